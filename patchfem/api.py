@@ -24,8 +24,7 @@ from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
 from .campaigns import cost as cost_curves
-from .campaigns.backbone import curves as backbone_curves
-from .campaigns.backbone import given_modes
+from .campaigns.backbone import request as backbone_requests
 from .campaigns.fits import request as fit_requests
 from .campaigns.fits.request import FitOptions
 from .campaigns.sweeps import case_models as case_models
@@ -486,11 +485,13 @@ def backbone(
     *,
     mode: str = "",
     amplitudes: float | str | Iterable | None = None,
+    forces: float | str | Iterable | None = None,
+    over: Mapping[str, Any] | None = None,
     method: str = "",
     modes: str | Iterable = "",
     **sets: Any,
 ) -> Dataset:
-    """Compute frequency and damping ratio of a mode as functions of its amplitude at the output.
+    """Compute frequency and damping ratio of a mode, and the force of its phase resonance, against its amplitude.
 
     Every value has a numerical error estimate. The band of the recommended curve is its error and the difference of the
     methods.
@@ -502,8 +503,12 @@ def backbone(
     mode : str, optional
         Name of the mode, or its number for a rig of masses. Default: the first mode.
     amplitudes : float, str or list, optional
-        One or more amplitudes [m], or a string such as "1 um..1 mm:25". Default: a range around the amplitude at which
-        the contact slips.
+        One or more amplitudes [m] at the output, or a string such as "1 um..1 mm:25". Default: a range around the
+        amplitude at which the contact slips, with more points where the damping changes fast.
+    forces : float, str or list, optional
+        One or more forces [N] at the output that hold the phase resonance, in place of the amplitudes.
+    over : dict, optional
+        One key with its values, such as {"contact.load": ["3.2 kN", "4 kN"]}: the variables have the dimension `case`.
     method : str
         "balance" or "quasi-static". Default: both.
     modes : str or list, optional
@@ -537,30 +542,38 @@ def backbone(
     >>> curves["quasi_static_frequency"].size
     5
     """
-    methods = backbone_curves.choose_methods(_require_string(method, "backbone: method"))
 
-    def build_with(tables: BackboneTables, *, is_written: bool) -> Model:
+    def build_with(tables: BackboneTables, *, is_written: bool, sets: tuple[str, ...]) -> Model:
         """Build the model of the scene, or of the scene as written, with the tables of a backbone."""
         if isinstance(scene, Model):
-            return build(scene, **sets)
-        loaded = _load_and_prepare(scene, tables, {} if is_written else sets)
+            return build(scene, **changes)
+        values = {} if is_written else changes | dict(text.split("=", 1) for text in sets)
+        loaded = _load_and_prepare(scene, tables, values)
         return build_model(remember_written(loaded, _count_written(scene), tables))
 
+    changes = sets
     if not isinstance(modes, str) and isinstance(modes, Iterable):
         modes = list(modes)
-    if modes and isinstance(scene, Model):
+    if isinstance(scene, Model) and (modes or over):
         raise PatchfemError(
-            "backbone: modes cannot be given with a Model; give them with the scene"
+            f"backbone: {'modes' if modes else 'over'} cannot be given with a Model; give the scene"
         )
-    model, notes = given_modes.prepare_model(build_with, modes)
-    lengths = None
-    if amplitudes is not None:
-        lengths = assignments.read_lengths(
-            format_values(assignments.LENGTH_KEY, amplitudes), "amplitudes"
-        )
-    name = _require_string(mode, "backbone: mode")
-    curves = backbone_curves.compute_backbone(model, name, lengths, methods)
-    return netcdf.to_dataset(backbones.make_answer(curves.add_notes(notes), model.source))
+    texts = []
+    for values, kind in ((amplitudes, "length"), (forces, "force")):
+        key = assignments.POSITIVE_KEYS[kind][0]
+        texts.append("" if values is None else format_values(key, values))
+        if values is not None and not texts[-1]:
+            raise PatchfemError("backbone: the list of amplitudes or forces is empty")
+    if len(over or {}) > 1:
+        raise PatchfemError("backbone: `over` must have one key with its values")
+    request = backbone_requests.BackboneRequest(
+        _require_string(mode, "backbone: mode"),
+        *texts,
+        _require_string(method, "backbone: method"),
+        modes,
+        "".join(f"{key}={format_values(key, values)}" for key, values in (over or {}).items()),
+    )
+    return netcdf.to_dataset(backbones.compute_answer(build_with, request))
 
 
 @_strip_file_and_line_from_errors

@@ -378,7 +378,7 @@ def test_exact_backbone_and_stress_plots_show_values():
     assert (
         1e3 * axes.lines[0].get_ydata() == pytest.approx(frequency) and "kHz" in axes.get_ylabel()
     )
-    assert len(axes.figure.axes) == 2 and pf.plot.backbone(found, axes) is axes
+    assert len(axes.figure.axes) == 3 and pf.plot.backbone(found, axes) is axes
     # The recommended curve is the first one, in its band.
     found = pf.backbone(PLASTIC_BLOCK, amplitudes="0.1 um..10 um:5")
     for axes, name in zip(pf.plot.backbone(found).figure.axes, ("frequency", "damping")):

@@ -5,11 +5,11 @@ Read `cost` first.
 
 # Names that other folders use, by the module that defines them.
 PUBLIC = {
-    "backbone.curves": ("compute_backbone",),
     "backbone.records": (
         "Backbone",
         "Curve",
     ),
+    "backbone.request": ("BackboneRequest",),
     "compare": (
         "SurfaceRuns",
         "run_both_surfaces",

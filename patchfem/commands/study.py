@@ -8,12 +8,10 @@ from cyclopts import Parameter
 
 from ..campaigns import cost as cost_curves
 from ..campaigns import numerical_settings
-from ..campaigns.backbone import curves as backbone_curves
-from ..campaigns.backbone import given_modes
+from ..campaigns.backbone import request as backbone_requests
 from ..campaigns.fits import request as fit_requests
 from ..export import backbones, costs, fits
 from ..model import model
-from ..scene import assignments
 from ..scene.scene import remember_written
 from .shared import (
     NOT_CONVERGED,
@@ -93,7 +91,15 @@ def backbone(
     ) = "",
     amplitudes: text_option(
         'amplitudes (half peak-to-peak at the output), such as "1 um..1 mm:25"; default: around '
-        "the onset of slip"
+        "the onset of slip, closer where the damping changes fast"
+    ) = "",
+    forces: text_option(
+        "amplitudes of a sinusoidal force at the output that holds the phase resonance, in place of --amplitudes, such as "
+        '"1 N..100 N:9"'
+    ) = "",
+    over: text_option(
+        "key and its values, each of which gives a curve on the same page, such as "
+        '"contact.load=3.2 kN,4 kN,4.8 kN"'
     ) = "",
     method: text_option(
         "method that computes the motion, such as balance; possible values: balance, quasi-static; default: both"
@@ -110,31 +116,32 @@ def backbone(
     quiet: Quiet = False,
     verbose: Verbose = False,
 ):
-    """Compute frequency and damping ratio of a mode of SCENE against its amplitude: a curve with a band of what tests
-    measure, and which method holds where. The contact is included; [drive] and [slide] are ignored.
+    """Compute frequency and damping ratio of a mode of SCENE against its amplitude, and the force at the output that holds
+    it in phase resonance: a curve with a band of what tests measure, and which method holds where. The contact is included;
+    [drive] and [slide] are ignored.
 
     Example: patchfem backbone joint.toml --modes "120 Hz:0.01, 170 Hz:0.02"
     """
 
-    def build_model(tables, *, is_written: bool):
+    def build_model(tables, *, is_written: bool, sets: tuple[str, ...]):
         """Build the model of the scene, or of the scene as written, with the tables of a backbone."""
-        loaded_scene = load_scene(scene, () if is_written else set_, prepare=tables)
+        loaded_scene = load_scene(scene, () if is_written else (*set_, *sets), prepare=tables)
         return model.build(remember_written(loaded_scene, prepare=tables))
 
-    free_model, notes = given_modes.prepare_model(build_model, modes)
-    methods = backbone_curves.choose_methods(method)
-    lengths = assignments.read_lengths(amplitudes, "--amplitudes") if amplitudes else None
-    target = choose_folder(out, f"{free_model.source.path.stem}-backbone")
+    if over and any(text.partition("=")[0] == over.partition("=")[0] for text in set_):
+        raise UsageError(f"--over {over}: --set gives this key, too; remove one of them")
+    target = choose_folder(out, f"{scene.stem}-backbone")
     output = Output(target, json_, quiet, not no_page, plot, verbose)
+    report = output.report and (lambda name: print_message(f"{name} ..."))
+    request = backbone_requests.BackboneRequest(mode, amplitudes, forces, method, modes, over)
 
     def compute_curves(_):
-        """Compute the curves of all methods."""
-        report = output.report and (lambda name: print_message(f"{name} ..."))
-        curves = backbone_curves.compute_backbone(free_model, mode, lengths, methods, report)
-        return backbones.make_answer(curves.add_notes(notes), free_model.source)
+        """Compute the curves of all methods and values of the key."""
+        return backbones.compute_answer(build_model, request, report, describe_command())
 
     answer = save(compute_curves, output)
-    if not answer.details["curves"]:
+    cases = answer.details.get("cases", [answer.details])
+    if not all(case["curves"] for case in cases):
         raise CommandExit(NOT_CONVERGED)
 
 

@@ -1,24 +1,55 @@
-"""The answer of `backbone`: frequency and damping ratio of a mode against its amplitude."""
+"""The answer of `backbone`: frequency, damping ratio and force of a mode against its amplitude."""
+
+from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
-from ..campaigns.backbone.band import Band
-from ..campaigns.backbone.records import METHODS, Backbone, Curve
+from ..campaigns.backbone.records import METHODS, VALUES, Backbone, Curve, match_amplitudes
+from ..campaigns.backbone.request import BackboneCases, BackboneRequest, compute_cases
 from ..core import PatchfemError
-from ..formatting import format_quantity
+from ..formatting import format_number, format_quantity
 from . import quantities
 from .answer import Answer, Quantity, Remarks, Variable, make_columns
 from .charts import axes, panels
 from .charts.table import CHARTS
 from .runs import make_origin
 
-COLUMNS = ("amplitude", "frequency", "frequency_error", "damping", "damping_error")
+COLUMNS = (
+    "amplitude",
+    *(name + end for name in VALUES for end in ("", "_error")),
+    "force_frequency",
+)
 BAND_COLUMNS = ("amplitude", "frequency_low", "frequency_high", "damping_low", "damping_high")
-UNITS = {"amplitude": "m", "frequency": "Hz", "damping": "1"}
+UNITS = {"amplitude": "m", "frequency": "Hz", "damping": "1", "force": "N"}
+NAMES = {"frequency": "frequency", "damping": "damping ratio"}
+DIGITS = {"frequency": 5, "damping": 3}  # significant digits of a value in a sentence on its change
+# Largest relative change of a key that is said in percent.
+MAX_PERCENT_CHANGE = 0.995
+
+
+def compute_answer(
+    build: Callable, request: BackboneRequest, progress: Callable | None = None, command: str = ""
+) -> Answer:
+    """Compute the backbones that a request asks for, and return them as an answer.
+
+    Parameters
+    ----------
+    build, request, progress
+        As for `campaigns.backbone.request.compute_cases`.
+    command : str
+        Command line that repeats it.
+    """
+    cases = compute_cases(build, request, progress)
+    if cases.axis is None:
+        answer = make_answer(cases.backbones[0], cases.source)
+    else:
+        answer = _make_answer_over(cases)
+    return replace(answer, origin=answer.origin | ({"command": command} if command else {}))
 
 
 def make_answer(backbone: Backbone, source) -> Answer:
-    """Return the answer of `backbone`.
+    """Return the answer of one backbone.
 
     Parameters
     ----------
@@ -33,9 +64,7 @@ def make_answer(backbone: Backbone, source) -> Answer:
         verdict=_make_verdict(backbone, measures),
         quantities=measures,
         data=_make_data(backbone),
-        remarks=Remarks(
-            notes=(*map(_make_sentence, backbone.notes), *backbone.answer.sentences[1:])
-        ),
+        remarks=Remarks(notes=(*map(_make_sentence, backbone.notes), *backbone.advice[1:])),
         details=_make_details(backbone),
         origin=make_origin(source, "backbone"),
     )
@@ -68,7 +97,8 @@ def backbone_axes(dataset, ax=None):
     """
     data = {}
     for name, array in getattr(dataset, "variables", {}).items():
-        data[name] = Variable(array.dims, array.values, array.attrs.get("units", "1"))
+        texts = (array.attrs.get("units", "1"), array.attrs.get("long_name", ""))
+        data[name] = Variable(array.dims, array.values, *texts)
     drawn = panels.make_panels({"": Answer("backbone", "", (), data=data)}, CHARTS["backbone"])
     if not drawn:
         raise PatchfemError(
@@ -81,21 +111,13 @@ def _make_quantities(backbone: Backbone) -> dict[str, Quantity]:
     """Return frequencies, ends of the recommended curve, exponents and the amplitude of flutter."""
     frequencies = backbone.frequencies
     out = {}
-    band = backbone.answer.band
-    curve = band and backbone.curves[band.method]
+    curve = backbone.best
     if curve is not None:
-
-        def take(name: str, k: int) -> Quantity:
-            """Return frequency or damping ratio of point k of the curve."""
-            return Quantity(
-                getattr(curve, name)[k], UNITS[name], getattr(curve, f"{name}_error")[k]
-            )
-
         largest = int(np.argmax(curve.damping))
-        for name in ("frequency", "damping"):
-            out[f"{name}_at_smallest_amplitude"] = take(name, 0)
-            out[f"{name}_at_largest_amplitude"] = take(name, -1)
-        out["largest_damping"] = take("damping", largest)
+        for name in VALUES:
+            out[f"{name}_at_smallest_amplitude"] = _take(curve, name, 0)
+            out[f"{name}_at_largest_amplitude"] = _take(curve, name, -1)
+        out["largest_damping"] = _take(curve, "damping", largest)
         out["amplitude_of_largest_damping"] = Quantity(curve.amplitude[largest], "m")
     no_frequency = "" if frequencies.stuck is not None else "a rigid contact leaves no motion"
     out |= {
@@ -110,6 +132,11 @@ def _make_quantities(backbone: Backbone) -> dict[str, Quantity]:
     return {name: one for name, one in out.items() if one.value is not None or one.reason}
 
 
+def _take(curve: Curve, name: str, k: int) -> Quantity:
+    """Return a value of point k of a curve with its error."""
+    return Quantity(getattr(curve, name)[k], UNITS[name], getattr(curve, f"{name}_error")[k])
+
+
 def _make_verdict(backbone: Backbone, measures: dict[str, Quantity]) -> tuple[str, ...]:
     """Return the ends of the recommended curve, natural frequencies, largest damping, and which curve to use."""
 
@@ -117,20 +144,20 @@ def _make_verdict(backbone: Backbone, measures: dict[str, Quantity]) -> tuple[st
         """Return a quantity as text."""
         return quantities.format_quantity(name, measures[name])
 
-    band = backbone.answer.band
-    curve = band and backbone.curves[band.method]
-    free = f"without the contact {show('free_frequency')}"
-    stuck = ""
+    curve = backbone.best
+    natural = (
+        f"Natural frequencies of mode {backbone.mode}: without the contact {show('free_frequency')}"
+    )
     if backbone.frequencies.stuck is not None:
-        stuck = f", with a sticking contact {show('stuck_frequency')}"
-    natural = f"Natural frequencies of mode {backbone.mode}: {free}{stuck}."
+        natural += f", with a sticking contact {show('stuck_frequency')}"
+    natural += "."
     if curve is None:
         headline = f"No method found frequency and damping of mode {backbone.mode}."
-        return (headline, natural, *backbone.answer.sentences[:1])
+        return (headline, natural, *backbone.advice[:1])
 
     # first and last point of the recommended curve
     changes = []
-    for name, label in (("frequency", "frequency"), ("damping", "damping ratio")):
+    for name, label in NAMES.items():
         first, last = (measures[f"{name}_at_{size}_amplitude"] for size in ("smallest", "largest"))
         texts = [show(f"{name}_at_{size}_amplitude") for size in ("smallest", "largest")]
         if abs(last.value - first.value) <= (first.error or 0.0) + (last.error or 0.0):
@@ -150,7 +177,7 @@ def _make_verdict(backbone: Backbone, measures: dict[str, Quantity]) -> tuple[st
             f"Above {show('flutter_amplitude')} the mode gains energy: friction dissipates less than the "
             "negative damping supplies."
         )
-    return (headline, natural, extreme, *backbone.answer.sentences[:1])
+    return (headline, natural, extreme, *backbone.advice[:1])
 
 
 def _make_data(backbone: Backbone) -> dict[str, Variable]:
@@ -163,28 +190,35 @@ def _make_data(backbone: Backbone) -> dict[str, Variable]:
         for method in METHODS
         if method in backbone.curves
     ]
-    band = backbone.answer.band
+    band = backbone.band
     if band is not None:
         records.insert(1, (records[0][0], band, BAND_COLUMNS[1:]))
         records.append(("band", band, BAND_COLUMNS))
     data = {}
     for prefix, record, names in records:
-        columns = {
-            f"{prefix}_{name}": (getattr(record, name), UNITS[name.partition("_")[0]])
-            for name in names
-        }
+        columns = {f"{prefix}_{name}": (getattr(record, name), _find_unit(name)) for name in names}
         data |= make_columns(f"{prefix}_amplitude", columns)
     return data
+
+
+def _find_unit(name: str) -> str:
+    """Return the SI unit of a column."""
+    return UNITS["frequency" if name == "force_frequency" else name.partition("_")[0]]
 
 
 def _make_details(backbone: Backbone) -> dict:
     """Return the content of backbone.json in SI units."""
     frequencies = backbone.frequencies
-    band = backbone.answer.band
+    band = backbone.band
 
-    def list_columns(record: Curve | Band, names: tuple[str, ...]) -> dict[str, list[float]]:
-        """Return some columns of a curve or of the band as lists."""
-        return {name: getattr(record, name).tolist() for name in names}
+    def list_columns(record, names: tuple[str, ...]) -> dict[str, list[float | None]]:
+        """Return some columns of a curve or of the band as lists; None for an unknown number."""
+        return {
+            name: [
+                None if np.isnan(number) else number for number in getattr(record, name).tolist()
+            ]
+            for name in names
+        }
 
     return {
         "mode": backbone.mode,
@@ -199,5 +233,137 @@ def _make_details(backbone: Backbone) -> dict:
         "notes": list(backbone.notes),
         "method": band and band.method,
         "band": band and list_columns(band, BAND_COLUMNS),
-        "advice": backbone.answer.advice,
+        "advice": " ".join(backbone.advice),
     }
+
+
+def _make_answer_over(cases: BackboneCases) -> Answer:
+    """Return the answer of the backbones for several values of a key: all curves, and what the change does."""
+    axis = cases.axis
+    first = cases.backbones[0]
+    known_notes = [one.notes for one in cases.backbones]
+    shared = [note for note in first.notes if all(note in notes for notes in known_notes)]
+    notes = [*map(_make_sentence, shared)]
+    for text, backbone in zip(axis.texts, cases.backbones):
+        own = [note for note in backbone.notes if note not in shared]
+        own += [f"method {name}: {reason}" for name, reason in backbone.missing.items()]
+        notes += [f"{axis.key} = {text}: {note.rstrip('.')}." for note in own]
+    verdict, measures = _compare_ends(cases)
+    known = [_make_quantities(one) for one in cases.backbones]
+    shown = ("stuck_frequency", "largest_damping", "amplitude_of_largest_damping")
+    table = [
+        {"value": text}
+        | {
+            name: quantities.format_quantity(name, one[name])
+            for name in shown
+            if name in one and one[name].value is not None
+        }
+        for text, one in zip(axis.texts, known)
+    ]
+    details = {"key": axis.key, "values": list(axis.texts), "mode": first.mode, "table": table}
+    return Answer(
+        kind="backbone",
+        title=cases.source.title,
+        verdict=verdict,
+        quantities=measures,
+        data=_make_data_over(cases),
+        remarks=Remarks(notes=tuple(notes)),
+        details=details | {"cases": [_make_details(one) for one in cases.backbones]},
+        origin=make_origin(cases.source, "backbone"),
+    )
+
+
+def _make_data_over(cases: BackboneCases) -> dict[str, Variable]:
+    """Return the recommended curves of all values of the key at common amplitudes; NaN where one has no motion."""
+    data = {"case": Variable(("case",), np.array(cases.axis.texts), "", cases.axis.key)}
+    for method in METHODS:
+        curves = [
+            one.best if one.band and one.band.method == method else None for one in cases.backbones
+        ]
+        known = [curve for curve in curves if curve is not None]
+        if not known:
+            continue
+        prefix = method.replace("-", "_")
+        amplitude = np.unique(np.concatenate([curve.amplitude for curve in known]))
+        data |= make_columns(f"{prefix}_amplitude", {f"{prefix}_amplitude": (amplitude, "m")})
+        for name in COLUMNS[1:] + BAND_COLUMNS[1:]:
+            values = np.full((len(curves), amplitude.size), np.nan)
+            for row, curve, backbone in zip(values, curves, cases.backbones):
+                if curve is not None:
+                    record = backbone.band if name in BAND_COLUMNS else curve
+                    row[np.searchsorted(amplitude, curve.amplitude)] = getattr(record, name)
+            unit = _find_unit(name)
+            dims = ("case", f"{prefix}_amplitude")
+            data[f"{prefix}_{name}"] = Variable(dims, values, unit, name.replace("_", " "))
+    return data
+
+
+def _compare_ends(cases: BackboneCases) -> tuple[tuple[str, ...], dict[str, Quantity]]:
+    """Return the sentences on what the change of the key from its first to its last value does, and the changes.
+
+    They hold at the amplitude with the largest sum of both changes beyond the numerical errors, each over its maximum.
+    """
+    axis = cases.axis
+    first, last = cases.backbones[0], cases.backbones[-1]
+    subject = f"{axis.key} from {axis.texts[0]} to {axis.texts[-1]}{_describe_change(axis.values)}"
+    if first.best is None or last.best is None:
+        missing = axis.texts[0] if first.best is None else axis.texts[-1]
+        return (f"No method found frequency and damping for {axis.key} = {missing}.",), {}
+    here, there = match_amplitudes(first.best, last.best)
+    if not here.size:
+        return (f"{subject}: the curves have no common amplitude.",), {}
+
+    # differences at the common amplitudes, and the largest one
+    start, end = first.best.at(here), last.best.at(there)
+    changes = {}
+    score = np.zeros(here.size)
+    for name in VALUES:
+        step = getattr(end, name) - getattr(start, name)
+        error = getattr(end, f"{name}_error") + getattr(start, f"{name}_error")
+        changes[name] = (step, error)
+        if name in NAMES and (np.abs(step) > error).any():
+            score += np.where(np.abs(step) > error, np.abs(step) / np.abs(step).max(), 0.0)
+    if not score.any():
+        sentence = "changes frequency and damping ratio by less than their numerical errors"
+        return (f"{subject} {sentence}.", *last.advice[:1]), {}
+    place = int(np.argmax(score))
+    amplitude = float(start.amplitude[place])
+    measures = {"compared_amplitude": Quantity(amplitude, "m")}
+    for name, (step, error) in changes.items():
+        measures[f"{name}_change"] = Quantity(step[place], UNITS[name], error[place])
+
+    parts = []
+    for name, label in NAMES.items():
+        step = measures[f"{name}_change"]
+        ends = [
+            format_quantity(getattr(curve, name)[place], UNITS[name], DIGITS[name])
+            for curve in (start, end)
+        ]
+        if abs(step.value) <= step.error:
+            parts.append(f"keeps the {label} at {ends[0]}")
+            continue
+        verb = "raises" if step.value > 0 else "lowers"
+        size = ""
+        if name == "frequency":
+            digits = format_quantity(abs(step.value), step.unit, 2)
+            size = f" by {digits}"
+        parts.append(f"{verb} the {label}{size} from {ends[0]} to {ends[1]}")
+    place_text = format_quantity(amplitude, "m", 3)
+    headline = f"{subject}, at {place_text}, {parts[0]} and {parts[1]}."
+    forces = [_take(curve, "force", place) for curve in (start, end)]
+    more = ()
+    if None not in (forces[0].value, forces[1].value):
+        texts = [format_quantity(one.value, "N", 3) for one in forces]
+        more = (f"The force at the output there goes from {texts[0]} to {texts[1]}.",)
+    return (headline, *more, *last.advice[:1]), measures
+
+
+def _describe_change(values) -> str:
+    """Return the relative change from the first to the last value, such as " (20 % more)"; "" without one."""
+    first, last = values[0], values[-1]
+    if not (isinstance(first, float) and isinstance(last, float) and first > 0):
+        return ""
+    change = last / first - 1
+    if abs(change) > MAX_PERCENT_CHANGE:
+        return f" ({format_number(last / first, 3)} times as much)"
+    return f" ({format_number(100 * abs(change), 3)} % {'more' if change > 0 else 'less'})"

@@ -313,6 +313,7 @@ def describe_curve_fit(fit: FittedCurve) -> Parts:
             f"{name}_residual": (distance / errors[k], "1"),
         }
         curve[f"curve_{name}"] = (fit.beyond[k + 1], unit)
+        curve[f"curve_{name}_error"] = (fit.beyond[k + 3], unit)
     assumed = " The errors of the measured values are assumed." if measured.assumed else ""
     percent = {name: f"{100 * value:.2g} %" for name, value in rms.items()}
     return Parts(

@@ -33,8 +33,14 @@ KEY = (
     "frequency_at_largest_amplitude",
     "damping_at_smallest_amplitude",
     "damping_at_largest_amplitude",
+    "force_at_smallest_amplitude",
+    "force_at_largest_amplitude",
     "largest_damping",
     "amplitude_of_largest_damping",
+    "compared_amplitude",
+    "frequency_change",
+    "damping_change",
+    "force_change",
     "free_frequency",
     "stuck_frequency",
     "cpu_time",
@@ -114,6 +120,24 @@ QUANTITIES: dict[str, Definition] = {
     ),
     "damping_at_largest_amplitude": Definition(
         "1", "damping ratio of structure and friction at the largest amplitude"
+    ),
+    "force_at_smallest_amplitude": Definition(
+        "N", "force at the output that holds the phase resonance at the smallest amplitude"
+    ),
+    "force_at_largest_amplitude": Definition(
+        "N", "force at the output that holds the phase resonance at the largest amplitude"
+    ),
+    "compared_amplitude": Definition(
+        "m", "amplitude at the output at which the change of the key has the largest effect"
+    ),
+    "frequency_change": Definition(
+        "Hz", "frequency for the last value of the key minus that for the first value"
+    ),
+    "damping_change": Definition(
+        "1", "damping ratio for the last value of the key minus that for the first value"
+    ),
+    "force_change": Definition(
+        "N", "force at the output for the last value of the key minus that for the first value"
     ),
     "largest_damping": Definition(
         "1", "largest damping ratio among the amplitudes of the recommended curve"

@@ -285,14 +285,28 @@ def _stack_columns(data: dict[str, Variable], stack: Stack) -> dict[str, list]:
     prefixes = {
         group: prefix for group, prefix in prefixes.items() if prefix + stack.names[0] in data
     }
-    lists = {stack.heading: []} if prefixes else {}
+    known = {}
+    for name in stack.names:
+        variables = [data[prefix + name] for prefix in prefixes.values() if prefix + name in data]
+        known |= {name: _head(name, variables[0])} if variables else {}
+
+    lists: dict[str, list] = {}
     for group, prefix in prefixes.items():
-        count = data[prefix + stack.names[0]].values.size
-        lists[stack.heading] += count * [group]
-        for name in stack.names:
+        abscissa = data[prefix + stack.names[0]]
+        cases = data["case"].values.size if "case" in data else 1
+        count = cases * abscissa.values.size
+        if "case" in data:
+            repeated = np.repeat(data["case"].values, abscissa.values.size).tolist()
+            lists.setdefault(data["case"].text, []).extend(repeated)
+        lists.setdefault(stack.heading, []).extend(count * [group])
+        for name, heading in known.items():
+            cells = count * [""]
             if prefix + name in data:
-                variable = data[prefix + name]
-                lists.setdefault(_head(name, variable), []).extend(_list_cells(variable))
+                # a variable without the dimension of the cases is the same in all of them
+                values = data[prefix + name].values
+                values = np.broadcast_to(values, (cases, *abscissa.values.shape)).ravel()
+                cells = _list_cells(Variable(("row",), values))
+            lists.setdefault(heading, []).extend(cells)
     return lists
 
 

@@ -9,12 +9,11 @@ parameters that the data do not determine; frequencies, damping ratios and shape
 PUBLIC = {
     "least_squares": (
         "Descent",
-        "DescentStorage",
+        "Descents",
         "Fit",
         "Problem",
+        "Search",
         "SearchCounts",
-        "assemble_fit",
-        "run_descents",
     ),
     "measured_modes": (
         "SHAPE_QUANTITIES",
@@ -24,10 +23,7 @@ PUBLIC = {
         "identify_driven_modes",
         "list_shape_modes",
     ),
-    "space": (
-        "UnitCubeResidual",
-        "make_space_filling_points",
-    ),
+    "space": ("make_space_filling_points",),
     "two_models": ("TwoModels",),
     "fit_sentences": ("describe_fit",),
 }

@@ -1,26 +1,20 @@
 """Natural modes fitted to the time record of one response, without windows that widen peaks.
 
-The model is x = sum_r A_r h_r * f + L f_-2 + U f + (free decays) + c, where h_r is the impulse response of
-q'' + 2 zeta w q' + w^2 q = f, and L and U are the residuals of modes below and above the band as in
-`structure.modal_fit`. The input is assumed to be band-limited, and the response is computed by Fourier
-transform, which is periodic. Free decays of the same modes represent the initial state and the jump between
-the end and the start of the record. Only w_r and zeta_r are nonlinear parameters (variable projection, Golub
-and Pereyra 1973). Modes are added at the spectral line where the residual depends most on the input, as long
-as each reduces the residual enough.
+The model is that of `sinusoids` with the columns L f_-2 + U f + c, where L and U are the residuals of modes below
+and above the band as in `structure.modal_fit`. The input is assumed to be band-limited, and the response is computed by
+Fourier transform, which is periodic. Free decays of the same modes represent the initial state and the jump between
+the end and the start of the record. Modes are added at the spectral line where the residual depends most on the input.
 """
 
 from dataclasses import dataclass
-from enum import IntEnum
-from typing import NamedTuple
 
 import numpy as np
 from scipy.fft import irfft, rfft, rfftfreq
-from scipy.optimize import least_squares
 
 from ..core import PatchfemError
-from ..structure.modal_fit import ModalFit, add_mode
+from ..structure.modal_fit import ModalFit
 from .frequency_response import MAX_NYQUIST_FRACTION, FrequencyResponse, estimate_response
-from .variable_projection import Projection, compute_standard_errors, project_data
+from .sinusoids import Forced, SinusoidFit, SinusoidProblem
 
 # order of the time derivative of the displacement, by the quantity of the response
 DERIVATIVE_ORDERS = {"displacement": 0, "velocity": 1, "acceleration": 2}
@@ -30,7 +24,6 @@ MIN_RESIDUAL_DECREASE = 0.02
 # Smallest rms of a further mode, relative to the rms of the response.
 MIN_RMS_RATIO = 3e-3
 MIN_MISFIT = 1e-8  # smallest residual above round-off, relative to the response
-MAX_START_EVALUATIONS = 12  # evaluations from each initial guess; only the best is refined further
 # Number of samples at each end that are not fitted, because of the jump of the periodic continuation.
 N_EDGE_SAMPLES = 32
 # Largest number of fitted samples, from the beginning of the record.
@@ -63,154 +56,60 @@ class DrivenModes:
     misfit: float
 
 
-class _ModeColumn(IntEnum):
-    """Indices of the three columns of a mode in the design matrix.
+class _DrivenRecord:
+    """Record of a response and its input (k,), with the samples that are fitted.
 
-    - RESPONSE: response of the mode to the input; its coefficient is the residue.
-    - COSINE, SINE: free decay of the mode.
+    derivative: number of time derivatives between displacement and response.
     """
-
-    RESPONSE = 0
-    COSINE = 1
-    SINE = 2
-
-
-class _Columns(NamedTuple):
-    """Design matrix of the linear least-squares fit for given modes, with its derivatives.
-
-    - design: design matrix (k, 3 + 3n). The first three columns are a constant, and the residuals of modes
-      below and above the band. The three columns of each mode follow (`_ModeColumn`).
-    - by_frequency, by_damping: derivatives of the columns of each mode with respect to ln w_r and ln zeta_r.
-    """
-
-    design: np.ndarray
-    by_frequency: list
-    by_damping: list
-
-
-class _ModeFit(NamedTuple):
-    """Modes fitted to a record, with the residual of the fit.
-
-    - theta: ln w_r of all modes, then ln zeta_r of all modes (2n,).
-    - residual: model minus data (k,).
-    """
-
-    theta: np.ndarray
-    residual: np.ndarray
-
-    @property
-    def sum_of_squares(self) -> float:
-        """Sum of squares of the residual."""
-        return self.residual @ self.residual
-
-
-class _ModeProblem:
-    """Separable least-squares problem for the modes of a response to a known input."""
 
     def __init__(self, step: float, force, response, derivative: int):
         self.inner = slice(N_EDGE_SAMPLES, force.size - N_EDGE_SAMPLES)
         self.step = step
-        self.samples = force.size
         self.force = force
-        self.time = (step * np.arange(force.size))[self.inner]
-        self.value = response[self.inner]
-        self.response_rms = np.sqrt(np.mean((self.value - self.value.mean()) ** 2))
         self.omega = 2 * np.pi * rfftfreq(force.size, step)
         self.input = (1j * self.omega) ** derivative * rfft(force)
+
+        # modes below the band move as the double integral of the input, those above it in proportion to it
         lower = -self.input / np.maximum(self.omega, self.omega[1]) ** 2
         lower[0] = 0.0
-        self.fixed = [
-            np.ones(self.time.size),
-            self._inverse_transform(lower),
-            self._inverse_transform(self.input),
-        ]
-
-    def _inverse_transform(self, spectrum) -> np.ndarray:
-        """Return the inverse Fourier transform of a spectrum at the fitted samples."""
-        return irfft(spectrum, self.samples)[self.inner]
-
-    def columns(self, theta) -> _Columns:
-        """Return the design matrix of the linear fit for given modes, with its derivatives."""
-        columns = list(self.fixed)
-        by_frequency = []
-        by_damping = []
-        for w, z in np.exp(theta).reshape(2, -1).T:
-            damping = 2j * z * w * self.omega
-            pole = 1 / (w * w - self.omega**2 + damping)
-            damped_omega = w * np.sqrt(1 - z * z)
-            rate = z * w
-            envelope = np.exp(-np.minimum(rate * self.time, 700.0))
-            cosine = envelope * np.cos(damped_omega * self.time)
-            sine = envelope * np.sin(damped_omega * self.time)
-            columns += [self._inverse_transform(self.input * pole), cosine, sine]
-            motion = (pole, rate, cosine, sine)
-            by_frequency.append(
-                self._differentiate_columns(motion, 2 * w * w + damping, damped_omega)
-            )
-            by_damping.append(
-                self._differentiate_columns(motion, damping, -w * z * z * w / damped_omega)
-            )
-        return _Columns(np.stack(columns, axis=1), by_frequency, by_damping)
-
-    def _differentiate_columns(self, motion: tuple, by_pole, by_omega) -> list:
-        """Return the derivatives of the three columns of a mode with respect to one parameter.
-
-        `motion` contains pole, decay rate, cosine and sine of the mode. `by_pole` and `by_omega` are the
-        derivatives of 1/pole and of the damped frequency.
-        """
-        pole, rate, cosine, sine = motion
-        return [
-            self._inverse_transform(-self.input * pole**2 * by_pole),
-            -self.time * (rate * cosine + by_omega * sine),
-            -self.time * (rate * sine - by_omega * cosine),
-        ]
-
-    def solve(self, theta) -> Projection:
-        """Return the linear fit of given modes to the response."""
-        return project_data(self.columns(theta).design, self.value)
-
-    def mode_coefficients(self, linear: Projection) -> np.ndarray:
-        """Return the coefficients (n, 3) of the columns of each mode (`_ModeColumn`)."""
-        return linear.coefficients[len(self.fixed) :].reshape(-1, len(_ModeColumn))
-
-    def slopes(self, theta) -> np.ndarray:
-        """Return the derivatives (k, 2n) of the residual with respect to ln w_r and ln zeta_r."""
-        columns = self.columns(theta)
-        linear = project_data(columns.design, self.value)
-        coefficients = self.mode_coefficients(linear)
-        slopes = []
-        for derivatives in (columns.by_frequency, columns.by_damping):
-            for mode_coefficients, mode_columns in zip(coefficients, derivatives):
-                parts = [c * column for c, column in zip(mode_coefficients, mode_columns)]
-                slopes.append(sum(parts))
-        return linear.jacobian(np.stack(slopes, axis=1))
-
-    def refine(self, theta, max_evaluations: int = 100, tolerance: float = 1e-13) -> _ModeFit:
-        """Minimize the residual over frequencies and damping ratios from an initial guess.
-
-        Parameters
-        ----------
-        theta : (2n,) ndarray
-            Initial values of ln w_r of all modes, followed by ln zeta_r.
-        max_evaluations : int
-        tolerance : float
-            Relative change at convergence.
-        """
-        n = theta.size // 2
-        low = np.repeat(np.log([self.omega[1] / 2, MIN_ZETA]), n)
-        high = np.repeat(np.log([np.pi / self.step, MAX_ZETA]), n)
-        result = least_squares(
-            lambda p: self.solve(p).residual / self.response_rms,
-            np.clip(theta, low + 1e-9, high - 1e-9),
-            lambda p: self.slopes(p) / self.response_rms,
-            bounds=(low, high),
-            x_scale="jac",
-            xtol=tolerance,
-            ftol=tolerance,
-            gtol=1e-14,
-            max_nfev=max_evaluations,
+        time = (step * np.arange(force.size))[self.inner]
+        fixed = [np.ones(time.size), self._transform(lower), self._transform(self.input)]
+        low = np.array([self.omega[1] / 2, MIN_ZETA * self.omega[1] / 2])
+        high = np.array([1.0, MAX_ZETA]) * np.pi / step
+        self.problem = SinusoidProblem(
+            time, response[self.inner], fixed, self._compute_forced, (low, high)
         )
-        return _ModeFit(result.x, result.fun * self.response_rms)
+
+    def _transform(self, spectrum) -> np.ndarray:
+        """Return the fitted samples (k,) of a spectrum."""
+        return irfft(spectrum, self.force.size)[self.inner]
+
+    def _compute_forced(self, omega: float, rate: float) -> Forced:
+        """Return the response of a mode to the input, with its derivatives."""
+        pole = 1 / (omega**2 + rate**2 - self.omega**2 + 2j * rate * self.omega)
+        response = self.input * pole
+        return Forced(
+            self._transform(response),
+            self._transform(-2 * omega * response * pole),
+            self._transform(-2 * (rate + 1j * self.omega) * response * pole),
+        )
+
+    def find_starts(self, fit: SinusoidFit, estimate: FrequencyResponse) -> list[np.ndarray]:
+        """Return initial poles (2,) at the frequency where the input explains most of the residual."""
+        response = estimate_response(
+            self.step,
+            self.force[self.inner],
+            fit.residual,
+            min(estimate.segment, fit.residual.size),
+            estimate.window,
+        )
+        power = np.abs(response.value) ** 2 * response.input
+        if response.coherence is not None:
+            power = power * response.coherence
+        frequency = response.frequency[int(np.argmax(power))]
+        line_width = 1 / (estimate.segment * self.step)
+        zetas = np.clip(np.multiply(START_PEAK_WIDTHS, line_width / frequency), 1e-4, 0.2)
+        return [2 * np.pi * frequency * np.array([1.0, zeta]) for zeta in zetas]
 
 
 def fit_driven_modes(
@@ -246,16 +145,28 @@ def fit_driven_modes(
         If no mode is visible in the band.
     """
     derivative = DERIVATIVE_ORDERS[quantity]
-    problem = _ModeProblem(
+    record = _DrivenRecord(
         step, force[:MAX_FITTED_SAMPLES], response[:MAX_FITTED_SAMPLES], derivative
     )
-    fit = _add_modes(problem, estimate)
-    n = fit.theta.size // 2
-    w, zeta = np.exp(fit.theta).reshape(2, -1)
-    residue = problem.mode_coefficients(problem.solve(fit.theta))[:, _ModeColumn.RESPONSE]
-    rms = float(np.sqrt(np.mean(fit.residual**2)))
-    # the standard errors of ln zeta are stored after those of ln w
-    zeta_error = compute_standard_errors(problem.slopes(fit.theta), rms)[n:] * zeta
+    problem = record.problem
+
+    def is_better(before: SinusoidFit, after: SinusoidFit) -> bool:
+        """Return whether a further mode reduces the sum of squares enough."""
+        reduction = before.rms**2 - after.rms**2
+        least = (MIN_RMS_RATIO * problem.scale) ** 2
+        return reduction >= max(MIN_RESIDUAL_DECREASE * before.rms**2, least)
+
+    fit = problem.fit(
+        lambda one: record.find_starts(one, estimate), is_better, MAX_MODES, MIN_MISFIT
+    )
+    if not fit.poles.size:
+        raise PatchfemError(
+            "no mode is visible in the response; a record over a resonance is needed"
+        )
+    w = fit.omega
+    zeta = fit.damping
+    linear = problem.project(problem.tabulate(fit.poles)[0])
+    residue = problem.split_coefficients(linear)[:, -1]
     min_frequency, max_frequency = band
     min_w = 2 * np.pi * max(min_frequency, estimate.frequency[0])
     max_w = 2 * np.pi * min(max_frequency, MAX_NYQUIST_FRACTION / (2 * step))
@@ -275,54 +186,11 @@ def fit_driven_modes(
         frequency=frequency,
         damping=zeta[order],
         residue=residue[order],
-        damping_error=1.96 * zeta_error[order],
+        damping_error=(problem.estimate_rate_errors(fit) / w)[order],
         estimate_damping=_fit_estimate(estimate, w, zeta, derivative)[order],
         coherence=coherence,
-        misfit=rms / problem.response_rms,
+        misfit=fit.rms / problem.scale,
     )
-
-
-def _add_modes(record: _ModeProblem, estimate: FrequencyResponse) -> _ModeFit:
-    """Add modes to a fit one at a time, as long as each reduces the residual enough."""
-    fit = _ModeFit(np.empty(0), record.solve(np.empty(0)).residual)
-    min_reduction = MIN_RMS_RATIO**2 * fit.residual.size * record.response_rms**2
-    min_square = (MIN_MISFIT * record.response_rms) ** 2 * fit.residual.size
-    while fit.theta.size < 2 * MAX_MODES and fit.sum_of_squares > min_square:
-        attempts = []
-        for start in _find_starts(record, estimate, fit.residual):
-            theta = add_mode(fit.theta, *start)
-            attempts.append(record.refine(theta, MAX_START_EVALUATIONS, 1e-3))
-        best = min(attempts, key=lambda attempt: attempt.sum_of_squares)
-        reduction = fit.sum_of_squares - best.sum_of_squares
-        if reduction < max(MIN_RESIDUAL_DECREASE * fit.sum_of_squares, min_reduction):
-            break
-        fit = record.refine(best.theta)
-    if not fit.theta.size:
-        raise PatchfemError(
-            "no mode is visible in the response; a record over a resonance is needed"
-        )
-    return fit
-
-
-def _find_starts(record: _ModeProblem, estimate: FrequencyResponse, residual) -> list:
-    """Return initial modes (w, zeta) at the frequency where the input explains most of the residual."""
-    response = estimate_response(
-        record.step,
-        record.force[record.inner],
-        residual,
-        min(estimate.segment, residual.size),
-        estimate.window,
-    )
-    power = np.abs(response.value) ** 2 * response.input
-    if response.coherence is not None:
-        power = power * response.coherence
-    frequency = response.frequency[int(np.argmax(power))]
-    line_width = 1 / (estimate.segment * record.step)
-    starts = []
-    for width in START_PEAK_WIDTHS:
-        zeta = float(np.clip(width * line_width / frequency, 1e-4, 0.2))
-        starts.append((2 * np.pi * frequency, zeta))
-    return starts
 
 
 def _fit_estimate(estimate: FrequencyResponse, w, zeta, derivative: int) -> np.ndarray:

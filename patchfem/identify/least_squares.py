@@ -49,17 +49,6 @@ class IntervalKind(StrEnum):
     NONE = ""
 
 
-class DescentStorage:
-    """Storage of finished descents, with which an interrupted search continues; this one stores nothing."""
-
-    def load(self, start: int) -> "Descent | None":
-        """Return the stored descent from a starting point, or None."""
-        return None
-
-    def save(self, start: int, descent: "Descent") -> None:
-        """Store the descent from a starting point."""
-
-
 class SearchCounts(NamedTuple):
     """Number of residual evaluations of a search, and of failures.
 
@@ -116,6 +105,38 @@ class Descent(NamedTuple):
         return float(np.sqrt(self.cost / self.rows)) if np.isfinite(self.cost) else np.nan
 
 
+class Descents(NamedTuple):
+    """Descents of a search with an expensive residual.
+
+    starts, ends: parameters (s, n) at the starting and at the final points, NaN if a descent failed; rms: (s,) root mean
+    square of the residual at the ends.
+    """
+
+    starts: np.ndarray
+    ends: np.ndarray
+    rms: np.ndarray
+
+
+@dataclass(frozen=True, slots=True)
+class Search:
+    """Search from random starting points, for a residual that is expensive to evaluate.
+
+    Derivatives are one-sided differences; the best descent is continued with central ones.
+
+    - starts, seed: number of starting points, and seed of the random numbers.
+    - load, save: functions of the number of a start that return the stored descent or None, and store one.
+    - before_descent: called before each descent.
+    - report: called with 1 after each descent.
+    """
+
+    starts: int
+    seed: int = 0
+    load: Callable = lambda start: None
+    save: Callable = lambda start, descent: None
+    before_descent: Callable = lambda: None
+    report: Callable = lambda count: None
+
+
 @dataclass(frozen=True, eq=False, slots=True)
 class Problem:
     """Least-squares problem whose residual is a function of n bounded parameters.
@@ -161,79 +182,58 @@ class Problem:
         model = UnitCubeResidual(self.residual, space)
         n = space.low.size
         start = None if self.start is None else space.to_unit_cube(self.start)
-        starting_points = choose_starting_points(model, start, max_descents)
-        if model.rows < n:
-            raise ValueError(f"{model.rows} rows of data cannot determine {n} values")
-        ends = run_descents(model, starting_points, stops_when_exact=True)
-        return assemble_fit(model, ends, interval_kind)
+        ends = []
+        for point in choose_starting_points(model, start, max_descents):
+            if model.rows < n:
+                raise ValueError(f"{model.rows} rows of data cannot determine {n} values")
+            ends.append(descend(model, point, range(n)))
+            # a fit that is exact to round-off is not repeated
+            if ends[-1].cost <= (EXACT_FIT_RATIO * model.largest) ** 2 * model.rows:
+                break
+        return _assemble_fit(model, min(ends, key=lambda end: end.cost), ends, interval_kind)
+
+    def search(
+        self, search: Search, interval_kind: str = IntervalKind.ROWS
+    ) -> tuple[Fit, Descents]:
+        """Minimize the sum of squares of an expensive residual from random starting points.
+
+        Raises NotConverged if all descents fail.
+        """
+        space = self.search_space
+        n = space.low.size
+        model = UnitCubeResidual(self.residual, space, is_expensive=True)
+        starts = np.random.default_rng(search.seed).random((search.starts, n))
+        ends = []
+        for k, start in enumerate(starts):
+            end = search.load(k)
+            if end is None:
+                search.before_descent()
+                end = descend(model, start, range(n))
+                search.save(k, end)
+            ends.append(end)
+            search.report(1)
+        best = min(ends, key=lambda end: end.cost)
+        if not np.isfinite(best.cost):
+            raise NotConverged(
+                f"fit: all {search.starts} searches failed; the first failed for this reason: {model.reason}"
+            )
+        search.before_descent()
+        best = descend(UnitCubeResidual(self.residual, space), best.u, range(n))
+        final = [
+            space.to_values(end.u) if np.isfinite(end.cost) else np.full(n, np.nan) for end in ends
+        ]
+        descents = Descents(
+            starts=np.array([space.to_values(start) for start in starts]),
+            ends=np.array(final),
+            rms=np.array([end.rms for end in ends]),
+        )
+        return _assemble_fit(model, best, ends, interval_kind), descents
 
 
-def run_descents(
-    model: UnitCubeResidual,
-    starting_points,
-    *,
-    stops_when_exact: bool = False,
-    storage: DescentStorage | None = None,
-    before_descent: Callable | None = None,
-    report: Callable | None = None,
-) -> list:
-    """Minimize the residual by local searches from several points of the unit cube.
-
-    Parameters
-    ----------
-    model : UnitCubeResidual
-    starting_points : sequence of (n,) ndarray
-        Points from which the descents start.
-    stops_when_exact : bool
-        Whether the search ends after a fit that is exact to round-off.
-    storage : DescentStorage, optional
-        Stored descents, which are not repeated; new descents are added. Default: no storage.
-    before_descent : callable, optional
-        Called before each descent.
-    report : callable, optional
-        Called with 1 after each descent.
-
-    Returns
-    -------
-    list of Descent
-    """
-    storage = storage or DescentStorage()
-    ends = []
-    for k, starting_point in enumerate(starting_points):
-        end = storage.load(k)
-        if end is None:
-            if before_descent is not None:
-                before_descent()
-            end = descend(model, starting_point, range(len(starting_point)))
-            storage.save(k, end)
-        ends.append(end)
-        if report is not None:
-            report(1)
-        if stops_when_exact and end.cost <= (EXACT_FIT_RATIO * model.largest) ** 2 * model.rows:
-            break
-    return ends
-
-
-def assemble_fit(
-    model: UnitCubeResidual, ends: list, interval_kind: str = IntervalKind.ROWS, first_descents=None
+def _assemble_fit(
+    model: UnitCubeResidual, best: Descent, ends: list[Descent], interval_kind: str
 ) -> Fit:
-    """Return the result of a least-squares fit from its descents.
-
-    Parameters
-    ----------
-    model : UnitCubeResidual
-    ends : list of Descent
-    interval_kind : str
-        Value of `IntervalKind`.
-    first_descents : list of Descent, optional
-        Descents from all starting points, if `ends` continues the best of them; they show whether several
-        reached the same minimum.
-
-    Returns
-    -------
-    Fit
-    """
-    best = min(ends, key=lambda end: end.cost)
+    """Return the result of a fit from its best descent and the descents from all starting points."""
     max_difference = SAME_RESULT_TOL * best.cost + 1e-20 * model.largest**2 * model.rows
     agreed = sum(abs(end.cost - best.cost) <= max_difference for end in ends)
     u = best.u
@@ -244,7 +244,9 @@ def assemble_fit(
     if interval_kind in (IntervalKind.ROWS, IntervalKind.SERIES):
         is_series = interval_kind == IntervalKind.SERIES
         intervals = compute_intervals(model, u, cost, descend, is_series=is_series)
-    n_same_minimum = sum(end.cost <= SAME_MINIMUM_RATIO * cost for end in first_descents or ends)
+
+    # with round-off noise in the residual a descent may not converge formally
+    n_same_minimum = sum(end.cost <= SAME_MINIMUM_RATIO * cost for end in ends)
     is_converged = best.is_converged or n_same_minimum > 1
     at_bound = np.where(u <= 0, "low", np.where(u >= 1, "high", ""))
     return Fit(

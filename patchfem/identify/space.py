@@ -28,31 +28,29 @@ class SearchSpace:
     def to_values(self, u) -> np.ndarray:
         """Return the parameters (n,) of a point u of the unit cube, exactly at the bounds."""
         u = np.asarray(u, float)
-        inside = np.empty(u.size)
-        for i, x in enumerate(u):
-            low = self.low[i]
-            high = self.high[i]
-            inside[i] = low * (high / low) ** x if self.is_log[i] else low + (high - low) * x
+        inside = np.where(
+            self.is_log, self.low * self._ratio**u, self.low + (self.high - self.low) * u
+        )
         return np.where(u <= 0, self.low, np.where(u >= 1, self.high, inside))
 
     def to_unit_cube(self, values) -> np.ndarray:
         """Return the point of the unit cube nearest to given parameters (n,)."""
-        u = np.empty(len(values))
-        for i, value in enumerate(values):
-            low = self.low[i]
-            high = self.high[i]
-            if self.is_log[i]:
-                u[i] = np.log(max(value, low) / low) / np.log(high / low)
-            else:
-                u[i] = (value - low) / (high - low)
+        values = np.asarray(values, float)
+        u = (values - self.low) / (self.high - self.low)
+        logs = self.is_log
+        u[logs] = np.log(np.maximum(values, self.low)[logs] / self.low[logs])
+        u[logs] /= np.log(self._ratio[logs])
         return np.clip(u, 0.0, 1.0)
+
+    @property
+    def _ratio(self) -> np.ndarray:
+        """Ratio (n,) of the bounds of the parameters with a logarithmic scale; 1 for the others."""
+        return np.divide(self.high, self.low, out=np.ones(self.low.size), where=self.is_log)
 
     def derivatives(self, u) -> np.ndarray:
         """Return the derivatives (n,) of the parameters with respect to the coordinates u."""
-        slope = self.high - self.low
-        ratio = self.high[self.is_log] / self.low[self.is_log]
-        slope[self.is_log] = self.to_values(u)[self.is_log] * np.log(ratio)
-        return slope
+        logs = self.to_values(u) * np.log(self._ratio)
+        return np.where(self.is_log, logs, self.high - self.low)
 
 
 def make_search_space(low, high) -> SearchSpace:
@@ -167,48 +165,31 @@ class UnitCubeResidual:
             Indices of the f coordinates that vary.
         """
         residual_at_u = self(u)
-        columns = []
-        for i in free:
-            columns.append(_difference_quotient(residual_at_u, self._evaluate_neighbours(u, i)))
+        columns = [self._differentiate(u, i, residual_at_u) for i in free]
         self._cache_residual(u, residual_at_u)
         return np.column_stack(columns) if columns else np.zeros((self.rows, 0))
 
-    def _evaluate_neighbours(self, u, i: int) -> dict:
-        """Evaluate the residual at neighbouring points of u along coordinate i.
+    def _differentiate(self, u, i: int, here: np.ndarray) -> np.ndarray:
+        """Return the derivative (r,) along coordinate i at u with the residual `here`; 0 if no neighbour is known."""
+        near = {}
+        for k in (1, -1):
+            if not (self.is_expensive and near):
+                residual = self._evaluate_neighbour(u, i, k)
+                near |= {} if residual is None else {k: residual}
+        if len(near) == 2:
+            return (near[1] - near[-1]) / (2 * DIFFERENCE_STEP)
+        for k, residual in near.items():
+            far = None if self.is_expensive else self._evaluate_neighbour(u, i, 2 * k)
+            if far is None:
+                return k * (residual - here) / DIFFERENCE_STEP
+            return k * (4 * residual - 3 * here - far) / (2 * DIFFERENCE_STEP)
+        return np.zeros_like(here)
 
-        Returns a dict of residuals (r,) by the number of difference steps.
-        """
-        neighbours = {}
-        for n_steps in (1, -1, 2, -2):
-            if self.is_expensive and neighbours:
-                break
-            point = np.array(u, float)
-            point[i] += n_steps * DIFFERENCE_STEP
-            is_needed = abs(n_steps) == 1 or 1 not in neighbours or -1 not in neighbours
-            if is_needed and 0 <= point[i] <= 1:
-                residual = self(point)
-                if residual is not None:
-                    neighbours[n_steps] = residual
-        return neighbours
-
-
-def _difference_quotient(residual_at_u, neighbours: dict) -> np.ndarray:
-    """Return the derivative (r,) of the residual by finite differences.
-
-    `neighbours` contains these residuals by the number of steps; if it is empty, the derivative is 0.
-    """
-    if 1 in neighbours and -1 in neighbours:
-        return (neighbours[1] - neighbours[-1]) / (2 * DIFFERENCE_STEP)
-    for k in (1, -1):
-        if k in neighbours and 2 * k in neighbours:
-            return (
-                k
-                * (4 * neighbours[k] - 3 * residual_at_u - neighbours[2 * k])
-                / (2 * DIFFERENCE_STEP)
-            )
-        if k in neighbours:
-            return k * (neighbours[k] - residual_at_u) / DIFFERENCE_STEP
-    return np.zeros_like(residual_at_u)
+    def _evaluate_neighbour(self, u, i: int, n_steps: int) -> np.ndarray | None:
+        """Return the residual (r,) some difference steps along coordinate i; None outside the cube or if it fails."""
+        point = np.array(u, float)
+        point[i] += n_steps * DIFFERENCE_STEP
+        return self(point) if 0 <= point[i] <= 1 else None
 
 
 def make_space_filling_points(count: int, n: int) -> np.ndarray:

@@ -13,20 +13,17 @@ from typing import NamedTuple
 import numpy as np
 
 from ..core import PatchfemError
-from .least_squares import choose_starting_points, descend, run_descents
+from .least_squares import choose_starting_points, descend
 from .space import SearchSpace, UnitCubeResidual
 
-MAX_CORRECTIONS = 4  # largest number of corrections of the cheap model in one search
-MAX_RESIDUAL_CHANGE = 1e-3  # largest difference of the residuals of two models that agree [1]
+MAX_CORRECTIONS = 8  # largest number of corrections of the cheap model in one search
 # Number of trial points per parameter, at which the cheap model is evaluated to choose the starting points.
 N_TRIALS_PER_VALUE = 24
 MAX_MINIMA = 3  # largest number of minima of the cheap model that are refined
 # Smallest distance in the unit cube between two different minima.
 MIN_MINIMUM_DISTANCE = 0.03
-# Largest sum of squares of a minimum that is refined, relative to the smallest one.
+# Largest sum of squares of a minimum of the cheap model that is refined, relative to the smallest one.
 MAX_COST_RATIO = 10.0
-# Largest sum of squares of a minimum that is refined with derivatives, relative to the smallest one.
-MAX_LOCAL_MINIMUM_RATIO = 1.5
 # Step of the finite differences of the expensive model in the unit cube.
 DIFFERENCE_STEP = 1e-4
 MIN_IMPROVEMENT = (
@@ -89,22 +86,21 @@ class TwoModels:
         """
         cheap = UnitCubeResidual(lambda values: self.residual(self.cheap(values)), self.space)
         n_trials = N_TRIALS_PER_VALUE * len(given_values)
-        starting_points = choose_starting_points(
-            cheap, self.space.to_unit_cube(given_values), n_starts, n_trials
-        )
+        start = self.space.to_unit_cube(given_values)
+        ends = [
+            descend(cheap, u, range(u.size))
+            for u in choose_starting_points(cheap, start, n_starts, n_trials)
+        ]
         points = []
         errors = []
-        for u in _choose_minima(run_descents(cheap, starting_points)):
+        for u in _choose_minima(ends):
             try:
-                points.append(self._minimize_with_value_correction(u))
+                points.append(self._minimize(u))
             except PatchfemError as error:
                 errors.append(error)
         if not points:
             raise errors[0]
-        limit = MAX_LOCAL_MINIMUM_RATIO * min(point.sum_of_squares for point in points)
-        best_points = [point for point in points if point.sum_of_squares <= limit]
-        refined = list(map(self._minimize_with_slope_correction, best_points))
-        best = min(refined, key=lambda point: point.sum_of_squares)
+        best = min(points, key=lambda point: point.sum_of_squares)
         return best.model, self.space.to_values(best.u)
 
     def correct_cheap_model(self, u, expensive_value, slopes=None) -> Callable:
@@ -135,57 +131,32 @@ class TwoModels:
 
         return corrected_model
 
-    def _minimize_with_value_correction(self, u) -> _SearchPoint:
-        """Minimize the cheap model, corrected by the value of the expensive one at each minimum.
+    def _minimize(self, u) -> _SearchPoint:
+        """Minimize the cheap model with the value and the derivatives of the expensive one, in turn from u (n,).
 
-        Starting from u (n,), minimization and correction are repeated until the models agree. Returns the
-        best point.
+        Returns the best point, without a model if the sum of squares does not converge. Raises PatchfemError if the
+        expensive model fails at u.
         """
-        expensive_value = self.expensive(self.space.to_values(u))
-        best = _SearchPoint(self._sum_of_squares(expensive_value), u)
-        for _ in range(MAX_CORRECTIONS):
-            model = self.correct_cheap_model(u, expensive_value)
-            u = self._descend(model, u)
-            values = self.space.to_values(u)
-            try:
-                expensive_value = self.expensive(values)
-            except PatchfemError:
-                break
-            sum_of_squares = self._sum_of_squares(expensive_value)
-            if sum_of_squares < best.sum_of_squares:
-                best = _SearchPoint(sum_of_squares, u)
-            change = np.abs(self.residual(expensive_value) - self.residual(model(values))).max()
-            if change < MAX_RESIDUAL_CHANGE:
-                break
-        return best
-
-    def _minimize_with_slope_correction(self, point: _SearchPoint) -> _SearchPoint:
-        """Minimize the cheap model, corrected by value and derivatives of the expensive one.
-
-        Returns the best point, without a model if the sum of squares does not converge.
-        """
-        sum_of_squares = point.sum_of_squares
-        u = point.u
+        value = self.expensive(self.space.to_values(u))
+        point = _SearchPoint(self._sum_of_squares(value), u)
         for _ in range(MAX_CORRECTIONS):
             try:
-                model = self._make_tangent_model(u)
-                new_u = self._descend(model, u)
-                new_sum = self._sum_of_squares(self.expensive(self.space.to_values(new_u)))
+                model = self._make_tangent_model(point.u, value)
+                u = self._descend(model, point.u)
+                value = self.expensive(self.space.to_values(u))
             except PatchfemError:
                 break
-            if new_sum > sum_of_squares * (1 - MIN_IMPROVEMENT):
-                is_converged = new_sum < sum_of_squares * (1 + MIN_IMPROVEMENT)
-                return _SearchPoint(sum_of_squares, u, model if is_converged else None)
-            sum_of_squares = new_sum
-            u = new_u
-        return _SearchPoint(sum_of_squares, u)
+            change = self._sum_of_squares(value) / max(point.sum_of_squares, 1e-300) - 1
+            if change > -MIN_IMPROVEMENT:
+                return point._replace(model=model if change < MIN_IMPROVEMENT else None)
+            point = _SearchPoint(self._sum_of_squares(value), u)
+        return point
 
-    def _make_tangent_model(self, u) -> Callable:
+    def _make_tangent_model(self, u, expensive_value) -> Callable:
         """Return the cheap model with the value and the derivatives of the expensive one at u (n,).
 
         The derivatives are approximated by one-sided differences.
         """
-        expensive_value = self.expensive(self.space.to_values(u))
         value_corrected_model = self.correct_cheap_model(u, expensive_value)
         slopes = []
         for i in range(u.size):

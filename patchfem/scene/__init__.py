@@ -10,14 +10,14 @@ PUBLIC = {
     "assignments": (
         "Axis",
         "BOUNDS",
-        "LENGTH_KEY",
         "LISTS",
         "RANDOM",
         "Range",
         "describe_ranges",
         "make_axis",
         "read_assignments",
-        "read_lengths",
+        "POSITIVE_KEYS",
+        "read_positive_values",
     ),
     "backbone_scene": (
         "BackboneTables",

@@ -36,7 +36,9 @@ from .lines import split_assignment, split_key
 from .reader import read_set_value
 from .suggestions import require_key
 
-LENGTH_KEY = "drive.displacement"  # key of a length whose values `read_lengths` reads
+# keys of a length and of a force whose values `read_positive_values` reads, with an example
+LENGTH_KEY = "drive.displacement"
+POSITIVE_KEYS = {"length": (LENGTH_KEY, "1 um..1 mm:9"), "force": ("drive.force", "1 N..100 N:9")}
 # Largest number of values in one range; the cases of a larger sweep would exhaust the memory.
 MAX_RANGE_VALUES = 10_000_000
 # Ratio of the ends of a range of positive numbers; at and above it the range is logarithmic by default.
@@ -247,22 +249,23 @@ def read_table(table: Any) -> tuple[list[Axis], list[tuple[str, str]]]:
     return axes, mistakes
 
 
-def read_lengths(text: str, name: str) -> list[float]:
-    """Return the lengths [m] of a range ``a..b:n`` or a list in rising order; all are above 0.
+def read_positive_values(text: str, name: str, kind: str = "length") -> list[float]:
+    """Return the lengths [m] or forces [N] of a range ``a..b:n`` or a list in rising order; all are above 0.
 
     Raises PatchfemError, whose message begins with `name`, for any other text.
     """
     axes: list[Axis] = []
     mistakes: list[str] = []
-    _append_values(axes, mistakes, name, (LENGTH_KEY, text), LISTS)
+    key, example = POSITIVE_KEYS[kind]
+    _append_values(axes, mistakes, name, (key, text), LISTS)
     if mistakes:
         raise PatchfemError("; ".join(mistakes))
-    lengths = sorted(axes[0].values)
-    if lengths[0] <= 0:
+    values = sorted(axes[0].values)
+    if values[0] <= 0:
         raise PatchfemError(
-            f"{name}: {lengths[0]:g} m; lengths above 0 are needed, such as 1 um..1 mm:9"
+            f"{name}: {values[0]:g} {axes[0].unit}; {kind}s above 0 are needed, such as {example}"
         )
-    return lengths
+    return values
 
 
 def describe_ranges(texts: Iterable[str]) -> list[str]:

@@ -27,9 +27,8 @@ from patchfem.campaigns.rows.cells import compute_rms_scores, read_response_tabl
 from patchfem.campaigns.rows.model_readings import ModelReadings
 from patchfem.campaigns.rows.search import make_residual
 from patchfem.core import G_N
-from patchfem.identify import UnitCubeResidual, run_descents
-from patchfem.identify.least_squares import NEAR_BOUND_FRACTION
-from patchfem.identify.space import make_search_space
+from patchfem.identify.least_squares import NEAR_BOUND_FRACTION, Descent, descend
+from patchfem.identify.space import UnitCubeResidual, make_search_space
 
 MIL = 25.4e-6
 SCORES = FOLDER / "scores.json"
@@ -51,6 +50,15 @@ NEUTRAL = {
     "rods.mass": 0.01,
 }
 NULLS = {"constant": "constant", "strong": "power_input_frequency"}
+
+
+def run_descents(model: UnitCubeResidual, points, before_descent) -> list[Descent]:
+    """Return the descents from points (n,) of the unit cube; `before_descent` is called before each."""
+    ends = []
+    for point in points:
+        before_descent()
+        ends.append(descend(model, point, range(len(point))))
+    return ends
 
 
 def training(cells, protocol: str) -> np.ndarray:

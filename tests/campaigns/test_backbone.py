@@ -7,7 +7,7 @@ from scene_texts import IWAN, make_shaken_block
 from scipy.integrate import solve_ivp
 
 import patchfem as pf
-from patchfem.campaigns import compute_backbone
+from patchfem.campaigns.backbone.curves import compute_backbone
 
 PLASTIC = 'law = "elastic-plastic"\nbond_length = "1 mm"'
 OMEGA = 200 * np.pi

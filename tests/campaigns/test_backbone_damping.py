@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import patchfem as pf
-from patchfem.campaigns import compute_backbone
+from patchfem.campaigns.backbone.curves import compute_backbone
 from patchfem.export import backbones, page, store
 
 LAWS = {

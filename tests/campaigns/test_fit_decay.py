@@ -5,6 +5,7 @@ import json
 import decay_fits
 import numpy as np
 import pytest
+import xarray as xr
 from command_line import run_cli
 from page_data import find_accessibility_errors
 from scene_texts import DRIVE, KILOGRAM, POINT, make_friction_table, make_shaken_block
@@ -42,6 +43,23 @@ def write_decay(path, text: str, noise: float = 0.0, seed: int = 0, amplitudes=A
     head = "decay_amplitude [m],decay_frequency [Hz],decay_frequency_error [Hz],decay_damping,decay_damping_error"
     path.write_text("\n".join([head, *rows]) + "\n")
     return path
+
+
+def test_band_of_the_fitted_curve_contains_the_truth_beyond_the_data(tmp_path):
+    """The 95 % band of a curve that is fitted to noisy data contains the true curve at three times the amplitudes."""
+    path = write_decay(tmp_path / "decay.csv", IWAN, 0.03, 5, np.geomspace(2e-7, 1e-5, 9))
+    result = pf.fit(START, to=path, free=FREE, starts=1, out=tmp_path / "out")
+    with xr.open_dataset(tmp_path / "out/result.nc") as data:
+        amplitude = data.curve_amplitude.values
+        truth = pf.backbone(IWAN, amplitudes=amplitude, method="balance")
+        for name in ("frequency", "damping"):
+            difference = abs(data[f"curve_{name}"].values - truth[f"balance_{name}"].values)
+            band = data[f"curve_{name}_error"].values
+            assert np.mean(difference <= band) >= 0.9
+            # the band is no wider than a few times the noise of the data
+            assert (band > 0).all() and np.median(band / data[f"curve_{name}"].values) < 0.1
+    assert amplitude[-1] == pytest.approx(3e-5) and amplitude[0] == pytest.approx(2e-7 / 3)
+    assert any("a further measurement at about" in note for note in result["notes"])
 
 
 def test_exact_parameters_are_recovered_from_computed_decay(tmp_path):

@@ -33,7 +33,7 @@ from campaigns import Row
 from decay_fits import make_sliders
 
 import patchfem as pf
-from patchfem.campaigns import compute_backbone
+from patchfem.campaigns.backbone.curves import compute_backbone
 from patchfem.core import PatchfemError
 
 LAWS = ("elastic-plastic", "iwan", "bouc-wen", "lugre", "tanh", "coulomb")
@@ -289,7 +289,7 @@ def band_rows(band, name: str, points) -> list:
 def band_at(model, points):
     """Return the band at the amplitudes of some points, which are their first values."""
     amplitudes = np.unique([point[0] for point in points])
-    return compute_backbone(model, "mode1", amplitudes, ("balance", "quasi-static")).answer.band
+    return compute_backbone(model, "mode1", amplitudes, ("balance", "quasi-static")).band
 
 
 def march_steady_points(joint: Joint, curve) -> list:

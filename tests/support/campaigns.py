@@ -43,6 +43,8 @@ KINDS = {  # Name on the command line -> module and function.
     "decay-fits": ("decay_fits", "compare_fit"),
     "scan-pairs": ("surface_pairs", "compare_scans"),
     "backbone-bands": ("backbone_band", "compare_band"),
+    "backbone-forces": ("backbone_forces", "compare_force"),
+    "backbone-preload": ("backbone_forces", "compare_preload"),
 }
 # Time limit of a scene with its reference; a longer one is recorded as failed.
 MAX_CPU_SECONDS = 60

@@ -23,13 +23,12 @@ import numpy as np
 from campaigns import Row
 
 import patchfem as pf
-from patchfem.campaigns import compute_backbone
+from patchfem.campaigns.backbone.curves import compute_backbone
 from patchfem.campaigns.fits.curve import fit_curve, read_damping_curve
 from patchfem.core import PatchfemError
 from patchfem.export.lab import imported
-from patchfem.identify import UnitCubeResidual
 from patchfem.identify.least_squares import descend
-from patchfem.identify.space import make_search_space
+from patchfem.identify.space import UnitCubeResidual, make_search_space
 from patchfem.model import build
 from patchfem.scene import BOUNDS, BaseScene, read_assignments
 

@@ -9,24 +9,15 @@ from ...runs.bench import bench
 from ...runs.bench.engine import steps_per_cycle
 from ...runs.rig import decays
 
-FIRST_CYCLES = 3.0  # Number of cycles of the first loop, of which the last one is evaluated.
+# Number of cycles of the first loop, of which the last one is evaluated.
+FIRST_CYCLES = 3.0
 # Largest number of cycles: most laws are steady after a few, growing bonds after tens.
 MAX_CYCLES = 192.0
 LOOP_MEASURES = ("secant_stiffness", "loop_area")
 
 
-class BenchLoop(NamedTuple):
-    """Run of a contact under a sinusoidal displacement, with its model and number of steps."""
-
-    run: object
-    model: Model
-    steps: int
-
-
 class SteadyLoop(NamedTuple):
-    """Steady run of a contact under a sinusoidal displacement.
-
-    It has its model and its number of steps.
+    """Steady run of a contact under a sinusoidal displacement, with its model and its number of steps.
 
     change: change of each of LOOP_MEASURES by the later half of the cycles.
     """
@@ -34,34 +25,7 @@ class SteadyLoop(NamedTuple):
     run: object
     model: Model
     steps: int
-    change: list
-
-
-def run_friction_loop(
-    model: Model, patch, slide: float, frequency: float, cycles: float
-) -> BenchLoop:
-    """Compute the friction loop of a contact under a sinusoidal displacement.
-
-    Parameters
-    ----------
-    model : Model
-        Model of the rig.
-    patch : Patch or None
-        Pressed patch.
-    slide : float
-        Amplitude of the sinusoidal displacement [m].
-    frequency : float
-        Frequency of the displacement [Hz].
-    cycles : float
-
-    Returns
-    -------
-    BenchLoop
-    """
-    path = SlidePath("sine", slide, frequency, None, 0.0, cycles, None)
-    contact = replace(decays.with_automatic_method(model), kind="bench", rig=None, slide=path)
-    steps = steps_per_cycle(contact)
-    return BenchLoop(bench.run_bench(contact, patch, steps), contact, steps)
+    change: list[float]
 
 
 def compute_steady_loop(model: Model, patch, slide: float, frequency: float) -> SteadyLoop:
@@ -77,21 +41,21 @@ def compute_steady_loop(model: Model, patch, slide: float, frequency: float) -> 
         Amplitude of the sinusoidal displacement [m].
     frequency : float
         Frequency of the displacement [Hz].
-
-    Returns
-    -------
-    SteadyLoop
     """
     tolerance = model.accuracy.tolerance
+    rested = replace(decays.with_automatic_method(model), kind="bench", rig=None)
     cycles = FIRST_CYCLES
-    loop = run_friction_loop(model, patch, slide, frequency, cycles)
+    before = None
     while True:
+        path = SlidePath("sine", slide, frequency, None, 0.0, cycles, None)
+        contact = replace(rested, slide=path)
+        steps = steps_per_cycle(contact)
+        run = bench.run_bench(contact, patch, steps)
+        if before is not None:
+            change = [abs(run.values[name] - before[name]) for name in LOOP_MEASURES]
+            limits = [tolerance * abs(run.values[name]) for name in LOOP_MEASURES]
+            is_steady = all(step <= limit for step, limit in zip(change, limits))
+            if cycles >= MAX_CYCLES or is_steady:
+                return SteadyLoop(run, contact, steps, change)
+        before = run.values
         cycles *= 2
-        before = loop.run.values
-        loop = run_friction_loop(model, patch, slide, frequency, cycles)
-        values = loop.run.values
-        change = [abs(values[name] - before[name]) for name in LOOP_MEASURES]
-        limits = [tolerance * abs(values[name]) for name in LOOP_MEASURES]
-        is_steady = all(step <= limit for step, limit in zip(change, limits))
-        if cycles >= MAX_CYCLES or is_steady:
-            return SteadyLoop(*loop, change)

@@ -1,6 +1,8 @@
-"""Backbone of a mode: curves by all methods, loss exponents and flutter amplitude."""
+"""Backbones of a mode: curves by all methods, loss exponents and flutter amplitude, for one or several models."""
 
+from collections.abc import Callable, Sequence
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 from scipy.optimize import brentq
@@ -12,24 +14,24 @@ from ...model.model import Model
 from ...model.source import locate_errors
 from ...response.errors import finer_errors
 from ...runs.joint import find_stuck_patch_stiffness
-from . import notes
-from .advice import write_advice
+from . import words
+from .amplitudes import default_amplitudes, find_amplitudes_of_forces
 from .balance import compute_balance_curve
-from .band import make_band
 from .joint import JointMode, build_joint
-from .linear import compute_constant_curve
 from .quasi_static import compute_static_curve
 from .records import (
     AMPLITUDE_TOL,
     METHODS,
     ROUND_OFF_ERROR,
-    Answer,
+    VALUES,
     Backbone,
     Curve,
     LossExponents,
     ModeFrequencies,
+    make_band,
 )
 
+CURVES = {"balance": compute_balance_curve, "quasi-static": compute_static_curve}
 # Ratio of the smallest amplitude of gross slip to the amplitude at which the complete contact
 # begins to slip.
 MIN_GROSS_SLIP_RATIO = 3.0
@@ -42,7 +44,20 @@ REMOVED_METHODS = {
 FLUTTER_TOL = 1e-8
 
 
-def choose_methods(method: str | None) -> tuple:
+class Levels(NamedTuple):
+    """Amplitudes of a backbone, or the forces that hold the phase resonance; () for a range around the onset of slip.
+
+    amplitudes: at the output [m]; forces: at the output [N].
+    """
+
+    amplitudes: Sequence[float] = ()
+    forces: Sequence[float] = ()
+
+
+DEFAULT_LEVELS = Levels()
+
+
+def choose_methods(method: str | None) -> tuple[str, ...]:
     """Return the method of a given name; all methods for "" and None.
 
     Raises
@@ -66,7 +81,7 @@ def compute_backbone(
     mode: str = "",
     amplitudes=None,
     methods=METHODS,
-    progress=None,
+    progress: Callable | None = None,
     *,
     errors: bool = True,
 ) -> Backbone:
@@ -79,15 +94,13 @@ def compute_backbone(
     mode : str
         Name of the mode; "" for the first.
     amplitudes : (k,) array, optional
-        Increasing, at the output [m]. By default from a hundredth of the amplitude at which the
-        complete contact slips to 15 times this amplitude, or to the amplitude at which the mode
-        moves nearly freely.
+        At the output [m]. By default a range around the onset of slip, as in `compute_backbones`.
     methods : sequence of str
         From METHODS.
     progress : callable, optional
         Takes the name of a method that begins.
     errors : bool
-        Whether the errors of the mesh, of the cells of a law and of missing modes are computed; the
+        Whether the force and the errors of the mesh, of the cells of a law and of missing modes are computed; the other
         values are the same without them, in less than half the time. Without them there is no band.
 
     Returns
@@ -99,65 +112,105 @@ def compute_backbone(
     PatchfemError
         If the scene has no rig, or the rig does not have this mode.
     """
-    with locate_errors(model.source):
-        joint = build_joint(model, mode)._replace(has_errors=errors)
-        if amplitudes is None:
-            amplitudes = joint.default_amplitudes()
-        amplitudes = np.unique(np.asarray(amplitudes, float))
-        if amplitudes[-1] > joint.model.rig.springs.travel:
-            raise PatchfemError(
-                f"the largest amplitude, {format_length(amplitudes[-1], 3)}, is larger than the "
-                "travel of the flexure; give smaller amplitudes with --amplitudes",
-                "structure.travel",
-            )
-        richer = None
-        if errors and model.rig.structure.richer_rig is not None:
-            richer = build_joint(replace(model, rig=model.rig.structure.richer_rig), mode)
-        curves = {}
-        missing = {}
-        for method in methods:
-            if progress is not None:
-                progress(method)
-            try:
-                curve = compute_curve(joint, amplitudes, method)
-                if richer is not None:
-                    richer_curve = compute_curve(richer, amplitudes, method)
-                    curve = _widen_by_missing_modes(curve, richer_curve)
-                curves[method] = curve
-            except (NotConverged, PatchfemError) as reason:
-                missing[method] = str(reason).removeprefix("backbone: ")
-        answer = Answer()
-        if errors:
-            band = make_band(curves)
-            answer = Answer(band, write_advice(joint, band, curves, missing))
-    return _assemble_backbone(joint, amplitudes, curves, missing)._replace(answer=answer)
+    levels = Levels(() if amplitudes is None else amplitudes)
+    return compute_backbones([model], mode, levels, methods, progress, errors=errors)[0]
 
 
-def compute_curve(joint: JointMode, amplitudes, method: str) -> Curve:
-    """Compute the frequency and damping curve of a mode by a given method.
+def compute_backbones(
+    models: Sequence[Model],
+    mode: str = "",
+    levels: Levels = DEFAULT_LEVELS,
+    methods=METHODS,
+    progress: Callable | None = None,
+    *,
+    errors: bool = True,
+) -> list[Backbone]:
+    """Compute frequency and damping of a mode of several rigs at the same amplitudes.
+
+    The default amplitudes reach from a hundredth of the amplitude at which the complete contact slips to 15 times this
+    amplitude, or to the amplitude at which the mode moves nearly freely; further ones lie where the curve changes fast.
 
     Parameters
     ----------
-    joint : JointMode
-    amplitudes : (k,) array
-        Increasing, at the output [m].
-    method : str
-        One of METHODS.
-
-    Returns
-    -------
-    Curve
+    models : sequence of Model
+        Models of rigs, such as those of one scene with several values of a key.
+    mode, methods, progress, errors
+        As for `compute_backbone`.
+    levels : Levels
 
     Raises
     ------
-    NotConverged, PatchfemError
-        If there is no curve.
+    PatchfemError
+        As for `compute_backbone`, and for a force that no amplitude has.
     """
-    if joint.is_linear:
-        return compute_constant_curve(joint, amplitudes)
-    if method == "balance":
-        return compute_balance_curve(joint, amplitudes)
-    return compute_static_curve(joint, amplitudes)
+    joints = []
+    wanted = [np.asarray(levels.amplitudes, float)]
+    for model in models:
+        with locate_errors(model.source):
+            joint = build_joint(model, mode)._replace(has_errors=errors, has_force=errors)
+            joints.append(joint)
+            if len(levels.forces):
+                forced = joint._replace(has_force=True)
+                wanted.append(find_amplitudes_of_forces(forced, levels.forces))
+    if not len(levels.forces) and not len(levels.amplitudes):
+        wanted.append(default_amplitudes(joints))
+    amplitudes = _merge(np.concatenate(wanted))
+
+    backbones = []
+    for joint in joints:
+        with locate_errors(joint.model.source):
+            backbones.append(_compute(joint, mode, amplitudes, methods, progress))
+    return backbones
+
+
+def _merge(amplitudes) -> np.ndarray:
+    """Return amplitudes in rising order, without those that differ by round-off."""
+    ordered = np.unique(amplitudes)
+    return ordered[np.append(True, np.diff(ordered) > AMPLITUDE_TOL * ordered[1:])]
+
+
+def _compute(joint: JointMode, mode: str, amplitudes, methods, progress) -> Backbone:
+    """Compute the backbone of a joint at amplitudes (k,) [m] by given methods."""
+    model = joint.model
+    if amplitudes[-1] > model.rig.springs.travel:
+        raise PatchfemError(
+            f"the largest amplitude, {format_length(amplitudes[-1], 3)}, is larger than the "
+            "travel of the flexure; give smaller amplitudes with --amplitudes",
+            "structure.travel",
+        )
+    richer = None
+    if joint.has_errors and model.rig.structure.richer_rig is not None:
+        richer = build_joint(replace(model, rig=model.rig.structure.richer_rig), mode)
+    curves = {}
+    missing = {}
+    for method in methods:
+        if progress is not None:
+            progress(method)
+        try:
+            curve = CURVES[method](joint, amplitudes)
+            if richer is not None:
+                curve = _widen_by_missing_modes(curve, CURVES[method](richer, amplitudes))
+            curves[method] = curve
+        except (NotConverged, PatchfemError) as reason:
+            missing[method] = str(reason).removeprefix("backbone: ")
+
+    exponents = LossExponents()
+    if not joint.is_linear:
+        exponents = _fit_exponents(joint, curves.get("quasi-static", curves.get("balance")))
+    backbone = Backbone(
+        mode=_main_mode_name(joint),
+        frequencies=_mode_frequencies(joint),
+        curves=curves,
+        missing=missing,
+        exponents=exponents,
+        flutter=_find_flutter_amplitude(joint, curves),
+        notes=(),
+        band=make_band(curves) if joint.has_errors else None,
+    )
+    backbone = backbone._replace(notes=words.write_notes(joint, amplitudes, backbone))
+    if joint.has_errors:
+        backbone = backbone._replace(advice=words.write_advice(joint, backbone))
+    return backbone
 
 
 def _widen_by_missing_modes(curve: Curve, richer: Curve) -> Curve:
@@ -174,43 +227,9 @@ def _widen_by_missing_modes(curve: Curve, richer: Curve) -> Curve:
         )
     values = curve.interpolate(curve.amplitude)
     added = finer_errors(values, richer.interpolate(curve.amplitude))
+    names = [f"{name}_error" for name in VALUES]
     return curve._replace(
-        frequency_error=curve.frequency_error + added["frequency"],
-        damping_error=curve.damping_error + added["damping"],
-    )
-
-
-def _assemble_backbone(joint: JointMode, amplitudes, curves: dict, missing: dict) -> Backbone:
-    """Assemble the backbone from its curves at the requested amplitudes (k,) [m]."""
-    exponents = LossExponents()
-    first = curves.get("quasi-static", curves.get("balance"))
-    sentences = [
-        *joint.model.describe_removed_joint(),
-        *notes.note_linear_rig(joint),
-        *notes.note_gaps(amplitudes, curves),
-    ]
-    if not joint.is_linear:
-        exponents = _fit_exponents(joint, first)
-        sentences += notes.note_differences(curves)
-        if exponents.micro_theory is not None and exponents.micro is None:
-            sentences += notes.note_micro_slip(joint, amplitudes)
-    sentences += notes.note_missing_mesh(joint)
-    for curve in curves.values():
-        sentences += curve.notes
-    sentences += notes.note_secant_stiffness(joint, amplitudes, curves)
-    sentences += notes.note_wear(joint.model)
-    flutter = None
-    for method, curve in curves.items():
-        if flutter is None:
-            flutter = _flutter_amplitude(joint, method, curve)
-    return Backbone(
-        mode=_main_mode_name(joint),
-        frequencies=_mode_frequencies(joint),
-        curves=curves,
-        missing=missing,
-        exponents=exponents,
-        flutter=flutter,
-        notes=tuple(sentences),
+        **{error: getattr(curve, error) + added[name] for error, name in zip(names, VALUES)}
     )
 
 
@@ -232,37 +251,28 @@ def _mode_frequencies(joint: JointMode) -> ModeFrequencies:
     """
     model = joint.model
     modes = joint.modes
-    spring = model.rig.springs.interlock
-    free = float(modes.omega[joint.mode])
-    if spring is not None:
-        free = modes.compute_stuck_mode(modes.interfaces[:1], np.array([spring[0]]), joint.mode)[0]
-    free = free / (2 * np.pi)
-    stuck = joint.stuck_mode.omega
-    if stuck is None:
+
+    def find(rows, stiffness: float) -> float:
+        """Return the frequency [Hz] of the mode with springs [N/m] on the rows."""
+        return modes.compute_stuck_mode(rows, np.array([stiffness]), joint.mode)[0] / (2 * np.pi)
+
+    free = float(modes.omega[joint.mode]) / (2 * np.pi)
+    if model.rig.springs.interlock is not None:
+        free = find(modes.interfaces[:1], model.rig.springs.interlock[0])
+    if joint.stuck_mode.omega is None:
         return ModeFrequencies(free, None)
     stiffness = find_stuck_patch_stiffness(model, (joint.patch, *joint.coarser))
     # Modes that were measured with the joint include the stiffness of the joint.
     has_joint = len(modes.interfaces) > 1 or model.rig.structure.bolted is not None
-    if stiffness is None or has_joint:
-        return ModeFrequencies(free, stuck / (2 * np.pi), free_error=_free_frequency_error(joint))
-    stuck = _stuck_frequency(joint, stiffness.value)
-    high = _stuck_frequency(joint, stiffness.value + stiffness.error)
-    return ModeFrequencies(free, stuck, high - stuck)
-
-
-def _free_frequency_error(joint: JointMode) -> float:
-    """Return the error [Hz] of the frequency without the contact, due to the joint that was subtracted."""
-    if joint.stiffer is None:
-        return 0.0
-    omega = joint.stiffer.model.rig.modes.omega[joint.mode]
-    return abs(float(omega - joint.modes.omega[joint.mode])) / (2 * np.pi)
-
-
-def _stuck_frequency(joint: JointMode, stiffness: float) -> float:
-    """Return the frequency [Hz] of a mode with a sticking contact of a given stiffness [N/m]."""
-    modes = joint.modes
-    omega, _ = modes.compute_stuck_mode(modes.interfaces, np.array([stiffness]), joint.mode)
-    return omega / (2 * np.pi)
+    if stiffness is not None and not has_joint:
+        stuck = find(modes.interfaces, stiffness.value)
+        high = find(modes.interfaces, stiffness.value + stiffness.error)
+        return ModeFrequencies(free, stuck, high - stuck)
+    free_error = 0.0
+    if joint.stiffer is not None:
+        shift = joint.stiffer.model.rig.modes.omega[joint.mode] - modes.omega[joint.mode]
+        free_error = abs(float(shift)) / (2 * np.pi)
+    return ModeFrequencies(free, joint.stuck_mode.omega / (2 * np.pi), free_error=free_error)
 
 
 def _fit_exponents(joint: JointMode, curve: Curve | None) -> LossExponents:
@@ -279,10 +289,10 @@ def _fit_exponents(joint: JointMode, curve: Curve | None) -> LossExponents:
     loss = curve.loss
     speed = 2 * np.pi * curve.frequency * amplitude / joint.reach
     energy = joint.modes.mass * speed**2
-    relative_error = notes.MIN_LOSS_RATIO * 2 * np.pi * curve.damping_error
+    relative_error = words.MIN_LOSS_RATIO * 2 * np.pi * curve.damping_error
     known = loss > np.maximum(ROUND_OFF_ERROR, relative_error) * energy
     slip = joint.slip_amplitude
-    micro = np.flatnonzero(known & (amplitude < notes.MAX_MICRO_SLIP_RATIO * slip))
+    micro = np.flatnonzero(known & (amplitude < words.MAX_MICRO_SLIP_RATIO * slip))
     gross = np.flatnonzero(known & (amplitude > MIN_GROSS_SLIP_RATIO * slip))[-2:]
     return LossExponents(_loss_slope(curve, micro), _loss_slope(curve, gross), theory)
 
@@ -295,9 +305,8 @@ def _loss_slope(curve: Curve, points) -> float | None:
     if points.size < 2:
         return None
     ends = points[[0, -1]]
-    low_loss, high_loss = curve.loss[ends]
-    low, high = curve.amplitude[ends]
-    return float(np.log(high_loss / low_loss) / np.log(high / low))
+    loss_step = np.diff(np.log(curve.loss[ends]))
+    return float(loss_step[0] / np.diff(np.log(curve.amplitude[ends]))[0])
 
 
 def _theoretical_exponent(joint: JointMode) -> float | None:
@@ -315,33 +324,38 @@ def _theoretical_exponent(joint: JointMode) -> float | None:
     return 3.0 if law_has_trait(friction.law, "bonds") or is_elastic else None
 
 
-def _flutter_amplitude(joint: JointMode, method: str, curve: Curve) -> float | None:
+def _find_flutter_amplitude(joint: JointMode, curves: dict[str, Curve]) -> float | None:
     """Find the largest amplitude [m] at which the damping changes from positive to negative.
 
-    The curve gives the two amplitudes that enclose the root. Brent's method on damping x amplitude,
+    A curve gives the two amplitudes that enclose the root. Brent's method on damping x amplitude,
     which is a straight line under Coulomb friction, computes further points of the same curve. It
     is None if there is no such root.
     """
-    falls = np.flatnonzero((curve.damping[:-1] > 0) & (curve.damping[1:] <= 0))
-    if not falls.size:
+    falls = {}
+    for method, curve in curves.items():
+        signs = (curve.damping[:-1] > 0) & (curve.damping[1:] <= 0)
+        if signs.any():
+            falls[method] = int(np.flatnonzero(signs)[-1])
+    if not falls:
         return None
-    bracket = slice(falls[-1], falls[-1] + 2)
-    low, high = np.log(curve.amplitude[bracket])
-    loss_low, loss_high = (curve.damping * curve.amplitude)[bracket]
-    known = {low: loss_low, high: loss_high}
+    method, place = next(iter(falls.items()))
+    bracket = slice(place, place + 2)
+    amplitudes = curves[method].amplitude[bracket]
+    losses = (curves[method].damping * curves[method].amplitude)[bracket]
+    known = dict(zip(np.log(amplitudes), losses))
+    joint = joint._replace(has_errors=False, has_force=False)
 
     def net_loss(log_amplitude: float) -> float:
         """Return the product of damping ratio and amplitude [m], given the log of the amplitude."""
         if log_amplitude not in known:
             amplitude = np.array([np.exp(log_amplitude)])
-            point = compute_curve(joint._replace(has_errors=False), amplitude, method)
+            point = CURVES[method](joint, amplitude)
             known[log_amplitude] = float(point.damping[0] * amplitude[0])
         return known[log_amplitude]
 
     try:
-        return float(np.exp(brentq(net_loss, low, high, xtol=FLUTTER_TOL)))
+        return float(np.exp(brentq(net_loss, *known, xtol=FLUTTER_TOL)))
     except (NotConverged, PatchfemError):
         # No further point is known, so the root of the chord between the two points is used.
-        amplitudes = curve.amplitude[bracket]
-        fraction = loss_low / (loss_low - loss_high)
+        fraction = losses[0] / (losses[0] - losses[1])
         return float(amplitudes[0] + fraction * (amplitudes[1] - amplitudes[0]))

@@ -19,22 +19,8 @@ from ...runs.rig import decays
 from ...runs.rig.plan import stuck_stiffnesses
 from .bench_loops import compute_steady_loop
 
-AMPLITUDES_PER_DECADE = 8  # Number of default amplitudes per decade.
 # Ratio of the smallest default amplitude to the amplitude at which the complete contact slips.
 MIN_AMPLITUDE_FACTOR = 1e-2
-# Ratio of the largest default amplitude to the amplitude at which the complete contact slips.
-MAX_AMPLITUDE_FACTOR = 15.0
-# Ratio of the smallest default amplitude under rigid friction to the static deflection by friction.
-MIN_RIGID_FACTOR = 2.0
-# Ratio of the largest amplitude to that at which a softening spring no longer returns the block.
-SOFTENING_END = 0.7
-# Ratio of the largest amplitude to that at which a hardening spring is as stiff as the mode.
-HARDENING_END = 3.0
-# Ratio of the release amplitude to the largest amplitude; above 1, because the first half cycles
-# depend on the release.
-RELEASE_FACTOR = 1.15
-# First [m] and last [m] amplitude and their number for a linear rig.
-LINEAR_AMPLITUDES = (1e-6, 1e-3, 4)
 # Fraction of the gross-slip amplitude at which there is no slip at all.
 STUCK_FRACTION = 1e-5
 QUASI_STATIC_ADVICE = "; use --method quasi-static"
@@ -71,6 +57,8 @@ class JointMode(NamedTuple):
         Tangential stiffness [N/m] of each interface while nothing slips.
     has_errors : bool
         Whether the errors of the mesh and of the cells of a law are computed.
+    has_force : bool
+        Whether the force of phase resonance is computed.
     stiffer : FreeRig or None
         Rig and patch with a stiffer joint, if a joint was subtracted from the modes.
     """
@@ -82,6 +70,7 @@ class JointMode(NamedTuple):
     stuck_mode: StuckMode
     stiffness: np.ndarray
     has_errors: bool = True
+    has_force: bool = True
     stiffer: FreeRig | None = None
 
     @property
@@ -188,39 +177,9 @@ class JointMode(NamedTuple):
         """Amplitude at the output [m] at which the complete contact slips."""
         return self.output_amplitude(self.slip_displacement)
 
-    def default_amplitudes(self) -> np.ndarray:
-        """Return amplitudes (k,) [m] from full stick to nearly free motion of the mode."""
-        rig = self.model.rig
-        if self.is_linear:
-            return np.geomspace(*LINEAR_AMPLITUDES) * min(
-                1.0, rig.springs.travel / LINEAR_AMPLITUDES[1]
-            )
-        low, high = self.output_amplitude(np.array(self._default_slides()))
-        high = min(high, self._max_amplitude())
-        low = min(low, MIN_AMPLITUDE_FACTOR * high)
-        count = 1 + int(np.ceil(AMPLITUDES_PER_DECADE * np.log10(high / low)))
-        return np.geomspace(low, high, count)
-
-    def _default_slides(self) -> tuple:
-        """Return the smallest and largest relative displacement [m] of the default amplitudes."""
-        stiffness = float(self.stiffness[self.face])
-        deflection = self.deflection if self.friction_limit else 0.0
-        if 0 < stiffness < np.inf or not deflection:
-            slip = self.slip_displacement
-            return MIN_AMPLITUDE_FACTOR * slip, MAX_AMPLITUDE_FACTOR * max(slip, deflection)
-        return MIN_RIGID_FACTOR * deflection, MAX_AMPLITUDE_FACTOR**2 * deflection
-
-    def _max_amplitude(self) -> float:
-        """Return the largest default amplitude [m], limited by the stop and by a cubic spring."""
-        rig = self.model.rig
-        modes = self.modes
-        travel = rig.springs.travel / RELEASE_FACTOR
-        if not rig.springs.cubic:
-            return travel
-        output = abs(float(modes.output[self.mode])) or self.reach
-        doubling = np.sqrt(self.spring / abs(rig.springs.cubic)) / output
-        end = SOFTENING_END if rig.springs.cubic < 0 else HARDENING_END
-        return min(travel, doubling * end)
+    def slides(self, amplitudes) -> np.ndarray:
+        """Return the amplitudes (k,) [m] of the dominant interface in the stuck mode for those at the output."""
+        return np.abs(self.modes.interfaces[0] @ self.shape) * np.asarray(amplitudes) / self.reach
 
     def steady_laws(self) -> LawGroup:
         """Return the steady friction loops of all interface laws.

@@ -8,6 +8,7 @@ from ...friction.record import steady_loop
 from ...response.errors import add_errors
 from ...runs.bench.errors import estimate_bench_errors
 from ...runs.rig import decays
+from .balance import compute_constant_curve
 from .bench_loops import LOOP_MEASURES, compute_steady_loop
 from .joint import JointMode
 from .records import AMPLITUDE_TOL, ROUND_OFF_ERROR, Curve, make_curve
@@ -20,10 +21,12 @@ MIN_FLOOR = 1e-10
 
 
 def compute_static_curve(joint: JointMode, amplitudes) -> Curve:
-    """Compute the quasi-static backbone of a mode from the loops of its contact.
+    """Compute the quasi-static backbone of a mode at amplitudes (k,) [m] from the loops of its contact.
 
-    Loops of laws without a closed form are computed on a bench.
+    Loops without a closed form are computed on a bench. Raises NotConverged or PatchfemError if there is no curve.
     """
+    if joint.is_linear:
+        return compute_constant_curve(joint, amplitudes)
     joint.require_steady_loops("static curve")
     if joint.is_rigid:
         raise PatchfemError(
@@ -41,7 +44,7 @@ def compute_static_curve(joint: JointMode, amplitudes) -> Curve:
         return _compute_from_bench_loops(joint, amplitudes)
 
     def tabulate(group, samples: int) -> np.ndarray:
-        """Return amplitude, frequency, damping and loss (4, k) from the loops of a LawGroup."""
+        """Return amplitude, frequency, damping, loss and force (5, k) from the loops of a LawGroup."""
         return decays.compute_static_curve(group.modes, group, joint.mode, amplitudes, samples)
 
     best = tabulate(laws, N_SAMPLES)
@@ -53,14 +56,14 @@ def compute_static_curve(joint: JointMode, amplitudes) -> Curve:
 
 
 def _select_rising_part(best, error) -> Curve:
-    """Return the part of a quasi-static curve on which the force increases.
+    """Return the part of a quasi-static curve on which the inertia force increases.
 
     Beyond this part no equilibrium is stable.
 
     Parameters
     ----------
-    best, error : (4, k) array
-        Amplitude [m], frequency [Hz], damping ratio, loss [J], and their errors.
+    best, error : (5, k) array
+        Amplitude [m], frequency [Hz], damping ratio, loss [J] and force [N], and their errors.
     """
     force = best[1] ** 2 * best[0]
     rises = np.isfinite(best + error).all(axis=0) & (np.diff(force, prepend=0.0) > 0)
@@ -83,7 +86,7 @@ def _compute_in_closed_form(joint: JointMode, amplitudes) -> Curve | None:
     if model.friction is None or is_soft or len(model.rig.friction.interfaces) > 1:
         return None
     load = joint.friction_limit / model.friction.static
-    slides = np.abs(modes.interfaces[0] @ joint.shape) * amplitudes / joint.reach
+    slides = joint.slides(amplitudes)
     for _ in range(MAX_STEPS):
         loops = [steady_loop(model.friction, load, float(slide)) for slide in slides]
         if None in loops:
@@ -96,7 +99,6 @@ def _compute_in_closed_form(joint: JointMode, amplitudes) -> Curve | None:
             break
         # The deflection shape differs from the stuck mode shape, so that the output amplitude is missed.
         slides = slides * amplitudes / best[0]
-    has_amplitude = np.abs(best[0] / amplitudes - 1) < AMPLITUDE_TOL
     best = np.where(has_amplitude, best, np.nan)
     best[0] = amplitudes
     relative = ROUND_OFF_ERROR + (AMPLITUDE_TOL if modes.omega.size > 1 else 0.0)
@@ -104,7 +106,7 @@ def _compute_in_closed_form(joint: JointMode, amplitudes) -> Curve | None:
 
 
 def _compute_from_loops(joint: JointMode, slides, loops: list) -> np.ndarray:
-    """Compute amplitude, frequency, damping and loss (4, k) from hysteresis loops.
+    """Compute amplitude, frequency, damping, loss and force (5, k) from hysteresis loops.
 
     The loops have displacement amplitudes (k,) [m].
     """
@@ -117,7 +119,7 @@ def _compute_from_loops(joint: JointMode, slides, loops: list) -> np.ndarray:
 
 def _compute_from_bench_loops(joint: JointMode, amplitudes) -> Curve:
     """Compute the curve from steady bench loops of the contact at the frequency of the mode."""
-    slides = np.abs(joint.modes.interfaces[0] @ joint.shape) * amplitudes / joint.reach
+    slides = joint.slides(amplitudes)
     patches = [joint.patch]
     if joint.coarse is not None:
         patches.append(joint.coarse)

@@ -1,4 +1,4 @@
-"""Records of a backbone: curves of a mode, its frequencies and its loss exponents."""
+"""Records of a backbone: curves of a mode, the recommended band, natural frequencies and loss exponents."""
 
 from typing import NamedTuple
 
@@ -7,11 +7,11 @@ import numpy as np
 METHODS = ("balance", "quasi-static")  # methods, the recommended one first
 ROUND_OFF_ERROR = 1e-9  # Relative round-off error of a computed value.
 AMPLITUDE_TOL = 1e-7  # Amplitudes with a smaller relative difference count as equal.
-COLUMNS = ("amplitude", "frequency", "frequency_error", "damping", "damping_error", "loss")
+VALUES = ("frequency", "damping", "force")  # values of a curve that have an error
 
 
 class Curve(NamedTuple):
-    """Frequency and damping of a mode against amplitude, computed by a given method.
+    """Frequency, damping and force of a mode against amplitude, computed by one method.
 
     Attributes
     ----------
@@ -21,56 +21,87 @@ class Curve(NamedTuple):
         Frequency and its error [Hz].
     damping, damping_error : (k,) array
         Damping ratio and its error [1].
+    force, force_error : (k,) array
+        Amplitude of the force at the output that holds the phase resonance, and its error [N]; NaN if not known.
     loss : (k,) array
         Energy that the contact dissipates per cycle [J]; NaN if it is not known.
-    notes : tuple of str
-        Sentences about the errors.
+    force_frequency : (k,) array
+        Frequency [Hz] at which the force is in phase with the velocity of the output; NaN if it is not known. It is that of
+        the curve unless the force moves other modes, too.
     """
 
     amplitude: np.ndarray
     frequency: np.ndarray
-    frequency_error: np.ndarray
     damping: np.ndarray
+    force: np.ndarray
+    frequency_error: np.ndarray
     damping_error: np.ndarray
+    force_error: np.ndarray
     loss: np.ndarray
-    notes: tuple = ()
+    force_frequency: np.ndarray
 
     def at(self, points) -> "Curve":
         """Return the curve at selected points, given by bools (k,), indices or a slice."""
-        columns = {name: getattr(self, name)[points] for name in COLUMNS}
-        return self._replace(**columns)
+        return Curve(*(column[points] for column in self))
 
-    def interpolate(self, amplitudes) -> dict:
-        """Interpolate frequency and damping linearly at amplitudes (k,) [m]; return a dict by name."""
-        names = ("frequency", "damping")
-        return {name: np.interp(amplitudes, self.amplitude, getattr(self, name)) for name in names}
+    def interpolate(self, amplitudes) -> dict[str, np.ndarray]:
+        """Interpolate the values linearly at amplitudes (k,) [m]; return a dict by name."""
+        return {name: np.interp(amplitudes, self.amplitude, getattr(self, name)) for name in VALUES}
 
 
-def match_amplitudes(curve: Curve, other: Curve) -> tuple:
+def make_curve(amplitude, values, errors) -> Curve:
+    """Make a curve from values and errors (4, k) or (5, k).
+
+    The rows are frequency [Hz], damping ratio, loss [J], force [N] and, if it differs, the frequency of the force [Hz].
+    """
+    frequency, damping, loss, force, *forced = values
+    errors = (errors[0], errors[1], errors[3])
+    return Curve(amplitude, frequency, damping, force, *errors, loss, *(forced or [frequency]))
+
+
+def match_amplitudes(curve: Curve, other: Curve) -> tuple[np.ndarray, np.ndarray]:
     """Return the indices of the common amplitudes of two curves, for each of them."""
     distance = np.abs(np.log(curve.amplitude[:, None] / other.amplitude[None]))
     return np.nonzero(distance < AMPLITUDE_TOL)
 
 
-def make_curve(amplitude, values, errors, **columns) -> Curve:
-    """Make a curve from values and errors; the energy loss is optional.
+class Band(NamedTuple):
+    """Recommended curve of a backbone with its band.
 
-    It is the last row of the values if it is known, else NaN.
+    The curve is that of `balance` where it exists: a steady vibration in phase resonance.
 
-    Parameters
-    ----------
-    amplitude : (k,) array
-        [m]
-    values : sequence of (k,) arrays
-        Frequency [Hz], damping ratio, and the loss [J] if it is known.
-    errors : sequence of (k,) arrays
-        Errors of the frequency and of the damping ratio; further rows are ignored.
-    **columns
-        Other fields of the curve.
+    method: of the recommended curve; amplitude (k,) [m]; limits (k,) of the frequency [Hz] and of the damping ratio.
     """
-    frequency, damping, *loss = values
-    loss = loss[0] if loss else np.full(amplitude.size, np.nan)
-    return Curve(amplitude, frequency, errors[0], damping, errors[1], loss, **columns)
+
+    method: str
+    amplitude: np.ndarray
+    frequency_low: np.ndarray
+    frequency_high: np.ndarray
+    damping_low: np.ndarray
+    damping_high: np.ndarray
+
+
+def make_band(curves: dict[str, Curve]) -> Band | None:
+    """Return the recommended curve with its band; None if there is no curve.
+
+    The band contains every curve, by method, with its numerical errors.
+    """
+    method = next((name for name in METHODS if name in curves), None)
+    if method is None:
+        return None
+    curve = curves[method]
+    limits = []
+    for name in ("frequency", "damping"):
+        low = getattr(curve, name) - getattr(curve, f"{name}_error")
+        high = getattr(curve, name) + getattr(curve, f"{name}_error")
+        for other in curves.values():
+            here, there = match_amplitudes(curve, other)
+            value = getattr(other, name)[there]
+            error = getattr(other, f"{name}_error")[there]
+            low[here] = np.fmin(low[here], value - error)
+            high[here] = np.fmax(high[here], value + error)
+        limits += low, high
+    return Band(method, curve.amplitude, *limits)
 
 
 class ModeFrequencies(NamedTuple):
@@ -99,26 +130,6 @@ class LossExponents(NamedTuple):
     micro_theory: float | None = None
 
 
-class Answer(NamedTuple):
-    """Recommended curve of a backbone with its band, and advice on its use.
-
-    Attributes
-    ----------
-    band : band.Band or None
-        None without a curve.
-    sentences : tuple of str
-        Sentences on the curve to use and on where the methods hold.
-    """
-
-    band: object = None
-    sentences: tuple = ()
-
-    @property
-    def advice(self) -> str:
-        """Advice as one text, joined from its sentences."""
-        return " ".join(self.sentences)
-
-
 class Backbone(NamedTuple):
     """Backbone of a mode: its curves by all methods, frequencies and loss exponents.
 
@@ -135,17 +146,26 @@ class Backbone(NamedTuple):
     flutter : float or None
         Amplitude [m] above which the mode gains energy.
     notes : tuple of str
-    answer : Answer
+    band : Band or None
+        None without a curve, or without errors.
+    advice : tuple of str
+        Sentences on the curve to use and on where the methods hold.
     """
 
     mode: str
     frequencies: ModeFrequencies
-    curves: dict
-    missing: dict
+    curves: dict[str, Curve]
+    missing: dict[str, str]
     exponents: LossExponents
     flutter: float | None
-    notes: tuple
-    answer: Answer = Answer()
+    notes: tuple[str, ...]
+    band: Band | None = None
+    advice: tuple[str, ...] = ()
+
+    @property
+    def best(self) -> Curve | None:
+        """Curve of the recommended method; None without a curve."""
+        return next((self.curves[name] for name in METHODS if name in self.curves), None)
 
     def add_notes(self, notes) -> "Backbone":
         """Return the backbone with further notes placed first."""

@@ -56,6 +56,10 @@ MAX_LISTED_AMPLITUDES = 6  # Largest number of amplitudes that a message lists.
 # Number of cached curves; each step of the search evaluates some of the last ones again.
 N_CACHED_CURVES = 8
 N_CURVE_POINTS = 25  # number of amplitudes of the fitted curve
+BAND_STEP = (
+    0.1  # change of a parameter in half-widths of its interval, for the slope of the fitted curve
+)
+MIN_GAIN = 0.1  # smallest decrease of an interval for which a further measurement is advised
 EXTENT = 3.0  # ratio by which the fitted curve goes beyond the measured amplitudes on both sides
 NO_MODE_ERROR = "the intervals do not contain the error of the modes left out of the structure"
 
@@ -103,8 +107,9 @@ class FittedCurve:
         Notes about assumed errors, about the compared quantities and about neglected modes of a reduced structure.
     n_computed : int
         Number of computed curves of the model.
-    beyond : (3, j) array
-        Amplitude [m], frequency [Hz] and damping ratio of the fitted model beyond the measured amplitudes.
+    beyond : (5, j) array
+        Amplitude [m], frequency [Hz] and damping ratio of the fitted model from below to beyond the measured amplitudes,
+        and the half-widths of their 95 % bands; NaN if a parameter is not determined.
     """
 
     keys: FittedKeys
@@ -342,6 +347,7 @@ def fit_curve(
     missing = measured.amplitude[np.isnan(curves.compute_reference_curve(fit.values)[0])]
     if missing.size:
         keys = replace(keys, notes=[_warn_of_substituted_values(missing)])
+    extrapolated = _extrapolate_curve(curves, measured, widened.fit)
     return FittedCurve(
         keys=keys.make_fitted_keys(widened.fit, begin),
         path=Path(curve_file),
@@ -352,24 +358,94 @@ def fit_curve(
             *filter(None, [measured.assumed]),
             *_note_different_methods(curve_file, curves.methods[0], measured),
             *widened.notes,
+            *extrapolated.advice,
         ),
         n_computed=curves.n_computed,
-        beyond=_extrapolate_curve(curves, fit.values),
+        beyond=extrapolated.rows,
     )
 
 
-def _extrapolate_curve(curves: CurveModel, values) -> np.ndarray:
-    """Compute amplitude, frequency and damping (3, j) of the fitted model beyond the measured amplitudes.
+class ExtrapolatedCurve(NamedTuple):
+    """Fitted curve beyond the data (5, j), as in `FittedCurve.beyond`, and advice on a further measurement, or ()."""
 
-    Amplitudes at which the mode does not oscillate are left out.
+    rows: np.ndarray
+    advice: tuple[str, ...]
+
+
+def _extrapolate_curve(curves: CurveModel, measured: MeasuredCurve, fit: Fit) -> ExtrapolatedCurve:
+    """Compute the fitted curve with its band beyond the measured amplitudes.
+
+    The band is the linear propagation of the intervals and of the correlation of the parameters. Amplitudes at which the
+    mode does not oscillate are left out.
     """
     ends = curves.amplitude[[0, -1]] * [1 / EXTENT, EXTENT]
     amplitudes = np.geomspace(*ends, N_CURVE_POINTS)
+
+    def compute(values) -> np.ndarray:
+        """Return frequency [Hz] and damping ratio (2, k) for values of the parameters."""
+        return _compute_backbone_curve(curves.build_model(values), amplitudes, curves.methods[0])
+
+    half_widths = np.ptp(fit.intervals.ends, axis=1) / 2
     try:
-        curve = _compute_backbone_curve(curves.build_model(values), amplitudes, curves.methods[0])
+        curve = compute(fit.values)
+        known = np.isfinite(curve).all(axis=0)
+        if not np.isfinite(half_widths).all() or not half_widths.all():
+            rows = np.array([amplitudes, *curve, *np.full_like(curve, np.nan)])
+            return ExtrapolatedCurve(rows[:, known], ())
+
+        # changes of the curve per half-width of each parameter; a step towards the middle stays within its range
+        slopes = []
+        for k, half_width in enumerate(half_widths):
+            values = np.array(fit.values)
+            middle = (curves.ranges[k].low + curves.ranges[k].high) / 2
+            step = np.copysign(BAND_STEP * half_width, middle - values[k])
+            values[k] += step
+            slopes.append((compute(values) - curve) / step * half_width)
     except PatchfemError:
-        return np.zeros((3, 0))
-    return np.array([amplitudes, *curve])[:, np.isfinite(curve).all(axis=0)]
+        return ExtrapolatedCurve(np.zeros((5, 0)), ())
+    correlation = fit.intervals.correlation
+    correlation = np.where(np.isfinite(correlation), correlation, np.eye(len(slopes)))
+    variance = np.einsum("iqk,ij,jqk->qk", slopes, correlation, slopes)
+    rows = np.array([amplitudes, *curve, *np.sqrt(np.maximum(variance, 0.0))])
+    widest = int(np.argmax(half_widths / np.maximum(np.abs(fit.values), 1e-300)))
+    deviation = np.median(measured.error / np.abs(measured.value), axis=1)[:, None] * np.abs(curve)
+    advice = _advise_amplitude(
+        amplitudes, np.array(slopes) / deviation, correlation, curves.ranges[widest].key, widest
+    )
+    return ExtrapolatedCurve(rows[:, known], advice)
+
+
+def _advise_amplitude(
+    amplitudes: np.ndarray, slopes: np.ndarray, correlation: np.ndarray, key: str, k: int
+) -> tuple[str, ...]:
+    """Return a sentence on the further amplitude that narrows the interval of parameter k most; () if none does.
+
+    The covariance after a further measurement with the gradients G is (C^-1 + G^T G)^-1.
+
+    Parameters
+    ----------
+    amplitudes : (j,) array
+        [m]
+    slopes : (n, 2, j) array
+        Change of the curve per half-width of each parameter, in standard deviations of a measurement.
+    correlation : (n, n) array
+    key : str
+        Name of parameter k.
+    k : int
+    """
+    # a 95 % half-width is 1.96 standard deviations
+    covariance = correlation / 1.96**2
+    information = np.linalg.pinv(covariance)
+    gradients = np.nan_to_num(slopes).transpose(2, 1, 0)
+    after = np.linalg.pinv(information + np.einsum("jqn,jqm->jnm", gradients, gradients))
+    ratio = np.sqrt(after[:, k, k] / covariance[k, k])
+    best = int(np.argmin(ratio))
+    if ratio[best] > 1 - MIN_GAIN:
+        return ()
+    return (
+        f"a further measurement at about {format_length(amplitudes[best], 2)} would narrow the interval of {key} most, by "
+        f"about {100 * (1 - ratio[best]):.0f} %",
+    )
 
 
 def _search_two_models(models: TwoModels, start, starts: int, amplitude) -> tuple:

@@ -5,8 +5,11 @@ import json
 from collections.abc import Iterable
 from pathlib import Path
 
+import numpy as np
+
 from ... import __version__
 from ...disk.atomic_write import write_text
+from ...identify.least_squares import Descent
 
 
 class SearchCheckpoint:
@@ -36,9 +39,16 @@ class SearchCheckpoint:
             if isinstance(content, dict) and content.get("question") == self.key:
                 self.known = content["ends"]
 
-    def __call__(self, name: str, ends: list | None = None) -> list | None:
-        """Return the stored result of a search, after storing a new one if it is given."""
-        if ends is not None:
-            self.known[name] = ends
-            write_text(self.path, json.dumps({"question": self.key, "ends": self.known}))
-        return self.known.get(name)
+    def load(self, name: str) -> Descent | None:
+        """Return the stored descent of a name; None if there is none."""
+        stored = self.known.get(name)
+        if not stored:
+            return None
+        *u, cost, rows, is_converged = stored
+        return Descent(np.array(u), np.inf if cost is None else cost, is_converged, rows)
+
+    def save(self, name: str, descent: Descent) -> None:
+        """Store a finished descent; JSON has no infinite number."""
+        cost = descent.cost if np.isfinite(descent.cost) else None
+        self.known[name] = [*descent.u.tolist(), cost, descent.rows, bool(descent.is_converged)]
+        write_text(self.path, json.dumps({"question": self.key, "ends": self.known}))

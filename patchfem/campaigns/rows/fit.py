@@ -15,11 +15,12 @@ from typing import NamedTuple
 import numpy as np
 
 from ...core import PatchfemError
+from ...identify.least_squares import Descents, Fit, Search
 from ..fits.problem import FittedKeys, FreeKeys
 from .cells import MAX_LOG_RATIO, Readings, compute_rms_scores, read_response_table
 from .condition_models import ConditionModels, FitRequest
 from .model_readings import ModelReadings
-from .search import BestFit, SearchSettings, make_residual, search_random_starts
+from .search import SearchSettings, make_residual
 
 SAME_SCORE = 1.01  # Largest ratio of scores at which two descents count as the same fit.
 UNSTABLE_MEANINGS = {
@@ -44,7 +45,7 @@ class FittedRows:
     settings : SearchSettings
     held_out : (n,) bool
         Mask of the readings that were held out.
-    search : BestFit
+    search : Descents
         Search from random starting points.
     computed : (2, c) array
         Acceleration reading [m s-2] and displacement [m] of every condition.
@@ -61,7 +62,7 @@ class FittedRows:
     cells: Readings
     settings: SearchSettings
     held_out: np.ndarray
-    search: BestFit
+    search: Descents
     computed: np.ndarray
     logs: np.ndarray
     left_out_logs: np.ndarray
@@ -159,24 +160,24 @@ def fit_rows(
     every_condition = range(len(cells.conditions))
 
     fitter = _RowsFitter(cells, keys, settings, report)
-    best = fitter.fit(computed, fitted, "all", "rows")
-    prediction = _predict_from_rest(computed, best.fit.values, every_condition)
+    best, descents = fitter.fit(computed, fitted, "all", "rows")
+    prediction = _predict_from_rest(computed, best.values, every_condition)
     logs = cells.compute_log_ratios(*prediction)
     left_out_logs = np.full(held_out.size, np.nan)
     for name, group in groups.items():
-        fold = fitter.fit(computed, fitted & ~group, f"without {name}")
+        fold, _ = fitter.fit(computed, fitted & ~group, f"without {name}")
         conditions = sorted(set(cells.condition[group].tolist()))
-        fold_prediction = _predict_from_rest(computed, fold.fit.values, conditions)
+        fold_prediction = _predict_from_rest(computed, fold.values, conditions)
         left_out_logs[group] = cells.compute_log_ratios(*fold_prediction)[group]
     return FittedRows(
         keys=keys.make_fitted_keys(
-            best.fit, begin, _warn_of_doubtful_fit(cells, best, logs, settings)
+            best, begin, _warn_of_doubtful_fit(cells, descents, logs, settings)
         ),
         models=models,
         cells=cells,
         settings=settings,
         held_out=held_out,
-        search=best,
+        search=descents,
         computed=prediction,
         logs=logs,
         left_out_logs=left_out_logs,
@@ -215,8 +216,11 @@ class _RowsFitter(NamedTuple):
 
     def fit(
         self, readings: ModelReadings, training, search_name: str, interval_kind: str = ""
-    ) -> BestFit:
+    ) -> tuple[Fit, Descents]:
         """Fit the free parameters to the readings in the mask `training` (n,).
+
+        The first motions of each descent start from rest, so that its result depends only on its starting point and on
+        the training readings.
 
         Parameters
         ----------
@@ -228,11 +232,17 @@ class _RowsFitter(NamedTuple):
         interval_kind : str
             As in `Problem.solve`.
         """
-        residual = make_residual(self.cells, readings, training, self.settings.unstable)
-        problem = self.keys.make_problem(residual)
-        return search_random_starts(
-            problem, self.settings, readings.reset_motions, interval_kind, search_name, self.report
-        )
+        settings = self.settings
+        residual = make_residual(self.cells, readings, training, settings.unstable)
+        options = {"before_descent": readings.reset_motions}
+        if self.report is not None:
+            options["report"] = self.report
+        if settings.checkpoint is not None:
+            checkpoint = settings.checkpoint
+            options["load"] = lambda start: checkpoint.load(f"{search_name}/{start}")
+            options["save"] = lambda start, end: checkpoint.save(f"{search_name}/{start}", end)
+        search = Search(settings.starts, settings.seed, **options)
+        return self.keys.make_problem(residual).search(search, interval_kind)
 
 
 class _StartCounter:
@@ -250,7 +260,7 @@ class _StartCounter:
 
 
 def _warn_of_doubtful_fit(
-    readings: Readings, search: BestFit, logs, settings: SearchSettings
+    readings: Readings, search: Descents, logs, settings: SearchSettings
 ) -> list:
     """Return warnings about rows without readings, unstable readings and an unreliable search."""
     warnings = []

@@ -57,19 +57,34 @@ class FreeBalance:
     - h: number of harmonics
 
     - scale: scale of the frequency [rad/s]
+    - excitation: (n, n) matrix E of a force 2 zeta omega m E z' in the first harmonic alone, such as that of a shaker;
+      None for the negative damping 2 zeta omega m z' of all coordinates in all harmonics
 
     The unknowns are the packed slides of `HarmonicBalance` divided by the amplitude, omega/scale and zeta. The
     prescribed coordinate has no receptance; its two equations determine omega and zeta.
     """
 
-    def __init__(self, balance: HarmonicBalance, mode: int, harmonics: int, scale: float):
+    def __init__(
+        self,
+        balance: HarmonicBalance,
+        mode: int,
+        harmonics: int,
+        scale: float,
+        excitation: np.ndarray | None = None,
+    ):
         self.balance = balance
         self.mode = mode
         self.h = harmonics
         self.scale = scale
+        n = balance.modes.omega.size
+        # matrix of the exciting force for each harmonic
+        self.excitation = np.broadcast_to(np.eye(n), (harmonics + 1, n, n))
+        if excitation is not None:
+            is_first = np.arange(harmonics + 1) == 1
+            self.excitation = is_first[:, None, None] * excitation
 
     def make_linear_part(self, omega: float, zeta: float) -> LinearPart:
-        """Return the receptances of the modes, to which the damping -2 zeta omega is added.
+        """Return the receptances of the modes, to which the damping -2 zeta omega E is added.
 
         The coordinate of prescribed amplitude has no receptance. omega: frequency [rad/s].
         """
@@ -80,7 +95,7 @@ class FreeBalance:
         dynamic_stiffness = (
             np.diag(modes.omega**2)
             - (k * omega) ** 2 * eye
-            + 1j * k * omega * (modes.damping_matrix - 2 * zeta * omega * eye)
+            + 1j * k * omega * (modes.damping_matrix - 2 * zeta * omega * self.excitation)
         )
         inverse = np.zeros_like(dynamic_stiffness)
         right_vector = eye[self.mode] + 0j
@@ -93,7 +108,8 @@ class FreeBalance:
         )
         right_vector -= inverse[1] @ dynamic_stiffness[1][:, self.mode]
         left_vector -= dynamic_stiffness[1][self.mode] @ inverse[1]
-        slope = -2 * k**2 * omega * eye + 1j * k * (modes.damping_matrix - 4 * zeta * omega * eye)
+        damping_slope = modes.damping_matrix - 4 * zeta * omega * self.excitation
+        slope = -2 * k**2 * omega * eye + 1j * k * damping_slope
         return LinearPart(
             inverse,
             slope,
@@ -116,7 +132,8 @@ class FreeBalance:
             np.append(x[:-2] * amplitude, [amplitude, 0.0]), omega, 0.0, self.h, linear_part
         )
         # This is the derivative of the dynamic stiffness with respect to zeta, times the motion.
-        by_zeta = -2j * np.arange(self.h + 1)[:, None] * omega**2 * equations.modal
+        excited = np.einsum("kab,kb->ka", self.excitation, equations.modal)
+        by_zeta = -2j * np.arange(self.h + 1)[:, None] * omega**2 * excited
         slides_by_zeta = balance.faces @ np.einsum("kab,kb->ak", linear_part.inverse, by_zeta)
         residual_by_zeta = linear_part.free[0][2] @ by_zeta[1] / omega**2
         jacobian = equations.jacobian.copy()

@@ -96,7 +96,8 @@ def make_panel(answers: dict[str, Answer], chart: Chart) -> Panel | None:
         y_label = first_data[main[0]].text
     y_axis = _make_axis(y_label, first_data[main[0]].unit, y_values, chart.log, "y")
     second_axis = None
-    second = [name for name in chart.y2 if name in first_data]
+    # of several cases only the first axis is drawn, so that each case is one curve
+    second = [name for name in chart.y2 if name in first_data and "case" not in first_data]
     if second:
         second_axis = _make_axis(
             second[0], first_data[second[0]].unit, [first_data[second[0]].values], chart.log, "y"
@@ -262,6 +263,8 @@ def _make_curves(data: dict[str, Variable], chart: Chart, name: str, axes: tuple
             (text, x_values, values)
             for text, values in zip(_name_elements(data, first), variable.values, strict=True)
         ]
+    elif variable.values.ndim == 2 and first == "case":
+        return _make_case_curves(data, name, x_values, y_axis)
     elif variable.values.ndim == 2:
         rows = [(label, x_values, variable.values[-1])]  # the last frame
 
@@ -277,6 +280,25 @@ def _make_curves(data: dict[str, Variable], chart: Chart, name: str, axes: tuple
     if chart.by in data and len(curves) == 1 and not is_line:
         is_joined = chart.style != "points"
         return _split_by_code(curves[0], data[chart.by], thin(rows[0][2]), is_joined)
+    return curves
+
+
+def _make_case_curves(
+    data: dict[str, Variable], name: str, x_values: np.ndarray, y_axis: Axis
+) -> list[Curve]:
+    """Return a curve with its band for each case of a variable (case, x), without its missing points."""
+    # the legend has the last part of the key: "load 4 kN"
+    key = data["case"].text.rpartition(".")[2].replace("_", " ")
+    names = [f"{key} {value}" for value in data["case"].values]
+    low, high = _find_band(data, name)
+    curves = []
+    for number, values in enumerate(data[name].values):
+        keep = np.isfinite(values)
+        scaled = [
+            None if end is None else end[number, keep] * y_axis.scale
+            for end in (data[name].values, low, high)
+        ]
+        curves.append(Curve(names[number], x_values[keep], *scaled, colour=number))
     return curves
 
 

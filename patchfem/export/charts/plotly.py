@@ -133,6 +133,8 @@ def _curve_traces(curve: Curve, style: str, colour: str) -> list[dict]:
         "hoverinfo": "skip",
         "showlegend": False,
     }
+    if curve.on_second_axis:
+        band["yaxis"] = "y2"
     return [band, trace]
 
 

@@ -339,7 +339,7 @@ _METHOD_CURVES = {
     name: tuple(
         f"{method}_{name}@{method}_amplitude".replace("-", "_") for method in BACKBONE_METHODS
     )
-    for name in ("frequency", "damping")
+    for name in ("frequency", "damping", "force")
 }
 BACKBONE = (
     Chart(
@@ -358,6 +358,14 @@ BACKBONE = (
         log="x auto",
         labels=("amplitude at the output", "damping ratio"),
         caption="Structure and friction together. Use the first curve; its band contains what other kinds of test read.",
+    ),
+    Chart(
+        "Force of the phase resonance",
+        "balance_amplitude quasi_static_amplitude decay_amplitude",
+        _METHOD_CURVES["force"],
+        log="x y",
+        labels=("amplitude at the output", "force at the output"),
+        caption="Amplitude of a sinusoidal force at the output, in phase with the velocity there, that holds the amplitude.",
     ),
 )
 FIT = (
@@ -385,7 +393,7 @@ FIT = (
         "points",
         log="x",
         lines=("curve_frequency@curve_amplitude",),
-        caption="Measured values with 95 % intervals, and the fitted curve beyond them.",
+        caption="Measured values with 95 % intervals, and the fitted curve with its 95 % band beyond them.",
     ),
     Chart(
         "Damping ratio",
@@ -395,7 +403,7 @@ FIT = (
         log="x auto",
         lines=("curve_damping@curve_amplitude",),
         labels=("", "damping ratio"),
-        caption="Measured values with 95 % intervals, and the fitted curve beyond them.",
+        caption="Measured values with 95 % intervals, and the fitted curve with its 95 % band beyond them.",
     ),
     Chart(
         "Residuals of the frequency",
@@ -690,10 +698,30 @@ CURVES: dict[str, dict[str, dict[str, str] | Stack | Rows | Entries]] = {
         "backbone.csv": Stack(
             "method",
             BACKBONE_METHODS,
-            ("amplitude", "frequency", "frequency_error", "damping", "damping_error", "force"),
+            (
+                "amplitude",
+                "frequency",
+                "frequency_error",
+                "damping",
+                "damping_error",
+                "force",
+                "force_error",
+                "force_frequency",
+                "frequency_low",
+                "frequency_high",
+                "damping_low",
+                "damping_high",
+            ),
         )
     },
     "fit": {
+        "fitted_curve.csv": {
+            "amplitude": "curve_amplitude",
+            "frequency": "curve_frequency",
+            "frequency_error": "curve_frequency_error",
+            "damping": "curve_damping",
+            "damping_error": "curve_damping_error",
+        },
         "fit.csv": {
             # of a loop
             "time": "time",
@@ -717,7 +745,7 @@ CURVES: dict[str, dict[str, dict[str, str] | Stack | Rows | Entries]] = {
             "computed acceleration [g]": "computed_acceleration",
             "computed displacement [mil]": "computed_displacement",
             "held": "held",
-        }
+        },
     },
     "cost": {"cost.csv": Rows("run", has_units=False)},
 }
@@ -783,6 +811,18 @@ SWEEP_TABLES = (
 TABLES: dict[str, tuple[Table, ...]] = {
     **dict.fromkeys(("patch", "bench", "rig", "linear"), RUN_TABLES),
     "sweep": SWEEP_TABLES,
+    "backbone": (
+        Table(
+            "Values of the key",
+            "table",
+            (
+                Column("value", "value"),
+                Column("stuck_frequency", "frequency with a sticking contact"),
+                Column("largest_damping", "largest damping ratio"),
+                Column("amplitude_of_largest_damping", "at"),
+            ),
+        ),
+    ),
     "compare": tuple(
         Table(
             title,

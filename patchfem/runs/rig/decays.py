@@ -166,8 +166,9 @@ def compute_static_curve(modes, laws, mode_index: int, amplitudes, samples: int)
 
     Returns
     -------
-    (4, k) array
-        Amplitude [m], frequency [Hz], damping ratio [1], and dissipated energy per cycle [J].
+    (5, k) array
+        Amplitude [m], frequency [Hz], damping ratio [1], energy that friction dissipates per cycle [J], and the force at
+        the output that replaces the energy of a cycle [N].
     """
     stuck_mode = modes.compute_stuck_mode(laws.rows, laws.stiffness(), mode_index)
     output_motion = float(modes.output @ stuck_mode[1])
@@ -185,12 +186,17 @@ def compute_static_curve(modes, laws, mode_index: int, amplitudes, samples: int)
 
 
 def tabulate_static_motions(modes, motions: list) -> np.ndarray:
-    """Return amplitude, frequency, damping ratio and loss (4, k) of quasi-static motions."""
+    """Return amplitude, frequency, damping ratio, loss and force (5, k) of quasi-static motions."""
     amplitude = [abs(float(modes.output @ motion.z)) for motion in motions]
     frequency = [motion.omega / (2 * np.pi) for motion in motions]
     damping = [motion.zeta for motion in motions]
     loss = [motion.loss for motion in motions]
-    return np.array([amplitude, frequency, damping, loss])
+    # The work pi F a of a force in phase with the velocity is the energy 2 pi zeta m omega^2 z z lost in a cycle.
+    force = [
+        2 * motion.zeta * modes.mass * motion.omega**2 * float(motion.z @ motion.z) / size
+        for motion, size in zip(motions, amplitude)
+    ]
+    return np.array([amplitude, frequency, damping, loss, force])
 
 
 def estimate_mesh_error(fine, coarse, compute) -> np.ndarray:

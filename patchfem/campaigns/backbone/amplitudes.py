@@ -1,0 +1,228 @@
+"""Amplitudes of a backbone: a default range, those of given forces, and more points where the damping changes fast."""
+
+import numpy as np
+
+from ...core import NotConverged, PatchfemError
+from ...formatting import format_length, format_quantity
+from . import balance
+from .joint import MIN_AMPLITUDE_FACTOR, JointMode
+from .quasi_static import compute_static_curve
+from .records import Curve, make_curve
+
+AMPLITUDES_PER_DECADE = 6  # Number of default amplitudes per decade before points are added.
+# Ratio of the largest default amplitude to the amplitude at which the complete contact slips.
+MAX_AMPLITUDE_FACTOR = 15.0
+# Ratio of the smallest default amplitude under rigid friction to the static deflection by friction.
+MIN_RIGID_FACTOR = 2.0
+# Ratio of the largest amplitude to that at which a softening spring no longer returns the block.
+SOFTENING_END = 0.7
+# Ratio of the largest amplitude to that at which a hardening spring is as stiff as the mode.
+HARDENING_END = 3.0
+# Ratio of the travel to the largest default amplitude, so that a release can start above it.
+TRAVEL_FACTOR = 1.15
+LINEAR_AMPLITUDES = (1e-6, 1e-3)  # first and last amplitude of a linear rig [m]
+N_LINEAR = 4  # number of amplitudes of a linear rig, whose values are constant
+# Change between neighbours, as a fraction of the range of the curve, above which a point is added between them.
+MAX_CHANGE = 0.08
+MIN_SPACING = 1.02  # ratio of neighbouring amplitudes below which no point is added
+MAX_REFINEMENTS = 3  # each one may halve the spacing
+N_EXTENSIONS = 8  # number of decades by which the default range is extended to reach a force
+MAX_FORCE_STEPS = 8  # largest number of interpolations towards the amplitude of a force
+
+
+def default_amplitudes(joints: list[JointMode]) -> np.ndarray:
+    """Return amplitudes (k,) [m] from full stick to nearly free motion of all modes, closer where a curve changes fast."""
+    ends = np.array([_default_range(joint) for joint in joints])
+    low, high = ends[:, 0].min(), ends[:, 1].max()
+    high = min(high, *(joint.model.rig.springs.travel for joint in joints))
+    if joints[0].is_linear:
+        return np.geomspace(low, high, N_LINEAR)
+    count = 1 + int(np.ceil(AMPLITUDES_PER_DECADE * np.log10(high / low)))
+    amplitudes = np.geomspace(low, high, count)
+    for joint in joints:
+        amplitudes = refine_amplitudes(joint, amplitudes)
+    return amplitudes
+
+
+def _default_range(joint: JointMode) -> tuple[float, float]:
+    """Return the smallest and largest default amplitude [m] of a mode."""
+    travel = joint.model.rig.springs.travel
+    if joint.is_linear:
+        low, high = LINEAR_AMPLITUDES
+        factor = min(1.0, travel / high)
+        return low * factor, high * factor
+    low, high = joint.output_amplitude(np.array(_default_slides(joint)))
+    high = min(high, _max_amplitude(joint))
+    return min(low, MIN_AMPLITUDE_FACTOR * high), high
+
+
+def _default_slides(joint: JointMode) -> tuple[float, float]:
+    """Return the smallest and largest relative displacement [m] of the default amplitudes."""
+    stiffness = float(joint.stiffness[joint.face])
+    deflection = joint.deflection if joint.friction_limit else 0.0
+    if 0 < stiffness < np.inf or not deflection:
+        slip = joint.slip_displacement
+        return MIN_AMPLITUDE_FACTOR * slip, MAX_AMPLITUDE_FACTOR * max(slip, deflection)
+    return MIN_RIGID_FACTOR * deflection, MAX_AMPLITUDE_FACTOR**2 * deflection
+
+
+def _max_amplitude(joint: JointMode) -> float:
+    """Return the largest default amplitude [m], limited by the stop and by a cubic spring."""
+    springs = joint.model.rig.springs
+    travel = springs.travel / TRAVEL_FACTOR
+    if not springs.cubic:
+        return travel
+    output = abs(float(joint.modes.output[joint.mode])) or joint.reach
+    doubling = np.sqrt(joint.spring / abs(springs.cubic)) / output
+    end = SOFTENING_END if springs.cubic < 0 else HARDENING_END
+    return min(travel, doubling * end)
+
+
+def estimate_curve(joint: JointMode, amplitudes) -> Curve | None:
+    """Return the curve (k,) of the recommended method without errors, with few harmonics; None if there is none.
+
+    Amplitudes without a motion have NaN.
+    """
+    joint = joint._replace(has_errors=False)
+    try:
+        if joint.is_linear or joint.is_rigid:
+            return balance.compute_balance_curve(joint, amplitudes)
+        joint.require_steady_loops("balance")
+        harmonics = balance.HARMONIC_COUNTS[0]
+        laws = joint.steady_laws()
+        values, motions = balance.tabulate_free_motions(laws, joint, amplitudes, harmonics)
+        forces = np.full((2, len(amplitudes)), np.nan)
+        if joint.has_force:
+            forces = balance.find_forces(laws, joint, amplitudes, harmonics, motions)
+        values = np.vstack([values, forces])
+        return make_curve(amplitudes, values, np.zeros_like(values))
+    except (NotConverged, PatchfemError):
+        pass
+    try:
+        return compute_static_curve(joint, amplitudes)
+    except (NotConverged, PatchfemError):
+        return None
+
+
+def refine_amplitudes(joint: JointMode, amplitudes) -> np.ndarray:
+    """Add amplitudes where frequency or damping ratio change by more than MAX_CHANGE of their range.
+
+    Parameters
+    ----------
+    joint : JointMode
+    amplitudes : (k,) array
+        Increasing [m].
+
+    Returns
+    -------
+    (n,) array
+        The amplitudes, with further ones between them.
+    """
+    if joint.is_linear:
+        return amplitudes
+    joint = joint._replace(has_force=False)
+    known = estimate_curve(joint, amplitudes)
+    for _ in range(MAX_REFINEMENTS):
+        if known is None or known.amplitude.size < 2:
+            break
+        is_wide = np.zeros(known.amplitude.size - 1, bool)
+        for values in (known.frequency, known.damping):
+            step = np.abs(np.diff(values))
+            is_wide |= step > MAX_CHANGE * (np.nanmax(values) - np.nanmin(values))
+        is_wide &= known.amplitude[1:] > MIN_SPACING**2 * known.amplitude[:-1]
+        if not is_wide.any():
+            break
+        between = np.sqrt(known.amplitude[1:] * known.amplitude[:-1])[is_wide]
+        added = estimate_curve(joint, between)
+        if added is None:
+            break
+        known = _join(known, added)
+        amplitudes = np.union1d(amplitudes, between)
+    return amplitudes
+
+
+def _join(curve: Curve, other: Curve) -> Curve:
+    """Return two curves as one with increasing amplitudes."""
+    joined = Curve(*(np.concatenate(pair) for pair in zip(curve, other)))
+    return joined.at(np.argsort(joined.amplitude))
+
+
+def find_amplitudes_of_forces(joint: JointMode, forces) -> np.ndarray:
+    """Return the smallest amplitudes (n,) [m] at which given forces at the output hold the phase resonance.
+
+    Parameters
+    ----------
+    joint : JointMode
+    forces : (n,) array
+        Amplitudes of the force [N], above 0.
+
+    Raises
+    ------
+    PatchfemError
+        If no amplitude within the travel has one of the forces.
+    """
+    forces = np.asarray(forces, float)
+    travel = joint.model.rig.springs.travel
+    low, high = _default_range(joint)
+    count = 1 + int(np.ceil(AMPLITUDES_PER_DECADE * np.log10(high / low)))
+    known = _estimate_forces(joint, np.geomspace(low, high, count))
+
+    # a wider range, decade by decade, until all forces lie inside
+    for _ in range(N_EXTENSIONS):
+        added = []
+        if known.force.min() > forces.min() and not joint.is_rigid:
+            added.append(known.amplitude[0] / 10)
+        if known.force.max() < forces.max() and known.amplitude[-1] < travel:
+            added.append(min(10 * known.amplitude[-1], travel))
+        if not added:
+            break
+        known = _join(known, _estimate_forces(joint, np.array(added)))
+    for force in forces:
+        if not known.force.min() <= force <= known.force.max():
+            ends = [
+                format_quantity(float(end), "N", 3)
+                for end in (known.force.min(), known.force.max())
+            ]
+            low, high = (format_length(known.amplitude[k], 3) for k in (0, -1))
+            raise PatchfemError(
+                f"no amplitude from {low} to {high} needs a force of {format_quantity(float(force), 'N', 3)} at the "
+                f"output for its phase resonance: the forces there are {ends[0]} to {ends[1]}; give other --forces"
+            )
+
+    # interpolation in logarithms; each step adds the points that it found
+    tolerance = 1e-2 * joint.model.accuracy.tolerance
+    for _ in range(MAX_FORCE_STEPS):
+        found = np.array([_interpolate_amplitude(known, force) for force in forces])
+        new = _estimate_forces(joint, np.unique(found))
+        reached = np.interp(found, new.amplitude, new.force)
+        if np.all(np.abs(reached - forces) <= tolerance * forces):
+            break
+        known = _join(known, new)
+    return found
+
+
+def _estimate_forces(joint: JointMode, amplitudes) -> Curve:
+    """Return the points of `estimate_curve` that have a positive force.
+
+    Raises PatchfemError if there are none.
+    """
+    curve = estimate_curve(joint, amplitudes)
+    if curve is not None:
+        curve = curve.at(curve.force > 0)
+    if curve is None or not curve.amplitude.size:
+        raise PatchfemError(
+            "the force at the output that holds the phase resonance is not known here; give --amplitudes"
+        )
+    return curve
+
+
+def _interpolate_amplitude(curve: Curve, force: float) -> float:
+    """Return the smallest amplitude [m] at which the force [N] of a curve, a straight line in logarithms, is reached."""
+    above = int(np.argmax(curve.force >= force))
+    if not above:
+        return float(curve.amplitude[0])
+    places = slice(above - 1, above + 1)
+    log_amplitude = np.interp(
+        np.log(force), np.log(curve.force[places]), np.log(curve.amplitude[places])
+    )
+    return float(np.exp(log_amplitude))

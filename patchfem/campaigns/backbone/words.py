@@ -1,0 +1,316 @@
+"""Sentences on a backbone: notes on its curves, and advice on which curve to use and where the methods hold."""
+
+import numpy as np
+
+from ...effects import law_has_trait
+from ...formatting import format_length, format_quantity
+from ...runs.patch import faces
+from .joint import MIN_AMPLITUDE_FACTOR, JointMode
+from .records import ROUND_OFF_ERROR, Backbone, Curve, match_amplitudes
+
+# Largest ratio of an amplitude of micro-slip to the amplitude at the onset of gross slip.
+MAX_MICRO_SLIP_RATIO = 0.3
+# Smallest ratio of a loss to its error at which the loss is used to determine an exponent.
+MIN_LOSS_RATIO = 4.0
+MAX_LISTED_AMPLITUDES = 6  # Largest number of amplitudes that a sentence lists individually.
+# Smallest ratio of two values that is reported as a ratio and not as a percentage.
+MIN_REPORTED_FACTOR = 2.0
+AGREEMENT = 0.02  # Largest relative difference of the damping at which two methods agree.
+MIN_REPORTED_LOSS = 0.05  # Smallest decrease of the amplitude per cycle that is reported.
+MIN_REPORTED_RATIO = 0.05  # Smallest relative motion of other modes that is reported.
+MISSING_ERRORS = (
+    "the errors of the curves do not account for the mesh, because no coarser mesh was computed: "
+)
+REASONS_OF_GAPS = {
+    "balance": "harmonic balance did not converge at these amplitudes; the curve may turn back to "
+    "smaller amplitudes, or the mode may stop oscillating",
+    "quasi-static": "the static curve does not reach these amplitudes",
+}
+PURPOSES = {
+    "balance": "it is the steady vibration in resonance, such as a test in phase resonance or a response near its peak",
+    "quasi-static": "no curve of the steady vibration is known here, and in micro-slip both agree",
+}
+NO_CURVE = (
+    "No method gives a curve at these amplitudes; give others with --amplitudes, or run a release with "
+    'drive.kind = "free".'
+)
+DIFFERENCE = (
+    "The values of {name} by quasi-static and by balance differ most at the amplitude {amplitude}, {size}: the static "
+    "curve uses the secant stiffness between the turning points; harmonic balance uses the first harmonic of the force."
+)
+SECANT = (
+    "--method quasi-static takes the stiffness from the two turning points of the motion; --method balance takes the "
+    "stiffness from the first harmonic of the force, and this stiffness is lower once the contact slips. The frequencies "
+    "by quasi-static are therefore higher than the frequencies by balance"
+)
+
+
+def write_notes(joint: JointMode, amplitudes, backbone: Backbone) -> tuple[str, ...]:
+    """Write notes on the removed joint, on gaps and differences of the curves, and on what the errors leave out.
+
+    amplitudes: requested ones (k,) [m].
+    """
+    model = joint.model
+    curves = backbone.curves
+    notes = [*model.describe_removed_joint()]
+    has_friction = model.friction is not None or model.rig.friction.interfaces
+    if joint.is_linear and has_friction:
+        notes.append("no friction acts, so frequency and damping are the same at all amplitudes")
+    for method, curve in curves.items():
+        notes += _note_gaps(amplitudes, method, curve)
+    if not joint.is_linear:
+        if backbone.exponents.micro_theory is not None and backbone.exponents.micro is None:
+            notes.append(_note_micro_slip(joint, amplitudes))
+        notes += _note_missing_mesh(joint)
+        slips = amplitudes[-1] > MAX_MICRO_SLIP_RATIO * joint.slip_amplitude
+        if joint.friction_limit and slips and set(curves) == {"quasi-static"}:
+            notes.append(SECANT)
+    if model.wear is not None:
+        notes.append("these curves are for unworn pieces: [wear] is ignored")
+    return tuple(notes)
+
+
+def _note_missing_mesh(joint: JointMode) -> list[str]:
+    """Return a list of notes on a contact with partial slip and without a coarser mesh."""
+    model = joint.model
+    if not model.partial_slip or joint.coarse is not None:
+        has_errors = not model.rig.friction.has_partial_slip or faces.has_error_meshes(model)
+        return [] if has_errors else [MISSING_ERRORS + faces.NO_ERROR_ESTIMATE]
+    advice = "leave out contact.element_size"
+    if model.patch.mesh.file is not None:
+        advice = "split the elements of contact.mesh"
+    return [f"{MISSING_ERRORS}the interface has too few elements for a coarser mesh; {advice}"]
+
+
+def _note_micro_slip(joint: JointMode, amplitudes) -> str:
+    """Return a note on why the exponent of micro-slip is not determined."""
+    edge = MAX_MICRO_SLIP_RATIO * joint.slip_amplitude
+    if amplitudes[0] > edge:
+        begin = format_length(MIN_AMPLITUDE_FACTOR / MAX_MICRO_SLIP_RATIO * edge, 2)
+        return (
+            f"the smallest amplitude, {format_length(amplitudes[0], 3)}, lies above the range of "
+            f"micro-slip, which ends at about {format_length(edge, 2)}; to get the exponent of "
+            f"micro-slip, begin --amplitudes at {begin}"
+        )
+    return (
+        "the exponent of micro-slip cannot be determined: fewer than two amplitudes below "
+        f"{format_length(edge, 2)} have an energy loss of at least {MIN_LOSS_RATIO:g} times the "
+        f"error of the loss; give amplitudes up to {format_length(edge, 2)}, or a smaller "
+        "accuracy.tolerance"
+    )
+
+
+def _note_gaps(amplitudes, method: str, curve: Curve) -> list[str]:
+    """Return a list of notes on the amplitudes (k,) [m] at which a curve has no value."""
+    missing = amplitudes[~np.isin(amplitudes, curve.amplitude)]
+    count = curve.amplitude.size
+    if not missing.size or count == amplitudes.size:
+        return []
+    if missing.size > MAX_LISTED_AMPLITUDES:
+        ends = [format_length(missing[k], 3) for k in (0, -1)]
+        places = f"lie from {ends[0]} to {ends[1]}"
+    else:
+        places = f"are {', '.join(format_length(amplitude, 3) for amplitude in missing)}"
+    return [
+        f"method {method}: {count} of {amplitudes.size} amplitudes have a result; the amplitudes "
+        f"without a result {places}: {REASONS_OF_GAPS[method]}"
+    ]
+
+
+class _Difference:
+    """Difference of frequency or damping of the quasi-static curve from harmonic balance at common amplitudes.
+
+    Attributes
+    ----------
+    amplitude : (k,) array
+        [m]
+    static, balance, error : (k,) array
+        Values by the methods, and the sum of their errors.
+    """
+
+    def __init__(self, name: str, curves: dict[str, Curve]):
+        here, there = match_amplitudes(curves["balance"], curves["quasi-static"])
+        balance = curves["balance"].at(here)
+        static = curves["quasi-static"].at(there)
+        self.amplitude = balance.amplitude
+        self.static = getattr(static, name)
+        self.balance = getattr(balance, name)
+        self.error = getattr(static, f"{name}_error") + getattr(balance, f"{name}_error")
+
+    @property
+    def size(self) -> np.ndarray:
+        """Absolute difference (k,)."""
+        return np.abs(self.static - self.balance)
+
+
+def write_advice(joint: JointMode, backbone: Backbone) -> tuple[str, ...]:
+    """Write the advice on which curve to use, its band, and the ranges of validity of the methods."""
+    band = backbone.band
+    curves = backbone.curves
+    if band is None:
+        return (NO_CURVE,)
+    if joint.is_linear:
+        return ("All methods agree: no friction acts, so frequency and damping are constant.",)
+    curve = backbone.best
+    sentences = [
+        f"Use the curve of method {band.method}: {PURPOSES[band.method]}.",
+        *_describe_slip(joint, curve),
+        _describe_band_width(backbone),
+        *_describe_static_curve(curves),
+        *_describe_largest_difference("frequency", curves),
+        *_describe_largest_difference("damping", curves),
+        *_describe_coupling(joint, curve),
+    ]
+
+    # A ring-down reads means over unequal cycles.
+    lost_fraction = -np.expm1(-2 * np.pi * curve.damping)
+    k = int(np.argmax(lost_fraction))
+    if lost_fraction[k] > MIN_REPORTED_LOSS:
+        sentences.append(
+            f"A ring-down reads other values where it decays fast: at {format_length(curve.amplitude[k], 3)} a cycle "
+            f"takes {100 * lost_fraction[k]:.2g} % of the amplitude."
+        )
+    for method, reason in backbone.missing.items():
+        sentences.append(f"Method {method} has no curve here: {reason}.")
+    return tuple(sentences)
+
+
+def _describe_slip(joint: JointMode, curve: Curve) -> list[str]:
+    """Describe at which amplitude friction reaches its limit, and below which it dissipates nothing.
+
+    The first amplitude follows from the stiffness of the sticking contact.
+    """
+    if not joint.friction_limit or joint.is_rigid:
+        return []
+    edge = format_length(joint.slip_amplitude, 3)
+    sentences = [
+        f"At the stiffness of the sticking contact, friction would reach its limit at {edge}."
+    ]
+    # Micro-slip has no onset: the smallest slider of a mesh or of a density sets where its loss begins.
+    model = joint.model
+    has_partial_slip = model.partial_slip or model.rig.friction.has_partial_slip
+    laws = [interface.numbers.law for interface in model.rig.friction.interfaces]
+    if has_partial_slip or any(law_has_trait(law, "cells") for law in laws):
+        return sentences
+    slips = curve.loss > ROUND_OFF_ERROR * joint.spring * (curve.amplitude / joint.reach) ** 2
+    count = int(np.argmax(slips)) if slips.any() else curve.amplitude.size
+    if count and not np.isnan(curve.loss).any():
+        edge = format_length(curve.amplitude[count - 1], 3)
+        sentences.append(
+            f"Up to {edge} friction dissipates nothing, and the damping ratio is that of the structure."
+        )
+    return sentences
+
+
+def _describe_band_width(backbone: Backbone) -> str:
+    """Describe where the band of the damping ratio is widest, and the largest deviation of the frequency."""
+    band = backbone.band
+    curve = backbone.best
+    frequency = _largest_distance(curve.frequency, band.frequency_low, band.frequency_high)
+    damping = _largest_distance(curve.damping, band.damping_low, band.damping_high)
+    k = int(np.argmax(damping))
+    content = "the numerical error"
+    if len(backbone.curves) > 1:
+        content += " and the difference of the two methods"
+    return (
+        f"Its band is {content}; it is widest at {format_length(curve.amplitude[k], 3)}, where the damping ratio is "
+        f"{band.damping_low[k]:.3g} to {band.damping_high[k]:.3g} beside {curve.damping[k]:.3g}, and the frequency is "
+        f"within {100 * frequency.max():.2g} % everywhere."
+    )
+
+
+def _largest_distance(value, low, high) -> np.ndarray:
+    """Return the largest relative deviation (k,) of a value from the limits of its band."""
+    return np.maximum(high - value, value - low) / np.maximum(np.abs(value), 1e-300)
+
+
+def _describe_static_curve(curves: dict[str, Curve]) -> list[str]:
+    """Describe where the quasi-static curve holds."""
+    if len(curves) < 2:
+        return []
+    is_beyond = np.False_
+    for name in ("frequency", "damping"):
+        difference = _Difference(name, curves)
+        limit = AGREEMENT * np.abs(difference.balance) + difference.error + ROUND_OFF_ERROR
+        is_beyond = is_beyond | (difference.size > limit)
+    if not is_beyond.size:
+        return []
+    tolerance = f"{100 * AGREEMENT:g} %"
+    if not is_beyond.any():
+        return [f"The quasi-static curve holds within {tolerance} at all its amplitudes."]
+    first = int(np.argmax(is_beyond))
+    if not first:
+        return [
+            f"The quasi-static curve differs by more than {tolerance} from its smallest amplitude on."
+        ]
+    edge = format_length(difference.amplitude[first - 1], 3)
+    return [f"The quasi-static curve holds up to {edge} within {tolerance}."]
+
+
+def _describe_largest_difference(name: str, curves: dict[str, Curve]) -> list[str]:
+    """Describe the largest difference of "frequency" or "damping" beyond the errors of both methods."""
+    if len(curves) < 2:
+        return []
+    difference = _Difference(name, curves)
+    is_large = difference.size > difference.error
+    relative = np.where(is_large, difference.size / np.abs(difference.balance), 0.0)
+    if not relative.size or not relative.max() > 0:
+        return []
+    k = int(np.argmax(relative))
+    ratio = difference.static[k] / difference.balance[k]
+    size = f"by {100 * relative[k]:.2g} %"
+    if ratio >= MIN_REPORTED_FACTOR:
+        size = f"where the value by quasi-static is {ratio:.2g} times the value by balance"
+    amplitude = format_length(difference.amplitude[k], 3)
+    return [DIFFERENCE.format(name=name, amplitude=amplitude, size=size)]
+
+
+def _describe_coupling(joint: JointMode, curve: Curve) -> list[str]:
+    """Describe the coupling of the mode with the other modes."""
+    modes = joint.modes
+    if modes.omega.size == 1:
+        return []
+    ratio = _forced_mode_ratio(joint, curve).max()
+    omega = 2 * np.pi * curve.frequency[-1]
+    others = np.delete(modes.omega, joint.mode)
+    nearest = others[np.argmin(np.abs(others - omega))] / (2 * np.pi)
+    name = format_quantity(float(nearest), "Hz", 4)
+    if ratio < MIN_REPORTED_RATIO:
+        return [f"The coupling with the other modes (nearest: {name} without the contact) is weak."]
+    size = "as much as the mode itself"
+    if ratio < 1:
+        size = f"by up to {100 * ratio:.2g} % of its motion"
+    sentence = (
+        f"The mode is coupled with the one of {name} (without the contact): a force at the output moves other modes "
+        f"{size}; a test reads the curve only if it isolates the mode"
+    )
+    shift = np.abs(curve.force_frequency - curve.frequency)
+    if np.isfinite(shift).any() and np.nanmax(shift) > 0:
+        k = int(np.nanargmax(shift))
+        frequency = format_quantity(float(curve.force_frequency[k]), "Hz", 5)
+        sentence += (
+            f": at {format_length(curve.amplitude[k], 3)} the force of the phase resonance has {frequency}, "
+            f"{100 * shift[k] / curve.frequency[k]:.2g} % beside the curve"
+        )
+    return [f"{sentence}."]
+
+
+def _forced_mode_ratio(joint: JointMode, curve: Curve) -> np.ndarray:
+    """Return the ratio (k,) of the motion of other modes to that of the mode under a force at the output.
+
+    The force acts at the output and the friction at the contact, so each of them moves the other modes.
+    """
+    modes = joint.modes
+    square = (2 * np.pi * curve.frequency) ** 2
+    own = modes.output[joint.mode]
+    row = modes.interfaces[joint.face] if len(modes.interfaces) else modes.output
+    ratio = np.zeros(curve.amplitude.size)
+    for k, omega in enumerate(modes.omega):
+        if k == joint.mode or not own:
+            continue
+        participation = np.abs(modes.output[k] / own)
+        if row[joint.mode]:
+            participation += np.abs(row[k] / row[joint.mode])
+        distance = np.maximum(np.abs(omega**2 - square), ROUND_OFF_ERROR * square)
+        ratio += participation**2 * 2 * np.abs(curve.damping) * square / distance
+    return np.minimum(ratio, 1.0)

@@ -1,0 +1,193 @@
+"""Force of the phase resonance, amplitudes of given forces, and backbones for several values of a key."""
+
+import csv
+import json
+
+import numpy as np
+import pytest
+
+import patchfem as pf
+from patchfem.__main__ import main
+
+# A block of 1 kg at 100 Hz whose joint slips at 30 N, 60 um of its own motion or 120 um at the output.
+JOINT = """
+[normal]
+load = "100 N"
+[friction]
+law = "elastic-plastic"
+static = 0.3
+bond_length = "60 um"
+[structure]
+moving_mass = "1 kg"
+[[structure.mode]]
+name = "first"
+frequency = "100 Hz"
+damping = 0.005
+slide = 0.5
+output = 1.0
+"""
+STIFFNESS = 30 / 60e-6  # N/m
+SLIDE = 0.5
+OMEGA = 200 * np.pi
+TWO_MODES = (
+    JOINT
+    + """[[structure.mode]]
+name = "second"
+frequency = "170 Hz"
+damping = 0.01
+slide = -0.3
+output = 0.7
+"""
+)
+
+
+def run_stepped_sine(scene: str, force: float, frequency: float) -> float:
+    """Return the amplitude at the output [m] of a run under a sinusoidal force, which shares no solver with a backbone."""
+    drive = f'[drive]\nkind = "force"\nforce = "{force!r} N"\nfrequency = "{frequency!r} Hz"\ncycles = 150\n'
+    result = pf.run(scene + drive, **{"accuracy.tolerance": 1e-4})
+    return result.measures["relative_displacement_amplitude"].value
+
+
+@pytest.mark.parametrize("scene", [JOINT, TWO_MODES])
+def test_force_holds_the_amplitude_in_a_run(scene):
+    """A run under the stated force at its frequency has the stated amplitude within 0.1 %.
+
+    In two modes the frequency of the force is not that of the curve.
+    """
+    curve = pf.backbone(scene, amplitudes=[2e-4, 5e-4], method="balance")
+    for k, amplitude in enumerate(curve.balance_amplitude.values):
+        force = float(curve.balance_force[k])
+        frequency = float(curve.balance_force_frequency[k])
+        assert run_stepped_sine(scene, force, frequency) == pytest.approx(amplitude, rel=1e-3)
+    shift = np.abs(curve.balance_force_frequency - curve.balance_frequency).values
+    assert (shift < 1e-3).all() if scene is JOINT else (shift > 1e-3).all()
+
+
+def test_exact_quasi_static_force_replaces_the_energy_of_a_cycle():
+    """The quasi-static force of a Jenkins element is its loss and that of the structure over pi A, within 1e-9."""
+    amplitudes = np.array([5e-5, 2e-4, 1e-3])
+    curve = pf.backbone(JOINT, amplitudes=amplitudes, method="quasi-static")
+    slides = SLIDE * amplitudes
+    tip = STIFFNESS * np.minimum(slides, 60e-6)
+    loss = 4 * 30 * np.maximum(slides - 60e-6, 0)
+    omega = np.sqrt(OMEGA**2 + SLIDE * tip / amplitudes)
+    viscous = np.pi * omega * 2 * 0.005 * OMEGA * amplitudes**2
+    expected = (loss + viscous) / (np.pi * amplitudes)
+    assert curve.quasi_static_force.values == pytest.approx(expected, rel=1e-9)
+
+
+def test_exact_force_of_a_linear_rig():
+    """Without friction the force of the phase resonance is 2 zeta m omega^2 A, within 1e-9."""
+    scene = JOINT.replace("100 N", "0 N")
+    curve = pf.backbone(scene, amplitudes=[1e-5, 1e-3])
+    expected = 2 * 0.005 * OMEGA**2 * np.array([1e-5, 1e-3])
+    for method in ("balance", "quasi_static"):
+        assert curve[f"{method}_force"].values == pytest.approx(expected, rel=1e-9)
+
+
+def test_force_of_rigid_friction_agrees_with_energy():
+    """Under rigid friction far above its onset the force is 4 mu N s/pi and that of the structure, within 0.1 %."""
+    scene = JOINT.replace("elastic-plastic", "coulomb").replace('bond_length = "60 um"\n', "")
+    curve = pf.backbone(scene, amplitudes=[5e-3], method="balance")
+    expected = 4 * 30 * SLIDE / np.pi + 2 * 0.005 * OMEGA**2 * 5e-3
+    error = curve.balance_force_error.values
+    assert curve.balance_force.values == pytest.approx([expected], rel=1e-3)
+    assert abs(curve.balance_force.values - expected) <= error + 1e-3 * expected
+    assert 0 < error < 1e-2 * expected
+
+
+def test_amplitudes_of_forces_have_these_forces():
+    """Amplitudes of given forces have these forces within the tolerance, also beyond the default range."""
+    forces = [0.01, 5.0, 100.0]
+    curve = pf.backbone(JOINT, forces=forces, method="balance")
+    assert curve.balance_force.values == pytest.approx(forces, rel=1e-4)
+    # below slip the joint is linear
+    stuck = 0.005 * 2 * OMEGA * np.sqrt(OMEGA**2 + STIFFNESS * SLIDE**2)
+    assert curve.balance_amplitude.values[0] == pytest.approx(0.01 / stuck, rel=1e-4)
+
+
+def test_default_amplitudes_follow_the_damping():
+    """Between neighbouring default amplitudes the damping ratio changes by at most 15 % of its range."""
+    damping = pf.backbone(JOINT, method="balance").balance_damping.values
+    assert np.abs(np.diff(damping)).max() < 0.15 * np.ptp(damping)
+
+
+def solve_one_harmonic(load: float, amplitude: float) -> tuple[float, float]:
+    """Return frequency [Hz] and damping ratio of the joint at a load [N] by balance of one harmonic.
+
+    Equivalent linearization of a Jenkins element of limit mu N and yield displacement 60 um (Iwan 1973).
+    """
+    limit, slide = 0.3 * load, SLIDE * amplitude
+    stiffness = limit / 60e-6
+    if slide <= 60e-6:
+        real, loss = stiffness, 0.0
+    else:
+        angle = np.arccos(1 - 2 * 60e-6 / slide)
+        real = stiffness / np.pi * (angle - np.sin(2 * angle) / 2)
+        loss = 4 * limit * (slide - 60e-6)
+    omega = np.sqrt(OMEGA**2 + real * SLIDE**2)
+    damping = 0.005 * OMEGA / omega + loss / (2 * np.pi * omega**2 * amplitude**2)
+    return omega / (2 * np.pi), damping
+
+
+def test_preloads_on_one_page_agree_with_closed_form(tmp_path, capsys, monkeypatch):
+    """Three preloads give curves in one table and page that agree with equivalent linearization within 0.2 %.
+
+    The sentence states the sign of both changes, and the CSV has the values of the key.
+    """
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "joint.toml").write_text(JOINT, "utf-8")
+    over = ("--over", "normal.load=80 N,100 N,120 N", "--amplitudes", "0.1 mm..1 mm:5")
+    with pytest.raises(SystemExit) as ended:
+        main(["backbone", "joint.toml", *over, "-o", "out", "--plot", "curves.png"])
+    assert not ended.value.code
+    with open("out/backbone.csv", encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    assert len(rows) == 15 and {row["method"] for row in rows} == {"balance"}
+    for row in rows:
+        load = float(row["normal.load"].split()[0])
+        frequency, damping = solve_one_harmonic(load, float(row["amplitude [m]"]))
+        assert float(row["frequency [Hz]"]) == pytest.approx(frequency, rel=2e-3)
+        assert float(row["damping"]) == pytest.approx(damping, rel=2e-2)
+    headline = json.loads((tmp_path / "out/summary.json").read_text("utf-8"))["verdict"][0]
+    assert headline.startswith("normal.load from 80 N to 120 N (50 % more), at ")
+    assert "raises the frequency by" in headline
+    page = (tmp_path / "out/report.html").read_text("utf-8")
+    assert "Values of the key" in page
+    assert (tmp_path / "curves.png").stat().st_size > 1000
+
+
+def test_over_in_python_has_the_dimension_case():
+    """`pf.backbone` with `over` returns variables over case and amplitude; single backbones agree within 1e-9."""
+    given = {"amplitudes": [2e-4, 5e-4], "method": "balance"}
+    both = pf.backbone(JOINT, over={"friction.static": [0.2, 0.3]}, **given)
+    assert both.balance_frequency.dims == ("case", "balance_amplitude")
+    for case, static in enumerate((0.2, 0.3)):
+        alone = pf.backbone(JOINT, **given, **{"friction.static": static})
+        for name in ("frequency", "damping", "force"):
+            found = both[f"balance_{name}"].values[case]
+            assert found == pytest.approx(alone[f"balance_{name}"].values, rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    "options, message",
+    [
+        ({"forces": "1 um..2 um:3"}, "force"),
+        ({"forces": ["0 N"]}, "forces above 0 are needed, such as 1 N..100 N:9"),
+        ({"forces": ["1 N"], "amplitudes": ["1 um"]}, "give only one of them"),
+        ({"over": {"friction.statik": [0.1, 0.2]}}, "statik"),
+        ({"over": {"friction.static": [0.1], "normal.load": ["1 N"]}}, "one key"),
+    ],
+)
+def test_refuses_invalid_forces_and_keys(options, message):
+    """Forces with another unit, forces beside amplitudes, and more than one key are refused."""
+    with pytest.raises(pf.PatchfemError, match=message):
+        pf.backbone(JOINT, **options)
+
+
+def test_force_that_no_amplitude_has_is_refused():
+    """A force beyond the travel of the structure is refused with the largest one within it."""
+    scene = JOINT.replace("moving_mass", 'travel = "0.2 mm"\nmoving_mass')
+    with pytest.raises(pf.PatchfemError, match=r"needs a force of 100 N .* the forces there are"):
+        pf.backbone(scene, forces=[100.0])
+    assert pf.backbone(scene, forces=[5.0]).balance_amplitude.values < 0.2e-3
