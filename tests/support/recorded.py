@@ -32,7 +32,7 @@ sys.path[:0] = [str(HERE), str(TESTS)] if __name__ == "__main__" else []
 
 import same_answers  # noqa: E402
 import scene_texts  # noqa: E402
-from known_pairs import KINDS, draw_pair  # noqa: E402
+from surface_pairs import KINDS, draw_pair  # noqa: E402
 from traces import format_trace  # noqa: E402
 
 GROUPS = tomllib.loads((RECORDED / "commands.toml").read_text("utf-8"))
