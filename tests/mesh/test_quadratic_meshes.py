@@ -126,18 +126,6 @@ def test_exact_refined_mesh_of_second_order(kind, tmp_path):
     assert not cKDTree(fine.points).query_pairs(1e-9)
 
 
-@pytest.mark.parametrize("ending", [".msh", ".vtu"])
-def test_exact_round_trip_of_second_order(ending, tmp_path):
-    """A pair of second order is written and read back bit for bit."""
-    pair = read_pieces(write_pair(tmp_path, "quad8", ".msh"))
-    write_mesh(pair.lower, tmp_path / f"again{ending}", pair.upper)
-    again = read_pieces(tmp_path / f"again{ending}")
-    for piece, expected in ((again.lower, pair.lower), (again.upper, pair.upper)):
-        assert np.array_equal(piece.points, expected.points)
-        assert np.array_equal(piece.blocks["quad8"], expected.blocks["quad8"])
-        assert np.array_equal(piece.interface, expected.interface)
-
-
 def make_quadratic_block(kind, cell, half_region, length, height):
     """Return a block of elements of second order with equal cells at the contact, which grow away from it."""
     n = round(half_region / cell)
