@@ -4,7 +4,7 @@ import re
 
 import numpy as np
 import pytest
-from scene_texts import BENCH, DRIVE, KILOGRAM, find_line, list_mistakes
+from scene_texts import BENCH
 
 import patchfem as pf
 from patchfem.core import PatchfemError
@@ -16,11 +16,9 @@ from patchfem.scene import (
     describe_ranges,
     format_values,
     loads,
-    parse_quantity,
     read_assignments,
 )
 
-RIG = KILOGRAM + DRIVE
 SWEPT = BENCH + '[sweep]\n"friction.static" = "0.1..0.6:6"\nnormal.load = "26 lbf, 100 N"\n'
 
 
@@ -107,29 +105,6 @@ def test_refuses_invalid_axis(text, says):
     assert not found and len(wrong) == 1 and says in wrong[0] and text.partition("=")[0] in wrong[0]
 
 
-def test_refuses_axes_with_all_mistakes():
-    """All mistakes in several axes are reported at once."""
-    _, wrong = read_assignments(
-        ["contact.load=5 lb,3", "friction.static=a", "contact.pairs=1", "contact.pairs=2"]
-    )
-    assert [line.partition(":")[0] for line in wrong] == [
-        "--over contact.load",
-        "--over contact.load",
-        "--over friction.static",
-        "--over contact.pairs",
-    ]
-
-
-def test_exact_sampled_axis_uses_16_bytes_per_value():
-    """A sampled axis stores 16 bytes per value, and its texts are read as the same values."""
-    span = read_axis("contact.length=1 mm..9 mm", RANDOM)
-    drawn = span.make_axis(np.linspace(0, 1, 1001))
-    assert drawn.texts[0] == "1 mm" and drawn.texts[-1] == "9 mm" and len(drawn.texts) == 1001
-    assert drawn.texts[1:3] == [drawn.texts[1], drawn.texts[2]] == ["1.008 mm", "1.016 mm"]
-    assert list(drawn.values) == [parse_quantity(text, "length") for text in drawn.texts]
-    assert drawn.texts.numbers.itemsize + drawn.values.itemsize == 16
-
-
 def test_exact_sampled_values_lie_within_range():
     """Sampled values lie between the ends of a range, on a logarithmic or a linear scale."""
     log_range = read_axis("contact.tilt.angle=1 mrad..100 mrad", RANDOM)
@@ -176,36 +151,6 @@ def test_exact_key_only_in_sweep_table_has_first_value():
     """A key that stands only in the table [sweep] has the first value of its axis in the scene."""
     scene = loads(SWEPT.replace("static = 0.3\n", ""), "a.toml")
     assert scene.friction.static == 0.1
-
-
-def test_exact_swept_key_of_mode_keeps_scene_value():
-    """A swept key of a mode, given by number or name, keeps its value in the scene, or else the first of its axis."""
-    swept = (
-        RIG + '[sweep]\n"structure.mode.axial.frequency" = "100 Hz, 120 Hz"\n'
-        '"structure.mode[1].damping" = "0.1,0.2"\n'
-    )
-    (mode,) = loads(swept, "a.toml").structure.mode
-    (scene_mode,) = loads(RIG, "a.toml").structure.mode
-    assert (mode.frequency, mode.damping) == (scene_mode.frequency, scene_mode.damping)
-    (swept_mode,) = loads(re.sub(r"\ndamping = .*", "", swept, count=1), "a.toml").structure.mode
-    assert swept_mode.frequency == scene_mode.frequency and swept_mode.damping == 0.1
-
-
-def test_refuses_sweep_table_with_lines_of_mistakes():
-    """Mistakes in the table [sweep] are reported with their lines."""
-    text = (
-        BENCH + '[sweep]\n"friction.static" = "0.1, a"\n"normal.lod" = "1 N"\n"normal.load" = 3\n'
-    )
-    found = list_mistakes(text)
-    for start, says in (
-        ('"friction.static"', "sweep.friction.static: a plain number"),
-        ('"normal.lod"', "sweep.normal.lod: unknown key; did you mean 'load'?"),
-        ('"normal.load"', "sweep.normal.load: the values must be a string"),
-    ):
-        line = find_line(text, start)
-        assert any(one.startswith(f"a.toml:{line}: {says}") for one in found), (says, found)
-    assert len(found) == 3
-    assert "a.toml:10: sweep: keys with their values" in list_mistakes(BENCH + "[sweep]\n")[0]
 
 
 def test_always_values_of_all_axes_select_one_case():
