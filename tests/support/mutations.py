@@ -7,8 +7,9 @@
 changed, a condition negated, or a statement left out. `run` works on a copy of the checkout, so that the checkout may be
 edited meanwhile. It first runs the tests without a fault and records which functions each of them reaches; tests that
 fail or skip there are left out. Then it plants one fault at a time and runs the tests that reach its function until one
-fails. Compiled functions cannot be watched: for their faults all tests run. Tests that take several times their time
-without a fault hang, and the fault counts as caught.
+fails. Compiled functions cannot be watched, and a fault in one of them compiles all of them anew: `draw` leaves modules
+of kernels out without `--kernels`, and for their faults all tests run. Tests that take several times their time without
+a fault hang, and the fault counts as caught.
 """
 
 import argparse
@@ -165,12 +166,14 @@ class Planter(ast.NodeTransformer):
     visit_AugAssign = visit_Expr
 
 
-def draw_faults(folders: list[str], seed: int, count: int) -> list[dict]:
+def draw_faults(folders: list[str], seed: int, count: int, kernels: bool = False) -> list[dict]:
     """Return `count` faults of folders or modules of the package: file, number, line, function and description."""
     sites = {}
     for folder in folders:
         path = ROOT / "patchfem" / folder
         for file in sorted(path.rglob("*.py")) if path.is_dir() else [path]:
+            if file.stem.endswith("kernels") and not kernels:
+                continue
             planter = Planter()
             planter.visit(ast.parse(file.read_text()))
             for number, (line, function, description) in enumerate(planter.sites):
@@ -193,21 +196,22 @@ def draw_faults(folders: list[str], seed: int, count: int) -> list[dict]:
     return faults
 
 
-def run_pytest(copy: Path, words: list[str], seconds: float | None = None) -> int | None:
-    """Return the exit code of pytest in a copy of the checkout; None if it takes more than `seconds`."""
+def run_pytest(copy: Path, words: list[str], seconds: float | None = None) -> str:
+    """Return the first test that fails in a copy of the checkout, "" if none does; "hangs" after `seconds`."""
     environment = os.environ | {"PYTHONPATH": str(copy), "PYTHONDONTWRITEBYTECODE": "1"}
     command = [sys.executable, "-m", "pytest", "-q", "-n", "0", "-p", "no:cacheprovider", *words]
     try:
-        return subprocess.run(
-            command,
-            cwd=copy,
-            env=environment,
-            timeout=seconds,
-            stdout=subprocess.DEVNULL,
-            stderr=subprocess.DEVNULL,
-        ).returncode
+        done = subprocess.run(
+            command, cwd=copy, env=environment, timeout=seconds, capture_output=True, text=True
+        )
     except subprocess.TimeoutExpired:
-        return None
+        return "hangs"
+    if done.returncode == 0:
+        return ""
+    failed = [
+        line.split()[1] for line in done.stdout.splitlines() if line.startswith(("FAILED", "ERROR"))
+    ]
+    return failed[0] if failed else f"exit code {done.returncode}"
 
 
 def run_faults(faults: list[dict], tests: list[str], results: Path) -> None:
@@ -236,14 +240,23 @@ def run_faults(faults: list[dict], tests: list[str], results: Path) -> None:
                 )
             )
             begin = time.perf_counter()
-            code = run_pytest(copy, ["-x", *names], limit)
+            failed = run_pytest(copy, ["-x", *names], limit)
             file.write_text(text)
-            outcomes.append(
-                fault | {"caught": code != 0, "watched": is_watched, "tests": len(names)}
+            outcomes.append(fault | {"caught": failed, "watched": is_watched, "tests": len(names)})
+            print(
+                failed or "SURVIVES",
+                fault,
+                len(names),
+                f"{time.perf_counter() - begin:.0f} s",
+                flush=True,
             )
-            print(code, fault, len(names), f"{time.perf_counter() - begin:.0f} s", flush=True)
             results.write_text(json.dumps(outcomes, indent=1))
-    print(sum(outcome["caught"] for outcome in outcomes), "of", len(outcomes), "faults are caught")
+    print(
+        sum(bool(outcome["caught"]) for outcome in outcomes),
+        "of",
+        len(outcomes),
+        "faults are caught",
+    )
 
 
 def main() -> None:
@@ -255,11 +268,12 @@ def main() -> None:
     parser.add_argument("--folders", nargs="+", default=["."])
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--count", type=int, default=20)
+    parser.add_argument("--kernels", action="store_true", help="faults in compiled modules too")
     parser.add_argument("--tests", nargs="+", default=["tests"])
     given = parser.parse_args()
     if given.action == "draw":
         given.faults.write_text(
-            json.dumps(draw_faults(given.folders, given.seed, given.count), indent=1)
+            json.dumps(draw_faults(given.folders, given.seed, given.count, given.kernels), indent=1)
         )
     else:
         run_faults(json.loads(given.faults.read_text()), given.tests, given.results)

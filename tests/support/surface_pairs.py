@@ -7,11 +7,13 @@ Seeds 41000 to 41019 were used in developing the comparison of traces.
 """
 
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 from campaigns import Row
 from scipy.ndimage import gaussian_filter, map_coordinates, spline_filter
+from traces import format_trace
 
 from patchfem.core import PatchfemError, frozen_array
 from patchfem.surface import Profile
@@ -182,6 +184,14 @@ def make_profiles(pair: TracePair) -> tuple:
         Profile(*map(frozen_array, trace), name)
         for trace, name in ((pair.before, "before"), (pair.after, "after"))
     )
+
+
+def write_traces(pair: TracePair, folder: Path, before: str, after: str) -> tuple:
+    """Write both traces of a pair as tables in um; return their paths."""
+    paths = folder / f"{before}.csv", folder / f"{after}.csv"
+    for path, (x, z) in zip(paths, (pair.before, pair.after)):
+        path.write_text(format_trace(1e6 * x, 1e6 * z, digits=9), "utf-8")
+    return paths
 
 
 SCAN_KINDS = (
