@@ -10,8 +10,6 @@ from command_line import run_cli
 
 import patchfem as pf
 from patchfem.closed_forms import contact as closed_forms
-from patchfem.export.folder import FILES
-from patchfem.surface import make_report, read_surface
 
 UM = 1e-6
 
@@ -67,43 +65,6 @@ def test_exact_profile_json_is_in_si_units(trace_file, scan_file):
         "profiles"
     ][0]
     assert window["window"] == [1e-3, 1.8e-3] and window["shape"] == [801]
-
-
-def test_exact_profile_means_of_files(tmp_path, scan_file):
-    """The mean of three traces has the 95 % interval of Student's t of the logarithm (4.302653 for two degrees).
-
-    The stored profile of a trace gives the same parameters within 1e-7.
-    """
-    heights = (4.0, 5.0, 6.5)
-    names = []
-    out = tmp_path / "out"
-    for k, height in enumerate(heights):
-        names.append(tmp_path / f"{k}.csv")
-        z = height * np.sin(2 * np.pi * np.arange(800) / 8) + 0.01 * np.arange(800)
-        names[-1].write_text(
-            "x [um],z [um]\n" + "".join(f"{a},{b:.17g}\n" for a, b in enumerate(z))
-        )
-    assert run_cli("profile", *names, scan_file, "-o", out).code == 0
-    data = json.loads((out / "profile.json").read_text())
-    rows = (out / "profile.csv").read_text().splitlines()
-    assert [(one["kind"], one["files"], one["notes"]) for one in data["means"]] == [
-        ("profile", 3, [])
-    ]
-    found = data["means"][0]["measures"]["Pq"]
-    half_width = 4.302653 * np.std(heights, ddof=1) / np.sqrt(6)
-    assert found["value"] == pytest.approx(np.mean(heights) * UM / np.sqrt(2), rel=2e-3)
-    factor = np.exp(half_width * UM / found["value"])
-    assert found["high"] == pytest.approx(found["value"] * factor, rel=5e-3)
-    assert found["low"] == pytest.approx(found["value"] / factor, rel=5e-3)
-    assert "Mean of 3 traces: Pa " in (out / "report.html").read_text()
-    assert len(rows) == 5
-    assert rows[0].startswith("file,Pa [m],Pa_low [m],Pa_high [m],")
-    # only files that the next run may replace
-    assert {one.name for one in out.iterdir()} <= set(FILES)
-    assert run_cli("profile", names[1], "-o", out).code == 0
-    again = make_report(read_surface(out / "primary.csv"))["Pq"].value
-    assert again == pytest.approx(data["profiles"][1]["measures"]["Pq"]["value"], rel=1e-7)
-    assert "counts twice" in run_cli("profile", names[0], names[0]).err
 
 
 @pytest.mark.skipif(
@@ -177,32 +138,3 @@ def test_exact_a_trace_of_two_waves_is_split_between_them(split_scene):
     closing = closed_forms.westergaard_full_pressure(1.0, np.hypot(*(heights / waves)), modulus)
     assert split["closing_pressure"] == pytest.approx(closing, rel=0.02)
     assert split["pressure"] == pytest.approx(2e3 / 12.7e-3**2)
-
-
-def test_exact_split_scene_keeps_other_text_and_runs(split_scene):
-    """The new scene has the printed tables, keeps all other lines and comments, and runs."""
-    comment = "# comment above the table of the slide"
-    split_scene.write_text(SPLIT_SCENE.replace("[slide]", f"{comment}\n[slide]"), "utf-8")
-    answer = run_cli("profile", "waves.csv", "--split", "scene.toml", "-o", "split.toml")
-    assert answer.code == 0 and answer.err == ""
-    assert "split the trace: waves longer than " in answer.out
-    assert "-o NEW_SCENE" not in answer.out
-    text = Path("split.toml").read_text("utf-8")
-    assert f"{comment}\n[slide]" in text
-    for line in SPLIT_SCENE.split("[contact.profile]")[0].splitlines():
-        assert line in text
-    assert text.index("[slide]") < text.index("[contact.profile]")
-    tables = text[text.index("[contact.profile]") :]
-    assert all(f"    {line}" in answer.out.splitlines() for line in tables.splitlines())
-    contact = pf.load("split.toml").contact
-    assert SHORT < contact.asperities.cutoff < LONG
-    assert contact.asperities.tangential_ratio == 1.0 and contact.profile.heights == "surface"
-    answer = run_cli("run", "split.toml", "--no-page")
-    assert answer.code == 0
-    assert answer.err.count("pressure_peak and contact_fraction are means over the waves") == 1
-    # the name of the trace is relative to the new scene
-    Path("other").mkdir()
-    assert (
-        run_cli("profile", "waves.csv", "--split", "scene.toml", "-o", "other/split.toml").code == 0
-    )
-    assert pf.load("other/split.toml").contact.profile.file == "../waves.csv"

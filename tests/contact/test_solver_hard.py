@@ -18,9 +18,9 @@ from patchfem.contact import (
     press,
     press_to_approach,
 )
-from patchfem.contact.active_set import ContactProblem, solve_primal, solve_primal_dual
+from patchfem.contact.active_set import solve_primal_dual
 from patchfem.contact.gaps import crown, tilt
-from patchfem.contact.unilateral import explain_singular_set, solve
+from patchfem.contact.unilateral import explain_singular_set
 from patchfem.core import Compliance, Interface, NotConverged, Outcome, PatchfemError
 
 
@@ -224,31 +224,6 @@ def test_exact_cycling_sets_are_solved_by_gradients():
     state = press_to_approach(make_pair(x, CYCLE), gap + 8e-9, 8e-9)
     (expected,) = solve_by_enumeration(CYCLE, x, gap)
     assert nodal_forces(make_pair(x, CYCLE), state) == pytest.approx(expected, rel=1e-12)
-
-
-@pytest.mark.parametrize("seed", range(4))
-def test_exact_primal_method_with_two_rotations(seed):
-    """The primal method solves strips that rotate about two axes, and agrees with the combined solver."""
-    pair = make_coated_pair(40)
-    n_strips = 3
-    x = np.tile(pair.interface.x, n_strips)
-    y = np.repeat([-3e-3, 0.0, 3e-3], pair.interface.x.size)
-    rng = np.random.default_rng(seed)
-    gap = np.concatenate([draw_gap(rng, pair.interface.x, 1e-7) for _ in range(n_strips)])
-    motions = np.stack([np.ones(x.size), x, y], axis=1)
-    problem = ContactProblem(gap, motions, np.array([LOAD, 0.0, 0.0]), springs=np.zeros(3))
-    solution, _ = solve_primal(
-        StripCompliance(pair.normal), problem, np.full(x.size, LOAD / x.size)
-    )
-    displacement = solution.force.reshape(n_strips, -1) @ pair.normal
-    opening = gap - motions @ solution.motion + displacement.ravel()
-    in_contact = solution.force > 0
-    assert n_strips < np.count_nonzero(in_contact) < x.size and solution.force.min() == 0
-    assert motions.T @ solution.force == pytest.approx([LOAD, 0, 0], abs=1e-12 * LOAD)
-    assert np.abs(opening[in_contact]).max() <= 1e-12 * displacement.max()
-    assert opening[~in_contact].min() >= 0
-    expected = solve(StripCompliance(pair.normal), problem)
-    assert np.abs(expected.force - solution.force).max() <= 1e-10 * LOAD
 
 
 # ---- random gaps on random compliances

@@ -226,15 +226,3 @@ def test_exact_grids_of_result_agree_with_patch_and_file(crowned_run, tmp_path):
         values = getattr(patch, name)
         np.testing.assert_allclose(line[name] * unit, values, 1e-6, 1e-6 * np.abs(values).max())
     assert np.array_equal(line.points[:, 0], patch.x)
-
-
-def test_always_frame_is_selected_by_number(crowned_run):
-    """A frame is selected by its number, also counted from the end; other numbers are refused."""
-    all_frames = crowned_run.to_pyvista(frame=None)
-    count = len(all_frames)
-    for number in (2, -count, np.int64(count - 1)):
-        moved = crowned_run.to_pyvista(frame=number)["upper"]["displacement"]
-        assert np.array_equal(moved, all_frames[number]["upper"]["displacement"])
-    for number in (count, -count - 1, 0.5, "last"):
-        with pytest.raises(pf.PatchfemError, match=rf"no frame {number}; .* 0 to {count - 1}"):
-            crowned_run.to_pyvista(frame=number)

@@ -14,7 +14,6 @@ from patchfem.scene import (
     RANDOM,
     Range,
     describe_ranges,
-    format_values,
     loads,
     read_assignments,
 )
@@ -123,20 +122,6 @@ def test_exact_sampled_values_lie_within_range():
     assert "leave out :9" in read_assignments(["friction.static=0.2..0.6:9"], RANDOM)[1][0]
 
 
-def test_exact_python_values_become_axis_texts():
-    """Python and NumPy values, and texts with commas or quotes, become texts that are read back unchanged."""
-    assert format_values("contact.load", [26.0, "26 lbf"]) == "26.0 N,26 lbf"
-    assert format_values("friction.static", np.array([0.1, 0.2]), "..") == "0.1..0.2"
-    assert (
-        format_values("friction.law", ["tanh"]) == format_values("friction.law", "tanh") == "tanh"
-    )
-    for one in (26.0, np.float64(26), np.array(26.0)):
-        assert format_values("contact.load", one) == "26.0 N"
-    names = ["plain", "a,b.csv", 'an "inch"', "it's,", "back\\slash,"]
-    found = read_axis(f"title={format_values('title', names)}")
-    assert [loads(BENCH, "a.toml", [f"title={one}"]).title for one in found.texts] == names
-
-
 def test_exact_sweep_table_equals_options():
     """The table [sweep] gives the same axes as --over."""
     scene = loads(SWEPT, "a.toml")
@@ -145,12 +130,6 @@ def test_exact_sweep_table_equals_options():
         == read_assignments(["friction.static=0.1..0.6:6", "normal.load=26 lbf,100 N"])[0]
     )
     assert scene.effect_names()[-1] == "sweep" and loads(BENCH, "a.toml").sweep == ()
-
-
-def test_exact_key_only_in_sweep_table_has_first_value():
-    """A key that stands only in the table [sweep] has the first value of its axis in the scene."""
-    scene = loads(SWEPT.replace("static = 0.3\n", ""), "a.toml")
-    assert scene.friction.static == 0.1
 
 
 def test_always_values_of_all_axes_select_one_case():
@@ -183,24 +162,3 @@ def test_exact_value_with_tolerance_is_uniform_range(text, low, high, unit):
     ends = note.partition(" is drawn evenly from ")[2].split("..")
     assert [float(end.removesuffix(unit)) for end in ends] == [low, high]
     assert describe_ranges(["friction.static=0.2..0.3"]) == []
-
-
-@pytest.mark.parametrize(
-    "text, form, says",
-    [
-        (
-            "friction.static=0.3+-15%",
-            LISTS,
-            "write this range as 0.255..0.345:9 for 9 values in it",
-        ),
-        (
-            "normal.load=115 N +- 10 kN",
-            RANDOM,
-            "write the width in % or in the unit of the value (N)",
-        ),
-    ],
-)
-def test_refuses_invalid_tolerance_of_value(text, form, says):
-    """An invalid tolerance of a value is refused with its remedy."""
-    found, (wrong,) = read_assignments([text], form)
-    assert not found and says in wrong

@@ -7,13 +7,11 @@ import pytest
 from scene_texts import COULOMB, LINEAR, MODE, STRUCTURE, get_only_mistake
 
 import patchfem as pf
-from patchfem.core import PatchfemError
 from patchfem.model import build, compute_named_motions
 from patchfem.model.structure import build_modes, compute_initial_state
 from patchfem.runs.plan import plan
 from patchfem.runs.run import run
 from patchfem.scene import load, loads
-from patchfem.scene.scene import SceneError
 
 MASSES = """\
 [structure]
@@ -234,35 +232,6 @@ def test_exact_matrices_equal_masses(tmp_path):
         build_modes(scene).interfaces, build_modes(loads(RUB + MASSES)).interfaces, rtol=1e-9
     )
     assert scene.kind == "rig"
-
-
-def test_refuses_unsuitable_structure_files(tmp_path):
-    """Structure files without required arrays, or of a wrong size, are refused at the line of the scene."""
-    np.savez(tmp_path / "rig.npz", M=M, K=K)
-    with pytest.raises(PatchfemError) as caught:
-        plan(write_scene(tmp_path, FILE))
-    assert str(caught.value).startswith(
-        f"{tmp_path / 'scene.toml'}:2: structure.file: lacks output"
-    )
-    np.savez(tmp_path / "rig.npz", M=M, K=K, output=[0, 1])
-    with pytest.raises(PatchfemError, match=r"structure\.file: lacks `slide`"):
-        build_modes(write_scene(tmp_path, POINT + FILE))
-    late = write_scene(tmp_path, FILE + '[structure.start]\nvelocity = ["1 m/s"]\n')
-    with pytest.raises(
-        PatchfemError, match=r":8: structure\.start: 1 values are given for 2 modes or masses"
-    ):
-        compute_initial_state(late, build_modes(late))
-    with pytest.raises(SceneError, match=r"structure\.file: there is no file"):
-        write_scene(tmp_path, FILE.replace("rig.npz", "other.npz"))
-    for text, says in (
-        (FILE.replace("rig.npz", "rig.uff"), "structure.moving_mass: missing"),
-        (FILE.replace("rig.npz", "rig.uff"), "structure.slide_at: missing"),
-        (FILE.replace("[drive]", 'slide_at = "1:x"\n[drive]'), "contains the array slide"),
-        (RUB + FILE.replace("rig.npz", "rig.uff"), "a universal file has nodes"),
-    ):
-        with pytest.raises(SceneError) as caught:
-            loads(text)
-        assert says in str(caught.value)
 
 
 @pytest.mark.parametrize("output", ["", "output = 0.5\n"])

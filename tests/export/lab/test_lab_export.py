@@ -14,7 +14,6 @@ from patchfem.core import PatchfemError
 from patchfem.export import store
 from patchfem.export.answer import Answer, Variable
 from patchfem.export.lab.write import export_histories
-from patchfem.inputs import read_loop
 
 
 def read_uff_functions(path):
@@ -151,26 +150,3 @@ def test_refuses_non_finite_values_in_universal_file(tmp_path):
         export_histories(tmp_path, tmp_path / "a.uff")
     assert not (tmp_path / "a.uff").exists()
     assert "2 rows of slide, force" in export_histories(tmp_path, tmp_path / "a.mat")
-
-
-def test_exact_exported_run_is_readable_as_measured_loop(bench_folder, tmp_path):
-    """The exported histories of a run are a valid measured loop: displacement and force come back unchanged.
-
-    This holds after an import too.
-    """
-    assert run_cli("export", bench_folder, "-o", tmp_path / "loop.csv", "--histories").code == 0
-    measured = read_loop(tmp_path / "loop.csv")
-    with h5netcdf.File(bench_folder / "result.nc", "r") as file:
-        slide, force = (
-            np.asarray(file[name][...]) for name in ("relative_displacement", "friction_force")
-        )
-    assert np.array_equal(measured.displacement, slide - slide[0]) and np.array_equal(
-        measured.reading, force
-    )
-    assert measured.quantity == "force" and "normal_load" in measured.labels
-    assert run_cli("import", tmp_path / "loop.csv", "-o", tmp_path / "lab.csv").code == 0
-    imported = read_loop(tmp_path / "lab.csv")
-    assert np.array_equal(imported.displacement, measured.displacement) and np.array_equal(
-        imported.reading, force
-    )
-    assert (tmp_path / "lab.csv").read_text().startswith("time [s],displacement [m],force [N]\n")

@@ -10,11 +10,8 @@ import numpy as np
 import pytest
 from command_line import run_cli
 from scene_texts import COULOMB, PATCH, POINT, SHORT
-from sweep_tables import make_random_table, make_table
 
-from patchfem.campaigns.sweeps.changes import analyse
 from patchfem.export import store
-from patchfem.export.sweeps.words import make_verdict
 
 KINDS = {
     "one key": ("rig", ("--over", "friction.static=0.3,0.35,0.6,0.1")),
@@ -126,31 +123,3 @@ def test_exact_numbers_of_verdict_agree_with_closed_form(folders):
     assert "How far the key may go" in text and "contact fraction" in text
     values = answer.data["pressure_peak"].values
     assert f"{values[-1] / 1e6:.4g} MPa" in answer.verdict[0]
-
-
-def test_exact_words_of_given_tables():
-    """The sentences state the largest change, the peak, the shares, and cases that are missing or over the tolerance."""
-    tilt = [1.0, 2.0, 3.0]
-    measures = {"loop_area": [1.0, 1.02, 1.2], "pressure_peak": [1.0, 1.1, 1.15]}
-    table = make_table({"contact.tilt.angle": tilt}, measures)
-    assert make_verdict(table, analyse(table)) == (
-        "With contact.tilt.angle, loop area changes most: from 1 at 1 to 1.2 at 3.",
-        "contact.tilt.angle may reach 2.17 before loop area changes by 5 % (between the cases at 2 and 3).",
-        "All 3 cases settled and meet the tolerance.",
-    )
-    assert make_verdict(table, analyse(table, "pressure_peak"))[0].startswith(
-        "With contact.tilt.angle, pressure peak changes from 1 at 1 to 1.15 at 3"
-    )
-    outcome = np.array(["steady", "transient", ""], object)
-    broken = make_table({"normal.load": tilt}, measures, errors=0.1, outcome=outcome)
-    assert make_verdict(broken, analyse(broken))[-1] == (
-        "3 cases: 1 unfinished, 1 unsettled, 3 over the tolerance in loop area and 1 more."
-    )
-    empty = make_table({"normal.load": tilt}, {}, outcome=np.full(3, "", object))
-    assert make_verdict(empty, analyse(empty))[0] == "No case has a result."
-    points = np.random.default_rng(0).random((256, 2))
-    random = make_random_table(points, {"loop_area": 3 * points[:, 0] + points[:, 1]})
-    verdict = make_verdict(random, analyse(random))
-    assert "mainly with k0 (90 % of its variance)" in verdict[0]
-    assert verdict[1].startswith("Shares of the variance of loop area: k0 90 % (")
-    assert verdict[2].startswith("90 % of the cases have a loop area of 0.")
