@@ -22,6 +22,7 @@ from . import quantities
 from .answer import Quantity
 from .run_data import find_readings
 
+CHECKS = ("energy_balance", "work_check")  # measures that only check a run
 MAX_LISTED = 3  # largest number of interfaces or contact regions that are listed one by one
 # largest slip [m] and largest work relative to force times motion that are attributed to round-off
 SLIP_ROUND_OFF = 1e-15
@@ -380,8 +381,12 @@ def describe_accuracy(result: Result, measures: dict[str, Quantity]) -> str:
     }
     if not ratios or max(ratios.values()) > 1:
         return ""
-    # errors that are too small to be displayed say nothing
-    visible = {name: ratio for name, ratio in ratios.items() if "±" in _format(name, measures)}
+    # errors that are too small to be displayed say nothing, and those of checks of a run concern no answer
+    visible = {
+        name: ratio
+        for name, ratio in ratios.items()
+        if name not in CHECKS and "±" in _format(name, measures)
+    }
     if not visible:
         return f"All errors are within the tolerance {tolerance:g}."
     name = max(visible, key=lambda one: (visible[one], one))

@@ -337,6 +337,8 @@ def skip_cycles(rig, state, record, cycle, count):
 def count_repeated(rig, state, record, cycle):
     """Return the number of cycles without a window that follow in the same piece of the drive.
 
+    If this cycle has no samples from which those of later cycles can be repeated, only cycles without samples count.
+
     Parameters
     ----------
     rig : Rig
@@ -352,6 +354,11 @@ def count_repeated(rig, state, record, cycle):
     end = np.inf
     if state.clock[Clock.PIECE] + 1 < rig.pieces.shape[0]:
         end = rig.pieces[int(state.clock[Clock.PIECE]) + 1, Piece.START]
+    sample = int(state.clock[Clock.SAMPLE])
+    if sample < record.samples.shape[0]:
+        start = 0.0 if cycle == 0 else record.cycles[cycle - 1, Cycle.END]
+        if sample == 0 or record.samples[sample - 1, 0] <= start:
+            end = min(end, record.samples[sample, 0])
     while cycle + count + 1 < record.cycles.shape[0]:
         row = record.cycles[cycle + count + 1]
         if row[Cycle.WINDOW] != -1 or row[Cycle.END] > end:

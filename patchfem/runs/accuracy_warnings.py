@@ -351,12 +351,13 @@ def _advise_steps(context: AccuracyContext, name: str, excess: dict, steps: int)
     exact = ""
     if (
         model.kind == "rig"
-        and model.accuracy.method != "exact"
+        and (model.accuracy.method == "march" or model.accuracy.steps_per_cycle is not None)
         and not engines.HYBRID.find_unsupported_feature(model)
     ):
-        exact = 'set accuracy.method = "exact", which chooses its own steps'
-        if model.accuracy.steps_per_cycle is not None:
-            exact = f"leave out accuracy.steps_per_cycle and {exact}"
+        keys = [
+            key for key in ("method", "steps_per_cycle") if key in model.accuracy.model_fields_set
+        ]
+        exact = f"leave out {' and '.join(f'accuracy.{key}' for key in keys)}; the steps then follow from the tolerance"
     if order is None:
         return f"{_describe_missing_order(name, steps)}{_advise_without_order(model, steps, exact)}"
     total = sum(parts.values())

@@ -1,6 +1,5 @@
 """The two problems with exact answers: stick-slip at resonance and the two masses of Fig 16."""
 
-
 import numpy as np
 
 from patchfem.core import ModalBasis, SineDrive, frozen_array

@@ -7,7 +7,7 @@ from hybrid_cases import coulomb, make_modes, make_oscillator
 from patchfem.hybrid import cases, drives, runs
 from patchfem.hybrid.laws import masing
 from patchfem.hybrid.periodic import find_periodic_motion
-from patchfem.hybrid.records import LawNumbers
+from patchfem.hybrid.records import LawNumbers, Memory, Window
 
 AMPLITUDE = "relative_displacement_amplitude"
 LAWS = {
@@ -41,6 +41,18 @@ def test_shooting_equals_a_long_run(name):
     assert steady.batch.windows[0]["loop_area"][0] == pytest.approx(
         run.values["loop_area"], rel=1e-5
     )
+
+
+def test_force_of_elements_that_slide_on_both_sides_is_their_limit():
+    """Where all elements slide in each half cycle, the steady force is between plus and minus the slip force 0.8,
+    whatever offset a correction gives to the reversal points that it starts from."""
+    case = make_oscillator(LAWS["elastic"], acceleration=2.0, zeta=0.05, cycles=1, rtol=1e-9)
+    first = find_periodic_motion(case)
+    start = first.batch.states
+    stack = start.memory[0, 0, Memory.STACK :]
+    stack[1 : 2 * int(start.memory[0, 0, Memory.COUNT]) : 2] -= 0.3
+    faces = find_periodic_motion(case, start=start, n_first=1).batch.records.faces[0, 0, 0]
+    assert faces[[Window.MIN_FORCE, Window.MAX_FORCE]] == pytest.approx([-0.8, 0.8], abs=1e-9)
 
 
 def test_multipliers_of_a_linear_rig():

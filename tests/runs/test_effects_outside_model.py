@@ -85,7 +85,7 @@ def test_exact_warning_states_contact_length_of_tilted_patch():
     [
         (COULOMB, "", "exact"),
         (COULOMB, '[accuracy]\nmethod = "march"\nsteps_per_cycle = 100\n', "march"),
-        (COULOMB.replace('"coulomb"', '"elastic-plastic"\nbond_length = "1 um"'), "", "piecewise"),
+        (COULOMB.replace('"coulomb"', '"elastic-plastic"\nbond_length = "1 um"'), "", "hybrid"),
         (COULOMB, '[accuracy]\nmethod = "harmonic"\n', "harmonic"),
     ],
 )

@@ -141,15 +141,8 @@ def test_exact_level_with_unbounded_motion_grows():
     assert [level.outcome for level in run.extra["levels"]] == ["stuck", "steady", "grows"]
     assert run.outcome == "steady" and np.isnan(run.extra["curve"]["amplitude"][2])
     with_elements = pf.run(text.replace(COULOMB, PLASTIC), **STEADY)
-    assert [level.outcome for level in with_elements.extra["levels"]] == [
-        "stuck",
-        "steady",
-        "not_converged",
-    ]
-    assert any(
-        "1 of 3 drive levels" in warning and "undamped mode" in warning
-        for warning in with_elements.warnings
-    )
+    outcomes = [level.outcome for level in with_elements.extra["levels"]]
+    assert outcomes == ["stuck", "steady", "grows"]
 
 
 INTERLOCK = (

@@ -183,5 +183,8 @@ def test_always_unused_steps_per_cycle_give_remark(method):
     """The key steps_per_cycle gives a remark with engines that have no time steps."""
     text = SCENES["exact rig"] + f'[accuracy]\nmethod = "{method}"\nsteps_per_cycle = 60\n'
     engine = "harmonic" if method == "harmonic" else "hybrid"
-    told = f"accuracy.steps_per_cycle has no meaning for engine '{engine}', which has no steps, and is not used"
+    told = (
+        f"accuracy.steps_per_cycle has no meaning for engine '{engine}', which does not use steps of equal length, and "
+        "is not used"
+    )
     assert told in run_and_collect(text)[1] and told in plan(loads(text)).verdict

@@ -114,9 +114,8 @@ def test_refuses_unsupported_keys_at_their_lines():
     assert list_mistakes(text) == [
         f"a.toml:{find_line(text, '[contact.strips]')}: contact.strips: not supported yet with [contact.shear]; leave "
         "one of the two out",
-        f"a.toml:{find_line(text, 'method')}: accuracy.method: the motion cannot be "
-        "computed from event to event for law 'nonlocal' with "
-        "[contact.shear]; use 'march' or leave `method` out",
+        f"a.toml:{find_line(text, 'method')}: accuracy.method: the motion cannot be computed from event to event for "
+        "law 'nonlocal' with [contact.shear]; use 'march' or leave `method` out",
     ]
 
 
@@ -156,6 +155,8 @@ ALLOWED = [
         "rig",
     ),
     (LINEAR, ["accuracy.method=exact"], "linear"),
+    (RIG, ["accuracy.method=exact"], "rig"),
+    (RIG, ["accuracy.method=exact", PLASTIC, "structure.stiffening.cubic=1e12 N/m^3"], "rig"),
 ]
 
 

@@ -9,13 +9,20 @@ Numbers: chi, beta, slip force F_S [N], phi_max [m], number n of pieces of the c
 n + 1 forces. With beta >= 0 the curve is Segalman's (2005) power law below phi_max; otherwise it is linear between
 its n + 1 points. Beyond the last point the force is F_S. One piece is the elastic-plastic law (eq. 3.12).
 `memory[FLAG]` is the number of the piece. On the first piece of a linear curve no element slips, so that the motion may
-turn there without an event: the piece is left at its end, or at the reversal from which it started.
+turn there without an event: the piece is left at its end, or at the reversal from which it started. With beta =
+ALL_REVERSALS each turn is an event all the same.
 """
+
+import numpy as np
 
 from ..records import Friction, LawNumbers, Margin, Memory
 
 RIGID = False
 POINTS = 5  # first of the n + 1 displacements among the numbers
+TURNS_FREELY = (
+    -1.0
+)  # beta of a linear curve whose first piece is left without an event at reversals
+ALL_REVERSALS = -2.0  # beta of a linear curve that has an event at each reversal
 MIN_BRANCH = 1e-13  # shortest branch between two reversals, relative to phi_max
 
 
@@ -98,7 +105,7 @@ def write_margins(p, memory, point, s, margins):
     half = 0.5 if n > 0 else 1.0
     start = memory[Memory.STACK + 2 * n - 2] if n > 0 else 0.0
     x = half * direction * (q - start)
-    if k == 0 and p[1] < 0:
+    if k == 0 and p[1] == TURNS_FREELY:
         # Without a reversal the elastic range extends to both sides of the origin.
         before = p[POINTS + 1] if n == 0 else 0.0
         margins[Margin.LIMIT] = (p[POINTS + 1] - x) / p[3]
@@ -140,7 +147,7 @@ def switch(p, memory, point, s, which):
         memory[Memory.FLAG] += 1
         return False
 
-    if which == Margin.BRANCH and int(memory[Memory.FLAG]) == 0 and p[1] < 0:
+    if which == Margin.BRANCH and int(memory[Memory.FLAG]) == 0 and p[1] == TURNS_FREELY:
         # No element has slipped since the last reversal, which is forgotten; the branch before it goes on.
         n = max(n - 1, 0)
         direction = -direction
@@ -194,8 +201,11 @@ def switch(p, memory, point, s, which):
 def from_elements(stiffness, yield_displacement):
     """Return the law of parallel Jenkins elements of given stiffness [N/m] and yield displacement [m].
 
-    Elements that yield at the same displacement form one point of the curve.
+    Elements that yield at the same displacement form one point of the curve. Without a load the elements have no force,
+    and their yield displacement is that of a single element of 1 m.
     """
+    if not np.any(np.multiply(stiffness, yield_displacement)):
+        stiffness, yield_displacement = [0.0], [1.0]
     pairs = {}
     for k, x in zip(stiffness, yield_displacement):
         pairs[float(x)] = pairs.get(float(x), 0.0) + float(k)
@@ -207,8 +217,16 @@ def from_elements(stiffness, yield_displacement):
         forces.append(forces[-1] + slope * (x - edges[-1]))
         edges.append(x)
         slope -= pairs[x]
-    numbers = (0.0, -1.0, forces[-1], edges[-1], len(points), *edges, *forces)
-    return LawNumbers("masing", numbers, length=forces[-1] / sum(pairs.values()))
+    numbers = (0.0, TURNS_FREELY, forces[-1], edges[-1], len(points), *edges, *forces)
+    total = sum(pairs.values())
+    return LawNumbers("masing", numbers, length=forces[-1] / total if total > 0 else edges[-1])
+
+
+def with_all_reversals(law: LawNumbers) -> LawNumbers:
+    """Return a law of elements that has an event at each reversal, so that histories contain all extremes of the slide."""
+    if law.law != "masing" or law.numbers[1] != TURNS_FREELY:
+        return law
+    return law._replace(numbers=(law.numbers[0], ALL_REVERSALS, *law.numbers[2:]))
 
 
 def from_keys(friction, load, speed):

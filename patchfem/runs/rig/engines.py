@@ -425,7 +425,7 @@ def describe_unused_settings(model: Model, engine: str) -> list:
     if ENGINES[engine].finds_periodic_motion:
         used = choose_steady_method(model).engine
     reasons = {
-        "steps_per_cycle": f"for engine '{engine}', which has no steps,",
+        "steps_per_cycle": f"for engine '{engine}', which does not use steps of equal length,",
         "harmonics": "if the steady motion is found by the exact solution from event to event",
     }
     sentences = []

@@ -14,7 +14,7 @@ from ...friction import record
 from ...hybrid.cases import Load
 from ...hybrid.laws import make_law, smooth_grooves
 from ...hybrid.laws.grooves import make_grooves
-from ...hybrid.laws.masing import from_elements
+from ...hybrid.laws.masing import from_elements, with_all_reversals
 from ...hybrid.records import LawNumbers
 from ...model.model import Model
 from ..bench import averaged_law
@@ -62,7 +62,12 @@ def make_joints(model: Model, numerics: Numerics, patch) -> Joints:
     if friction is None:
         return Joints()
     if model.partial_slip or rig.friction.has_partial_slip:
-        return _make_soft_joints(model, numerics, patch)
+        joints = _make_soft_joints(model, numerics, patch)
+        if rig.drive.kind == "free":
+            # Decay curves are measured at the extremes of the output.
+            laws = tuple((with_all_reversals(law), load) for law, load in joints.laws)
+            joints = joints._replace(laws=laws)
+        return joints
     laws = _list_laws(model, patch)
     return Joints(
         tuple(laws),

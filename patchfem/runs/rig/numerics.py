@@ -114,7 +114,8 @@ def choose_numerics(model: Model) -> Numerics:
         frozenset(pinned),
     )
     if engine is HYBRID:
-        is_exact = accuracy.method == "exact"
+        # A linear rig needs few steps.
+        is_exact = accuracy.method == "exact" or model.friction is None
         local = cases.EXACT_RTOL if is_exact else choose_step_tolerance(accuracy.tolerance)
         return replace(numerics, local=local, steps=cases.MIN_STEPS)
     if engine is MARCH and accuracy.steps_per_cycle is None:

@@ -32,7 +32,7 @@ from .curves import (
 
 # Cycles from rest within which a lifted mass leaves its grooves, if it leaves them at all.
 N_CYCLES_IN_GROOVES = 30
-RTOL = 1e-10  # tolerance of a step, so that the change over a period is far below the motion
+RTOL = 1e-11  # tolerance of a step, so that the change over a period is far below the motion
 STEPS_ERROR = 100.0  # error of a periodic motion that is due to its steps, relative to RTOL
 N_CYCLES = 2.0  # computed cycles of a periodic motion, so that each stick is complete
 MIN_STOP = 1e-9  # shortest stop that is counted, in periods
