@@ -38,6 +38,7 @@ KINDS = {  # Name on the command line -> module and function.
     "traces": ("random_traces", "compare_trace"),
     "wear": ("wear_scenes", "compare_bench"),
     "predicted-wear": ("predicted_pairs", "compare_pair"),
+    "hybrid-rigs": ("hybrid_campaign", "compare_rig"),
     "stick-together": ("sticks_together", "compare_rig"),
     "decay-fits": ("decay_fits", "compare_fit"),
     "trace-pairs": ("surface_pairs", "compare_traces"),
