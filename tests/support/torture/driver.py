@@ -34,7 +34,7 @@ CAMPAIGNS = {
     "bytes": Campaign(3000, "scenes.run_bytes_trial", "scenes with wrong bytes"),
     "profiles": Campaign(1000, "tables.run_profiles_trial", "traces of a surface"),
     "tables": Campaign(3000, "tables.run_table_trial", "drives, slides, rows and loops"),
-    "hostile": Campaign(240, "hostile.run_trial", "files made to harm, twelve kinds"),
+    "hostile": Campaign(240, "hostile.run_trial", "files made to harm"),
 }
 WARM = (  # Scenes that load the modules of most trials, so that a forked trial already has them.
     '[normal]\nload = "26 lbf"\n[friction]\nlaw = "tanh"\nstatic = 0.3\nreference_speed = "1 mm/s"\n[structure]\n'
