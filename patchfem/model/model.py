@@ -17,6 +17,7 @@ from ..effects import law_has_trait, list_absent_effects
 from ..formatting import format_quantity
 from ..scene.keys.memoize import memoize
 from ..scene.keys.tables import Accuracy, Friction, Temperature
+from ..scene.rules.methods import MotionFeatures, find_motion_features
 from ..scene.scene import Scene
 from . import load, patch, rig, slide, structure, wear
 from .law import find_normal_load, find_pad_width, make_bond_parameters, make_effective_law
@@ -76,6 +77,7 @@ class Model:
     - wear: wear over many cycles, or None.
     - absent: effects that the scene does not name.
     - grooves: grooves that the load climbs, or None.
+    - motion: features of the scene that decide which engines can compute its motion.
     """
 
     source: Source
@@ -93,6 +95,7 @@ class Model:
     wear: WearModel | None
     absent: tuple
     grooves: Grooves | None = None
+    motion: MotionFeatures | None = None
 
     def __repr__(self) -> str:
         effects = shorten(", ".join(self.source.effects), MAX_SHOWN_EFFECTS)
@@ -222,6 +225,7 @@ def build(scene: Scene) -> Model:
         wear=wear.build_wear_model(scene) if scene.wear else None,
         absent=_find_absent(effects),
         grooves=grooves,
+        motion=find_motion_features(scene, scene.kind),
     )
     source = Source(
         path=scene.path,

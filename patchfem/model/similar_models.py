@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..core import frozen_array
+from ..scene.rules.methods import find_motion_features
 from . import patch as patches
 from .law import complete_bond_length, find_normal_load
 from .load import build_point_load
@@ -126,7 +127,8 @@ def replace_numbers(
             rig = _replace_drive(rig, scene.drive)
         if "structure" in tables:
             rig = _replace_modes(rig, scene.structure)
-    unwritten = replace(model, source=None, rig=rig, **changes)
+    motion = find_motion_features(scene, model.kind)
+    unwritten = replace(model, source=None, rig=rig, motion=motion, **changes)
     write = partial(write_resolved, scene, unwritten)
     source = replace(model.source, write=write, sets=scene.sets)
     return replace(unwritten, source=source)

@@ -69,7 +69,6 @@ def solve(omega: float, ratio: float) -> Row:
             "structure.mode.block.frequency": omega / (2 * np.pi),
             "friction.static": omega**2 / ratio,
             "drive.cycles": ratio,
-            "accuracy.method": "exact",
         },
     ).to_xarray()
     time = found.time.values

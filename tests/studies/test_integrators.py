@@ -52,7 +52,7 @@ def test_exact_dop853_restarted_at_events(engines, problem, where):
 
 
 def test_exact_free_decay_by_the_event_driven_solver(engines, problem):
-    """The event-driven solver agrees with the closed form of free decay within 1e-12."""
+    """The event-driven solver agrees with the closed form of free decay within 1e-11."""
     run, settings, problems = engines.OURS["exact"]
     case = problem("decay")
     assert "decay" in problems and case.error(run(case, settings[0])) < 1e-11

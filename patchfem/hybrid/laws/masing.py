@@ -229,6 +229,11 @@ def with_all_reversals(law: LawNumbers) -> LawNumbers:
     return law._replace(numbers=(law.numbers[0], ALL_REVERSALS, *law.numbers[2:]))
 
 
+def has_stick(law: LawNumbers) -> bool:
+    """Return whether a law is that of elements, all of which stick on the first piece of the curve."""
+    return law.law == "masing" and law.numbers[1] < 0
+
+
 def from_keys(friction, load, speed):
     """Return the elastic-plastic law, or Segalman's for law "iwan".
 

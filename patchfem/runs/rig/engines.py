@@ -102,33 +102,8 @@ def find_obstacle_of_map(name: str, model: Model) -> str:
 
 
 def collect_motion_features(model: Model, *, steady: bool = False) -> methods.MotionFeatures:
-    """Collect the properties of a model that decide which engines can compute its motion."""
-    rig = model.rig
-    spring = ""
-    if rig.springs.cubic is not None:
-        spring = "[structure.stiffening]"
-    elif rig.springs.interlock is not None:
-        spring = "structure.bonded.wavelength"
-    elif model.grooves is not None:
-        spring = f"[{model.grooves.key}]"
-    waveform = NO_WAVEFORM if steady else rig.drive.waveform
-    laws = rig.friction.interfaces
-    return methods.MotionFeatures(
-        [methods.Joint(law.numbers, model.partial_slip or law.partial_slip) for law in laws],
-        _describe_load_change(model),
-        rig.friction.strips_slide_apart,
-        spring,
-        waveform,
-        lower_shape=model.side if model.side == "lower" else "",
-    )
-
-
-def _describe_load_change(model: Model) -> str:
-    """Return the cause of a load that changes, "" for a constant load."""
-    if not model.rig.friction.load_varies:
-        return ""
-    cause = "normal.amplitude" if model.load_varies else "the motion"
-    return f"under a load that changes with {cause}"
+    """Return the features of a scene, with the waveform of the rig or, if `steady`, that of a response curve."""
+    return model.motion._replace(waveform=NO_WAVEFORM if steady else model.rig.drive.waveform)
 
 
 class SteadyMethod(NamedTuple):

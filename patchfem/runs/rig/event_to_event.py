@@ -19,13 +19,14 @@ from ...core import (
     SineDrive,
 )
 from ...dynamics.event_list import DRIVE_CHANGE, RELEASE, REVERSAL, STOP, EventLog
-from ...dynamics.grooves.climbing import lift_message
+from ...dynamics.grooves import climbing
 from ...dynamics.integrated import find_accelerations
 from ...formatting import format_length
 from ...hybrid import cases, periodic
 from ...hybrid import runs as engine
 from ...hybrid.laws import is_rigid
-from ...hybrid.records import Memory, State, Status
+from ...hybrid.laws.masing import has_stick
+from ...hybrid.records import Margin, Memory, State, Status
 from ...response import run_events
 from ...response.measures import MIN_SLIDE_RANGE, compute_harmonic, relative_gap
 from ...response.ringing import compute_stuck_vibration, make_ringing_measures, select_strongest
@@ -217,7 +218,7 @@ class LumpedEvaluator(RunEvaluator):
     def _explain_end(self, motion, travel: float) -> str:
         """Return why a motion ended early, "" if it reached the travel of the scene."""
         if motion.status == Status.LEAVES_GROOVES:
-            return lift_message(self.model.grooves, motion.time)
+            return climbing.lift_message(self.model.grooves, motion.time)
         if travel >= self.model.rig.springs.travel:
             return ""
         return (
@@ -314,7 +315,7 @@ class LumpedEvaluator(RunEvaluator):
             end=motion.final,
             cycles_done=cycles,
             events=len(motion.event_rows),
-            log=self._make_log(motion, drive) if self.is_rigid else None,
+            log=self._make_log(motion, drive),
             snapshots=self._list_snapshots(motion, response, times[2], start),
             repeats=motion.repeats,
         )
@@ -345,9 +346,17 @@ class LumpedEvaluator(RunEvaluator):
         force = self.joints.laws[0][1].mean + grooves.lifted_mass * rise
         return replace(response, extra=response.extra | {"normal_load": force})
 
-    def _make_log(self, motion, drive) -> EventLog:
-        """Return stops, releases and reversals of rigid interfaces, and the changes of the drive."""
-        directions = motion.find_directions()
+    def _make_log(self, motion, drive) -> EventLog | None:
+        """Return stops, releases and reversals of the interfaces, and the changes of the drive.
+
+        None for laws that have no such events, because some part of them always slips.
+        """
+        if self.is_rigid:
+            directions = motion.find_directions()
+        elif self.joints.laws and all(has_stick(law) for law, _ in self.joints.laws):
+            directions = _find_slip_directions(motion, is_free=self.model.rig.drive.kind == "free")
+        else:
+            return None
         rows = motion.event_rows
         slides = (
             rows[:, 1 : 1 + self.model.rig.modes.omega.size] @ self.model.rig.modes.interfaces.T
@@ -476,7 +485,6 @@ class LumpedEvaluator(RunEvaluator):
                 self.model.rig.modes,
                 drive,
                 run.log,
-                self.stick_tolerance,
                 repeats=run.repeats,
             )
         mode = select_strongest(vibration, "acceleration")
@@ -555,6 +563,27 @@ def _divide(begin: float, end: float, period: float, minimum: int) -> np.ndarray
     """Return times (k,) [s] of equal distances from begin to end, SAMPLES_PER_CYCLE in a period."""
     count = round((end - begin) / period * SAMPLES_PER_CYCLE) + 1
     return np.linspace(begin, end, max(minimum, count))
+
+
+def _find_slip_directions(motion, *, is_free: bool) -> np.ndarray:
+    """Return the directions (e + 1, i) of slip of elements at the start and after each event; 0 while all of them stick.
+
+    The first element slips where the first piece of the curve ends, and all stick after a reversal. In a release, all
+    stick at the start.
+    """
+    directions = motion.find_directions()
+    # Without an event in the elastic range, a motion that begins with a reversal slipped at the start.
+    slips = np.zeros(directions.shape[1], bool)
+    if not is_free:
+        for row in motion.event_rows[::-1]:
+            slips[int(row[-2])] = int(row[-1]) == Margin.MOTION
+    directions[0, ~slips] = 0.0
+    for k, row in enumerate(motion.event_rows, 1):
+        number, margin = int(row[-2]), int(row[-1])
+        if margin in (Margin.LIMIT, Margin.MOTION):
+            slips[number] = margin == Margin.LIMIT
+        directions[k, ~slips] = 0.0
+    return directions
 
 
 def _list_remembered_reversals(state: State, interface: int) -> np.ndarray:

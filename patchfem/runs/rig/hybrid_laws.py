@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...dynamics.grooves.climbing import check_lifted_mass
+from ...dynamics.grooves import climbing
 from ...effects import law_has_trait
 from ...friction import record
 from ...hybrid.cases import Load
@@ -92,7 +92,7 @@ def _list_laws(model: Model, patch) -> list[tuple[LawNumbers, Load]]:
 
     load = _make_load(model, patch)
     if model.grooves is not None:
-        check_lifted_mass(model.grooves, friction.static, rig.modes)
+        climbing.check_lifted_mass(model.grooves, friction.static, rig.modes)
         is_rigid = law_has_trait(friction.law, "set-valued")
         make = make_grooves if is_rigid else smooth_grooves.make_grooves
         return [(make(friction, model.grooves), load)]

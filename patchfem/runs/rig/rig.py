@@ -222,13 +222,16 @@ def _find_step_excess(run: CoupledRun) -> float:
     The errors are those of the completed run. A measure needs more steps if it misses the tolerance,
     but would meet it without the error of the steps. The result is 0 if there is none.
     """
+    # The engine `hybrid` estimates the error of its steps itself.
+    kind = "own" if run.numerics.local else "steps"
     run = postprocessing.add_missing_value_reasons(postprocessing.add_outcome_and_errors(run))
     tolerance = run.model.accuracy.tolerance
     largest = 0.0
     for measure in set_final_floors(run.measures, tolerance).values():
         ratio = measure.error_ratio(tolerance)
         if ratio > 1 and measure.causes is not None:
-            step_ratio = ratio * measure.causes.parts.get("steps", 0.0) / measure.error
+            part = measure.causes.parts.get(kind, 0.0)
+            step_ratio = ratio * part / measure.error
             if ratio - step_ratio <= 1:
                 largest = max(largest, ratio)
     return largest
@@ -254,6 +257,9 @@ def _meets_tolerance(run: CoupledRun, excesses: list) -> bool:
             return True
     if displacement.error_ratio(run.model.accuracy.tolerance) > 1:
         return False
+    if run.numerics.local and hasattr(run.model.rig.drive.signal, "band"):
+        # The errors of a random motion are those of its samples.
+        return True
     excesses.append(_find_step_excess(run))
     if excesses[-1] <= 1 or (len(excesses) > 2 and excesses[-1] >= excesses[-3]):
         return True

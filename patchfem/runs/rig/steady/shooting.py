@@ -142,7 +142,7 @@ class ShootingFinder(TracedCurve):
         errors = hybrid_runs.estimate_errors(shared, coarse_values, RTOL)
         relative = find_relative_error(motion)
         errors = {
-            name: errors.get(name, abs(value)) + relative * abs(value)
+            name: errors.get(name, solution.errors.get(name, abs(value))) + relative * abs(value)
             for name, value in solution.values.items()
         }
         # A periodic motion does not drift, and friction without slip does no work over a period.
@@ -182,6 +182,7 @@ class ShootingFinder(TracedCurve):
         """Return the Solution of a run with a regime."""
         solution = self.evaluator.make_solution(run, perf_counter() - begin, drive)
         errors = {name: RTOL * abs(value) for name, value in solution.values.items()}
+        errors |= solution.errors or {}
         extra = {"regime": regime, "multipliers": np.zeros(0)}
         return replace(solution, steady=(None, None), errors=errors, extra=extra)
 
