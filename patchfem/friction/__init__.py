@@ -63,7 +63,6 @@ PUBLIC = {
     "bonds.temperature": ("surface_temperature_rise",),
     "flags_kernels": (
         "FASTMATH_FLAGS",
-        "NJIT_INLINE",
         "NJIT_KERNEL",
     ),
     "grooves": ("Grooves",),

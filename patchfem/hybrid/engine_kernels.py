@@ -22,6 +22,7 @@ from .records import (
     Clock,
     Cycle,
     Face,
+    Margin,
     Memory,
     Mode,
     Piece,
@@ -251,6 +252,8 @@ def advance(rig, state, record, t_end, cycle):
             number = int(clock[Clock.N_EVENTS]) - 1
             if number < record.events.shape[0]:
                 write_directions(state, record.events[number])
+            if rig.settings[Setting.HAS_RIGID] > 0:
+                write_event(rig, state, record, face, Margin.AFTER)
         elif h == clock[Clock.STEP] or h == longest:
             clock[Clock.STEP] = h * step_factor(norm)
     return Status.DONE

@@ -311,6 +311,8 @@ def hold_or_release(rig, state):
             break
         if pivot < N_ORDERED_PIVOTS and rests(state.memory[i]):
             i = find_first_overload(rig, state, i)
+
+        # The interface changes sides, in the direction of the force that held it.
         memory = state.memory[i]
         memory[Memory.RELEASED] = 0.0
         if rests(memory):
@@ -319,6 +321,8 @@ def hold_or_release(rig, state):
             memory[Memory.DIRECTION] = 1.0 if memory[Memory.FORCE] > 0 else -1.0
         else:
             memory[Memory.DIRECTION] = 0.0
+
+    # The first interface that was released may rest again after others have begun to slip.
     if n_released > 1:
         hold_again(rig, state)
     for i in range(n_faces):

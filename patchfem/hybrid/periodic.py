@@ -86,39 +86,19 @@ def find_periodic_motion(
     if start is not None:
         shooting.state = _copy(start)
     shooting.relax(n_first - 1)
-    best = np.inf
     tolerance = MAX_CHANGE * float(case.rig.settings[Setting.RTOL])
-    for _ in range(MAX_ITERATIONS):
-        before = shooting.state
-        shooting.run()
-        change = shooting.measure_change(before)
-        if change < tolerance:
-            if shooting.has_same_regime(before):
-                break
-            shooting.slopes = None
-            continue
-        if change > best:
-            shooting.relax(N_RELAXED)
-            shooting.slopes = None
-            best = np.inf
-            continue
-        # The derivatives of a correction that was nearly exact serve for the next one.
-        if best < np.inf and change > MAX_REMAINDER * best:
-            shooting.slopes = None
-        best = change
-        shooting.correct(before)
-    if best < np.inf and change > MAX_REMAINDER * best:
-        shooting.slopes = None
+    before, change = shooting.converge(tolerance)
     multipliers, error = shooting.find_multipliers(before)
+
+    # Near the periodic motion one more correction costs a period, because the derivatives are known.
     if change < tolerance and error > change:
-        # The motion is close to periodic, and the derivatives are known: one more correction costs nothing.
-        shooting.correct(before)
-        nearer = _copy(shooting.state)
-        shooting.run()
-        if shooting.measure_change(nearer) < change and shooting.has_same_regime(nearer):
+        nearer, nearer_change = shooting.correct_once(before)
+        if nearer_change < change and shooting.has_same_regime(nearer):
             before = nearer
-            change = shooting.measure_change(nearer)
+            change = nearer_change
             error = shooting.find_multipliers(nearer)[1]
+
+    # The measures are those of a period from there on.
     shooting.state = before
     batch = shooting.run(has_windows=True)
     largest = np.abs(multipliers).max(initial=0.0)
@@ -200,6 +180,50 @@ class _Shooting:
         """Advance the motion by some periods."""
         for _ in range(count):
             self.run()
+
+    def converge(self, tolerance: float) -> tuple[State, float]:
+        """Correct the state until a period changes it by less than a tolerance and keeps the regimes of the laws.
+
+        Returns
+        -------
+        before : State
+            Last state at the start of a period.
+        change : float
+            Change over this period, relative to the scale of the state.
+        """
+        best = np.inf
+        for _ in range(MAX_ITERATIONS):
+            before = self.state
+            self.run()
+            change = self.measure_change(before)
+            if change < tolerance:
+                if self.has_same_regime(before):
+                    break
+                self.slopes = None
+                continue
+
+            # A correction that did not help is given up for some periods of the motion itself.
+            if change > best:
+                self.relax(N_RELAXED)
+                self.slopes = None
+                best = np.inf
+                continue
+
+            # The derivatives of a correction that was nearly exact serve for the next one.
+            if best < np.inf and change > MAX_REMAINDER * best:
+                self.slopes = None
+            best = change
+            self.correct(before)
+        if best < np.inf and change > MAX_REMAINDER * best:
+            self.slopes = None
+        return before, change
+
+    def correct_once(self, before: State) -> tuple[State, float]:
+        """Return the state after a correction of another one, and its change over a period."""
+        self.correct(before)
+        nearer = _copy(self.state)
+        self.run()
+        return nearer, self.measure_change(nearer)
 
     def _scales(self) -> np.ndarray:
         """Return the magnitudes (n,) of the modes and law states at the start of a period."""

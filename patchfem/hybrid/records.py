@@ -144,12 +144,16 @@ class Memory(IntEnum):
 
 
 class Margin(IntEnum):
-    """Margins of a regime: direction of motion or rest, branch, contact, and a limit of the law."""
+    """Margins of a regime: direction of motion or rest, branch, contact, and a limit of the law.
+
+    AFTER is no margin; it marks the row after an event at which the force of a rigid law may jump.
+    """
 
     MOTION = 0
     BRANCH = 1
     CONTACT = 2
     LIMIT = 3
+    AFTER = 4
 
 
 class Clock(IntEnum):
@@ -302,7 +306,7 @@ class Record(NamedTuple):
     - whole (W, 9), faces (W, M, 19): measures of the windows, see `Whole` and `Window`
     - samples (S, m), events (E, m): time, state y, forces, loads and directions of the interfaces, interface and margin
       of an event; the first column of the samples is given. Force and load of an event are those before it, the
-      directions those after it
+      directions those after it; a rigid law has a second row, `Margin.AFTER`, with the force after it
     """
 
     cycles: np.ndarray

@@ -333,7 +333,13 @@ def run_case(
     if repeats and fills_histories and len(samples):
         samples, event_rows = _fill_repeated_cycles(case, cycles, samples, event_rows)
     samples = samples[~np.isnan(samples[:, 0])]
-    rows = np.concatenate([samples, event_rows])
+
+    # Where a force jumps, a second row follows at the next instant.
+    is_after = event_rows[:, -1] == Margin.AFTER
+    after_rows = event_rows[is_after]
+    after_rows[:, 0] = np.nextafter(after_rows[:, 0], np.inf)
+    event_rows = event_rows[~is_after]
+    rows = np.concatenate([samples, event_rows, after_rows])
 
     duration = np.diff(cycles[:, Cycle.END], prepend=0.0)
     return Motion(

@@ -526,7 +526,7 @@ def write_samples(rig, state, record, fraction):
 
 @njit(**NJIT_KERNEL)
 def write_event(rig, state, record, face, which):
-    """Write the state at an event, before the regime changes.
+    """Write the state at an event, before the regime changes, or after it with the mark `Margin.AFTER`.
 
     Parameters
     ----------
@@ -539,7 +539,7 @@ def write_event(rig, state, record, face, which):
     face : int
         Number of the interface.
     which : int
-        Margin that has vanished (`records.Margin`).
+        Margin that has vanished, or the mark (`records.Margin`).
     """
     number = int(state.clock[Clock.N_EVENTS])
     if number < record.events.shape[0]:

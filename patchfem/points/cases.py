@@ -68,7 +68,7 @@ def list_parameters(
     )
 
 
-def march_cases(cases: Cases, steps: int, has_samples: bool = False) -> CaseMarch:
+def march_cases(cases: Cases, steps: int, *, has_samples: bool = False) -> CaseMarch:
     """Run cases with a number of steps per cycle, and compute their measures.
 
     Parameters

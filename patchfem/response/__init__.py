@@ -54,14 +54,12 @@ PUBLIC = {
     "loops": (
         "find_reversals",
         "interface_loop",
-        "interface_loops",
         "mean_half_range",
         "reversal_force_rule",
         "secant_stiffness",
     ),
     "measures": (
         "MIN_SLIDE_RANGE",
-        "SLIP_FRACTION",
         "compute_harmonic",
         "compute_ledger_measures",
         "compute_peak",
@@ -138,7 +136,6 @@ PUBLIC = {
         "window_amplitude_means",
     ),
     "spectrum": (
-        "distortion_ratio",
         "friction_harmonic",
         "motion_harmonic",
         "odd_harmonics",

@@ -109,7 +109,7 @@ def list_slipping_interfaces(window, drive, log=None, max_stick_slip: float = 0.
                 1
             ].any()
         else:
-            is_slipping = np.ptp(slip) > 0
+            is_slipping = np.ptp(slip) > max_stick_slip
         slipping.append(bool(is_slipping))
     return slipping
 

@@ -95,7 +95,6 @@ PUBLIC = {
     ),
     "rig.engines": (
         "ENGINES",
-        "HYBRID",
         "collect_motion_features",
         "find_obstacle_of_map",
     ),

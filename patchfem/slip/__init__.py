@@ -23,13 +23,11 @@ PUBLIC = {
     ),
     "shear_modes": (
         "JenkinsSet",
-        "N_REFERENCE_MODES",
         "N_SHEAR_MODES",
         "comparison_mode_count",
         "find_sufficient_modes",
         "find_fewest_gauss_points",
         "jenkins_set",
-        "modes_at_gauss_points",
         "scale_limits",
     ),
 }

@@ -108,4 +108,4 @@ def test_exact_page_of_limits_agrees_with_refusals():
             message = str(error).rpartition(": ")[2]
             assert cell == "no" and refusals[law, column][0].rpartition(": ")[2] == message
             assert message in limits.format_messages()
-    assert cells["coulomb", "`exact`"] == "yes" and cells["nonlocal, order 2", "`exact`"] == "no"
+    assert cells["coulomb", "`exact`"] == "yes" and cells["tanh", "`exact`"] == "yes"

@@ -145,7 +145,7 @@ def test_exact_matrices_and_elements_of_several_interfaces(tmp_path):
         (
             POINT + WAVE + PLASTIC + STRUCTURE,
             ".mat",
-            "cannot be written under a load that changes with normal.amplitude",
+            "cannot be written with normal.amplitude; remove this feature",
         ),
         (
             POINT

@@ -124,7 +124,7 @@ def test_samples_at_ends_of_repeated_cycles_have_their_times(omega):
     time = motion.rows[:, 0]
     assert motion.repeats and time[-1] <= 60 * period * (1 + 1e-12)
     assert np.abs(time[:, None] - samples).min(axis=0).max() < 1e-9 * period
-    assert time.size == samples.size + len(motion.event_rows)
+    assert time.size == samples.size + 2 * len(motion.event_rows)
 
 
 def test_drives_have_the_values_of_their_records():

@@ -14,7 +14,7 @@ from patchfem.contact import press, tangential_stiffness
 from patchfem.contact.gaps import crown, tilt
 from patchfem.core import PatchfemError
 from patchfem.slip import find_fewest_gauss_points, jenkins_set, scale_limits
-from patchfem.slip.shear_modes import shear_modes
+from patchfem.slip.shear_modes import find_fewest_modes, shear_modes
 
 MU = 0.3
 
@@ -284,3 +284,19 @@ def test_refuses_patch_without_friction():
     """A patch whose friction limit is zero at every point is refused."""
     with pytest.raises(PatchfemError, match="the friction limit is 0 at every point"):
         jenkins_set(make_coated_pair(40).tangential, np.zeros(41))
+
+
+@pytest.mark.parametrize("angle", [1e-4])
+@pytest.mark.parametrize("tolerance", [1e-4, 1e-6])
+def test_always_number_of_modes_is_minimal(angle, tolerance):
+    """The chosen number of modes meets the tolerance, and one mode less does not (within a factor
+    of 1.3)."""
+    pair = make_coated_pair(100)
+    limit = friction_limit(100, angle)
+    modes = find_fewest_modes(pair.tangential, limit, 1e-6, tolerance)
+    count = modes.stiffness.size
+    fewer = shear_modes(pair.tangential, limit, 1e-6, count - 1)
+    assert modes.backbone_error <= tolerance and (
+        count == 2 or tolerance < 1.3 * fewer.backbone_error
+    )
+    np.testing.assert_allclose(modes.shape, shear_modes(pair.tangential, limit, 1e-6, count).shape)

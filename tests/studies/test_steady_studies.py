@@ -22,7 +22,7 @@ def test_exact_time_march_agrees_with_steady_state_solver(march, contact, freque
     for name in march.MEASURES:
         assert row.miss(name) < near
         if row.run is not None:
-            assert row.miss(name, "run") < 1e-12
+            assert row.miss(name, "run") < 1e-10
     assert row.multiplier < 1 and row.regime != "stuck"
 
 
@@ -33,7 +33,7 @@ def test_order_of_the_time_march_with_reversals_inside_steps(march):
     """
     coarse, fine = (march.row("Coulomb", 129.0, steps, 300, 400) for steps in (400, 1600))
     name = march.MEASURES[0]
-    assert coarse.regime == "sliding" and coarse.miss(name, "run") < 1e-12
+    assert coarse.regime == "sliding" and coarse.miss(name, "run") < 1e-10
     assert coarse.miss(name) < 2e-5 and fine.miss(name) < coarse.miss(name) / 16
 
 
@@ -49,7 +49,7 @@ def test_exact_time_march_at_forty_frequencies_of_five_contacts(march, tmp_path,
         assert max(worst[name].values()) < 1.1e-4
     assert max(worst["patch of 41 elements"].values()) < 1.1e-3
     for name in ("Coulomb", "Coulomb, two modes"):
-        assert max(r.miss(m, "run") for r in table[name] for m in march.MEASURES) < 1e-12
+        assert max(r.miss(m, "run") for r in table[name] for m in march.MEASURES) < 1e-10
         assert {r.regime for r in table[name]} == {"sliding", "2 stops"}
         assert worst[name][march.MEASURES[0]] < (4e-7 if name == "Coulomb" else 3e-5)
         assert max(worst[name].values()) < (3e-6 if name == "Coulomb" else 4e-4)

@@ -205,7 +205,8 @@ def from_elements(stiffness, yield_displacement):
     and their yield displacement is that of a single element of 1 m.
     """
     if not np.any(np.multiply(stiffness, yield_displacement)):
-        stiffness, yield_displacement = [0.0], [1.0]
+        stiffness = [0.0]
+        yield_displacement = [1.0]
     pairs = {}
     for k, x in zip(stiffness, yield_displacement):
         pairs[float(x)] = pairs.get(float(x), 0.0) + float(k)

@@ -465,7 +465,7 @@ def add_ringing(
     for count in np.unique(steps[may_ring]).astype(int).tolist():
         part = np.flatnonzero(may_ring & (steps == count))
         counts = (count, count // 2)
-        runs = [march_cases(cases.select(part), n, True) for n in counts]
+        runs = [march_cases(cases.select(part), n, has_samples=True) for n in counts]
         for row, case in enumerate(part.tolist()):
             drive, modes = models[case].rig.drive.signal, models[case].rig.modes
             windows = [

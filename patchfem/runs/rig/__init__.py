@@ -8,7 +8,7 @@ its coarse runs, each only once, and `solve` calls the engine. `engines` has a r
 with its comparison runs. `scene.rules.methods.ENGINE_SUPPORT` lists what each engine can compute,
 and `runs.memory` the memory of its compiled code.
 
-Each engine has a module (`march`, `event_driven`, `event_to_event` for the engine `hybrid`, and the
+Each engine has a module (`march`, `event_to_event` for the engine `hybrid`, and the
 folder `steady`), which prepares the integration in `dynamics` or `hybrid` and contains the measures that the
 engine computes itself.
 `evaluation` converts a run to a Solution, and `levels` continues a run from drive level to drive

@@ -295,8 +295,10 @@ class LumpedEvaluator(RunEvaluator):
             # Spectra need samples of equal distances.
             is_kept = np.isin(time, np.concatenate(times[:2]))
         else:
-            # Differences of samples at nearly the same time are round-off; the last sample is kept.
+            # Differences of samples at nearly the same time are round-off, except at a jump of the force; the last sample
+            # is kept.
             is_late = np.diff(time) > SAME_TIME_TOL * drive.period
+            is_late |= motion.rows[1:, -1] == Margin.AFTER
             is_kept = np.append(is_late, True)
         motion = replace(motion, rows=motion.rows[is_kept])
         response = motion.make_response(self.model.rig.modes, drive)
@@ -579,9 +581,8 @@ def _find_slip_directions(motion, *, is_free: bool) -> np.ndarray:
             slips[int(row[-2])] = int(row[-1]) == Margin.MOTION
     directions[0, ~slips] = 0.0
     for k, row in enumerate(motion.event_rows, 1):
-        number, margin = int(row[-2]), int(row[-1])
-        if margin in (Margin.LIMIT, Margin.MOTION):
-            slips[number] = margin == Margin.LIMIT
+        if int(row[-1]) in (Margin.LIMIT, Margin.MOTION):
+            slips[int(row[-2])] = int(row[-1]) == Margin.LIMIT
         directions[k, ~slips] = 0.0
     return directions
 
