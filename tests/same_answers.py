@@ -192,11 +192,15 @@ def run_command(*words: str) -> dict:
     out = io.StringIO()
     err = io.StringIO()
     code = 0
+    # answers record the command line of the process, which here is that of the tests
+    arguments, sys.argv = sys.argv, ["patchfem"]
     with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
         try:
             patchfem(list(words))
         except SystemExit as end:
             code = end.code or 0
+        finally:
+            sys.argv = arguments
     return {
         "code": code,
         "out": "" if words[0] == "run" else out.getvalue(),

@@ -2,22 +2,18 @@
 
 import json
 import os
-import platform
 import re
 import shutil
 import subprocess
 import sys
 import tempfile
-import time
 from pathlib import Path
 from types import SimpleNamespace
-from zipfile import ZipFile
 
 import numba
 import pytest
 from limits import limit_file_size
 from scene_texts import PLASTIC, POINT, TRIANGLE
-from test_compiled_callers import CALLS, KERNELS
 
 import patchfem
 from patchfem import compiled
@@ -96,48 +92,6 @@ def test_exact_only_first_of_two_processes_compiles(parallel_results):
     """Of two processes started at once on an empty cache, only one compiles, and both give the same loop."""
     assert [one["numba"] for one in parallel_results] == [True, False]
     assert len({(one["work"], one["peak"]) for one in parallel_results}) == 1
-
-
-def test_always_waiting_process_compiles_after_kill(tmp_path):
-    """If the process that compiles is killed, the process that waits for it compiles the code."""
-    (tmp_path / "some_kernels.py").write_text(KERNELS, "utf-8")
-    calls = CALLS.format(tmp_path / "some_kernels.py")
-    started_file = tmp_path / "compiles"
-    first = start_process(
-        tmp_path,
-        f"""
-import pathlib, time
-from patchfem.compiled import machine
-def compile_and_store(*arguments):
-    pathlib.Path({str(started_file)!r}).touch()
-    time.sleep(600)
-machine.compile_and_store = compile_and_store
-"""
-        + calls,
-    )
-    deadline = time.monotonic() + 120
-    while not started_file.exists() and time.monotonic() < deadline:
-        time.sleep(0.05)
-    waiting_file = tmp_path / "waits"
-    second = start_process(
-        tmp_path,
-        f"""
-import pathlib, time
-from patchfem import compiled
-def sleep(seconds):
-    pathlib.Path({str(waiting_file)!r}).touch()
-    time.sleep(seconds)
-compiled.sleep = sleep
-"""
-        + calls,
-    )
-    while not waiting_file.exists() and time.monotonic() < deadline:
-        time.sleep(0.05)
-    assert waiting_file.exists() and second.poll() is None and not list(tmp_path.rglob("*.code"))
-    first.kill()
-    assert second.communicate(timeout=300)[0].split()[:2] == ["6.0", "True"]
-    assert list(tmp_path.rglob("*.code"))
-    first.communicate()
 
 
 def test_exact_edited_law_is_compiled_again(tmp_path, shared_cache, parallel_results):
@@ -231,68 +185,6 @@ def test_exact_wheel_has_machine_code_only_on_request(monkeypatch):
         assert data.get("tag", "").startswith("py3-none-") is has
 
 
-def build_wheel(folder: Path, **more) -> Path:
-    """Build a wheel of this checkout, unpack it in a folder, and return its path."""
-    done = subprocess.run(
-        [sys.executable, "-m", "hatchling", "build", "-t", "wheel", "-d", folder],
-        text=True,
-        cwd=Path(patchfem.__file__).parents[1],
-        env=os.environ | more,
-        capture_output=True,
-    )
-    assert done.returncode == 0, done.stderr
-    [path] = folder.glob("*.whl")
-    with ZipFile(path) as file:
-        file.extractall(folder)
-    return path
-
-
-@pytest.mark.slow
-def test_exact_wheel_with_machine_code_compiles_nothing(tmp_path):
-    """The first run of the rig from a wheel with machine code compiles nothing.
-
-    Its measures agree with those of a wheel without machine code within 1e-9.
-    """
-    bare = build_wheel(tmp_path / "bare")
-    full = build_wheel(tmp_path / "full", PATCHFEM_MACHINE_CODE="1")
-    assert bare.name.endswith("-py3-none-any.whl")
-    assert not (bare.parent / "patchfem/compiled/generic").exists()
-    assert not full.name.endswith("-any.whl")
-    assert len(list((full.parent / "patchfem/compiled/generic").rglob("*.code"))) > 7
-    measures = {}
-    for one in (bare, full):
-        words = [
-            sys.executable,
-            "-X",
-            "importtime",
-            "-m",
-            "patchfem",
-            "run",
-            hook.ROOT / "studies/rig/rig.toml",
-            "-o",
-            one.parent / "out",
-        ]
-        done = subprocess.run(
-            words,
-            cwd=one.parent,
-            capture_output=True,
-            text=True,
-            env=os.environ
-            | {"PYTHONPATH": str(one.parent), "PATCHFEM_CACHE": str(one.parent / "cache")},
-        )
-        assert done.returncode == 0, done.stderr
-        assert ("compiling" in done.stderr) is (" numba\n" in done.stderr) is (one is bare)
-        found = json.loads((one.parent / "out" / "summary.json").read_text("utf-8"))["measures"]
-        measures[one] = {
-            name: each["value"] for name, each in found.items() if each["value"] is not None
-        }
-        assert (
-            measures[one].pop("energy_balance") < 1e-11
-        )  # it is the round-off of a sum that cancels
-    assert not list((full.parent / "cache").rglob("*.code"))
-    assert measures[full] == pytest.approx(measures[bare], rel=1e-9, abs=1e-30)
-
-
 KEYS = """\
 import json, pathlib
 from patchfem import compiled
@@ -341,13 +233,6 @@ def test_exact_cache_key_depends_on_kernels(tmp_path):
     assert compute_keys()[-1] not in others
 
 
-def test_exact_cache_key_depends_on_machine(monkeypatch):
-    """The cache key changes with the type of the processor."""
-    own = compiled.compute_kernel_key()
-    monkeypatch.setattr(platform, "machine", lambda: "riscv64")
-    assert compiled.compute_kernel_key() != own
-
-
 def test_exact_cache_folder_follows_environment(tmp_path, monkeypatch):
     """The cache folder lies in PATCHFEM_CACHE, else in XDG_CACHE_HOME, else in ~/.cache."""
     monkeypatch.setenv("PATCHFEM_CACHE", str(tmp_path / "mine"))
@@ -360,25 +245,6 @@ def test_exact_cache_folder_follows_environment(tmp_path, monkeypatch):
     monkeypatch.delenv("XDG_CACHE_HOME")
     monkeypatch.setenv("HOME", str(tmp_path / "home"))
     assert compiled.cache_folder().is_relative_to(tmp_path / "home" / ".cache")
-
-
-def test_exact_completed_kinds_of_runs_are_recorded(tmp_path):
-    """A later process knows which kinds of runs were completed before with this cache."""
-
-    def run_python(code: str) -> str:
-        """Run Python code in a new process and return its output."""
-        return subprocess.run(
-            [sys.executable, "-c", f"from patchfem import compiled; {code}"],
-            env=os.environ | {"PATCHFEM_CACHE": str(tmp_path)},
-            capture_output=True,
-            text=True,
-            check=True,
-        ).stdout.strip()
-
-    question = "print(compiled.has_run('march'), compiled.has_run('other march'))"
-    assert run_python(question) == "False False"
-    run_python("compiled.record_run('march')")
-    assert run_python(question) == "True False"
 
 
 @pytest.mark.parametrize(
@@ -437,21 +303,6 @@ def test_exact_untrusted_cache_folder_is_avoided(tmp_path, monkeypatch, obstacle
         user_cache.make_process_folder.cache_clear()
 
 
-def test_exact_cache_folder_permissions_are_restricted(tmp_path, monkeypatch):
-    """Write permission of the group is removed from the cache folder, and without a home folder the cache is temporary."""
-    monkeypatch.setenv("PATCHFEM_CACHE", str(tmp_path))
-    (tmp_path / "patchfem").mkdir()
-    (tmp_path / "patchfem").chmod(0o775)  # permissions that an umask of 002 gives
-    assert compiled.cache_folder().parent == tmp_path / "patchfem"
-    assert os.stat(tmp_path / "patchfem").st_mode & 0o777 == 0o755
-    assert os.stat(compiled.cache_folder()).st_mode & 0o777 == 0o700
-    monkeypatch.delenv("PATCHFEM_CACHE")
-    monkeypatch.delenv("XDG_CACHE_HOME", raising=False)
-    monkeypatch.setattr(Path, "home", lambda: (_ for _ in ()).throw(RuntimeError("no home")))
-    # a user without an entry in the password file has no home folder
-    assert user_cache.find_cache_base() == user_cache.make_process_folder()
-
-
 @pytest.fixture
 def code_folder(tmp_path, monkeypatch):
     """Return the folder in which this process stores its compiled code."""
@@ -495,21 +346,6 @@ def test_always_damaged_cache_is_rebuilt(code_folder, ending, harm):
     assert count_cache_misses(make_dispatcher(code_folder)) == (1, 0)
     if harm != "a folder":
         assert count_cache_misses(make_dispatcher(code_folder)) == (0, 1)
-
-
-@pytest.mark.parametrize("obstacle", ["no room", "a file in the way"])
-def test_always_unwritable_cache_does_not_stop_run(code_folder, obstacle):
-    """A function is compiled in memory if the disk is full or a file blocks the folder."""
-    if obstacle == "a file in the way":
-        code_folder.write_text("mine")
-    found = make_dispatcher(code_folder)
-    with limit_file_size(0 if obstacle == "no room" else 1 << 30):
-        assert count_cache_misses(found) == (1, 0)
-    assert not [path for path in code_folder.rglob("*") if path.is_file()]
-    if obstacle == "no room":
-        assert count_cache_misses(make_dispatcher(code_folder)) == (1, 0) and count_cache_misses(
-            make_dispatcher(code_folder)
-        ) == (0, 1)
 
 
 def test_always_generated_module_needs_no_file(code_folder):

@@ -1,11 +1,9 @@
 """A command imports only the modules that its scene needs, and answers without delay."""
 
-import json
 import os
 import subprocess
 import sys
 from functools import cache
-from importlib.metadata import version
 from pathlib import Path
 from resource import RUSAGE_CHILDREN, getrusage
 from tempfile import TemporaryDirectory
@@ -18,11 +16,8 @@ from command_line import (
     has_code_of,
     modules_after,
     modules_after_cached,
-    run_cli,
 )
 from scene_texts import BENCH, COATED, COULOMB, PLASTIC, POINT, SHEAR, STRUCTURE, TRIANGLE
-
-from patchfem.export.runs import PACKAGES, list_versions
 
 RIG = Path(__file__).parents[1] / "studies" / "rig" / "rig.toml"
 PATCH = COATED + '[contact.tilt]\nangle = "0.1 mrad"\n'
@@ -229,45 +224,3 @@ def test_always_help_and_check_are_fast(write_scene, words):
     words = (*words, str(write_scene(rig_without_files()))) if words == ("check",) else words
     seconds, pyplot = cpu_seconds(2, ("-m", "patchfem", *words), ("-c", "import matplotlib.pyplot"))
     assert seconds < 0.55 * pyplot
-
-
-def test_exact_versions_of_installed_packages():
-    """The listed versions are those of the installed packages, also with importlib.metadata loaded lazily."""
-    found = list_versions()
-    assert set(found) == {"python", *PACKAGES}
-    assert all(found[name] == version(name) for name in PACKAGES)
-    for use in (
-        "import importlib.metadata; found = importlib.metadata.version('numpy')",
-        "from importlib.metadata import entry_points as e; from importlib.metadata import version; "
-        "found = version('numpy') if e(group='console_scripts') else ''",
-    ):
-        assert modules_after(
-            f"import json, patchfem.__main__; {use}; print(json.dumps([found]))"
-        ) == {version("numpy")}
-
-
-def test_always_shell_completion_is_written_to_given_file(tmp_path, monkeypatch):
-    """`--install-completion` writes the completion script to the file given by -o."""
-    monkeypatch.setenv("HOME", str(tmp_path))
-    done = run_cli("--install-completion", "--shell", "bash", "-o", tmp_path / "patchfem.bash")
-    assert done.code == 0, done.err
-    assert "patchfem" in (tmp_path / "patchfem.bash").read_text() and "patchfem" in done.out
-
-
-def test_exact_short_command_triggers_no_garbage_collection():
-    """A `check` of the rig triggers no garbage collection.
-
-    Two collections took 17 ms before; later ones have a threshold of 50 000 objects.
-    """
-    watched = (
-        "import gc, json, sys; found = []; gc.set_threshold(10**9); "
-        "from patchfem.__main__ import main\n"
-        "gc.callbacks.append(lambda phase, _: found.append(gc.get_threshold()[0]))\n"
-        "try:\n    main(sys.argv[1:])\nexcept SystemExit as end:\n    assert not end.code\n"
-        "short = list(found)\nkept = [[] for _ in range(400_000)]\n"
-        "print(json.dumps([short, found[:1], found[-1:]]))"
-    )
-    done = subprocess.run(
-        [sys.executable, "-c", watched, "check", RIG], capture_output=True, text=True, check=True
-    )
-    assert json.loads(done.stdout.splitlines()[-1]) == [[], [50_000], [50_000]]

@@ -233,11 +233,6 @@ def test_exact_checker_finds_modules_and_imports():
     )  # otherwise the check of effects has nothing to check
 
 
-def test_exact_small_package_has_no_fault():
-    """The small package of the examples has no fault."""
-    assert find_faults(SMALL) == []
-
-
 @pytest.mark.parametrize("name, text, fault", [
     ("friction.laws.tanh", "from ...dynamics.drives import Sine", "friction.laws.tanh imports dynamics.drives upward"),
     ("dynamics.events", "def f():\n    from ..runs.run import solve", "dynamics.events imports runs.run upward"),

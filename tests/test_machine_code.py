@@ -3,18 +3,15 @@
 import json
 import subprocess
 import sys
-from concurrent.futures import ThreadPoolExecutor
 from enum import IntEnum
 from math import exp, tan
-from threading import Barrier
-from time import sleep
 from typing import NamedTuple
 
 import numpy as np
 import pytest
 from numba import njit
 
-from patchfem.compiled import KernelModule, jit, load, machine
+from patchfem.compiled import jit, machine
 
 
 class Inner(NamedTuple):
@@ -247,44 +244,6 @@ def test_always_argument_kinds_distinguish_types():
     ) == words.convert(7)
 
 
-def test_always_cached_tuples_are_not_confused(stored_sum):
-    """Tuples that are created one after another at the same address are not confused, since cached tuples stay alive."""
-    _, (first, outer, step, _), _, code, numba_sum = stored_sum
-    words = machine.ArgumentConverter()
-    result = np.zeros(5)
-    for k in range(20):
-        other = outer._replace(inner=Inner(outer.inner.places * k, 0.1 * k))
-        row = b"".join(words.convert(one)[1] for one in (first, other, step, result))
-        assert code(row) == numba_sum(first, other, step, np.zeros(5))
-    assert len(words.known_tuples) <= machine.MAX_CACHED_TUPLES
-
-
-def test_exact_constants_are_read_without_import(tmp_path):
-    """Simple constants of a kernel module are read from its source; only other names import the module."""
-    path = tmp_path / "some_kernels.py"
-    path.write_text(
-        '"""Text."""\nimport nothing_there\nSTILL, MOVES = 0, 1\nNAME = "a"\nFAR = 1e-3\n'
-        "WIDE = -FAR * (2 + MOVES)\nHALF = 2.0 ** -(MOVES - 2 * STILL) / +1\nPLACES = (MOVES, (NAME, -2))\n"
-        "LEFT, RIGHT = range(MOVES + 1)\nUP, = range(STILL + 5, 6)\n"
-        "OTHER = len(NAME)\nWORSE = [missing.remove() for missing in NAME]\n"
-    )
-    imports = []
-    module = KernelModule("patchfem.some_kernels", path, lambda: imports.append(1))
-    assert (module.STILL, module.MOVES, module.NAME, module.FAR, module.WIDE) == (
-        0,
-        1,
-        "a",
-        1e-3,
-        -3e-3,
-    )
-    assert (module.HALF, module.PLACES) == (0.5, (1, ("a", -2)))
-    assert (module.LEFT, module.RIGHT, module.UP) == (0, 1, 5)
-    assert not imports
-    with pytest.raises(AttributeError):
-        module.OTHER  # noqa: B018
-    assert imports
-
-
 MOTIONS = """
 import json, sys
 import patchfem as pf
@@ -300,39 +259,6 @@ for law, more in (("coulomb", ""), ("elastic-plastic", 'bond_length = "2 um"'), 
     out.append([found.measures[name].value for name in ("slip_amplitude", "friction_work")])
 print(json.dumps([out, "numba" in sys.modules]))
 """
-
-
-def test_always_parallel_first_calls_load_code_once(monkeypatch):
-    """Two threads that call a kernel for the first time at once load its code once.
-
-    Loading it twice ended the process in half of the first sweeps of Iwan cases.
-    """
-    entry = fresh_kernel_module("response.ringing_kernels").fit_sinusoids
-    loaded_paths = []
-    barrier = Barrier(2)
-
-    def load_slowly(path):
-        """Record the path, and return a function after a delay."""
-        loaded_paths.append(path)
-        sleep(0.05)
-        return lambda words: 7.0
-
-    monkeypatch.setattr(machine, "load_file", load_slowly)
-
-    def call_with_other_thread(_):
-        """Call the kernel at the same time as the other thread."""
-        barrier.wait()
-        return entry(1.5)
-
-    with ThreadPoolExecutor(2) as pool:
-        assert list(pool.map(call_with_other_thread, range(2))) == [7.0, 7.0]
-    assert len(loaded_paths) == 1
-
-
-def fresh_kernel_module(module: str) -> KernelModule:
-    """Return a new handle of a kernel module of which no function has been called."""
-    known = load(module)
-    return KernelModule(known.__name__, known._source, known._importer)
 
 
 def test_exact_motions_agree_without_compilation(monkeypatch):

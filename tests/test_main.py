@@ -51,14 +51,6 @@ for name in "SIGTERM", "SIGINT", "SIGHUP":
     except KeyboardInterrupt:
         print(name)
 """
-LEFT = """\
-import os, sys
-from patchfem.__main__ import main
-
-leave = os._exit
-os._exit = lambda code: leave(40 + code)
-main()
-"""
 FAULTY = """\
 from patchfem.__main__ import main
 from patchfem.structure import drive_sizes
@@ -108,20 +100,6 @@ def test_exact_process_flushes_output_before_early_exit(scene, tmp_path, kind):
     assert (tmp_path / "end").read_text() == "of atexit"
 
 
-@pytest.mark.parametrize("words, code", [(["--version"], 40), (["check"], 42)])
-def test_exact_successful_command_exits_early(words, code):
-    """A successful command ends the process without freeing imported modules.
-
-    Freeing them took 0.1 s of CPU after a run of the rig.
-    """
-    assert (
-        subprocess.run(
-            [sys.executable, "-c", LEFT, *words], capture_output=True, timeout=60
-        ).returncode
-        == code
-    )
-
-
 @pytest.mark.skipif(
     os.name != "posix", reason="signals that end a process elsewhere cannot be caught"
 )
@@ -158,17 +136,6 @@ def test_exact_interrupt_in_compiler_callback_is_kept():
         if signal.getsignal(getattr(signal, name)) is not signal.SIG_IGN
     ]
     assert done.stdout.split() == taken and taken and not done.stderr
-
-
-def test_always_profiler_prints_its_table(scene):
-    """Python's profiler prints its table although the process ends early."""
-    done = subprocess.run(
-        [sys.executable, "-m", "cProfile", "-m", "patchfem", "check", scene],
-        text=True,
-        capture_output=True,
-        timeout=60,
-    )
-    assert "function calls" in done.stdout and f"{scene}:2: drive.kind" in done.stderr
 
 
 @pytest.mark.skipif(

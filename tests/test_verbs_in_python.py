@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from command_line import run_cli
-from scene_texts import BENCH, make_shaken_block
+from scene_texts import make_shaken_block
 
 import patchfem as pf
 
@@ -40,15 +40,6 @@ def test_exact_scene_from_dict_equals_text():
     assert pf.sweep(BLOCK, {"normal.load": ["90 N", "100 N"]})["outcome"].size == 2
 
 
-def test_exact_result_table_lists_measures():
-    """`Result.table` lists all measures with their values."""
-    result = pf.run(BLOCK)
-    found = result.table()
-    rows = found if isinstance(found, list) else found.reset_index().to_dict("records")
-    assert [one["measure"] for one in rows] == list(result.measures)
-    assert rows[0]["value"] == result.measures[rows[0]["measure"]].value
-
-
 def test_exact_fit_recovers_friction_of_computed_loop(tmp_path):
     """A fit to a computed loop recovers the friction coefficient within 1e-6, with options given in any form."""
     bench = pf.new("bench")
@@ -79,22 +70,6 @@ def test_exact_fit_recovers_friction_of_computed_loop(tmp_path):
         pf.fit(bench, path, {"hold": ()}, free=free)
 
 
-def test_exact_functions_are_not_hidden_by_subpackages(tmp_path):
-    """`pf.mesh` and `pf.export` stay functions after the subpackages of the same names are imported."""
-    for _ in range(2):
-        assert pf.mesh(PIECES, tmp_path / "pieces.vtu").is_file()
-        import patchfem.export.folder
-        import patchfem.mesh.files  # noqa: F401
-    with pytest.raises(pf.PatchfemError, match="only a scene with"):
-        pf.mesh(TEXT, tmp_path / "none.vtu")
-    pf.run(BLOCK).save(tmp_path / "block")
-    assert (
-        pf.export(tmp_path / "block", tmp_path / "histories.csv")
-        .read_text("utf-8")
-        .startswith("time")
-    )
-
-
 @pytest.fixture(scope="module")
 def results_folder(tmp_path_factory):
     """Return a folder with the results of a rig (`block`) and of pressed pieces with fields (`pieces`)."""
@@ -102,19 +77,6 @@ def results_folder(tmp_path_factory):
     pf.run(BLOCK).save(folder / "block")
     pf.run(PIECES).save(folder / "pieces")
     return folder
-
-
-def test_exact_report_shows_several_results(results_folder, tmp_path):
-    """A report of two results folders shows both side by side, and a report of one equals that of a list of one."""
-    one = results_folder / "block"
-    page = pf.report([one, results_folder / "pieces"], tmp_path / "both.html")
-    assert page == tmp_path / "both.html"
-    assert all(f">{name}<" in page.read_text("utf-8") for name in ("block", "pieces"))
-    alone = pf.report(one, tmp_path / "one.html").read_text("utf-8")
-    assert alone == pf.report([str(one)], out=tmp_path / "other.html").read_text("utf-8")
-    assert ">pieces<" not in alone
-    with pytest.raises(pf.PatchfemError, match="at least one results folder"):
-        pf.report([])
 
 
 @pytest.mark.parametrize(
@@ -150,40 +112,6 @@ def test_exact_backbone_accepts_amplitudes_in_any_form(amplitudes):
     """`pf.backbone` accepts amplitudes as a number, a text, an array or a list."""
     found = pf.backbone(PLASTIC_BLOCK, amplitudes=amplitudes, method="quasi-static")
     assert found["quasi_static_amplitude"].values == pytest.approx([1e-6], rel=1e-12)
-
-
-@pytest.mark.parametrize(
-    "amplitudes, said",
-    [
-        ([1e-6, np.nan, 1e-3], "amplitudes: 'nan m'"),
-        ("1 um..x", "amplitudes: "),
-        ([0.0, 1e-6], "above 0"),
-        ([], "amplitudes"),
-        (object(), "cannot be a value of a scene"),
-        ("1 um..9 um", "number of values"),
-    ],
-)
-def test_refuses_invalid_amplitudes(amplitudes, said):
-    """Amplitudes that are not positive lengths are refused."""
-    with pytest.raises(pf.PatchfemError, match=said):
-        pf.backbone(PLASTIC_BLOCK, amplitudes=amplitudes, method="quasi-static")
-
-
-@pytest.mark.parametrize(
-    "free, said",
-    [
-        ({"friction.static": 0.3}, r"\(low, high\) .* not 0\.3"),
-        ({"friction.static": (0.1, 0.2, 0.5)}, r"\(low, high\)"),
-        ({"friction.static": None}, r"\(low, high\) .* not None"),
-        (["friction.static=0.1..0.5"], "must be a dict"),
-        ({}, "at least one"),
-        ({"friction.static": "0.5..0.1"}, "must lie below"),
-    ],
-)
-def test_refuses_free_keys_without_range(tmp_path, free, said):
-    """A free key of a fit without a lower and an upper limit is refused."""
-    with pytest.raises(pf.PatchfemError, match=said):
-        pf.fit(BLOCK, to=write_rows(tmp_path), free=free)
 
 
 @pytest.mark.parametrize(
@@ -248,48 +176,6 @@ def test_refuses_folder_with_foreign_files(tmp_path, monkeypatch, scene, words):
     assert (tmp_path / "other" / "notes.txt").is_file()
 
 
-def test_exact_profile_accepts_cutoff_in_any_form(tmp_path):
-    """`pf.profile` accepts a cutoff as a number or a text, and refuses an invalid one."""
-    path = tmp_path / "trace.csv"
-    path.write_text("x [um],z [um]\n" + "".join(f"{k},{k % 7}\n" for k in range(2000)), "utf-8")
-    roughness = [
-        pf.profile(path, **options)["profiles"][0]["measures"]["Ra"]
-        for options in (
-            {"cutoff": "0.25 mm"},
-            {"cutoff": np.float64(2.5e-4)},
-            {"cutoff": 0.25e-3, "window": "0 um,1999 um"},
-        )
-    ]
-    assert roughness[1:] == roughness[:1] * 2
-    for wrong in (0.0, float("nan"), "0.25", object()):
-        with pytest.raises(pf.PatchfemError, match="profile: cutoff"):
-            pf.profile(path, cutoff=wrong)
-
-
-@pytest.mark.parametrize(
-    "given, said",
-    [
-        (
-            {"slide.amplitude": 2.0},
-            r"slide\.amplitude: 2 without a unit means 2 m, which is longer than the patch \(0\.04",
-        ),
-        (
-            {"contact": {"crown": {"radius": 3.0}}, "contact.length": 12.7},
-            r"contact\.length: 12\.7 .* any joint",
-        ),
-    ],
-)
-def test_refuses_implausible_length_without_unit(given, said):
-    """A number without a unit that would be an implausible length in metres is refused, and accepted with its unit."""
-    scene = pf.load(pf.new("joint"))
-    other = {key: f"{value!r} m" for key, value in given.items() if key != "contact"}
-    for load in (lambda sets: scene.with_(**sets), lambda sets: pf.load(pf.new("joint"), **sets)):
-        with pytest.raises(pf.SceneError, match=said):
-            load({key: value for key, value in given.items() if key != "contact"})
-        assert load(other).kind == "bench"  # a length with its unit is accepted
-    assert scene.with_(**{"contact.crown.radius": 3.0}).contact.crown.radius == 3.0
-
-
 def test_exact_with_equals_load_with_settings():
     """`Scene.with_` gives the same scene as `pf.load` with the same settings and leaves the original unchanged."""
     scene = pf.load(BLOCK)
@@ -299,25 +185,6 @@ def test_exact_with_equals_load_with_settings():
     assert (again.title, again.normal.load, scene.normal.load) == ("b", 90.0, 100.0)
     with pytest.raises(pf.SceneError, match=r"drive\.file: there is no file"):
         scene.with_(**{"drive.waveform": "file", "drive.file": "none.csv"})
-
-
-def test_exact_import_equals_command_line(tmp_path):
-    """`pf.import_` writes the same bytes as the command line, and refuses unsuitable settings."""
-    path = tmp_path / "run.csv"
-    path.write_text("time [ms],force [lbf]\n0,1\n1,2\n2,-1\n", "utf-8")
-    found = pf.import_(path, tmp_path / "python.csv", zero=True)
-    run_cli("import", path, "-o", tmp_path / "shell.csv", "--zero")
-    assert (tmp_path / "python.csv").read_bytes() == (
-        tmp_path / "shell.csv"
-    ).read_bytes() and found["rows"] == 3
-    for given, said in (
-        ({"segmet": "2 s"}, "segmet: unknown setting"),
-        ({"map": 3}, "map: a text"),
-        ({"segment": 2.0}, "segment: a text"),
-        ({"begin": "1 s"}, "can be used only for modes"),
-    ):
-        with pytest.raises(pf.PatchfemError, match=said):
-            pf.import_(path, tmp_path / "other.csv", **given)
 
 
 @pytest.mark.parametrize(
@@ -358,34 +225,3 @@ def test_refuses_arguments_of_wrong_type(odd):
             match=r"needed|at least one|unknown kind|must be a dict|settings|not a|give a Dataset",
         ):
             verb(odd)
-
-
-@pytest.mark.parametrize("text", [BENCH, TEXT], ids=["bench", "rig"])
-@pytest.mark.parametrize("keys", [{}, {"accuracy.method": "march", "accuracy.steps_per_cycle": 60}])
-def test_exact_rigid_loop_has_vertical_jumps(text, keys):
-    """In the plot of the loop of a rigid contact under a constant load, the force jumps at a fixed slide."""
-    line = pf.run(text, **keys).plot.loop().lines[0]
-    slide, force = np.diff(line.get_xydata().T)
-    jumps = np.abs(force) > 1e-9
-    assert jumps.sum() >= 2 and not slide[jumps].any()
-
-
-def test_exact_backbone_and_stress_plots_show_values():
-    """The plot of a backbone has its frequencies on the axis, and the plot of stresses shows positive values."""
-    found = pf.backbone(PLASTIC_BLOCK, amplitudes="0.1 um..10 um:5", method="quasi-static")
-    axes = pf.plot.backbone(found)
-    frequency = found["quasi_static_frequency"].values
-    assert (
-        1e3 * axes.lines[0].get_ydata() == pytest.approx(frequency) and "kHz" in axes.get_ylabel()
-    )
-    assert len(axes.figure.axes) == 3 and pf.plot.backbone(found, axes) is axes
-    # The recommended curve is the first one, in its band.
-    found = pf.backbone(PLASTIC_BLOCK, amplitudes="0.1 um..10 um:5")
-    for axes, name in zip(pf.plot.backbone(found).figure.axes, ("frequency", "damping")):
-        scale = 1e3 if name == "frequency" else 1.0
-        assert scale * axes.lines[0].get_ydata() == pytest.approx(found[f"balance_{name}"].values)
-        assert axes.lines[0].get_label() == f"balance {name}" and axes.collections
-    shown = pf.run(PIECES).plot.stress()
-    assert shown.collections[0].get_array().max() > 0 and "m" in shown.get_xlabel()
-    with pytest.raises(pf.PatchfemError, match="no \\[contact\\]"):
-        pf.run(BLOCK).plot.stress()

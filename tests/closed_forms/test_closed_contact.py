@@ -139,14 +139,6 @@ def test_order_rounded_corner_is_limit_of_rounded_punch(load, radius):
     )
 
 
-def test_exact_rounded_punch_pressure_is_finite_at_ends_of_flat():
-    """The pressure of a rounded punch is finite and symmetric at the ends of its flat, where a logarithm is singular."""
-    ends = exact.rounded_punch_pressure(
-        np.array([-FLAT_HALF_WIDTH, FLAT_HALF_WIDTH]), 3e6, FLAT_HALF_WIDTH, EDGE_RADIUS, MODULUS
-    )
-    assert np.isfinite(ends).all() and ends[0] == pytest.approx(ends[1], rel=1e-12)
-
-
 # ---- waves
 
 WAVELENGTH, AMPLITUDE = 80e-6, 1.5e-6
@@ -335,15 +327,6 @@ def test_exact_cattaneo_shear_sticks_inside_and_slips_outside(fraction, position
     assert np.sign(fraction) * surface_slope(q, -half, half, outside, (-stick, stick)) < 0
 
 
-def test_exact_cattaneo_limits_of_full_slip_and_no_shear():
-    """At the friction limit the shear is mu times the pressure, and without force it vanishes."""
-    x = np.linspace(-2e-3, 2e-3, 41)
-    assert exact.cattaneo_stick_half_width(35.0, 100.0, 1.0, MODULUS, 0.35) == 0
-    full = exact.cattaneo_shear(x, 35.0, 100.0, 1.0, MODULUS, 0.35)
-    assert np.allclose(full, 0.35 * exact.hertz_pressure(x, 100.0, 1.0, MODULUS), rtol=1e-14)
-    assert np.all(exact.cattaneo_shear(x, 0.0, 100.0, 1.0, MODULUS, 0.35) == 0)
-
-
 # ---- tilted pads
 
 PAD_PARAMETERS = {"load": 116.0, "length": 10e-3, "width": 10e-3, "stiffness": 1e13}
@@ -375,19 +358,6 @@ def test_exact_wedge_on_springs_agrees_with_quadrature(tilt):
     assert centre == pytest.approx(total(sink, 1) / PAD_PARAMETERS["load"], rel=1e-8)
     assert max_pressure == pytest.approx(kn * (sink + abs(tilt) * length / 2), rel=1e-8)
     assert min_pressure == pytest.approx(kn * max(sink - abs(tilt) * length / 2, 0), rel=1e-8)
-
-
-def test_exact_wedge_solution_is_continuous_at_opening_tilt():
-    """The solution of a tilted pad is continuous at the tilt at which it begins to open."""
-    opening = exact.wedge_opening_tilt(**PAD_PARAMETERS)
-    below = exact.wedge_on_linear_foundation(opening * (1 - 1e-9), **PAD_PARAMETERS)
-    above = exact.wedge_on_linear_foundation(opening * (1 + 1e-9), **PAD_PARAMETERS)
-    assert opening == pytest.approx(2.32e-5, rel=1e-12)
-    assert below[0] == 1 and above[0] < 1 and np.allclose(below, above, rtol=1e-8, atol=1)
-    assert (
-        exact.wedge_on_linear_foundation(-2e-4, **PAD_PARAMETERS)[1]
-        == -exact.wedge_on_linear_foundation(2e-4, **PAD_PARAMETERS)[1]
-    )
 
 
 def test_exact_kern_fraction_equals_wedge_fraction():
@@ -447,14 +417,6 @@ def test_exact_wedge_loop_area_equals_sum_of_strips(tilt, ratio):
     expected *= fraction * area / (max_pressure - min_pressure)
     computed = exact.wedge_loop_area(amplitude, mu, kt, fraction * area, min_pressure, max_pressure)
     assert computed == pytest.approx(expected, rel=1e-10, abs=1e-18)
-
-
-def test_exact_level_pad_loop_area_equals_single_strip():
-    """The loop area of a level pad equals that of a single elastic-plastic strip."""
-    amplitudes = np.array([0.5, 3.0]) * 1e-6
-    level = exact.wedge_loop_area(amplitudes, 0.4, 8e12, 1e-4, 1e6, 1e6)
-    strip = friction_forms.jenkins_loop(amplitudes, 0.4e6 / 8e12, 0.4e6)[0]
-    assert level == pytest.approx(1e-4 * strip)
 
 
 # ---- refusals

@@ -47,17 +47,6 @@ def test_exact_hertz_surface_slope_equals_crown_slope(fraction):
     )
 
 
-def test_exact_hertz_pressure_at_centre_edge_and_outside():
-    """Hertz's pressure has its peak at the centre and vanishes at the edge and outside."""
-    half = exact.hertz_half_width(**HERTZ_PARAMETERS)
-    p = exact.hertz_pressure(np.array([0.0, half, 1.01 * half]), **HERTZ_PARAMETERS)
-    assert (
-        p[0] == pytest.approx(exact.hertz_peak(**HERTZ_PARAMETERS), rel=1e-15)
-        and p[1] < 1e-6 * p[0]
-        and p[2] == 0
-    )
-
-
 def test_exact_combined_modulus_adds_compliances():
     """The inverse of the combined modulus is the sum of the compliances of both materials."""
     e = exact.combined_modulus(121e9, 0.32, 250e9, 0.24)

@@ -77,18 +77,3 @@ def test_exact_backbone_files_agree_with_answer(scene_folder, capsys):
         for k in (0, -1):
             error = curve[f"{name}_error"][k]
             assert formatting.format_value(curve[name][k], error, unit=unit) in headline
-
-
-def test_always_screen_names_unknown_results(scene_folder, capsys):
-    """The screen gives the natural frequency in a sentence, and the reason why the quasi-static curve is unknown."""
-    rigid = (
-        make_shaken_block(IWAN)
-        .replace('"iwan"', '"coulomb"')
-        .replace("chi = -0.5\nbeta = 0.5\n", "")
-    )
-    (scene_folder / "joint.toml").write_text(rigid.replace('stiffness = "20 kN/m"\n', ""), "utf-8")
-    assert run_command("backbone", "joint.toml", "--amplitudes", "2 mm,5 mm", "--no-page") == 0
-    shown = capsys.readouterr()
-    assert "\nNatural frequencies of mode axial: without the contact 100 Hz.\n" in shown.out
-    assert "Method quasi-static has no curve here: rigid friction" in shown.err
-    assert not (scene_folder / "out" / "joint-backbone" / "report.html").exists()

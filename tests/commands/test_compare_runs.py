@@ -1,13 +1,9 @@
 """`patchfem compare` of two results folders: wear between them, in the measures of compared traces, and error messages."""
 
 import json
-import re
-import shlex
-from pathlib import Path
 
 import numpy as np
 import pytest
-import xarray
 from command_line import run_cli
 from scene_texts import COULOMB, POINT
 from test_compare_verb import NAMES
@@ -15,8 +11,6 @@ from test_compare_verb import NAMES
 import patchfem as pf
 from patchfem.wear.between_runs import find_plane_below
 
-ROOT = Path(__file__).parents[2]
-GUIDE = ROOT / "patchfem" / "scene" / "guide" / "wear.md"
 TILTED = """
 [contact]
 length = "12.7 mm"
@@ -97,29 +91,6 @@ def test_exact_wear_measures_agree_with_archard(result_folders, before):
     assert ("loop_area" in measures[0]) == (before != "pressed")
 
 
-def test_exact_hidden_wear_of_tilted_patch(result_folders):
-    """Between two states in full contact, most of the wear is a wedge that a trace could not show.
-
-    From the new state on, a stretch stays unworn, and the hidden wear is zero.
-    """
-    found = pf.compare(result_folders / "new", result_folders / "worn")
-    mean = found["worn_depth_mean"]["value"]
-    hidden = found["hidden_wear"]["value"]
-    assert 0.8 * mean < hidden < mean
-    assert "which a trace alone cannot show" in found["sentences"][1]
-    found = pf.compare(result_folders / "new", result_folders / "half")
-    assert found["hidden_wear"]["value"] == 0
-    track = found["track"]
-    end = pf.compare(result_folders / "new", result_folders / "half")["track"]["to"]["value"]
-    assert (
-        0.5 * track["depth_mean"]["value"]
-        < track["hidden_wear"]["value"]
-        < track["depth_mean"]["value"]
-    )
-    assert end < 0
-    assert not any("cannot show" in text for text in found["sentences"])
-
-
 def test_exact_hidden_line_is_highest_line_below_depth():
     """The hidden line lies below the depth and has the largest mean of all such lines.
 
@@ -173,26 +144,6 @@ def test_exact_compare_command_agrees_with_python(result_folders, tmp_path):
     assert table[:, 2] - table[:, 1] == pytest.approx(table[:, 3], abs=1e-18)
 
 
-STORY = re.search(
-    r"Three commands compare[^\n]*:\n\n```bash\n(.*?)```\n\n((?:> [^\n]*\n)+)",
-    GUIDE.read_text(),
-    re.S,
-)
-
-
-@pytest.mark.slow
-def test_always_guide_example_prints_its_verdict(tmp_path, monkeypatch):
-    """The three commands of the guide print its verdict."""
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "studies").symlink_to(ROOT / "studies")
-    for line in STORY[1].splitlines():
-        words = shlex.split(line)
-        answer = run_cli(*words[1:], "-q")
-        assert words[0] == "patchfem" and answer.code == 0, answer.err
-    verdict = " ".join(STORY[2].replace("> ", "").split())
-    assert answer.out.splitlines()[1] == verdict
-
-
 @pytest.mark.parametrize(
     "names, told",
     [
@@ -218,107 +169,3 @@ def test_refuses_invalid_result_folders(result_folders, tmp_path, names, told):
     assert told in answer.err
     assert "Traceback" not in answer.err
     assert not (tmp_path / "out").exists()
-
-
-def test_refuses_trace_options_and_damaged_results(result_folders, tmp_path):
-    """Options for traces, a mixture of file and folder, and a damaged result.nc are refused for results folders."""
-    for words in (
-        ("--shift", "1 mm"),
-        ("--direction", "x"),
-        ("--keep-spikes",),
-        ("--units", "um,um"),
-    ):
-        answer = run_cli(
-            "compare",
-            result_folders / "new",
-            result_folders / "worn",
-            *words,
-            "-o",
-            tmp_path / "out",
-        )
-        assert answer.code == 2
-        assert f"{words[0]} cannot be used with results folders" in answer.err
-        assert "leave it out" in answer.err
-    (result_folders / "file.csv").write_text("x [um],z [um]\n0,0\n1,1\n")
-    answer = run_cli(
-        "compare",
-        result_folders / "file.csv",
-        result_folders / "worn",
-        "-o",
-        tmp_path / "out",
-    )
-    assert answer.code == 2 and "file.csv: a file, while" in answer.err
-    (tmp_path / "bad").mkdir()
-    for name in ("summary.json", "scene.resolved.toml", "result.nc"):
-        (tmp_path / "bad" / name).write_bytes((result_folders / "worn" / name).read_bytes())
-    (tmp_path / "bad" / "result.nc").write_bytes(b"no netCDF")
-    answer = run_cli("compare", result_folders / "new", tmp_path / "bad", "-o", tmp_path / "out")
-    assert answer.code == 2
-    assert "bad: a file of this folder is damaged" in answer.err
-    assert "Traceback" not in answer.err
-
-
-def test_exact_pairs_table_accepts_result_folders(result_folders, tmp_path):
-    """Each pair of folders in a table gives the results of `pf.compare`.
-
-    Pairs that cannot be compared give a reason, and the mean covers the others.
-    """
-    (tmp_path / "a.csv").write_text(
-        "x [um],z [um]\n" + "".join(f"{k},{np.sin(k):.3f}\n" for k in range(400))
-    )
-    names = [("new", "half"), ("new", "worn"), ("worn", "new")]
-    rows = [
-        "before,after,direction",
-        *(f"{result_folders / one},{result_folders / other}," for one, other in names),
-        f"{result_folders / 'new'},{result_folders / 'pressed'},x",
-        f"{result_folders / 'new'},a.csv,",
-        f"a.csv,{tmp_path / 'a.csv'},",
-    ]
-    (tmp_path / "pairs.csv").write_text("\n".join(rows) + "\n")
-    answer = run_cli("compare", "--pairs", tmp_path / "pairs.csv", "-o", tmp_path / "out", "--json")
-    found = json.loads(answer.out)
-    assert answer.code == 3 and [one["outcome"] for one in found] == ["done"] * 2 + [
-        "failed"
-    ] * 3 + ["done"]
-    for (before, after), row in zip(names, found[:2]):
-        alone = json.loads(json.dumps(pf.compare(result_folders / before, result_folders / after)))
-        assert {name: row[name] for name in alone if name not in ("before", "after")} == {
-            name: one for name, one in alone.items() if name not in ("before", "after")
-        }
-    says = ("has no [wear]", "a direction can be given only for traces", "a file, while")
-    assert all(text in row["message"] for text, row in zip(says, found[2:5]))
-    means = json.loads((tmp_path / "out" / "pairs.json").read_text())["means"]
-    assert len(means) == 2 and means[0]["kind"] == "run" and means[0]["pairs"] == 2
-    volumes = [row["worn_volume"]["value"] for row in found[:2]]
-    assert means[0]["worn_volume"]["value"] == pytest.approx(np.mean(volumes), rel=1e-12)
-    assert "Results folders: worn depth mean" in (tmp_path / "out" / "report.html").read_text()
-
-
-def test_exact_strips_are_compared_over_area(result_folders):
-    """The worn volume of a patch in strips agrees with Archard's law within 1e-11 and with the sum over the area."""
-    found = pf.compare(result_folders / "rolled", result_folders / "rolled_worn")
-    with xarray.open_dataset(result_folders / "rolled_worn" / "result.nc") as data:
-        depth = data.wear_worn_depth.values[-1]
-        weight = data.weight.values / len(depth)
-    volume = found["worn_volume"]
-    assert volume["value"] == pytest.approx(PER_CYCLE * MANY, rel=1e-11)
-    assert float((depth * weight).sum()) == pytest.approx(volume["value"], rel=1e-11)
-    assert depth.shape == (4, weight.size)
-    assert depth.max() == found["worn_depth_max"]["value"]
-    assert found["track"] is None and "y = -3.75 mm" in found["sentences"][0]
-    hidden = found["hidden_wear"]["value"]
-    assert "which a scan alone cannot show" in found["sentences"][1]
-    assert 0 < hidden < found["worn_depth_mean"]["value"]
-
-
-def test_exact_hidden_plane_is_highest_plane_below_depth():
-    """The hidden plane touches the depth from below: its corners equal those of the plane inserted into the depths."""
-    x = np.array([-3.0, -2.0, 0.0, 1.0, 3.0])
-    y = np.array([-1.0, 0.0, 1.0])
-    plane = 5 + 0.5 * x + 2 * y[:, None]
-    corners = (1.5, 4.5, 5.5, 8.5)
-    assert find_plane_below(x, y, plane) == pytest.approx(corners, rel=1e-9)
-    bumps = plane + np.array([[0, 3, 1, 2, 0], [1, 2, 9, 2, 1], [0, 1, 2, 1, 0]])
-    assert find_plane_below(x, y, bumps) == pytest.approx(corners, rel=1e-9)
-    assert find_plane_below(x, y, 0 * plane) == (0, 0, 0, 0)
-    assert find_plane_below(x, y[:1], 0 * x[None] + 2.0) == pytest.approx((2, 2))

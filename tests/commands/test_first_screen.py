@@ -5,11 +5,9 @@ import shlex
 
 import pytest
 from command_line import run_cli
-from page_data import find_wrong_numbers, parse_quantity
-from scene_texts import JOINT_SHAKEN
+from page_data import find_wrong_numbers
 
 from patchfem.__main__ import VERB_GROUPS, app, register_verbs
-from patchfem.commands import shared
 from patchfem.export import quantities
 from patchfem.scene import read_template
 
@@ -80,19 +78,6 @@ def test_exact_quiet_run_prints_nothing(tmp_path, words, out):
     assert (tmp_path / "out" / "summary.json").is_file()
 
 
-def test_exact_progress_lines_estimate_remaining_time(capsys):
-    """Progress lines are at least ten seconds apart and estimate the remaining time.
-
-    The rate is measured from the first reported fraction: 15 % in 3 s, without the 8 s of
-    compilation before.
-    """
-    times = iter([0.0, 8.0, 8.0, 11.0, 11.0, 11.0, 15.0, 15.0, 40.0, 40.0, 40.0])
-    progress = shared.Progress(is_silent=False, clock=lambda: next(times))
-    for fraction in (0.1, 0.25, 0.3, 1.0):
-        progress(fraction)
-    assert capsys.readouterr().err == "25% done, about 15 s left\n100% done, about 0 s left\n"
-
-
 def test_always_help_has_valid_example_of_every_command():
     """The help lists every command with an example that can be parsed, in lines of at most 80 characters."""
     screen = run_cli().out
@@ -113,34 +98,3 @@ def test_always_help_has_valid_example_of_every_command():
             [verb, *shlex.split(example)], exit_on_error=False, print_error=False
         )[0]
         assert read.__name__.rstrip("_") == verb
-
-
-def test_always_tilted_joint_reports_partial_slip(tmp_path):
-    """A tilted joint that touches over a hundredth of its length is reported as stuck with partial slip."""
-    scene = tmp_path / "joint.toml"
-    scene.write_text(JOINT_SHAKEN + '[contact.tilt]\nangle = "10 mrad"\n', "utf-8")
-    words = ("-o", tmp_path / "out", "--no-page", "-v", "--set", "accuracy.tolerance=1e-2")
-    answer = run_cli("run", scene, *words)
-    sentence = next(line for line in answer.out.splitlines() if "as a whole sticks" in line)
-    loss = read_numbers(answer.out)["loop_area"]
-    assert (
-        sentence
-        == f"The interface as a whole sticks, but part of the patch slips ({loss} per cycle)."
-    )
-    assert 1.6e-6 < parse_quantity(loss)[0] < 1.7e-6
-
-
-def test_always_large_damping_ratio_gives_note(tmp_path):
-    """A damping ratio of 0.5 or more gives a note that 1 means critical damping."""
-    path = tmp_path / "rig.toml"
-    path.write_text(read_template("rig"), "utf-8")
-    checks = [
-        run_cli("check", path, "--set", f"structure.mode.axial.damping={value}")
-        for value in ("0.49", "0.5", "1")
-    ]
-    assert [check.code for check in checks] == [0, 0, 0] and checks[0].err == ""
-    assert checks[1].err.endswith(
-        "structure.mode.axial.damping = 0.5 is a damping ratio: 1 means critical damping, and "
-        "1 % is written 0.01\n"
-    )
-    assert "damping = 1 is a damping ratio: 1 means critical" in checks[2].err

@@ -1,11 +1,9 @@
 """`patchfem import` of modes: a measured record, decay or set of mode shapes becomes a [structure] of a scene."""
 
 import json
-import tomllib
 
 import numpy as np
 import pytest
-import pyuff
 from command_line import run_cli
 from lab_files import SI, make_record, write_universal
 from lab_modes import OMEGA, RESIDUE, TIME, ZETA, driven_response, free_decay
@@ -13,7 +11,6 @@ from lab_modes import OMEGA, RESIDUE, TIME, ZETA, driven_response, free_decay
 from patchfem import build
 from patchfem.core import PatchfemError
 from patchfem.inputs import read_loop, read_signal, read_slide
-from patchfem.structure import universal
 
 HERTZ = OMEGA / (2 * np.pi)
 AROUND = '[normal]\nload = "26 lbf"\n[friction]\nlaw = "coulomb"\nstatic = 0.3\n'
@@ -33,19 +30,6 @@ def measured_file(tmp_path_factory):
             make_record(TIME, response / 9.80665, 12, id1="tip", ordinate_axis_units_lab="g"),
         ],
     )
-
-
-def test_always_notes_mask_control_characters(tmp_path):
-    """Control characters of a unit in a file are masked in the note on the screen."""
-    tip = make_record(
-        TIME, driven_response("acceleration")[1], 12, id1="tip", ordinate_axis_units_lab="NO"
-    )
-    path = write_universal(tmp_path / "lab.uff", [SI, tip])
-    path.write_bytes(path.read_bytes().replace(b"NO ", b"N\x1b "))
-    answer = run_cli("import", path, "-o", tmp_path / "out.csv")
-    assert answer.code == 0
-    assert "its unit 'N?' is not known" in answer.err
-    assert "\x1b" not in answer.err
 
 
 def test_exact_imported_table_is_read_by_all_readers(tmp_path):
@@ -104,41 +88,6 @@ def test_exact_imported_modes_agree_with_driven_oscillators(measured_file, tmp_p
     )
     assert modes.output**2 / modes.mass == pytest.approx(RESIDUE, rel=1e-6)
     assert "# modes of shaker.uff" in text and "the estimate from windowed segments gives" in text
-
-
-def test_exact_frequency_band_selects_mode(measured_file, tmp_path):
-    """A frequency band selects the mode inside, with the same damping ratio within 1e-6."""
-    answer = run_cli(
-        "import",
-        measured_file,
-        "-o",
-        tmp_path / "modes.toml",
-        "--band",
-        "200 Hz..300 Hz",
-        "--segment",
-        "0.5 s",
-    )
-    assert answer.code == 0 and answer.out.count("Hz with a damping") == 1, answer.err
-    (mode,) = tomllib.loads((tmp_path / "modes.toml").read_text())["structure"]["mode"]
-    assert mode["damping"] == pytest.approx(ZETA[1], rel=1e-6)
-
-
-def test_exact_written_response_is_read_back(measured_file, tmp_path):
-    """The written frequency response is read back with its peak at the natural frequency within 1e-3."""
-    answer = run_cli("import", measured_file, "-o", tmp_path / "response.uff", "--segment", "1 s")
-    assert answer.code == 0 and "window hann" in answer.out, answer.err
-    kinds = [
-        one["func_type"]
-        for one in pyuff.UFF(str(tmp_path / "response.uff")).read_sets()
-        if one["type"] == 58
-    ]
-    assert kinds == [4, 6]
-    shapes = universal.read_universal(tmp_path / "response.uff")
-    at = np.argmin(np.abs(shapes.frequency - HERTZ[1]))
-    assert shapes.frequency[at] == pytest.approx(HERTZ[1], rel=1e-3)
-    answer = run_cli("import", tmp_path / "response.uff", "-o", tmp_path / "modes.toml")
-    assert answer.code == 0 and "260" in answer.out, answer.err
-    build(FORCED + (tmp_path / "modes.toml").read_text())
 
 
 def test_exact_modes_of_free_decay(tmp_path):

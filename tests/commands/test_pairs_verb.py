@@ -6,8 +6,8 @@ import json
 import numpy as np
 import pytest
 from command_line import run_cli
-from pairs import UM, make_track_pair
 from scipy.stats import t
+from surface_pairs import draw_pair, write_traces
 
 import patchfem as pf
 from patchfem.campaigns import read_pairs
@@ -22,12 +22,7 @@ def pairs_table(tmp_path_factory):
     """Return a table of three pairs with a wear track; the last pair has no file after wear."""
     place = tmp_path_factory.mktemp("pairs")
     for k in range(2):
-        made = make_track_pair("band", 7100 + k, COUNT)
-        for name, one in (("before", made.before), ("after", made.after)):
-            (place / f"{name}{k}.csv").write_text(
-                "x [um],z [um]\n"
-                + "".join(f"{x / UM:.3f},{z / UM:.4f}\n" for x, z in zip(one.x, one.z))
-            )
+        write_traces(draw_pair("groove", 7100 + k), place, f"before{k}", f"after{k}")
     path = place / "pairs.csv"
     path.write_text(
         "specimen,before,after,direction\nA,before0.csv,after0.csv,y\n\nB,before1.csv,after1.csv,y\n"
@@ -133,12 +128,3 @@ def test_refuses_invalid_pairs_table(tmp_path, text, says):
     assert answer.code == 2 and f"{path}{says}" in answer.err and not (tmp_path / "out").exists()
     with pytest.raises(pf.PatchfemError):
         read_pairs(path)
-
-
-def test_refuses_table_without_comparable_pair(tmp_path):
-    """A table without a comparable pair ends with exit code 2."""
-    (tmp_path / "pairs.csv").write_text("before,after\na.csv,b.csv\n")
-    answer = run_cli("compare", "--pairs", tmp_path / "pairs.csv", "-o", tmp_path / "out")
-    assert answer.code == 2 and (tmp_path / "out" / "pairs.csv").is_file()
-    with pytest.raises(pf.PatchfemError, match="alone"):
-        pf.compare("a.csv", "b.csv", pairs=tmp_path / "pairs.csv")

@@ -8,7 +8,6 @@ import predicted_pairs
 import pytest
 import xarray
 from command_line import run_cli
-from scene_texts import SMALL_PATCH
 
 import patchfem as pf
 
@@ -129,60 +128,3 @@ def test_exact_wear_coefficient_follows_run_history(crowned_run, tmp_path):
     deep_trace = write_trace(tmp_path / "deep.csv", x, before - 1e3 * worn)
     with pytest.raises(pf.PatchfemError, match="check the units of z"):
         pf.compare(files[0], deep_trace, shift=0.0, predicted=crowned_run)
-
-
-def stretch_traces(folder: Path, tmp_path: Path, factor: float) -> list:
-    """Write the traces of a pair with another scale of x and return their paths."""
-    files = []
-    for name in ("before.csv", "after.csv"):
-        x, z = np.loadtxt(folder / name, delimiter=",", skiprows=1, unpack=True)
-        files.append(write_trace(tmp_path / name, factor * x * 1e-6, z * 1e-6))
-    return files
-
-
-def test_refuses_invalid_predicted_input(artificial_pair, tmp_path):
-    """Invalid folders, pieces and traces are refused with the cause."""
-    folder, pair = artificial_pair
-    files = [folder / "before.csv", folder / "after.csv"]
-    pf.run(SMALL_PATCH).save(tmp_path / "unworn")
-    wear = folder / "wear"
-    cases = [
-        (files, {"predicted": tmp_path / "none"}, "there is no such folder"),
-        (files, {"predicted": tmp_path / "unworn"}, r"no \[wear\]"),
-        (files, {"predicted": wear}, "say with --piece upper or --piece lower"),
-        (files, {"piece": "upper"}, "piece needs predicted"),
-        (files, {"predicted": wear, "piece": "upper", "direction": "y"}, "along y"),
-        (files[:1] * 2, {"predicted": wear, "piece": "upper"}, "no worn depth was measured"),
-        (stretch_traces(folder, tmp_path, 3.0), {"predicted": wear, "piece": "upper"}, "wide"),
-    ]
-    for paths, options, message in cases:
-        with pytest.raises(pf.PatchfemError, match=message):
-            pf.compare(*paths, **options)
-    small = stretch_traces(folder, tmp_path, 0.1)
-    with pytest.raises(pf.PatchfemError, match="within the traces"):
-        pf.compare(*small, predicted=wear, piece="upper")
-    assert pair.share != 0.5  # the pieces wear unequally, so that --piece is required
-
-
-def test_always_roughness_is_computed_by_region(tmp_path):
-    """Inside the wear track the roughness falls to a third within 2 %; outside it stays the same within 1e-3."""
-    x = np.arange(0.0, 8e-3, 1e-6)
-    before = draw_surface(x)
-    inside = (x > 2.5e-3) & (x < 5.5e-3)
-    after = np.where(inside, before / 3 - 4e-6, before)
-    after += 1e-9 * np.random.default_rng(2).normal(size=x.size)
-    files = (
-        write_trace(tmp_path / "before.csv", x, before),
-        write_trace(tmp_path / "after.csv", x, after),
-    )
-    roughness = pf.compare(*files)["roughness"]
-    for name in ("Ra", "Rq", "slope"):
-        worn, unworn = (roughness[region] for region in ("inside", "outside"))
-        assert worn["after"][name]["value"] == pytest.approx(
-            worn["before"][name]["value"] / 3, rel=0.02
-        )
-        assert unworn["after"][name]["value"] == pytest.approx(
-            unworn["before"][name]["value"], rel=1e-3
-        )
-    assert unworn["before"]["Rq"]["high"] < 0.55e-6
-    assert roughness["cutoff"] == 2.5e-4

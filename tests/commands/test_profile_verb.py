@@ -6,12 +6,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from command_line import ALWAYS, FROM_SHELL, modules_after, run_cli
+from command_line import run_cli
 
 import patchfem as pf
 from patchfem.closed_forms import contact as closed_forms
-from patchfem.export.folder import FILES
-from patchfem.surface import make_report, read_surface
 
 UM = 1e-6
 
@@ -42,14 +40,6 @@ def scan_file(tmp_path) -> Path:
     return path
 
 
-def test_exact_verbose_screen_has_all_parameters(trace_file):
-    """The screen has the main parameters and a cut-off that fits; `-v` adds all others."""
-    short = run_cli("profile", trace_file).out
-    long = run_cli("profile", trace_file, "-v").out
-    assert "  Pq " in short and "  Pvk " not in short and "  Pvk " in long
-    assert '--cutoff "250 um"' in short and "  Ra " not in short
-
-
 def test_exact_profile_json_is_in_si_units(trace_file, scan_file):
     """The JSON gives parameters in SI units; Sq of a scan agrees with the rms about a least-squares plane within 1e-9."""
     answer = json.loads(run_cli("profile", trace_file, scan_file, "--json").out)
@@ -77,62 +67,6 @@ def test_exact_profile_json_is_in_si_units(trace_file, scan_file):
     assert window["window"] == [1e-3, 1.8e-3] and window["shape"] == [801]
 
 
-def test_exact_profile_report_lists_all_parameters(trace_file, tmp_path):
-    """The report has four charts and lists all parameters of the JSON."""
-    out = tmp_path / "out"
-    answer = run_cli("profile", trace_file, "--cutoff", "0.25 mm", "-o", out)
-    assert f"results: {out}" in answer.out
-    page = (out / "report.html").read_text()
-    data = json.loads((out / "profile.json").read_text())
-    assert page.count("<figure ") == 4 == page.count('role="img" aria-label="')
-    labels = [name.replace("_", " ") for name in data["profiles"][0]["measures"]]
-    assert all(name in page for name in labels)
-
-
-def test_exact_profile_means_of_files(tmp_path, scan_file):
-    """The mean of three traces has the 95 % interval of Student's t of the logarithm (4.302653 for two degrees).
-
-    The stored profile of a trace gives the same parameters within 1e-7.
-    """
-    heights = (4.0, 5.0, 6.5)
-    names = []
-    out = tmp_path / "out"
-    for k, height in enumerate(heights):
-        names.append(tmp_path / f"{k}.csv")
-        z = height * np.sin(2 * np.pi * np.arange(800) / 8) + 0.01 * np.arange(800)
-        names[-1].write_text(
-            "x [um],z [um]\n" + "".join(f"{a},{b:.17g}\n" for a, b in enumerate(z))
-        )
-    assert run_cli("profile", *names, scan_file, "-o", out).code == 0
-    data = json.loads((out / "profile.json").read_text())
-    rows = (out / "profile.csv").read_text().splitlines()
-    assert [(one["kind"], one["files"], one["notes"]) for one in data["means"]] == [
-        ("profile", 3, [])
-    ]
-    found = data["means"][0]["measures"]["Pq"]
-    half_width = 4.302653 * np.std(heights, ddof=1) / np.sqrt(6)
-    assert found["value"] == pytest.approx(np.mean(heights) * UM / np.sqrt(2), rel=2e-3)
-    factor = np.exp(half_width * UM / found["value"])
-    assert found["high"] == pytest.approx(found["value"] * factor, rel=5e-3)
-    assert found["low"] == pytest.approx(found["value"] / factor, rel=5e-3)
-    assert "Mean of 3 traces: Pa " in (out / "report.html").read_text()
-    assert len(rows) == 5
-    assert rows[0].startswith("file,Pa [m],Pa_low [m],Pa_high [m],")
-    # only files that the next run may replace
-    assert {one.name for one in out.iterdir()} <= set(FILES)
-    assert run_cli("profile", names[1], "-o", out).code == 0
-    again = make_report(read_surface(out / "primary.csv"))["Pq"].value
-    assert again == pytest.approx(data["profiles"][1]["measures"]["Pq"]["value"], rel=1e-7)
-    assert "counts twice" in run_cli("profile", names[0], names[0]).err
-
-
-@pytest.mark.slow
-def test_exact_profile_loads_no_mesh_or_compiler(trace_file):
-    """`patchfem profile` imports neither scikit-fem, numba nor Matplotlib."""
-    modules = modules_after(FROM_SHELL, "profile", trace_file, "--cutoff", "0.25 mm")
-    assert not modules & {*ALWAYS, "skfem", "matplotlib", "patchfem.dynamics"}
-
-
 @pytest.mark.skipif(
     "PATCHFEM_DATA" not in os.environ, reason="PATCHFEM_DATA names no folder of scans"
 )
@@ -150,38 +84,6 @@ def test_exact_dektak_parameters_agree_with_instrument():
     }
     for name, (parameter, printed, tolerance) in known.items():
         assert answer["measures"][parameter]["value"] == pytest.approx(printed, abs=tolerance), name
-
-
-@pytest.mark.skipif(
-    "PATCHFEM_DATA" not in os.environ, reason="PATCHFEM_DATA names no folder of scans"
-)
-def test_exact_nanovea_parameters_agree_with_reference():
-    """Sa, Sq, Sz, Ssk and Sku of a Nanovea scan agree with the reference values within 1e-6."""
-    folder = Path(os.environ["PATCHFEM_DATA"])
-    name = "nanovea-test1.txt.gz"
-    known = json.loads((folder / "truth.json").read_text())[name]
-    found = json.loads(run_cli("profile", folder / name, "--units", "mm,um", "--json").out)[
-        "profiles"
-    ][0]["measures"]
-    for key, unit in (("Sa", UM), ("Sq", UM), ("Sz", UM), ("Ssk", 1), ("Sku", 1)):
-        assert found[key]["value"] == pytest.approx(known[key] * unit, rel=1e-6)
-
-
-@pytest.mark.skipif(
-    "PATCHFEM_DATA" not in os.environ, reason="PATCHFEM_DATA names no folder of scans"
-)
-def test_exact_brake_reuss_flatness_agrees_with_reference():
-    """The flatness Sz of the Brake-Reuss beam agrees with the published value within 1e-6."""
-    folder = Path(os.environ["PATCHFEM_DATA"])
-    known = json.loads((folder / "truth.json").read_text())["brb_surface_data.mat"]
-    answer = json.loads(
-        run_cli("profile", folder / "brb_surface_data.mat", "--units", "m,m", "--json").out
-    )["profiles"][0]
-    assert answer["measures"]["Sz"]["value"] == pytest.approx(
-        known["flatness_PV_um"] * UM, rel=1e-6
-    )
-    assert sorted(answer["shape"]) == [54, 246]
-    assert "596 of 13284 heights are missing" in answer["notes"][-1]
 
 
 SPLIT_SCENE = """\
@@ -236,84 +138,3 @@ def test_exact_a_trace_of_two_waves_is_split_between_them(split_scene):
     closing = closed_forms.westergaard_full_pressure(1.0, np.hypot(*(heights / waves)), modulus)
     assert split["closing_pressure"] == pytest.approx(closing, rel=0.02)
     assert split["pressure"] == pytest.approx(2e3 / 12.7e-3**2)
-
-
-def test_exact_split_scene_keeps_other_text_and_runs(split_scene):
-    """The new scene has the printed tables, keeps all other lines and comments, and runs."""
-    comment = "# comment above the table of the slide"
-    split_scene.write_text(SPLIT_SCENE.replace("[slide]", f"{comment}\n[slide]"), "utf-8")
-    answer = run_cli("profile", "waves.csv", "--split", "scene.toml", "-o", "split.toml")
-    assert answer.code == 0 and answer.err == ""
-    assert "split the trace: waves longer than " in answer.out
-    assert "-o NEW_SCENE" not in answer.out
-    text = Path("split.toml").read_text("utf-8")
-    assert f"{comment}\n[slide]" in text
-    for line in SPLIT_SCENE.split("[contact.profile]")[0].splitlines():
-        assert line in text
-    assert text.index("[slide]") < text.index("[contact.profile]")
-    tables = text[text.index("[contact.profile]") :]
-    assert all(f"    {line}" in answer.out.splitlines() for line in tables.splitlines())
-    contact = pf.load("split.toml").contact
-    assert SHORT < contact.asperities.cutoff < LONG
-    assert contact.asperities.tangential_ratio == 1.0 and contact.profile.heights == "surface"
-    answer = run_cli("run", "split.toml", "--no-page")
-    assert answer.code == 0
-    assert answer.err.count("pressure_peak and contact_fraction are means over the waves") == 1
-    # the name of the trace is relative to the new scene
-    Path("other").mkdir()
-    assert (
-        run_cli("profile", "waves.csv", "--split", "scene.toml", "-o", "other/split.toml").code == 0
-    )
-    assert pf.load("other/split.toml").contact.profile.file == "../waves.csv"
-
-
-def test_refuses_impossible_split(split_scene):
-    """A scene without patch, with a layer, or with inline tables is refused, as are other options."""
-    point = '[normal]\nload = "1 N"\n[friction]\nlaw = "coulomb"\nstatic = 0.3\n'
-    slide = SPLIT_SCENE[SPLIT_SCENE.index("[slide]") :]
-    Path("point.toml").write_text(point + slide, "utf-8")
-    skin = '[contact.asperities]\nlaw = "linear"\nnormal_stiffness = "1e13 Pa/m"\n'
-    Path("skin.toml").write_text(SPLIT_SCENE + skin, "utf-8")
-    table = SPLIT_SCENE[SPLIT_SCENE.index("[contact.profile]") :].split("\n[")[0]
-    inline = "profile = {file = 'waves.csv', heights = 'surface'}\n"
-    text = SPLIT_SCENE.replace(table, "").replace("[contact]\n", f"[contact]\n{inline}")
-    Path("inline.toml").write_text(text, "utf-8")
-    for words, message in (
-        (("scene.toml", "-o", "scene.toml"), "already exists"),
-        (("point.toml",), "has no [contact], so no patch has this trace"),
-        (("inline.toml", "-o", "new.toml"), "inside [contact]; write them as tables"),
-        (("skin.toml",), "without [contact.asperities]"),
-        (("scene.toml", "--form", "2"), "--form"),
-        (("scene.toml", "-v"), "and --verbose"),
-        (("scene.toml", "--set", "contact.load=1 N"), "--set"),
-        (("scene.toml", "--cutoff", "50 mm"), "not shorter than the trace; give a shorter one"),
-    ):
-        answer = run_cli("profile", "waves.csv", "--split", *words)
-        assert answer.code == 2 and message in answer.err, (words, answer.err)
-    assert Path("scene.toml").read_text("utf-8") == SPLIT_SCENE and not Path("new.toml").exists()
-
-
-def test_always_run_prints_tables_of_split_for_unresolved_trace(split_scene):
-    """A refusal of coarse elements and a warning of errors above the tolerance print both tables of a split."""
-    static = SPLIT_SCENE[: SPLIT_SCENE.index("[friction]")].replace("[contact.shear]\n", "")
-    tables = ["    [contact.profile]", "    [contact.asperities]", '    law = "exponential"']
-    for size, code in (("635 um", 2), ("40 um", 3)):
-        split_scene.write_text(static.replace("63.5 um", size), "utf-8")
-        answer = run_cli("run", "scene.toml", "--no-page")
-        lines = answer.err.splitlines()
-        assert answer.code == code and set(tables) <= set(lines), size
-        assert sum("split the trace: waves longer than" in line for line in lines) == 1
-
-
-def test_run_does_not_advise_to_split_smooth_bumps(split_scene):
-    """Bumps ten elements long have no waves that the mesh cannot represent. The errors of a run with few elements
-    exceed the tolerance, but only smaller elements help."""
-    x = np.linspace(0, 12.7e-3, 6351)
-    z = 1e-6 * np.cos(2 * np.pi * x / 2.1e-3 + 0.4)
-    rows = "".join(f"{1e6 * a:.3f},{1e6 * b:.4f}\n" for a, b in zip(x, z))
-    Path("waves.csv").write_text(f"x [um],z [um]\n{rows}", "utf-8")
-    static = SPLIT_SCENE[: SPLIT_SCENE.index("[friction]")].replace("[contact.shear]\n", "")
-    split_scene.write_text(static.replace("63.5 um", "200 um").replace("2 kN", "100 N"), "utf-8")
-    answer = run_cli("run", "scene.toml", "--no-page")
-    assert "pressure_peak has an estimated error" in answer.err
-    assert "split the trace" not in answer.err

@@ -2,7 +2,6 @@
 
 import json
 import re
-import shlex
 import subprocess
 import tomllib
 from importlib.metadata import PackageNotFoundError
@@ -13,11 +12,11 @@ from command_line import run_cli
 
 import patchfem as pf
 from patchfem import load
-from patchfem.__main__ import VERBS, app, register_verbs
+from patchfem.__main__ import app, register_verbs
 from patchfem.commands import examine
 from patchfem.commands.sources import SOURCES, bibtex
 from patchfem.effects import EFFECTS
-from patchfem.scene import NEXT_VERBS, TEMPLATE_DESCRIPTIONS, read_template
+from patchfem.scene import NEXT_VERBS, read_template
 
 register_verbs([])  # all verbs
 
@@ -36,17 +35,6 @@ def test_exact_new_writes_template(tmp_path):
     path.write_text("mine", "utf-8")
     answer = run_cli("new", "rig", "-o", path)
     assert answer.code == 2 and "already exists" in answer.err and path.read_text("utf-8") == "mine"
-
-
-def test_exact_new_lists_kinds_of_scenes():
-    """`patchfem new` lists the kinds of scenes, and suggests one for a misspelt kind."""
-    assert [line.split()[0] for line in run_cli("new").out.splitlines()] == list(
-        TEMPLATE_DESCRIPTIONS
-    )
-    message = f"joitn: unknown kind of scene; did you mean 'joint'? use one of {', '.join(TEMPLATE_DESCRIPTIONS)}\n"
-    assert run_cli("new", "joitn")[::2] == (2, message)
-    with pytest.raises(pf.PatchfemError, match="did you mean 'joint'"):
-        pf.new("joitn")
 
 
 def test_exact_demo_runs_shipped_rig(tmp_path):
@@ -114,23 +102,6 @@ def test_always_doctor_checks_all_dependencies(tmp_path, monkeypatch, broken_ope
     assert film["fine"] and film["found"] == "imageio-ffmpeg 1.0" and not film["cure"]
 
 
-def test_always_internal_error_asks_for_report(monkeypatch):
-    """An internal error ends with code 1 and asks for a report with the output of `patchfem doctor`."""
-    replace_versions(monkeypatch, lambda name: 1 / 0)
-    answer = run_cli("doctor")
-    assert answer.code == 1
-    assert "internal fault in " in answer.err and "): ZeroDivisionError" in answer.err
-    assert "what `patchfem doctor` says to the project's issue tracker" in answer.err
-
-
-def test_always_doctor_reports_unusable_cache(monkeypatch, tmp_path, broken_opengl):
-    """The doctor reports a cache folder that cannot be created."""
-    (tmp_path / "file").touch()
-    monkeypatch.setenv("PATCHFEM_CACHE", str(tmp_path / "file" / "below"))
-    found = {finding["name"]: finding for finding in json.loads(run_cli("doctor", "--json").out)}
-    assert not found["compiled code"]["fine"] and "PATCHFEM_CACHE" in found["compiled code"]["cure"]
-
-
 def test_exact_cite_lists_sources_of_effects(tmp_path):
     """`patchfem cite` lists the sources of the effects in a scene."""
     keys = lambda text: re.findall(r"^@\w+\{(\w+),", text, re.M)  # noqa: E731
@@ -169,24 +140,3 @@ def test_always_shell_completion_covers_commands(shell):
             timeout=30,
         )
         assert "sweep" in done.stdout.split()
-
-
-@pytest.mark.parametrize("verb", VERBS)
-def test_always_help_describes_options_with_examples(verb):
-    """The help of each command describes every option, and its example can be parsed."""
-    about = app[verb].help.partition("Example: ")
-    assert about[0].strip() and all(
-        one.parameter.help
-        for one in app[verb].assemble_argument_collection()
-        if one.parameter.name and any(name.startswith("-") for name in one.names)
-    )
-    for one in app[verb].assemble_argument_collection():
-        named = [name for name in one.names if name.startswith("-")]
-        if one.parameter.name and named and one.hint is not bool:
-            assert "such as" in one.parameter.help or set(named) & set(about[2].split()), named
-    words = shlex.split(" ".join(about[2].split()))
-    assert words[:2] == ["patchfem", verb]
-    assert (
-        app.parse_args(words[1:], exit_on_error=False, print_error=False)[0].__name__.rstrip("_")
-        == verb
-    )

@@ -2,7 +2,6 @@
 
 import csv
 import json
-import os
 import shlex
 
 import numpy as np
@@ -13,7 +12,6 @@ from scene_texts import COULOMB, POINT, SHORT
 
 import patchfem as pf
 from patchfem.export import runs, store
-from patchfem.export.sweeps.folder import Folder
 
 RIG = POINT + COULOMB + SHORT
 LOADS, LEVELS = ["10 N", "26 lbf", "-1 N"], ["1 g", "5 g"]
@@ -47,17 +45,6 @@ def assert_equals_single_run(found, measure, part="value", tolerance=1e-12) -> N
 def sweep_into(out, rig_scene, *words):
     """Sweep a scene into a folder with the command line, and return the answer."""
     return run_cli("sweep", rig_scene, *words, "-o", out)
-
-
-def file_names(folder) -> set:
-    """Return the names of the files in a folder."""
-    return {path.name for path in folder.iterdir()}
-
-
-def assert_same_tables(out, other) -> None:
-    """Assert that the tables of two sweeps are identical byte for byte."""
-    for name in ("sweep.csv", "sweep.nc"):
-        assert (out / name).read_bytes() == (other / name).read_bytes()
 
 
 def read_rows(out) -> list:
@@ -105,22 +92,6 @@ def test_exact_sweep_case_equals_single_run(whole_sweep, rig_scene):
             assert entry.get("reason", "") == measure.reason
 
 
-def test_exact_sweep_table_of_scene_equals_options(whole_sweep, tmp_path):
-    """A table [sweep] in the scene gives the same results as --over, and `run` refuses such a scene."""
-    path = tmp_path / "rig.toml"
-    table = f'[sweep]\n"normal.load" = "{",".join(LOADS)}"\n"drive.acceleration" = "1 g..5 g:2"\n'
-    path.write_text(RIG + table, encoding="utf-8")
-    assert run_cli("check", path).code == 0
-    assert sweep_into(tmp_path / "swept", path).code == 3
-    assert run_cli("check", path).out.endswith("a rig scene without mistakes, 6 cases\n")
-    assert json.loads(run_cli("check", path, "--json").out)["cases"] == 6
-    assert (tmp_path / "swept" / "sweep.csv").read_bytes() == (
-        whole_sweep[0] / "sweep.csv"
-    ).read_bytes()
-    answer = run_cli("run", path, "-o", tmp_path / "one")
-    assert answer.code == 2 and "use `patchfem sweep`" in answer.err
-
-
 def test_refuses_to_resume_different_sweep(rig_scene, tmp_path):
     """A folder with a finished sweep of another scene or other keys is refused by --resume and stays unchanged."""
     out = tmp_path / "out"
@@ -148,34 +119,6 @@ def test_refuses_to_resume_different_sweep(rig_scene, tmp_path):
     assert answer.code == 0 and len(read_rows(out)) == 2
     answer = sweep_into(out, rig_scene, "--over", "normal.load=10 N,20 N,30 N", "--resume")
     assert answer.code == 0 and len(read_rows(out)) == 3
-
-
-def test_refuses_second_sweep_in_folder(rig_scene, tmp_path, monkeypatch):
-    """A folder in which another sweep runs is refused, unless that process has died."""
-    words = ("sweep", rig_scene, "--over", "friction.static=0.1,0.2", "-o", tmp_path / "a")
-    with monkeypatch.context() as another:
-        another.setattr(os, "getpid", lambda: 1)
-        first = Folder(tmp_path / "a", ()).__enter__()
-    answer = run_cli(*words)
-    assert answer.code == 4
-    assert "another sweep (process 1)" in answer.err
-    assert "remove the file a/.writer" in answer.err
-    first.__exit__(None, None, None)
-    assert run_cli(*words).code == 0
-    # a number above the largest process number: that process has ended
-    (tmp_path / "a" / ".writer").write_text("4194305")
-    assert run_cli(*words).code == 0
-
-
-def test_exact_tables_of_many_cases_need_collect(whole_sweep, rig_scene, tmp_path, monkeypatch):
-    """A sweep of many cases writes sweep.csv only with --collect."""
-    out = tmp_path / "swept"
-    with monkeypatch.context() as many:
-        many.setattr("patchfem.export.sweeps.run.MAX_CASES_WITH_TABLES", 5)
-        answer = sweep_into(out, rig_scene, *OVER)
-        assert not (out / "sweep.csv").exists() and (out / "sweep.nc").exists()
-        assert sweep_into(out, rig_scene, *OVER, "--collect").code == answer.code
-    assert_same_tables(out, whole_sweep[0])
 
 
 def test_exact_cases_file_gives_rows(rig_scene, tmp_path):
@@ -239,35 +182,6 @@ def test_exact_printed_command_repeats_random_cases(tmp_path, monkeypatch, words
     assert run_cli(*read_command(listed)[1:], "-o", tmp_path / "third").code == 0
     for other in (again, listed, tmp_path / "third"):
         assert (other / "sweep.csv").read_bytes() == (first / "sweep.csv").read_bytes()
-
-
-def test_exact_answer_begins_with_requested_measure(tmp_path):
-    """With --of secant_stiffness, the answer begins with this measure; its quantiles agree with mu N/1 mm within 5e-3.
-
-    A note says that no case has another measure.
-    """
-    scene = tmp_path / "bench.toml"
-    scene.write_text(BENCH, encoding="utf-8")
-    axes = ("--over", "friction.static=0.1..0.5", "--over", "normal.load=99.9 N..100.1 N")
-    axes += ("--sobol", "64")
-    screen = sweep_into(tmp_path / "a", scene, *axes, "--of", "secant_stiffness")
-    answer = store.read(tmp_path / "a")
-    assert answer.verdict[0].startswith("Secant stiffness changes ")
-    assert "mainly with friction.static (100 % of its variance)" in answer.verdict[0]
-    assert answer.verdict[0] in screen.out and "--of secant_stiffness" in answer.origin["command"]
-    with open(tmp_path / "a/sweep.csv", newline="", encoding="utf-8") as file:
-        mu = [float(row["friction.static"]) for row in csv.DictReader(file)]
-    row = answer.details["quantiles"][0]
-    assert row["measure"] == "secant_stiffness"
-    assert [row["low"]["value"], row["high"]["value"]] == pytest.approx(
-        1e5 * np.quantile(mu, [0.05, 0.95]), rel=5e-3
-    )
-    again = sweep_into(tmp_path / "a", scene, *axes, "--of", "pressure_peak", "--resume")
-    assert "no case has a value of pressure peak" in again.out + again.err
-    swept = pf.sweep(scene, {"friction.static": [0.1, 0.2]}, of="secant_stiffness")
-    assert swept.attrs["answer"] == (
-        "With friction.static, secant stiffness changes most: from 10 N/mm at 0.1 to 20 N/mm at 0.2."
-    )
 
 
 def test_refuses_sweep_without_valid_case(rig_scene, tmp_path):

@@ -1,7 +1,5 @@
 """Files in the working folder are never executed, whatever module they are named after."""
 
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
@@ -81,27 +79,3 @@ def test_always_commands_execute_no_local_modules(hostile_folder, every):
     assert (hostile_folder / "swept" / "sweep.csv").is_file() and (
         hostile_folder / "seen.png"
     ).is_file() is every
-
-
-@pytest.mark.slow
-def test_always_cluster_executes_no_local_modules(hostile_folder):
-    """A sweep on a Dask cluster executes no module of the working folder."""
-    pytest.importorskip("distributed")
-    answer = run_cli(*SWEPT, "swept", "--executor", "dask", "-j", "1")
-    assert answer.code == 0, answer.err
-    assert not executed_modules(hostile_folder)
-
-
-def test_always_python_m_executes_no_local_modules(hostile_folder):
-    """`python -m patchfem` executes no module of the working folder."""
-    done = subprocess.run(
-        [sys.executable, "-m", "patchfem", "plan", "bench.toml"], capture_output=True, text=True
-    )
-    assert done.returncode == 0, done.stderr
-    assert not executed_modules(hostile_folder)
-
-
-def test_exact_hostile_modules_are_found_by_python(hostile_folder):
-    """Plain Python executes the module of the working folder, so that the other tests can fail."""
-    done = subprocess.run([sys.executable, "-c", "import random"], env={})
-    assert done.returncode == 9 and executed_modules(hostile_folder) == ["RAN-random"]

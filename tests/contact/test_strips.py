@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from pieces import LENGTH, LOAD, WIDTH, draw_gap, make_coated_pair
-from skins import layer_stiffness, press_layer, press_strips
+from skins import press_layer, press_strips
 
 from patchfem.closed_forms.contact import (
     wedge_on_asperities,
@@ -21,16 +21,13 @@ from patchfem.contact import (
     HertzAsperities,
     LinearAsperities,
     StripCompliance,
-    press,
-    press_to_approach,
     split_into_strips,
     strip_offsets,
     strips_stiffness,
-    tangential_stiffness,
 )
 from patchfem.contact.strips import STRIP_RESIDUAL_TOL
 from patchfem.contact.unilateral import solve_forces
-from patchfem.core import Compliance, Interface, NotConverged, Outcome, PatchfemError
+from patchfem.core import PatchfemError
 
 AREA = LENGTH * WIDTH
 MEAN_PRESSURE = LOAD / AREA
@@ -68,43 +65,9 @@ def add_linear_layer(layer, c, weight):
     return c if layer is None else c + np.diag(1 / (layer.k * weight))
 
 
-def solve_undivided(layer, n_elements, gap, moment=None, spring=0.0, load=LOAD):
-    """Return (nodal forces, delta, theta) of the undivided patch."""
-    pair = make_coated_pair(n_elements)
-    x = pair.interface.x
-    weight = pair.interface.weight
-    if layer is None or isinstance(layer, LinearAsperities):
-        pair = Compliance(
-            pair.interface, add_linear_layer(layer, pair.normal, weight), pair.tangential
-        )
-        state = press(pair, gap, load, moment, spring=spring)
-        return state.sigma_n * weight, state.approach, state.rotation
-    state = press_layer(layer, pair.normal, x, weight, gap, load, moment)
-    return state.force, state.delta, state.theta
-
-
 def random_gaps(rng, x, n_strips, amplitude):
     """Return one smooth random gap per strip (count, m) [m]."""
     return np.array([draw_gap(rng, x, amplitude) for _ in range(n_strips)])
-
-
-# ---- undivided patch
-@each_layer
-@each_control
-@pytest.mark.parametrize("angle", [1e-4])
-def test_exact_strips_without_roll_equal_undivided_patch(layer, control, angle):
-    """Strips without roll have the forces, approach and rotation of the undivided patch."""
-    c, x, weight, y = pair_strips(8)
-    state = press_strips(c, x, weight, y, angle * x, load=LOAD, asperities=layer, **control)
-    # the solver of the undivided patch has no spring
-    if isinstance(layer, ExponentialAsperities | HertzAsperities) and "spring" in control:
-        control = {"moment": control["moment"] + control["spring"] * state.theta}
-    force, delta, theta = solve_undivided(layer, 60, angle * x, **control)
-    assert np.abs(8 * state.force - force).max() <= 1e-12 * LOAD
-    assert state.delta == pytest.approx(delta, rel=1e-12, abs=1e-19)
-    assert state.theta == pytest.approx(theta, rel=1e-11, abs=1e-17)
-    assert abs(state.roll_moment) <= 1e-13 * LOAD * WIDTH
-    assert state.fraction == pytest.approx(weight[force > 0].sum() * 8 / AREA, rel=1e-12)
 
 
 # ---- dense problem of all strips
@@ -339,41 +302,6 @@ def test_always_random_strips_satisfy_contact_conditions(
     check_strips_state(state, layer, c, x, weight, gap, roll, load, moment, spring)
 
 
-# ---- hard cases
-@each_layer
-def test_exact_zero_load_gives_touching_strips_without_force(layer):
-    """Under zero load the strips touch without force, and the approach is that of first contact."""
-    c, x, weight, y = pair_strips(4)
-    state = press_strips(
-        c, x, weight, y, 1e-5 * x + 3e-6, 1e-4, load=0.0, moment=0.0, asperities=layer
-    )
-    assert state.outcome is Outcome.NO_CONTACT and not state.force.any()
-    assert (state.load, state.moment, state.roll_moment, state.centre_y, state.fraction) == (
-        0,
-        0,
-        0,
-        0,
-        0,
-    )
-    assert state.delta == pytest.approx(3e-6 - 1e-5 * LENGTH / 2 - 1e-4 * WIDTH * 3 / 8, rel=1e-12)
-    assert strips_stiffness(c, weight, state) == 0.0
-
-
-def test_exact_prescribed_approach_decouples_strips():
-    """Under a prescribed approach each strip equals a patch of its own."""
-    c, x, weight, y = pair_strips(6)
-    state = press_strips(c, x, weight, y, 2e-5 * x, 1e-4, approach=1e-7)
-    pair = Compliance(Interface(x, weight, WIDTH / 6), c, c)
-    for strip, offset in enumerate(y):
-        single_strip = press_to_approach(pair, 2e-5 * x + 1e-4 * offset, 1e-7)
-        assert np.abs(state.pressure[strip] - single_strip.sigma_n).max() <= 1e-12 * (
-            single_strip.sigma_n.max() + 1
-        )
-        assert np.abs(state.gap[strip] - single_strip.gap).max() <= 1e-18
-    separated = press_strips(c, x, weight, y, np.zeros(x.size), 1e-4, approach=-1e-4 * WIDTH)
-    assert separated.outcome is Outcome.NO_CONTACT and separated.gap.min() > 0
-
-
 # ---- stiffnesses
 @each_layer
 def test_order_two_stiffness_equals_load_difference(layer):
@@ -391,34 +319,6 @@ def test_order_two_stiffness_equals_load_difference(layer):
     )
     assert (upper_load - lower_load) / (2 * step) == pytest.approx(
         strips_stiffness(c, weight, state), rel=1e-6
-    )
-
-
-def test_exact_strip_stiffnesses_equal_undivided_patch():
-    """Normal and tangential stiffness of strips without roll equal those of the undivided patch."""
-    pair = make_coated_pair(60)
-    c, tangential, weight = split_into_strips(pair, 8)
-    y = strip_offsets(WIDTH, 8)
-    gap = 1e-4 * pair.interface.x
-    bare = press_strips(c, pair.interface.x, weight, y, gap, load=LOAD)
-    active = bare.force[0] > 0
-    assert strips_stiffness(c, weight, bare) == pytest.approx(
-        tangential_stiffness(pair.normal, active), rel=1e-12
-    )
-    assert strips_stiffness(tangential, weight, bare) == pytest.approx(
-        tangential_stiffness(pair.tangential, active), rel=1e-12
-    )
-    layer = LAYERS["hertz"]
-    rough_state = press_strips(c, pair.interface.x, weight, y, gap, load=LOAD, asperities=layer)
-    expected = layer_stiffness(
-        pair.tangential, pair.interface.weight, 0.8 * rough_state.stiffness[0]
-    )
-    assert strips_stiffness(tangential, weight, rough_state, 0.8) == pytest.approx(
-        expected, rel=1e-12
-    )
-    bare_stiffness = strips_stiffness(tangential, weight, rough_state, np.inf)
-    assert bare_stiffness == pytest.approx(
-        tangential_stiffness(pair.tangential, np.ones(61, bool)), rel=1e-12
     )
 
 
@@ -444,17 +344,6 @@ def test_refuses_invalid_strip_controls():
     assert with_spring.moment == pytest.approx(0.51 * LENGTH + 1e3 * with_spring.theta, rel=1e-9)
     with pytest.raises(PatchfemError, match=r"contact\.strips\.count"):
         strip_offsets(WIDTH, 0)
-
-
-def test_refuses_undetermined_strip_rotation():
-    """A rotation that a contact on one line does not determine is refused unless a spring supports it."""
-    c, x, weight, y = pair_strips(4, 30)
-    with pytest.raises(NotConverged, match="do not determine the rotation"):
-        press_strips(c, x, weight, y, np.where(x == 0, 0.0, 1.0), load=LOAD, moment=0.0)
-    state = press_strips(
-        c, x, weight, y, np.where(x == 0, 0.0, 1.0), load=LOAD, moment=0.0, spring=1e3
-    )
-    assert (state.force > 0).sum() == 4 and abs(state.theta) <= 1e-15
 
 
 # ---- free roll
@@ -499,29 +388,6 @@ def test_exact_free_roll_reproduces_prescribed_roll(layer, control):
         assert restarted.roll == pytest.approx(roll, rel=1e-8)
 
 
-def test_exact_free_roll_closes_lateral_wedge():
-    """A free roll closes a lateral wedge on a linear layer.
-
-    A load line at e adds the pressure N e y/sum A y^2.
-    """
-    c, x, weight, y = rigid_strips(9, 5)
-    wedge = 3e-5 * y[:, None] + np.zeros(x.size)
-    layer = LinearAsperities(1e13)
-    arm = 0.4e-3
-    centred = press_strips(c, x, weight, y, wedge, load=LOAD, asperities=layer, roll_moment=0.0)
-    assert centred.roll == pytest.approx(-3e-5, rel=1e-12) and centred.pressure == pytest.approx(
-        MEAN_PRESSURE, rel=1e-10
-    )
-    second_moment = 5 * weight[0] * (y**2).sum()
-    eccentric = press_strips(
-        c, x, weight, y, wedge, load=LOAD, asperities=layer, roll_moment=arm * LOAD
-    )
-    assert eccentric.pressure[:, 0] == pytest.approx(
-        MEAN_PRESSURE + LOAD * arm * y / second_moment, rel=1e-10
-    )
-    assert eccentric.roll == pytest.approx(-3e-5 - LOAD * arm / (second_moment * 1e13), rel=1e-10)
-
-
 def test_exact_rolling_strips_equal_rotating_nodes():
     """Rigid strips of one node under a free roll equal one strip of n nodes under a free rotation."""
     c, x, weight, y = rigid_strips(1, 24)
@@ -541,15 +407,3 @@ def test_exact_rolling_strips_equal_rotating_nodes():
         )
         assert rolled.roll == pytest.approx(rotated.theta, rel=1e-10)
         assert rolled.force[:, 0] == pytest.approx(rotated.force[0], rel=1e-9, abs=1e-12 * LOAD)
-
-
-def test_refuses_undetermined_roll():
-    """A free roll that the controls or the contact set do not determine is refused with the key."""
-    c, x, weight, y = pair_strips(4, 20)
-    with pytest.raises(PatchfemError, match=r"contact\.strips\.roll"):
-        press_strips(c, x, weight, y, 0 * x, approach=1e-7, roll_moment=0.0)
-    with pytest.raises(PatchfemError, match=r"contact\.strips\.offset"):
-        press_strips(c, x, weight, y, 0 * x, load=LOAD, roll_moment=y[-1] * LOAD)
-    ridge = np.where(np.arange(4) == 1, 0.0, 1.0)[:, None] + 0 * x
-    with pytest.raises(NotConverged, match="roll"):
-        press_strips(c, x, weight, y, ridge, load=LOAD, roll_moment=y[1] * LOAD)

@@ -17,9 +17,8 @@ from pieces import (
 )
 
 from patchfem.contact import press
-from patchfem.contact.gaps import crown, tilt
+from patchfem.contact.gaps import tilt
 from patchfem.contact.unilateral import solve_forces
-from patchfem.core import Outcome
 from patchfem.mesh import graded_grid
 
 
@@ -60,18 +59,6 @@ def test_always_initial_active_set_does_not_affect_forces():
                     pair.normal, x, gap, target, rng.random(x.size) < rng.random()
                 )
                 assert np.abs(restarted - reference).max() <= 1e-8 * load
-
-
-@pytest.mark.parametrize("moment", [None, 0.0])
-def test_exact_zero_load_gives_touching_pieces_without_force(moment):
-    """Under zero load the pieces touch without force, and the approach is the smallest gap."""
-    pair = make_coated_pair(100)
-    gap = crown(pair.interface.x, 1.0) + 3e-6
-    state = press(pair, gap, 0.0, moment)
-    assert state.outcome is Outcome.NO_CONTACT
-    assert not state.sigma_n.any() and (state.load, state.moment) == (0, 0)
-    assert state.approach == 3e-6
-    assert state.gap.min() == 0 and np.abs(state.gap - (gap - 3e-6)).max() <= 1e-20
 
 
 # contact fraction, tangential stiffness [N/m], peak pressure [Pa] and approach [m] of the coated pair at 200 cells, from

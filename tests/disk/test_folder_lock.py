@@ -1,7 +1,6 @@
 """A results folder has one writer: simultaneous starts, killed owners, reused process numbers, interrupted renames."""
 
 import os
-import signal
 import subprocess
 import sys
 import threading
@@ -9,16 +8,12 @@ from pathlib import Path
 
 import pytest
 from command_line import run_cli
-from limits import limit_file_size
 from scene_texts import BENCH
 
 from patchfem.core import Missing
 from patchfem.disk import FolderLock, exchange
 from patchfem.disk.lock import HOST_HASH, OWN_LOCK_PATHS, is_running, read_start_ticks
 from patchfem.export import Folder
-from patchfem.export.sweeps.folder import Folder as SweepFolder
-from patchfem.export.sweeps.folder import Writer
-from patchfem.runs import CaseResults
 
 PYTHON = [sys.executable, "-c"]
 # each of several processes tries to own every file, all at the same instants
@@ -155,56 +150,6 @@ def test_exact_lock_owner_is_process_start_and_host(tmp_path):
     assert is_running(os.getpid())
 
 
-def test_refuses_lock_through_link_or_over_folder(tmp_path):
-    """A lock is refused if its path is a link, a folder or in a missing folder."""
-    (tmp_path / "mine.txt").write_text("mine")
-    (tmp_path / "link").symlink_to(tmp_path / "mine.txt")
-    (tmp_path / "folder").mkdir()
-    for name in ("link", "folder", "none/lock"):
-        with pytest.raises(Missing, match="out: cannot be written"):
-            FolderLock(tmp_path / name, "out", "run").acquire()
-    assert (tmp_path / "mine.txt").read_text() == "mine" and list_names(tmp_path) == {
-        "mine.txt",
-        "link",
-        "folder",
-    }
-
-
-def test_exact_failed_lock_leaves_no_file(tmp_path):
-    """A lock that cannot be written because the disk is full leaves no file.
-
-    An incomplete lock could be owned or removed by no process.
-    """
-    with limit_file_size(5):
-        with pytest.raises(Missing, match=r"out: cannot be written.* \((No space left|File too)"):
-            FolderLock(tmp_path / "lock", "out", "run").acquire()
-        with pytest.raises(Missing, match="out: cannot be written"):
-            SweepFolder(tmp_path / "out", [1]).__enter__()
-    assert not list_names(tmp_path)
-
-
-def test_refuses_second_sweep_without_removing_folder(tmp_path):
-    """A second sweep into the same folder is refused and does not remove the still empty folder of the first."""
-    with SweepFolder(tmp_path / "out", [1]) as first:
-        with pytest.raises(Missing, match="another sweep"), SweepFolder(tmp_path / "out", [1]):
-            pass
-        names = first.chunks.names
-        writer = Writer((), tmp_path / "out", "out", names, "summaries", first.token)
-        assert writer([0], CaseResults.blank(1), ["{}"])
-    assert list_names(tmp_path / "out" / "cases" / f"{1:016x}") == {"summary.json"}
-    assert len(list_names(tmp_path / "out" / "chunks")) == 1
-
-
-def test_exact_folder_exchange_leaves_no_temporary_files(tmp_path):
-    """Replacing a results folder leaves only the new folder."""
-    for text in ("first", "second"):
-        with Folder(tmp_path / "out") as folder:
-            (folder.path / "summary.json").write_text(text)
-            (folder.path / "fields_frames").mkdir()
-        assert list_names(tmp_path) == {"out"}
-        assert (tmp_path / "out" / "summary.json").read_text() == text
-
-
 def test_always_folder_exists_during_exchange(tmp_path):
     """A reader finds the folder at every instant of an exchange, which two renames would not ensure."""
     target = tmp_path / "out"
@@ -273,25 +218,3 @@ def test_refuses_to_remove_foreign_files(tmp_path):
         assert list_names(tmp_path) == {name}
         (tmp_path / name / "mine.txt").unlink()
         (tmp_path / name).rmdir()
-
-
-@pytest.mark.parametrize("signal_number", [signal.SIGINT, signal.SIGTERM])
-def test_exact_signal_during_exchange_is_deferred(tmp_path, monkeypatch, signal_number):
-    """A signal during the exchange of folders takes effect after the exchange."""
-    old_handler = signal.signal(signal_number, signal.default_int_handler)
-    real = exchange.exchange_folders
-    monkeypatch.setattr(
-        exchange,
-        "exchange_folders",
-        lambda *both: signal.raise_signal(signal_number) or real(*both),
-    )
-    try:
-        (tmp_path / "out").mkdir()
-        with pytest.raises(KeyboardInterrupt), Folder(tmp_path / "out") as folder:
-            (folder.path / "summary.json").write_text("new")
-        assert signal.getsignal(signal_number) is signal.default_int_handler
-    finally:
-        signal.signal(signal_number, old_handler)
-    assert (
-        list_names(tmp_path) == {"out"} and (tmp_path / "out" / "summary.json").read_text() == "new"
-    )

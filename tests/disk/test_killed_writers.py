@@ -1,16 +1,9 @@
 """After a kill at any step or time the older or the newer results are complete, and the next run removes the rest."""
 
-import json
-import random
 import subprocess
 import sys
-import time
 
 import pytest
-from command_line import run_cli
-from scene_texts import BENCH
-
-from patchfem.export.netcdf import h5netcdf
 
 # each child process is killed at one step of the replacement of older results by new results
 STEPS = """\
@@ -81,44 +74,3 @@ def test_always_kill_at_any_step_leaves_complete_results(tmp_path, kind):
     )
     assert done.returncode == 0, done.stderr
     assert int(done.stdout) >= 15
-
-
-@pytest.mark.slow
-def test_always_kill_at_random_time_leaves_complete_results(tmp_path):
-    """Fifty runs that are killed at random times leave complete results."""
-    scene = tmp_path / "scene.toml"
-    out = tmp_path / "out"
-    rng = random.Random(17)
-    scene.write_text(BENCH, "utf-8")
-    assert run_cli("run", scene, "-o", out).code == 0
-    command = [sys.executable, "-m", "patchfem", "run", scene, "-q", "-o", out]
-    start = time.perf_counter()
-    assert subprocess.run(command, check=True).returncode == 0
-    duration = time.perf_counter() - start
-    n_killed = 0
-    for _ in range(50):
-        run = subprocess.Popen(command)
-        time.sleep(rng.uniform(0.2, 1.1) * duration)
-        run.kill()
-        n_killed += run.wait() == -9
-        assert {path.name for path in tmp_path.iterdir()} <= {
-            "scene.toml",
-            "out",
-            "out.partial",
-            ".out.old",
-            ".out.writer",
-        }
-        check_complete(out)
-    assert n_killed > 20
-    assert run_cli("run", scene, "-q", "-o", out).code == 0
-    assert {path.name for path in tmp_path.iterdir()} == {"scene.toml", "out"}
-    check_complete(out)
-
-
-def check_complete(out) -> None:
-    """Check that every file of a results folder can be read."""
-    assert json.loads((out / "summary.json").read_text("utf-8"))["outcome"] == "done"
-    with h5netcdf.File(out / "result.nc", "r") as file:
-        assert file.dimensions["time"].size > 10
-    page = out / "report.html"
-    assert not page.is_file() or page.read_text("utf-8").endswith("</html>\n")

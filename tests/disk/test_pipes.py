@@ -49,28 +49,3 @@ def test_refuses_pipe_without_writer(named_pipe, monkeypatch):
     assert read_case_table(named_pipe)[1] == [
         f"{named_pipe}: cannot be read: this is a pipe, and no data came through it within 0 s"
     ]
-
-
-def test_always_files_are_read_without_nonblocking_mode(tmp_path, monkeypatch):
-    """Files are read on systems without non-blocking mode.
-
-    On Windows `os.set_blocking`, which exists since Python 3.12, fails for anything but a pipe.
-    """
-
-    def raise_error(*arguments):
-        raise OSError(1, "not a pipe")
-
-    monkeypatch.delattr(os, "O_NONBLOCK")
-    monkeypatch.setattr(os, "set_blocking", raise_error)
-    (tmp_path / "x.toml").write_bytes(b"a = 1\r\n\x1a")
-    with open_with_timeout.open_for_reading(tmp_path / "x.toml") as file:
-        assert file.read() == b"a = 1\r\n\x1a"
-
-
-def test_exact_unreadable_path_leaves_no_open_descriptor(tmp_path):
-    """A path that cannot be read leaves no open file descriptor."""
-    before = len(os.listdir("/dev/fd"))
-    for _ in range(3):
-        with pytest.raises(IsADirectoryError):
-            open_with_timeout.open_for_reading(tmp_path)
-    assert len(os.listdir("/dev/fd")) == before

@@ -20,10 +20,8 @@ from patchfem.elasticity import (
     estimate_error,
     fit_recovery,
     get_cells,
-    lame,
     make_points,
 )
-from patchfem.elasticity.elasticity import hooke
 from patchfem.mesh import TensorGrid, graded_grid
 from patchfem.mesh.grid import graded_rows
 
@@ -83,65 +81,6 @@ def test_exact_linear_stress_is_recovered_at_each_node(mesh_index, seed):
         recovery.node.size
         == len(cells.points) + np.intersect1d(coating_nodes, substrate_nodes).size
     )
-
-
-def test_exact_single_row_coating_is_recovered_along_row():
-    """The stress in a coating of one row of elements is recovered along the row and is constant across it."""
-    grid = TensorGrid(np.linspace(-1e-3, 1e-3, 9), np.array([0.0, 1e-4, 3e-4, 6e-4, 1e-3]), 1)
-    recovery = fit_recovery(get_cells(grid_piece(grid)))
-    centres = recovery.cells.centres()
-    recovered = recovery(np.column_stack([np.ones(len(centres)), centres]))
-    is_coating = recovery.is_coating
-    expected = np.column_stack([np.ones(recovery.node.size), recovery.cells.points[recovery.node]])
-    expected[is_coating, 2] = (
-        0.5e-4  # the variation across the row is unknown, so the value at its centre is used
-    )
-    assert np.abs(recovered - expected).max() <= 1e-12
-
-
-@given(seed=st.integers(0, 2**32 - 1), plane=st.sampled_from(["strain", "stress"]))
-@settings(settings.get_profile("costly"))
-def test_exact_quadratic_displacement_has_exact_error_estimate(seed, plane):
-    """For a quadratic displacement the recovered stress is exact, and the error estimate equals the exact error."""
-    layers = make_bare_layers(TITANIUM, plane)
-    piece = grid_piece(SMALL, layers)
-    a, b = np.random.default_rng(seed).normal(size=(2, 3))
-    cells = get_cells(piece)
-    x, y = cells.points.T
-    u = np.stack(
-        [a[0] * x**2 + a[1] * x * y + a[2] * y**2, b[0] * x**2 + b[1] * x * y + b[2] * y**2], axis=1
-    )[None]
-    stress = centre_stress(get_cells(piece), u)
-    recovery = fit_recovery(cells)
-    x, y = cells.points[recovery.node].T
-    expected_stress = hooke(
-        (
-            2 * a[0] * x + a[1] * y,
-            b[1] * x + 2 * b[2] * y,
-            (a[1] * x + 2 * a[2] * y + 2 * b[0] * x + b[1] * y) / 2,
-        ),
-        recovery.is_coating,
-        layers,
-    )
-    assert (
-        np.abs(recovery(stress[0]) - expected_stress).max() <= 1e-11 * np.abs(expected_stress).max()
-    )
-    corner = cells.points[cells.blocks[0]]
-    widths = corner[:, 1, 0] - corner[:, 0, 0]
-    heights = corner[:, 3, 1] - corner[:, 0, 1]
-    # a bilinear cell has the terms in x y; it misses a0 x^2 and b0 x^2 along x, a2 y^2 and b2 y^2 along y
-    lam, mu = lame(*TITANIUM, plane)
-    expected = (
-        widths
-        * heights
-        / 3
-        * (
-            widths**2 * ((lam + 2 * mu) * a[0] ** 2 + mu * b[0] ** 2)
-            + heights**2 * ((lam + 2 * mu) * b[2] ** 2 + mu * a[2] ** 2)
-        )
-    )
-    error = estimate_error(recovery, u, stress, make_points(cells, "gauss")).error[0]
-    assert np.abs(error / expected - 1).max() <= 1e-9
 
 
 @pytest.mark.parametrize("split", [None, 0.5])
@@ -275,25 +214,6 @@ def test_exact_coating_traction_balances_load_and_moment(mesh_kind, seed, plane)
     assert (traction.shear * traction.length).sum(axis=1) == pytest.approx(
         shear.sum(axis=1), abs=1e-10 * total_load
     )
-
-
-@given(seed=st.integers(0, 2**32 - 1), slope=st.floats(-0.5, 0.5))
-@settings(settings.get_profile("costly"))
-def test_exact_traction_on_inclined_coating_under_uniform_stress(seed, slope):
-    """Under uniform stress the traction on an inclined coating interface equals sigma n at every inner node."""
-    mesh = mesh_of_grid(SMALL, 0.5, seed=2)
-    points = mesh.points + np.outer(slope * mesh.points[:, 0], [0.0, 1.0])
-    cells = Cells(points, mesh.blocks, mesh.is_coating, make_bare_layers(TITANIUM))
-    strain = np.random.default_rng(seed).normal(size=(2, 2))
-    computed = compute_coating_traction(cells, (points @ strain.T)[None])
-    (exx, exy), (eyx, eyy) = strain
-    xx, yy, _, xy = hooke((exx, eyy, (exy + eyx) / 2), np.array(0), make_bare_layers(TITANIUM))
-    normal_vector, tangent = np.array([[-slope, 1.0], [1.0, slope]]) / np.hypot(1, slope)
-    traction = -np.array([[xx, xy], [xy, yy]]) @ normal_vector
-    scale = np.abs([xx, yy, xy]).max()
-    assert computed.length.sum() == pytest.approx(2e-3 * np.hypot(1, slope), rel=1e-12)
-    assert np.abs(computed.normal[0, 1:-1] - traction @ normal_vector).max() <= 1e-10 * scale
-    assert np.abs(computed.shear[0, 1:-1] - traction @ tangent).max() <= 1e-10 * scale
 
 
 @pytest.mark.parametrize("split", [0.5, None])

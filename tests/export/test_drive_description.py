@@ -2,9 +2,7 @@
 
 import tomllib
 
-import numpy as np
 import pytest
-from page_data import read_charts
 
 import patchfem as pf
 from patchfem.export.driven import describe_drive
@@ -57,52 +55,3 @@ def test_exact_base_acceleration_is_zero_under_force_drive(friction, method):
 def test_exact_description_of_each_drive_and_slide(text, description):
     """The description of each drive and slide states its kind, amplitude and frequency."""
     assert describe_drive(tomllib.loads(pf.build(pf.load(text)).source.resolved)) == description
-
-
-def test_exact_description_of_recorded_and_absent_drive():
-    """The description of a recorded drive names its file; a patch without a drive has an empty description."""
-    assert describe_drive({"contact": {}}) == ""
-    assert describe_drive({"slide": {"kind": "file", "file": "in/a.csv"}}) == "the slide of a.csv"
-    assert (
-        describe_drive({"drive": {"kind": "base", "waveform": "file", "file": "b.csv"}})
-        == "recorded base acceleration of b.csv"
-    )
-
-
-def test_exact_page_states_drive_command_and_links(
-    tmp_path,
-):
-    """The page states the drive and the command that repeats the run, and links measures and existing files."""
-    (tmp_path / "swing.toml").write_text(
-        f'title = "t"\n{MODES}[drive]\nkind = "force"\nfrequency = "20 Hz"\n'
-        'force = "30 N"\ncycles = 20',
-        "utf-8",
-    )
-    pf.run(tmp_path / "swing.toml", **{"drive.force": "31 N"}).save(tmp_path / "out")
-    text = (tmp_path / "out" / "report.html").read_text("utf-8")
-    assert "force of 31 N at 20 Hz" in text
-    assert "<pre>patchfem run swing.toml --set &#39;drive.force=31 N&#39;</pre>" in text
-    assert "fields.vtkhdf" not in text.split("<script")[0]
-    assert str(tmp_path) not in text
-
-
-@pytest.mark.parametrize("column, factor", [("force [N]", 1.0), ("friction_ratio [1]", 0.1)])
-def test_exact_page_shows_measured_force_of_recorded_slide(tmp_path, column, factor):
-    """The page of a recorded slide shows the measured force beside the computed one."""
-    time = np.linspace(0.0, 1.0, 201)
-    slide = 10 * np.sin(4 * np.pi * time)
-    force = 2.5 * np.cos(4 * np.pi * time)
-    (tmp_path / "loop.csv").write_text(
-        f"time [s],displacement [um],{column}\n"
-        + "\n".join(
-            f"{t},{a!r},{b * factor!r}" for t, a, b in zip(time, slide.tolist(), force.tolist())
-        ),
-        "utf-8",
-    )
-    (tmp_path / "a.toml").write_text(BENCH + '[slide]\nkind = "file"\nfile = "loop.csv"', "utf-8")
-    pf.run(tmp_path / "a.toml").save(tmp_path / "out")
-    text = (tmp_path / "out" / "report.html").read_text("utf-8")
-    computed, measured = read_charts(text)["Friction loop"]["data"]
-    assert (computed["name"], measured["name"]) == ("loop friction force", "measured force")
-    np.testing.assert_allclose(measured["x"], slide, atol=1e-5)
-    np.testing.assert_allclose(measured["y"], force, atol=1e-6)

@@ -1,7 +1,6 @@
 """fields.vtkhdf and its exports agree with the run when VTK, PyVista, meshio and h5py read them."""
 
 import csv
-import re
 import tomllib
 
 import h5py
@@ -16,7 +15,6 @@ from vtkmodules.vtkIOHDF import vtkHDFReader
 
 import patchfem as pf
 from patchfem.export.fields.blocks import FIELDS
-from patchfem.export.fields.film import stress_frames
 from patchfem.export.fields.vtkhdf import NAME, read_frames
 
 PARTS = ["lower", "upper", "interface"]
@@ -151,21 +149,6 @@ def read_unit(grid, name: str) -> str:
     return information.Get(vtkDataArray.UNITS_LABEL())
 
 
-def test_exact_pvd_agrees_in_pyvista(tmp_path):
-    """A .pvd has the times, blocks and numbers of the series."""
-    small = write_small_series(tmp_path / "out", 12)
-    assert run_cli("export", tmp_path / "out", "-o", tmp_path / "a.pvd").code == 0
-    reader = pyvista.PVDReader(str(tmp_path / "a.pvd"))
-    assert reader.time_values == list(small.times)
-    for number in (0, 7, 11):
-        reader.set_active_time_point(number)
-        grids = reader.read()[0]
-        assert grids.keys() == PARTS
-        for part in PARTS:
-            assert_block_equal(grids[part], small.blocks[part], number)
-        assert read_unit(grids["interface"], "normal_stress") == "Pa"
-
-
 def test_exact_csv_has_interface_values(tmp_path):
     """A .csv has the points of the interface and their fields in SI, as they are in the file."""
     write_small_series(tmp_path / "out")
@@ -182,18 +165,6 @@ def test_exact_csv_has_interface_values(tmp_path):
         name, unit = label.rstrip("]").split(" [")
         written = frame_values(line.point_data[name], 1)
         assert np.array_equal(values.astype(written.dtype), written) and FIELDS[name].unit == unit
-
-
-def test_exact_vtkhdf_export_equals_file(tmp_path):
-    """A .vtkhdf has the same numbers as the file of the run."""
-    write_small_series(tmp_path / "out")
-    assert run_cli("export", tmp_path / "out", "-o", tmp_path / "a.vtkhdf").code == 0
-    original, copy = (
-        read_frames(path).blocks for path in (tmp_path / "out" / NAME, tmp_path / "a.vtkhdf")
-    )
-    for part in PARTS:
-        for data, copied in zip(original[part][2:], copy[part][2:]):
-            assert all(np.array_equal(values, copied[name]) for name, values in data.items())
 
 
 @pytest.mark.parametrize(
@@ -219,27 +190,6 @@ def test_refuses_unsupported_field_export(tmp_path, monkeypatch, arguments, code
     answer = run_cli("export", "out", *arguments)
     assert answer.code == code and message in answer.err and "internal fault" not in answer.err
     assert [path.name for path in tmp_path.iterdir()] == ["out"]
-
-
-def test_refuses_missing_or_damaged_fields(tmp_path):
-    """A missing folder, a run without fields, a damaged file and one of an older version are refused."""
-    for folder, code, message in (
-        ("nowhere", 4, "no such results folder"),
-        (".", 4, "only a run with [contact]"),
-    ):
-        answer = run_cli("export", tmp_path / folder, "-o", tmp_path / "a.vtu")
-        assert answer.code == code and message in answer.err
-    (tmp_path / NAME).write_bytes(b"\x89HDF\r\n\x1a\n spoilt")
-    assert "not the fields of a run" in run_cli("view", tmp_path, "-o", tmp_path / "a.png").err
-    write_small_series(tmp_path)
-    with h5py.File(tmp_path / NAME, "r+") as file:
-        del file["VTKHDF/interface/PointData/holder_slide"]
-    answer = run_cli("view", tmp_path, "-o", tmp_path / "a.png")
-    assert (
-        answer.code == 2
-        and "interface has no holder_slide" in answer.err
-        and "run the scene again" in answer.err
-    )
 
 
 @pytest.fixture(scope="module")
@@ -276,64 +226,3 @@ def test_exact_grids_of_result_agree_with_patch_and_file(crowned_run, tmp_path):
         values = getattr(patch, name)
         np.testing.assert_allclose(line[name] * unit, values, 1e-6, 1e-6 * np.abs(values).max())
     assert np.array_equal(line.points[:, 0], patch.x)
-
-
-def test_always_frame_is_selected_by_number(crowned_run):
-    """A frame is selected by its number, also counted from the end; other numbers are refused."""
-    all_frames = crowned_run.to_pyvista(frame=None)
-    count = len(all_frames)
-    for number in (2, -count, np.int64(count - 1)):
-        moved = crowned_run.to_pyvista(frame=number)["upper"]["displacement"]
-        assert np.array_equal(moved, all_frames[number]["upper"]["displacement"])
-    for number in (count, -count - 1, 0.5, "last"):
-        with pytest.raises(pf.PatchfemError, match=rf"no frame {number}; .* 0 to {count - 1}"):
-            crowned_run.to_pyvista(frame=number)
-
-
-def test_refuses_grids_of_run_without_contact():
-    """A run without [contact] has no grids and is refused."""
-    with pytest.raises(pf.PatchfemError, match=re.escape("no [contact]")):
-        pf.run(pf.new("bench")).to_pyvista()
-
-
-def test_exact_film_has_stress_of_cells(tmp_path):
-    """On the grid of the film each point has the stress of its cell, here linear in x and depth; outside it is NaN."""
-    frames = read_frames(write_linear_stress(tmp_path))
-    film = stress_frames(tmp_path / NAME)
-    assert film["values"].shape == (2, film["y"].size, film["x"].size)
-    assert np.array_equal(film["times"], frames.times)
-    x, y = np.meshgrid(film["x"], film["y"])
-    # centres of the cells of 50 um in which the points are
-    cell_x = (np.floor(x / 5e-5) + 0.5) * 5e-5
-    cell_depth = (np.floor(np.abs(y) / 5e-5) + 0.5) * 5e-5
-    expected = np.where(y < 0, 5e6, 9e6) + 2e9 * cell_x + 3e9 * cell_depth
-    assert (np.isfinite(film["values"][0]) == (np.abs(y) <= 1e-3)).all()
-    # points on the line between two cells may have the stress of either
-    is_inner = (np.abs(x / 5e-5 - np.round(x / 5e-5)) > 1e-6) & (np.abs(y) < 1e-3)
-    is_inner &= np.abs(y / 5e-5 - np.round(y / 5e-5)) > 1e-6
-    assert is_inner.sum() > 500
-    for number, values in enumerate(film["values"]):
-        np.testing.assert_allclose(values[is_inner], (1 + number) * expected[is_inner], 2e-6)
-
-
-def write_linear_stress(folder):
-    """Write the fields of two pieces of 40 x 20 cells whose stress is linear in x and depth."""
-    from patchfem.export.fields.vtkhdf import write_blocks
-
-    blocks = dict(write_small_series(folder, 2, times=[0.0, 1.0]).blocks)
-    for side, sign, offset in (("lower", -1, 5e6), ("upper", 1, 9e6)):
-        mesh = pyvista.ImageData(
-            dimensions=(41, 21, 1), spacing=(5e-5, 5e-5, 0), origin=(-1e-3, 0, 0)
-        )
-        grid = mesh.cast_to_unstructured_grid()
-        cells = grid.cell_connectivity.reshape(-1, 4)[:, [0, 1, 3, 2]]
-        centres = grid.points[cells].mean(axis=1)
-        stress = offset + 2e9 * centres[:, 0] + 3e9 * centres[:, 1]
-        blocks[side] = blocks[side]._replace(
-            points=grid.points * [1, sign, 0],
-            cells=cells,
-            point_data={"displacement": np.zeros((1, len(grid.points), 3), np.float32)},
-            cell_data={"von_mises": np.stack([stress, 2 * stress]).astype(np.float32)},
-        )
-    write_blocks(folder / NAME, blocks, [0.0, 1.0])
-    return folder / NAME

@@ -2,18 +2,12 @@
 
 import io
 import json
-import os
 import signal
 
 import pytest
 import xarray as xr
 from command_line import CommandResult, run_cli
-from limits import limit_file_size
 from scene_texts import BENCH
-
-from patchfem import plan
-from patchfem.core import Missing
-from patchfem.export import page, run_folder
 
 RESULT_FILES = {"summary.json", "result.nc", "scene.resolved.toml"}
 
@@ -87,56 +81,3 @@ def test_always_interrupt_before_page_leaves_results(scene_file, tmp_path):
     assert answer.code == 130 and "interrupted while the page was drawn" in answer.err
     assert "are complete except for report.html" in answer.err
     check_results_without_page(tmp_path / "out")
-
-
-def test_always_page_without_memory_leaves_results(scene_file, tmp_path, monkeypatch):
-    """If memory is exhausted while the page is drawn, the results are complete and the code is 4."""
-
-    def exhaust_memory(*_):
-        """Raise MemoryError."""
-        raise MemoryError
-
-    monkeypatch.setattr(page, "make_page", exhaust_memory)
-    answer = run_cli("run", scene_file, "-o", tmp_path / "out")
-    assert answer.code == 4 and "out of memory" in answer.err
-    assert "friction_force_peak" in answer.out and "are complete except for" in answer.err
-    check_results_without_page(tmp_path / "out")
-
-
-def test_exact_full_disk_leaves_no_partial_page(scene_file, tmp_path):
-    """If the disk is full, no part of a page remains; the results take 20 kB and the page more than 200 kB."""
-    with limit_file_size(200_000):
-        answer = run_cli("run", scene_file, "-o", tmp_path / "out")
-    assert answer.code == 4 and "complete except for the page" in answer.err
-    assert "report.html" in answer.err
-    check_results_without_page(tmp_path / "out")
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["out", "scene.toml"]
-
-
-def test_refuses_page_in_results_of_another_run(scene_file, tmp_path):
-    """A page is not written into a folder that another run has replaced in the meantime."""
-    out = tmp_path / "out"
-
-    def replace_results():
-        """Move the results away and write those of another run in their place."""
-        os.replace(out, tmp_path / "first")
-        assert (
-            run_cli("run", scene_file, "-o", out, "--no-page", "--set", "slide.cycles=3").code == 0
-        )
-
-    answer = run_with_action(scene_file, out, replace_results)
-    assert answer.code == 4 and "replaced by another run" in answer.err
-    for folder in (out, tmp_path / "first"):
-        assert {path.name for path in folder.iterdir()} == RESULT_FILES
-
-
-def test_refuses_page_for_moved_folder(scene_file, tmp_path):
-    """A page is refused for a folder that was moved, and is written to its new place."""
-    folder = tmp_path / "out"
-    run = run_folder.run_into(plan(scene_file), folder)
-    os.replace(folder, tmp_path / "moved")
-    with pytest.raises(Missing, match="replaced by another run"):
-        run_folder.write_run_page(run, folder)
-    # The page follows the folder, not its name.
-    run_folder.write_run_page(run, tmp_path / "moved")
-    assert (tmp_path / "moved" / "report.html").is_file()

@@ -236,10 +236,3 @@ def test_always_page_works_in_browser(folders, chromium):
         assert page.evaluate("document.documentElement.scrollWidth") <= 390
         count = page.evaluate("document.querySelectorAll('.chart .main-svg').length")
         assert count >= len(read_charts(read_page(folders(name))))
-
-
-@pytest.mark.parametrize("name", ["rig", "wear", "random"])
-def test_always_page_shows_no_backquotes(folders, name):
-    """Sentences, captions and definitions show no backquotes; scenes and commands are shown as written."""
-    page = re.sub(r"(?s)<(script|style|pre)\b.*?</\1>", "", read_page(folders(name)))
-    assert "`" not in page

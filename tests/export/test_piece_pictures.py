@@ -1,10 +1,6 @@
 """Pictures and films of the pieces agree with the fields of the file, or are refused with a sentence."""
 
-import base64
-import json
 import re
-import stat
-import sys
 
 import numpy as np
 import pytest
@@ -12,18 +8,11 @@ from command_line import run_cli
 from exported import write_small_series
 from PIL import Image
 
-from patchfem.export.fields.film import contact_window, last_frames
+from patchfem.export.fields.film import contact_window
 from patchfem.export.fields.vtkhdf import NAME, read_frames
 from patchfem.export.pieces import draw_pieces, magnify_pieces
 
 WHOLE = (-1.0, 1.0, -1.0, 1.0)  # [m], a window that contains all pieces
-FFMPEG = """\
-#!{python}
-import sys
-data = sys.stdin.buffer.read()
-open(sys.argv[-1], "wb").write(data)
-sys.exit({code})
-"""
 
 
 @pytest.fixture(scope="module")
@@ -32,12 +21,6 @@ def small_folder(tmp_path_factory):
     folder = tmp_path_factory.mktemp("small") / "out"
     write_small_series(folder, times=[0.0, 1.0, 1.001, 1.002], frames=4)
     return folder
-
-
-@pytest.mark.parametrize("times, first", [([0.0], 0), ([0, 1, 2, 3], 0), ([0, 50, 51, 52, 53], 1)])
-def test_exact_last_cycle_excludes_pressed_state(times, first):
-    """The last frames follow each other closely; the pressed state long before them is left out."""
-    assert list(last_frames(np.array(times, float))) == list(range(first, len(times)))
 
 
 @pytest.mark.parametrize("magnify", [None, 0.0, 2500.0])
@@ -74,19 +57,6 @@ def test_exact_drawn_gap_is_magnified_gap(bench_folder, magnify):
         np.testing.assert_allclose(gap, factor * line.point_data["gap"], 0, tolerance)
 
 
-def test_always_default_magnification_is_visible(bench_folder):
-    """The factor is 1, 2 or 5 times a power of ten, and draws the motion as 2 % to 5 % of the window's height."""
-    frames = read_frames(bench_folder / NAME)
-    window = contact_window(frames)
-    drawn = magnify_pieces(frames, np.array([len(frames.times) - 1]), window)
-    factor = float(re.match(r"motion × ([\d.e+]+)", drawn.captions[0])[1])
-    assert f"{factor:e}"[0] in "125"
-    height = 1e3 * (window[3] - window[2])
-    points = np.concatenate([frames.blocks[side].points for side in ("lower", "upper")])[:, 1]
-    motion = (drawn.places[0, :, 1] - 1e3 * points)[drawn.cells[drawn.is_inside]]
-    assert 0.019 * height < np.abs(motion).max() < 0.051 * height
-
-
 def test_exact_colours_are_stress_of_frame(bench_folder):
     """Cells of both panels have the stress of the frame that is shown, on one scale of all frames."""
     frames = read_frames(bench_folder / NAME)
@@ -117,51 +87,6 @@ def test_exact_gif_has_frames_of_last_cycle(small_folder, tmp_path):
     assert all(np.abs(frames[k] - frames[k - 1]).mean() > 1 for k in range(3))
 
 
-@pytest.mark.parametrize("frames", [1, 4])
-def test_exact_page_has_all_frames_and_loads_nothing(tmp_path, frames):
-    """A .html contains the frames as pictures, also a single one, and refers to nothing in the network."""
-    write_small_series(tmp_path / "<b>", frames, times=range(frames))
-    assert run_cli("view", tmp_path / "<b>", "-o", tmp_path / "a.html").code == 0
-    page = (tmp_path / "a.html").read_text("utf-8")
-    assert "http" not in page and "<title>&lt;b&gt;</title>" in page and "fa-" not in page
-    pictures = re.findall(r'"data:image/png;base64,([^"]+)"', page)
-    assert len(pictures) == frames
-    for picture in pictures:
-        assert base64.b64decode(picture.replace("\\\n", ""))[:4] == b"\x89PNG"
-
-
-def test_exact_pictures_have_title_of_scene(bench_folder, tmp_path):
-    """A picture has the title of the scene, or the name of the folder if there is none."""
-    (tmp_path / "other").mkdir()
-    fields = (bench_folder / NAME).read_bytes()
-    (tmp_path / "other" / NAME).write_bytes(fields)
-    answer = run_cli("view", tmp_path / "other", "-o", tmp_path / "a.pdf")
-    assert "a.pdf: other, frame" in answer.out and (tmp_path / "a.pdf").read_bytes()[:4] == b"%PDF"
-    summary = json.loads((bench_folder / "summary.json").read_text("utf-8"))
-    (tmp_path / "other" / "summary.json").write_text(json.dumps(summary | {"title": "Two pieces"}))
-    answer = run_cli("view", tmp_path / "other", "-o", tmp_path / "b.svg", "--frame", 0)
-    assert "b.svg: Two pieces, frame 0 of 0 to" in answer.out
-    assert "Two pieces" in (tmp_path / "b.svg").read_text("utf-8")
-
-
-@pytest.mark.parametrize("code", [0, 1])
-def test_exact_mp4_is_written_by_ffmpeg(small_folder, tmp_path, monkeypatch, code):
-    """For an .mp4 ffmpeg gets all frames; if it fails or is missing, a sentence says so and no file remains."""
-    program = tmp_path / "ffmpeg"
-    monkeypatch.setenv("PATH", str(tmp_path))
-    answer = run_cli("view", small_folder, "-o", tmp_path / "a.mp4")
-    assert answer.code == 4 and "pip install imageio-ffmpeg" in answer.err
-    program.write_text(FFMPEG.format(python=sys.executable, code=code))
-    program.chmod(program.stat().st_mode | stat.S_IXUSR)
-    answer = run_cli("view", small_folder, "-o", tmp_path / "a.mp4")
-    if code:
-        assert answer.code == 4 and "ffmpeg could not write this file" in answer.err
-        assert [path.name for path in tmp_path.iterdir()] == ["ffmpeg"]
-    else:
-        assert answer.code == 0, answer.err
-        assert (tmp_path / "a.mp4").stat().st_size == 3 * 1200 * 520 * 4
-
-
 @pytest.mark.parametrize(
     "arguments, code, message",
     [
@@ -181,10 +106,3 @@ def test_refuses_invalid_options(small_folder, tmp_path, monkeypatch, arguments,
         monkeypatch.delenv(name, raising=False)
     answer = run_cli("view", small_folder, *arguments)
     assert answer.code == code and message in answer.err and not list(tmp_path.iterdir())
-
-
-def test_refuses_film_without_motion(tmp_path):
-    """A film of a single frame is refused, with the advice to write a picture."""
-    write_small_series(tmp_path / "still", 1)
-    answer = run_cli("view", tmp_path / "still", "-o", tmp_path / "a.gif")
-    assert answer.code == 2 and "no motion to show" in answer.err and "-o FILE.png" in answer.err

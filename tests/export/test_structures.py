@@ -128,61 +128,6 @@ def test_exact_matrices_and_elements_of_several_interfaces(tmp_path):
     np.testing.assert_allclose(exported["stiffness"].ravel(), stiffness, rtol=1e-12)
 
 
-def test_exact_tanh_element_has_reference_speed(tmp_path):
-    """The element of the law tanh has its reference speed."""
-    _, path = export_structure(tmp_path, POINT + make_friction_table("tanh") + STRUCTURE)
-    exported = loadmat(path)
-    assert exported["form"].item() == "tanh" and exported["speed"].item() == 1e-3
-
-
-def test_exact_released_rig_has_no_excitation(tmp_path):
-    """The export of a released rig has no excitation."""
-    text = (
-        FRICTION_RIG.split("[drive]")[0]
-        + '[drive]\nkind = "free"\ndisplacement = "20 um"\ncycles = 5\n'
-    )
-    exported = loadmat(export_structure(tmp_path, text)[1])
-    assert not exported["Fex1"].any() and not {"force", "base", "Omega"} & set(exported)
-
-
-HEAD = FRICTION_RIG.split("[drive]")[0]
-LEVELS = '[drive]\nkind = "base"\nwaveform = "levels"\nfrequency = "100 Hz"\nlevels = ["1 g", "2 g"]\ncycles = 5\n'
-
-
-@pytest.mark.parametrize(
-    "text, message",
-    [
-        (
-            FRICTION_RIG,
-            "1 coordinate, 1 friction element\n",
-        ),
-        (
-            FRICTION_RIG + '[wear]\ncoefficient = "1e-14 m^2/N"\ncycles = 1000\n',
-            "; not in the file: [wear]\n",
-        ),
-        (
-            FRICTION_RIG.replace("[structure]", '[structure]\ntravel = "5 mm"'),
-            "; not in the file: structure.travel\n",
-        ),
-        (
-            FRICTION_RIG.replace("[drive]", '[structure.start]\ndisplacement = ["5 um"]\n[drive]'),
-            "; not in the file: the initial motion\n",
-        ),
-        (
-            HEAD + LEVELS,
-            "; Fex1 is the excitation for an amplitude of 1 m/s^2, not for waveform = 'levels'\n",
-        ),
-    ],
-)
-def test_always_export_states_omitted_features(tmp_path, text, message):
-    """The printed line of an export states the features of the scene that the file does not contain."""
-    (tmp_path / "rig.toml").write_text(text)
-    answer = run_cli("export", tmp_path / "rig.toml", "-o", tmp_path / "rig.mat")
-    assert answer.code == 0 and answer.out.endswith(message), answer.out
-    frequency = 100 if LEVELS in text else 143
-    assert loadmat(tmp_path / "rig.mat")["Omega"].item() == pytest.approx(2 * np.pi * frequency)
-
-
 @pytest.mark.parametrize(
     "text, ending, message",
     [

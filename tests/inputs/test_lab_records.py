@@ -4,11 +4,9 @@ import numpy as np
 import pytest
 from command_line import run_cli
 from lab_files import INCH, SI, elastic_plastic_loop, make_record, write_universal
-from scipy.io import savemat
 
 from patchfem.core import PatchfemError
 from patchfem.inputs import parse_requests, read_records
-from patchfem.inputs.units import find_unit_factor
 
 TIME, SLIDE, FORCE = elastic_plastic_loop(20, 1)
 
@@ -95,20 +93,6 @@ def test_exact_instrument_tables_are_read(tmp_path):
 
 
 @pytest.mark.parametrize(
-    "unit, factor",
-    [
-        ("m s-2", 1),
-        ("m/s**2", 1),
-        ("mm / s^2", 1e-3),
-        ("in/sec2", 0.0254),
-    ],
-)
-def test_exact_unit_spellings_are_recognised(unit, factor):
-    """The usual spellings of a unit of acceleration give its factor."""
-    assert find_unit_factor("acceleration", unit) == factor
-
-
-@pytest.mark.parametrize(
     "requests, message",
     [
         (["force"], "NAME=CHANNEL"),
@@ -159,17 +143,6 @@ def test_refuses_invalid_universal_record(tmp_path, datasets, message):
     assert result.code == 2 and message in result.err and str(tmp_path / "a.uff") in result.err
 
 
-def test_refuses_non_finite_value(tmp_path):
-    """A value that is not finite is refused with its sample.
-
-    pyuff writes NaN as 0, so the bytes of one value are replaced.
-    """
-    path = write_universal(tmp_path / "a.uff", [make_record(TIME, SLIDE, 13)])
-    path.write_bytes(path.read_bytes().replace(SLIDE[3].tobytes(), np.array(np.nan).tobytes()))
-    with pytest.raises(PatchfemError, match=r"a\.uff: force of sample 4 is nan"):
-        read_records(path, [])
-
-
 @pytest.mark.parametrize(
     "text, message",
     [
@@ -190,27 +163,3 @@ def test_refuses_invalid_table_with_line_number(tmp_path, text, message):
     assert result.code == 2 and message in result.err and str(tmp_path / "a.csv") in result.err, (
         result.err
     )
-
-
-def test_refuses_unsupported_missing_and_damaged_files(tmp_path):
-    """Unsupported, missing and damaged files are refused with the exit code of their fault."""
-    savemat(tmp_path / "a.mat", {"t": TIME, "s": {"x": 1.0}, "wide": np.ones((3, 3))})
-    (tmp_path / "b.uff").write_bytes(b"    -1\n    58\nnothing\n    -1\n")
-    (tmp_path / "c.tdms").write_bytes(b"")
-    for words, code, message in (
-        (["a.mat"], 2, "assign the variables of the file"),
-        (["a.mat", "--map", "force=F [N]"], 2, "no variable 'F'"),
-        (["a.mat", "--map", "force=t"], 2, "has no units"),
-        (["a.mat", "--map", "force=wide [N]"], 2, "wide(:,1)"),
-        (["a.mat", "--map", "force=wide(:,4) [N]"], 2, "no column 4"),
-        (["b.uff"], 2, "cannot be read"),
-        (["a.mat", "--map", "force=s [N]"], 2, "no variable 's'"),
-        (["c.tdms"], 2, "end in"),
-        (["d.uff"], 4, "no such file"),
-        (["d.mat"], 4, "no such"),
-        (["d.csv"], 4, "no such"),
-    ):
-        result = run_cli("import", tmp_path / words[0], *words[1:], "-o", tmp_path / "o.csv")
-        assert (
-            result.code == code and message in result.err and "internal fault" not in result.err
-        ), result.err

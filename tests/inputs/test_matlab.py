@@ -173,23 +173,6 @@ def test_exact_matlab_73_structure_equals_version_7(tmp_path):
     assert np.array_equal(basis_73.slide, basis_7.slide)
 
 
-def test_always_links_and_empty_items_are_ignored(tmp_path):
-    """Links, cycles and empty items of a file of version 7.3 are ignored."""
-    (tmp_path / "secret.h5").write_bytes(matlab73_bytes({"x": 1.0}))
-
-    def add_items(file):
-        file["out"] = h5py.ExternalLink(str(tmp_path / "secret.h5"), "/x")
-        file["ring"] = file["/"]
-        file["void"] = h5py.Empty("f8")
-        file.create_dataset("none", data=np.array([0, 3], "u8")).attrs.update(
-            MATLAB_class=np.bytes_("double"), MATLAB_empty=np.uint8(1)
-        )
-
-    variables = read_variables("a.mat", matlab73_bytes({"x": 2.0}, add_items))
-    shapes = {name: variable.shape for name, variable in variables.items()}
-    assert shapes == {"x": (1, 1), "none": (0, 3)}
-
-
 @pytest.mark.parametrize(
     "data",
     [

@@ -116,12 +116,6 @@ def test_exact_rounding_uncertainty_of_stiffness(expected, round_values):
     assert 0.85 < np.sqrt(np.mean(np.square(ratios))) < 1.15
 
 
-def test_exact_unrounded_matrices_show_no_rounding():
-    """A matrix of few or of full-precision numbers shows no rounding."""
-    assert matrices.estimate_rounding(sparse.csr_array(K)) is None
-    assert matrices.estimate_rounding(sparse.csr_array(slender_beam(1)[0] / 3)) is None
-
-
 def test_exact_rows_are_aligned_by_node():
     """Matrices whose files order the nodes differently are aligned by node and direction."""
     first_matrix = matrices.Matrix(
@@ -164,24 +158,3 @@ def test_refuses_invalid_matrix_file(tmp_path, name):
     with pytest.raises(PatchfemError) as caught:
         matrices.read_matrix(tmp_path / name, "stiffness")
     assert message in str(caught.value) and name in str(caught.value), str(caught.value)
-
-
-def test_refuses_unknown_names_and_unequal_sizes(tmp_path):
-    """Arrays without a known name, matrices of different sizes and mixed row names are refused."""
-    np.savez(tmp_path / "a.npz", A=K, B=M)
-    with pytest.raises(
-        PatchfemError, match=r"contains no stiffness under a known name .* its arrays: A, B"
-    ):
-        matrices.read_matrix(tmp_path / "a.npz", "stiffness")
-    np.savez(tmp_path / "k.npz", K=K)
-    for kind in ("mass", "damping"):
-        with pytest.raises(
-            PatchfemError, match=rf"of the file, K, has the name of a stiffness, but the {kind}"
-        ):
-            matrices.read_matrix(tmp_path / "k.npz", kind)
-    large, small = (matrices.Matrix(sparse.csr_array(matrix)) for matrix in (K, M[:2, :2]))
-    with pytest.raises(PatchfemError, match="differ in size: 4 x 4 and 2 x 2"):
-        matrices.align_rows(large, small)
-    with_nodes = matrices.Matrix(sparse.csr_array(K), np.array(ROW_NODES))
-    with pytest.raises(PatchfemError, match="name nodes and directions and others do not"):
-        matrices.align_rows(large, with_nodes)

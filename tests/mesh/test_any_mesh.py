@@ -87,38 +87,6 @@ def test_exact_mesh_pair_round_trip(kind, name, tmp_path):
             assert np.array_equal(piece.blocks[kind], cells)
 
 
-@given(
-    order=st.randoms(use_true_random=False),
-    shift=st.floats(-1.0, 1.0),
-    kind=st.sampled_from(ELEMENT_KINDS),
-)
-def test_always_numbering_orientation_and_shift_have_no_effect(
-    order, shift, kind, tmp_path_factory
-):
-    """The numbering, the orientation of elements and a shift along x have no effect on the pair that is read."""
-    mesh = make_pair(kind)
-    new_numbers = list(range(len(mesh.points)))
-    order.shuffle(new_numbers)
-    new_numbers = np.array(new_numbers)
-    points = np.empty_like(mesh.points)
-    points[new_numbers] = mesh.points + np.array([shift, 0.0])
-    mesh.points, mesh.triangles, mesh.quads, mesh.edges = (
-        points,
-        new_numbers[mesh.triangles],
-        new_numbers[mesh.quads],
-        new_numbers[mesh.edges][:, ::-1],
-    )
-    for cells in (mesh.triangles, mesh.quads):
-        for k in range(len(cells)):
-            cells[k] = np.roll(cells[k][:: order.choice((-1, 1))], order.randrange(4))
-    pair = write_and_read_pair(mesh, tmp_path_factory.mktemp("any"))
-    for piece in (pair.lower, pair.upper):
-        assert np.abs(piece.x - GRID.x).max() <= 1e-14
-        assert piece.areas().min() > 0 and piece.areas().sum() == pytest.approx(
-            GRID.length * GRID.height, rel=1e-9
-        )
-
-
 @pytest.mark.parametrize("kind", ELEMENT_KINDS)
 def test_exact_refined_piece_has_same_outline(kind, tmp_path):
     """A refined piece has the same outline and coating and four times the elements."""
@@ -295,22 +263,6 @@ def test_refuses_invalid_mesh_with_reason(name, form, tmp_path):
     assert time.process_time() - start_time < 2
 
 
-def test_refuses_parts_joined_at_single_node(tmp_path):
-    """A piece whose parts are joined only at a node is refused."""
-    mesh = make_pair("quads")
-    last_quad = mesh.quads[np.flatnonzero(mesh.quad_tags == CELL_TAGS["upper_substrate"])[-1]]
-    mesh.points = np.concatenate(
-        [mesh.points, mesh.points[last_quad[2]] + [[1e-3, 0], [1e-3, 1e-3], [0, 1e-3]]]
-    )
-    n_points = len(mesh.points)
-    mesh.quads = np.append(
-        mesh.quads, [[last_quad[2], n_points - 3, n_points - 2, n_points - 1]], axis=0
-    )
-    mesh.quad_tags = np.append(mesh.quad_tags, CELL_TAGS["upper_substrate"])
-    with pytest.raises(PatchfemError, match="the upper piece falls into 2 parts"):
-        write_and_read_pair(mesh, tmp_path)
-
-
 def test_refuses_curved_elements_nonplanar_meshes_and_unknown_tags(tmp_path):
     """Elements of other orders, meshes that are not plane and unknown tags are refused."""
     pair = make_pair("quads")
@@ -343,50 +295,6 @@ def test_refuses_curved_elements_nonplanar_meshes_and_unknown_tags(tmp_path):
     path.write_text(path.read_text().replace("ELSET=UPPER_COATING", "ELSET=GLUE"))
     with pytest.raises(PatchfemError, match=r"some cells have an unknown tag \(no tag\);"):
         read_pieces(path)
-
-
-@pytest.mark.parametrize(
-    "text, message",
-    [
-        ("*NODE\n1,0,0\n1,1,0\n*NODE\n1,2,2\n", "given twice"),
-        ("*NODE\n1,0,0\n*ELEMENT,TYPE=C3D8\n1,1,1,1,1,1,1,1,1\n", "C3D8 elements; only plane"),
-        ("*NODE\n1,0,0\n*ELEMENT,TYPE=CPE3\n1,1,1\n", "do not all have 3 nodes"),
-        ("*NODE\n1,0,0\n*NSET,NSET=upper_far,GENERATE\n1,2000000000,1\n", "longer than the deck"),
-        ("*NODE\n1,0,0\n*NSET,NSET=upper_far\nnobody\n", "unknown set nobody"),
-        (
-            "*NODE\n1,0,0\n3,1,0\n*ELEMENT,TYPE=CPE3\n12,1,3,7\n",
-            "element 12 names node 7, which the file does not define",
-        ),
-        (
-            "*NODE\n1,0,0\n*NSET,NSET=upper_far\n1,9\n",
-            "upper_far names node 9, which the file does not define",
-        ),
-        ("*INCLUDE, INPUT=other.inp\n", "INCLUDE is not supported yet"),
-        ("*NODE\n1,zero,0\n", "not a readable .inp"),
-        ("", "no cells or nodes are tagged .*ELSET"),
-        ("\x00\ufffd*", "no cells or nodes are tagged"),
-    ],
-)
-def test_refuses_unsupported_abaqus_decks(text, message, tmp_path):
-    """An invalid or unsupported Abaqus deck is refused with the reason."""
-    (tmp_path / "pair.inp").write_text(text, encoding="utf-8")
-    with pytest.raises(PatchfemError, match=message):
-        read_pieces(tmp_path / "pair.inp")
-
-
-@pytest.mark.parametrize("form", FORMATS)
-def test_refuses_truncated_mesh_files_quickly(form, tmp_path):
-    """A truncated mesh file of any format is refused within 2 s."""
-    ending, write = FORMATS[form]
-    path = tmp_path / f"pair{ending}"
-    write(make_pair("mixed"), path)
-    content = path.read_bytes()
-    for n_bytes in range(0, int(0.9 * len(content)), max(1, len(content) // 12)):
-        path.write_bytes(content[:n_bytes])
-        start_time = time.process_time()
-        with pytest.raises(PatchfemError, match="pair"):
-            read_pieces(path)
-        assert time.process_time() - start_time < 2
 
 
 BYTE_CHANGES = st.lists(

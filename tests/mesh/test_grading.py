@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from patchfem.mesh import Layout, TensorGrid, divide_into_columns, divide_into_rows, graded_grid
+from patchfem.mesh import Layout, divide_into_columns, divide_into_rows, graded_grid
 
 
 @given(
@@ -83,21 +83,3 @@ def test_exact_coarsening_reverses_refinement(coating):
     )
     assert np.array_equal(coarsened.x, grid.x) and np.array_equal(coarsened.depth, grid.depth)
     assert coarsened.coating_rows == grid.coating_rows
-
-
-def test_exact_refined_rows_remain_geometric():
-    """Refining rows in a geometric series gives a geometric series with the square root of the ratio."""
-    depth = np.concatenate([[0.0], np.cumsum(1.3 ** np.arange(12))])
-    heights = np.diff(TensorGrid(np.linspace(-1, 1, 5), depth, 0).refine().depth)
-    assert heights[1:] / heights[:-1] == pytest.approx(
-        np.full(heights.size - 1, 1.3**0.5), rel=1e-12
-    )
-
-
-@pytest.mark.parametrize("rows", [9, 10, 33, 34])
-def test_exact_coarsened_rows_grow_uniformly(rows):
-    """Coarsened rows grow uniformly for even and odd numbers of rows."""
-    depth = np.concatenate([[0.0], np.cumsum(1.1 ** np.arange(rows))])
-    half = np.diff(TensorGrid(np.linspace(-1, 1, 5), depth, 0).coarsen().depth)
-    assert half.size == (rows + 1) // 2 and half.sum() == pytest.approx(depth[-1])
-    assert (half[1:] / half[:-1] >= 1.15).all() and (half[1:] / half[:-1] <= 1.22).all()

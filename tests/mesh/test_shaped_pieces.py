@@ -81,14 +81,6 @@ def test_exact_elements_fill_outline_with_uniform_coating(kind, overhang):
         assert removed_area == pytest.approx(ENDS[kind].size ** 2, rel=1e-12)
 
 
-def test_exact_sharp_piece_without_overhang_is_rectangle():
-    """A sharp piece without overhang is the grid of a rectangle."""
-    grid = graded_grid(LENGTH, HEIGHT, 0.31e-3, COATING)
-    body = grid.extend(LENGTH, SHARP_END)
-    assert body.is_rectangle and np.array_equal(body.points, grid.points)
-    assert np.array_equal(body.points[body.interface, 0], grid.x)
-
-
 @pytest.mark.parametrize("kind", ENDS)
 def test_exact_refinement_and_coarsening_preserve_outline(kind):
     """Refinement and coarsening preserve the outline and the interface nodes of the inner grid."""

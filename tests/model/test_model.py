@@ -21,10 +21,8 @@ from scene_texts import (
     SMALL_PATCH,
     STRUCTURE,
     TRIANGLE,
-    find_line,
 )
 
-from patchfem.core import Missing, PatchfemError
 from patchfem.effects import EFFECTS, import_effect
 from patchfem.model import build, gap
 from patchfem.runs import find_drive_and_knee
@@ -99,24 +97,6 @@ def test_always_models_of_all_kinds_are_immutable(text, kind):
             part.another = None
 
 
-@pytest.mark.parametrize("text, kind", KINDS.values(), ids=KINDS)
-def test_always_model_keeps_text_of_its_scene(text, kind):
-    """A model keeps the text of its scene, and its resolved text gives the same model again."""
-    scene = loads(text, "a.toml")
-    source = build(scene).source
-    assert (source.text, source.title, source.effects) == (
-        text,
-        scene.title,
-        tuple(scene.effect_names()),
-    )
-    again = loads(source.resolved)
-    assert (
-        again.kind == kind
-        and again.remarks == []
-        and build(again).source.resolved == source.resolved
-    )
-
-
 def test_exact_resolved_text_contains_derived_values():
     """The resolved text contains the rest speed derived from other keys, but no element size that
     the tolerance determines."""
@@ -130,22 +110,6 @@ def test_exact_resolved_text_contains_derived_values():
         == model.bonds.rest_speed
         == 1e-3 * model.speed_scale
     )
-
-
-def test_always_resolved_text_contains_speed_of_released_rig():
-    """The resolved text of a released rig with several modes contains its rest speed, which is a
-    NumPy number and must be converted to a float."""
-    modes = "".join(
-        f'[[structure.mode]]\nname = "m{k}"\nfrequency = "{f} Hz"\ndamping = 0.01\nslide = {s}\n'
-        for k, (f, s) in enumerate([(120, 1.0), (300, 0.3)])
-    )
-    model = build(
-        loads(
-            POINT + GROWING + '[structure]\nmoving_mass = "1 kg"\n' + modes + "[structure.start]\n"
-            'displacement = ["0.4 mm", "0 mm"]\n[drive]\nkind = "free"\ncycles = 3\n'
-        )
-    )
-    assert loads(model.source.resolved).friction.rest_speed == model.bonds.rest_speed
 
 
 # ---- runs of a model
@@ -215,64 +179,7 @@ def test_exact_replaced_part_equals_changed_scene_key(text, sets, change):
     )
 
 
-def test_exact_replaced_friction_equals_changed_scene_keys():
-    """A model with a replaced friction law gives the results of the scene with the changed keys.
-    The law is replaced in the model and in the first interface of the rig, which both refer to
-    it."""
-    text = SMALL_PATCH + SHEAR + COULOMB + SHORT
-    sets = ["accuracy.steps_per_cycle=100"]
-    original = build(loads(text, sets=sets))
-    smaller_friction = original.friction.model_copy(update={"static": 0.2, "kinetic": 0.2})
-    friction = original.rig.friction
-    interfaces = (replace(friction.interfaces[0], numbers=smaller_friction),)
-    changed_rig = replace(original.rig, friction=replace(friction, interfaces=interfaces))
-    result = run(replace(original, friction=smaller_friction, rig=changed_rig))
-    assert comparable_result(result) == comparable_result(
-        run(loads(text, sets=[*sets, "friction.static=0.2", "friction.kinetic=0.2"]))
-    )
-
-
 # ---- error messages
-
-TINY = SMALL_PATCH.replace('"0.5 mm"', '"0.2 um"')
-STILL = STRUCTURE.replace("slide = 1.0", "slide = 1.0\nbase = 0.0")
-
-
-@pytest.mark.parametrize(
-    "text, key, line, expected",
-    [
-        (STILL, "drive.kind", 'kind = "base"', "the drive excites no mode"),
-        (TINY, "", "", "GB of memory are needed"),
-    ],
-    ids=["a key of a run", "a size"],
-)
-def test_refuses_scene_with_file_and_line_stated_once(text, key, line, expected):
-    """Scene, model and plan raise the same message, which begins with the file and the line of the
-    key."""
-    where = f"a.toml:{find_line(text, line)}: {key}: " if key else "a.toml: "
-    scene = loads(text, "a.toml")
-    messages = set()
-    for call in (lambda: run(scene), lambda: run(build(scene)), lambda: run(plan(scene))):
-        with pytest.raises(PatchfemError) as caught:
-            call()
-        messages.add(str(caught.value))
-        assert caught.value.key is None and isinstance(caught.value, Missing) == (text == TINY)
-    [message] = messages
-    assert message.startswith(where) and message.count("a.toml") == 1 and expected in message
-
-
-def test_refuses_invalid_model_with_file_and_line_stated_once():
-    """An error that appears when the model is built names the file and the line of its table
-    once."""
-    text = (
-        POINT + GROWING + '[friction.temperature]\nsurface = "1 K"\nreference = "293.15 K"\n'
-        'rest_activation = "2500 K"\nslip_activation = "1500 K"\n' + TRIANGLE
-    )
-    for call in (build, plan, run):
-        with pytest.raises(PatchfemError, match="rest_growth would be about 1e-") as caught:
-            call(loads(text, "a.toml"))
-        where = f"a.toml:{find_line(text, '[friction.temperature]')}: friction.temperature: "
-        assert str(caught.value).startswith(where) and str(caught.value).count("a.toml") == 1
 
 
 # ---- effects and derived properties

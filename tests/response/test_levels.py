@@ -154,19 +154,3 @@ def test_exact_gauge_onset_has_given_amplitude():
         never["onset_level"].reason
         == "no level of the increasing sequence has an amplitude of more than 1 m at the output"
     )
-
-
-def test_exact_levels_by_the_march_are_those_of_the_event_engine():
-    """Coulomb: each level's amplitude within its error, onset by forks of the march."""
-    levels = '["3.5 g", "4.4 g", "4.8 g", "4.4 g"]'
-    exact, _ = run_levels('law = "coulomb"', levels, cycles=12)
-    march, found = run_levels(
-        'law = "coulomb"', levels, 'method = "march"\nsteps_per_cycle = 800', 12
-    )
-    for a, b in zip(exact.extra["levels"], march.extra["levels"]):
-        assert a.stuck == b.stuck and a.drive == b.drive
-        assert b.values[NAME] == pytest.approx(
-            a.values[NAME], abs=2 * b.errors[NAME] + 1e-3 * a.values[NAME] + 1e-15
-        )
-    assert abs(found["onset_level"].value - ONSET) <= found["onset_level"].error + 1e-3 * ONSET
-    assert found["level_hysteresis"].value <= found["level_hysteresis"].error + 1e-3 * 1e-5

@@ -84,20 +84,6 @@ def test_exact_jenkins_loop_agrees_with_closed_form(amplitude, length):
     )
 
 
-def test_order_half_range_between_samples_is_four():
-    """The error of the half range falls with the fourth power of the step."""
-    errors = []
-    for steps in (20, 40, 80):
-        phase = 2 * pi * (np.arange(3 * steps + 1) + 0.35) / steps
-        turns = loops.find_reversals(
-            phase / OMEGA, np.sin(phase), OMEGA * np.cos(phase), phase, PERIOD
-        )
-        assert len(turns) == 3
-        errors.append(abs(loops.mean_half_range(turns) - 1))
-    assert np.log2(np.array(errors[:-1]) / errors[1:]) == pytest.approx(4, abs=0.1)
-    assert errors[-1] < 1e-7
-
-
 @pytest.mark.parametrize("rest", [0.0, 0.9])
 @pytest.mark.parametrize("fall", [0.4])
 def test_exact_secant_stiffness_at_force_jump(rest, fall):
@@ -114,37 +100,6 @@ def test_exact_secant_stiffness_at_force_jump(rest, fall):
     assert loops.mean_half_range(turns) == pytest.approx(
         1.0, abs=2e-4
     )  # samples alone, without rates
-
-
-@pytest.mark.parametrize("early", [0.05, 0.8])
-@pytest.mark.parametrize("length", [1e-4, 2.0])
-def test_exact_secant_stiffness_of_unresolved_reversal(length, early):
-    """The secant stiffness of a slider agrees with its limit within 1e-6, although no step resolves its elastic range."""
-    phase = 2 * pi * (np.arange(3 * 100 + 1) + early) / 100
-    slide = np.sin(phase)
-    force = np.zeros(phase.size)
-    for k in range(1, phase.size):
-        force[k] = np.clip(force[k - 1] + (slide[k] - slide[k - 1]) / length, -1, 1)
-    turns = loops.find_reversals(
-        phase / OMEGA, slide, OMEGA * np.cos(phase), force, PERIOD, "slide"
-    )
-    assert loops.secant_stiffness(turns) == pytest.approx(1 / max(1.0, length), rel=1e-6)
-
-
-def test_always_no_secant_without_reversals():
-    """A slide without reversals has no secant stiffness."""
-    time = np.linspace(0, PERIOD, 9)
-    zero = np.zeros(9)
-    force = np.arange(9.0)
-    assert (
-        loops.secant_stiffness(loops.find_reversals(time, zero, zero, force, PERIOD, "jumps"))
-        is None
-    )
-    # both ends of the window are its turns
-    up = loops.find_reversals(time, time, 1 + zero, force, PERIOD, "jumps")
-    assert up[0][1].force is None and loops.secant_stiffness(up) is None
-    assert loops.find_reversals(time[:5], zero[:5], zero[:5], force[:5], PERIOD) == []
-    assert loops.mean_half_range([]) == 0.0
 
 
 # drift
@@ -188,28 +143,3 @@ def test_exact_drift_and_damping_of_event_engine(more, drive):
     truth = done.measures["loop_area"].value / (2 * pi * 0.884 * OMEGA**2 * wide**2)
     # (pi/20000)^2/2 at the top
     assert damping.value == pytest.approx(truth, rel=damping.error / truth + 2e-8)
-
-
-@pytest.mark.parametrize("border, secant", [(0.05, None), (0.002, 0.0)])
-def test_exact_secant_of_rate_dependent_force_is_zero(border, secant):
-    """The secant stiffness of a force that depends on the rate is zero, as is the force at each reversal.
-
-    There is no secant if the largest slide lies far from a reversal. `border` is the time from the last reversal before
-    the first cycle to the beginning of this cycle, in periods.
-    """
-    decay = 0.02 * OMEGA
-    turn = np.arctan2(-decay, OMEGA) / OMEGA  # exp(-decay t) cos(OMEGA t) is largest there
-    time = turn + (border + np.linspace(-0.5, 4.0, 1801)) * PERIOD
-    time = np.sort(
-        np.append(
-            time[time >= turn + border * PERIOD], turn + np.arange(0.5, border + 4, 0.5) * PERIOD
-        )
-    )
-    wave = np.exp(-decay * time)
-    slide = 1e-5 * wave * np.cos(OMEGA * time)
-    rate = -1e-5 * wave * (decay * np.cos(OMEGA * time) + OMEGA * np.sin(OMEGA * time))
-    turns = loops.find_reversals(time, slide, rate, np.tanh(rate / 1e-4), PERIOD)
-    # the range is that of the cycle all the same
-    assert turns[0][1].slide == pytest.approx(slide[0], rel=1e-12)
-    found = loops.secant_stiffness(turns)
-    assert found is None if secant is None else found == pytest.approx(secant, abs=1e-6)

@@ -8,7 +8,6 @@ from scipy.signal import csd, welch
 from vibration_forms import shaken_rms
 
 from patchfem.response import stationary
-from patchfem.structure.noise import draw_random_record
 
 
 def test_exact_spectra_agree_with_scipy():
@@ -71,26 +70,3 @@ def test_always_record_intervals_cover_closed_forms(count):
     assert np.all(np.abs(rows[..., 0].mean(axis=0) - 1) <= 4 * far)
     # nor are the intervals idle
     assert np.all(rows[..., 1].mean(axis=0) <= 4 * rows[..., 0].std(axis=0))
-
-
-def test_exact_random_record_has_given_spectrum():
-    """The mean power of 40 random records agrees with the given spectrum between its rows."""
-    powers, (low, high), span = [], (20.0, 100.0), 5.0
-    for seed in range(40):
-        drive = draw_random_record((low, 50.0, high), (1.0, 4.0, 1.0), span, seed, 0.01)
-        f = np.arange(drive.time.size // 2 + 1) / span
-        lines = (
-            np.fft.rfft(drive.value[:-1]) / (drive.time.size - 1) * np.sinc(f * drive.time[1]) ** 2
-        )
-        assert np.all(np.abs(lines[(f < low) | (f > high)]) < 1e-12)
-        powers.append(2 * np.abs(lines) ** 2 * span)
-    inside = (f >= low) & (f <= high)
-    level = np.exp(np.interp(np.log(f[inside]), np.log([low, 50.0, high]), np.log([1.0, 4.0, 1.0])))
-    share = np.mean(powers, axis=0)[inside] / level
-    assert share.mean() == pytest.approx(1, abs=4 / np.sqrt(40 * inside.sum()))
-    assert drive.values(drive.time[3]) == drive.value[3] and drive.duration == pytest.approx(
-        span, rel=1e-12
-    )
-    assert not np.array_equal(
-        drive.value, draw_random_record((low, high), (1.0, 1.0), span, 0, 0.01).value
-    )

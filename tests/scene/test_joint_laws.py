@@ -1,9 +1,5 @@
 """`patchfem new joint --ask`: the questions select a friction law, whose scene runs and lists its limits."""
 
-import os
-import pty
-import subprocess
-import sys
 import tomllib
 
 import numpy as np
@@ -12,8 +8,6 @@ from command_line import run_cli
 
 import patchfem as pf
 from patchfem.scene import (
-    KNOWLEDGE,
-    WISHES,
     choose_law,
     compose_scene,
     load,
@@ -74,55 +68,6 @@ def test_always_scene_of_law_runs(name):
     } == {*row.keys}
 
 
-@pytest.mark.parametrize("want", WISHES)
-@pytest.mark.parametrize("know", KNOWLEDGE)
-def test_always_selected_law_serves_the_aim(know, want):
-    """For each knowledge and each aim, the selected law serves the aim, and the scene lists limits and assumptions."""
-    choice = choose_law(know, want)
-    text = compose_scene(choice)
-    missing = {*choice.row.known} - {know}
-    sentences = text.replace("\n#   ", " ")
-    assert want in choice.row.wanted
-    assert f"# what it cannot do: {choice.row.cannot}" in sentences
-    assert f"# what it gives: {choice.row.gives}" in sentences
-    assert ("assumed in the scene" in text) == bool(missing)
-    used = {*choice.row.known, *choice.row.keys, "coefficient", "nothing"}
-    used |= {"stiffness"} & {"stiffness" for key in choice.row.keys if key == "bond_length"}
-    assert ("not used" in text) == (know not in used)
-    assert loads(text).kind in ("bench", "rig")
-
-
-@pytest.mark.parametrize(
-    ("know", "want", "law", "unanswered"),
-    [
-        ("rest", "ageing,squeal", "nonlocal", "squeal"),
-        ("loop,stiffness", "loss,ageing", "bouc-wen", "ageing"),
-    ],
-)
-def test_always_unserved_aim_is_reported(know, want, law, unanswered):
-    """An aim that the selected law does not serve is named with the command for another law."""
-    answer = run_cli("new", "joint", "--know", know, "--want", want)
-    assert f"# law: {law};" in answer.out and "not used" not in answer.out
-    advice = f"not answered by this law: {unanswered}; ask again with --want {unanswered}"
-    assert advice in answer.out
-
-
-def test_scenes_of_one_joint_have_one_stiffness():
-    """The scene to fit a loop and those of the same bolt for other aims have the same stiffness before slip."""
-    stiffnesses = {}
-    for name, row in ROWS.items():
-        scene = loads(compose_scene(choose_law("loop", "loss")._replace(row=row)))
-        law = scene.friction
-        if (
-            scene.normal is not None
-            and law is not None
-            and {"stiffness", "bond_length"} & {*row.keys}
-        ):
-            stiffnesses[name] = law.stiffness or law.static * scene.normal.load / law.bond_length
-    assert {"bouc-wen-bouc-wen", "nonlocal-ageing"} < {*stiffnesses}
-    assert [*stiffnesses.values()] == pytest.approx([3.9e9] * len(stiffnesses), rel=1e-3)
-
-
 @pytest.mark.parametrize("law", SMALL_LOOPS)
 def test_exact_small_loop_closure_of_laws(law, tmp_path):
     """The force ratio after a small reversal loop inside a larger one agrees with the closed form of each law within 1 %."""
@@ -163,31 +108,3 @@ def test_always_new_joint_writes_scene_and_summary(tmp_path):
     assert "law: bouc-wen; keys: static, stiffness, exponent, shape" in answer.out
     assert "what it cannot do: " in answer.out and f"next: patchfem run {path}" in answer.out
     assert "already exists" in run_cli(*words, "-o", path).err
-
-
-def run_dialogue(*answers: bytes) -> tuple[int, str]:
-    """Return exit code and screen of `patchfem new joint --ask` on a terminal with typed answers."""
-    controller, terminal = pty.openpty()
-    os.write(controller, b"".join(answers))
-    process = subprocess.run(
-        [sys.executable, "-m", "patchfem", "new", "joint", "--ask"],
-        stdin=terminal,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.STDOUT,
-        timeout=60,
-    )
-    os.close(controller)
-    os.close(terminal)
-    return process.returncode, process.stdout.decode()
-
-
-def test_always_dialogue_selects_law():
-    """On a terminal, the dialogue asks both questions and prints the scene; an early end and invalid bytes are refused."""
-    code, screen = run_dialogue(b"loop, Roughness\n", b"loss\n")
-    scene = run_cli("new", "joint", "--know", "loop,roughness", "--want", "loss").out
-    assert code == 0 and scene in screen
-    assert all(f"  {word} " in screen for word in (*KNOWLEDGE, *WISHES))
-    code, screen = run_dialogue(b"\x04")  # end of file
-    assert code == 2 and "the input ended before the answer; give --know" in screen
-    code, screen = run_dialogue(b"\xff\n", b"loss\n")
-    assert code == 2 and "unknown answer" in screen

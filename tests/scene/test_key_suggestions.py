@@ -64,25 +64,6 @@ def test_exact_key_of_another_table_names_the_table(wrong, says):
         loads(read_template("bench"), sets=[wrong])
 
 
-def test_exact_mistake_in_first_value_of_sweep_has_line_of_sweep():
-    """A key that only [sweep] gives is reported at the line of [sweep], and a missing key says what it is."""
-    text = read_template("bench").replace("[friction]", "[frction]")
-    text += '[sweep]\n"friction.static" = "0.1..0.3:3"\n'
-    line = len(text.splitlines())
-    with pytest.raises(SceneError) as error:
-        loads(text, "a.toml")
-    assert any(
-        message.startswith(f"a.toml:{line}: friction.law: missing")
-        for message in error.value.mistakes
-    )
-
-
-def test_always_ambiguous_key_gets_no_suggestion():
-    """An unknown key that fits several lengths gets a list of the known keys."""
-    with pytest.raises(SceneError, match="unknown key; known here: length, width, height"):
-        loads(read_template("patch"), sets=["contact.thicknes=1 mm"])
-
-
 @pytest.mark.parametrize("wrong", ["qqq = true", 'qqq = "blue"', "qqq = {a = 1}"])
 def test_always_unrecognised_key_lists_known_keys(wrong):
     """A key that resembles no other gets a list of the known keys."""

@@ -185,32 +185,6 @@ def test_exact_remarks_on_keys_without_effect(text, sets, remark):
     assert loads(scene.resolved()).tables() == scene.tables()
 
 
-@pytest.mark.parametrize(
-    "one, key, says",
-    [
-        ("contact.load=26#", "contact.load", "'#' is ambiguous"),
-        ("friction.static=0.3#", "friction.static", "a plain number is needed, not '0.3#'"),
-        (
-            "contact.shear={} # on",
-            "contact.shear",
-            "a table [contact.shear] is needed, not '{} # on'",
-        ),
-    ],
-)
-def test_refuses_hash_in_setting(one, key, says):
-    """A hash in --set is part of the value and does not begin a comment."""
-    message = get_only_mistake(RIG, one)
-    assert message.startswith(f"--set: {key}: ") and says in message
-
-
-def test_exact_setting_accepts_leading_or_trailing_point():
-    """Numbers in --set may begin or end with the decimal point."""
-    for text in (".3", "+.3e0", "3.e-1"):
-        assert loads(RIG, sets=[f"friction.static={text}"]).friction.static == 0.3
-    assert loads(RIG, sets=["title=.3"]).title == ".3"
-    assert "without a unit" in get_only_mistake(RIG, "contact.load=.3")
-
-
 STUDIES = sorted((Path(__file__).parents[2] / "studies").rglob("*.toml"))
 
 

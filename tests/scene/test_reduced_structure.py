@@ -108,33 +108,6 @@ def test_always_reduction_errors_cover_full_matrices(matrix_folder, method):
     assert any("keeps 2 boundary coordinates and 4 " in note for note in reduced.extra["notes"])
 
 
-def test_always_reduction_error_is_not_small_by_accident(matrix_folder):
-    """The run with fewer modes shows the error where more modes hardly change a measure.
-
-    With 4 modes, the slip of this chain lies between its values with 2 and with all 38 modes, and equals
-    that with 12 modes by accident.
-    """
-    r = np.random.default_rng(3)
-    stiffness, mass = (base * 10 ** r.uniform(-0.3, 0.3, COUNT) for base in (1e7, 0.02))
-    K = np.diag(stiffness + np.append(stiffness[1:], 0))
-    K -= np.diag(stiffness[1:], 1) + np.diag(stiffness[1:], -1)
-    np.savez(matrix_folder / "both.npz", K=K, M=np.diag(mass))
-    text = SCENE.replace("k.mtx", "both.npz").replace('damping = "both.npz"', "damping = 0.01")
-    text = text.replace("boundary = [40, 25]", "boundary = [14, 25]").replace("50 N", "3 N")
-    text = text.replace("static = 0.4", "static = 0.3").replace("cycles = 10", "cycles = 40")
-    text = (
-        text.replace("100 Hz", "108.968 Hz")
-        .replace('kind = "base"', 'kind = "force"')
-        .replace('acceleration = "5 g"', 'force = "10 N"')
-    )
-    few, whole = (
-        run_scene(matrix_folder, text, **{"structure.reduced.modes": count}).measures
-        for count in ("4", "38")
-    )
-    for name in ("relative_displacement_amplitude", "slip_amplitude", "loop_area"):
-        assert abs(few[name].value - whole[name].value) <= few[name].error + whole[name].error, name
-
-
 def test_exact_reduction_with_all_modes_equals_full_matrices(matrix_folder):
     """With all modes kept, the measures agree with those of the full matrices within 1e-6."""
     reduced = run_scene(matrix_folder, SCENE, **{"structure.reduced.modes": 100})
@@ -152,16 +125,6 @@ def test_exact_reduction_with_all_modes_equals_full_matrices(matrix_folder):
                 err_msg=name,
             )
     assert "reduced" not in reduced.measures["relative_displacement_amplitude"].causes.parts
-
-
-def test_exact_proposed_modes_are_limited_by_structure(matrix_folder):
-    """A tolerance of 1e-9 proposes 38 modes, since two of the 40 rows are boundary coordinates."""
-    warning = next(
-        one
-        for one in run_scene(matrix_folder, SCENE, **{"accuracy.tolerance": 1e-9}).warnings
-        if "reduced.modes" in one
-    )
-    assert int(warning.rpartition("structure.reduced.modes = ")[2].split(";")[0]) == 38
 
 
 def test_exact_units_and_node_names_give_same_structure(matrix_folder):
@@ -254,43 +217,6 @@ def test_refuses_invalid_reduction_keys_at_their_lines(matrix_folder, key, old, 
     assert line in answer.err and REFUSED[key, old, new] in answer.err, answer.err
 
 
-def test_refuses_missing_matrix_with_single_message(matrix_folder):
-    """A missing matrix is reported once, and another missing file hides no fault of the matrices."""
-    missing_matrix = SCENE.replace("k.mtx", "absent.mtx")
-    answer = run_cli("check", write_scene(matrix_folder, missing_matrix))
-    assert "structure.reduced.stiffness: there is no file" in answer.err
-    assert answer.err.count("scene.toml:") == 1
-    wrong_size = SCENE.replace('mass = "both.npz"', 'mass = "small.npz"')
-    text = wrong_size + '[measured]\nfile = "absent.csv"\n'
-    answer = run_cli("check", write_scene(matrix_folder, text))
-    assert "the matrices differ in size: 40 x 40 and 9 x 9" in answer.err
-    assert answer.err.count("scene.toml:") == 2
-
-
-@pytest.mark.parametrize(
-    "old, new, says",
-    [
-        ("[1, 0]", "[3, 0]", "there is no boundary coordinate 3: structure.reduced.boundary has 2"),
-        (
-            'kind = "base"',
-            'kind = "force"\nmass = 3\nforce = "1 N"',
-            "there is no boundary coordinate 3",
-        ),
-        (
-            "[[structure.interface]]\nbetween = [1, 0]\n",
-            '[normal]\nload = "1 N"\n[friction]\n',
-            "structure.reduced.slide: missing",
-        ),
-    ],
-)
-def test_refuses_unknown_nodes(matrix_folder, old, new, says):
-    """Nodes that the matrices do not have are refused."""
-    text = SCENE.replace(old, new)
-    text = text.replace('load = "50 N"\n', "") if "normal" in new else text
-    answer = run_cli("check", write_scene(matrix_folder, text))
-    assert answer.code == 2 and says in answer.err, answer.err
-
-
 PATCH = (
     '[contact]\nlength = "10 mm"\nwidth = "10 mm"\nheight = "5 mm"\nload = "50 N"\n'
     'substrate = "Ti-8Al-1Mo-1V"\n[contact.shear]\n'
@@ -314,76 +240,3 @@ def test_refuses_patch_beside_interfaces(matrix_folder):
             "check", write_scene(matrix_folder, text.replace("[drive]", own + "[drive]"))
         )
         assert answer.code == 0, answer.err
-
-
-def test_exact_normal_load_equals_interface_on_boundary(matrix_folder):
-    """A point contact by [normal] with slide = [1, 0] equals the interface between these nodes within 1e-9.
-
-    A free decay displaces only the mass drive.mass.
-    """
-    head, tail = SCENE.split("[[structure.interface]]\n")
-    law, drive = tail.split("[drive]\n")
-    law = law.replace("between = [1, 0]\n", "").replace('load = "50 N"\n', "")
-    by_interface = run_scene(matrix_folder, SCENE)
-    by_point = run_scene(
-        matrix_folder,
-        head.replace("modes = 4", "modes = 4\nslide = [1, 0]") + '[normal]\nload = "50 N"\n'
-        "[friction]\n" + law + "[drive]\n" + drive,
-    )
-    np.testing.assert_allclose(
-        by_point.measures["loop_area"].value, by_interface.measures["loop_area"].value, rtol=1e-9
-    )
-    text = (
-        SCENE.split("[drive]")[0]
-        + '[drive]\nkind = "free"\nmass = 2\ndisplacement = "20 um"\ncycles = 5\n'
-    )
-    model = pf.build(pf.load(write_scene(matrix_folder, text)))
-    moved = model.rig.modes.shapes @ model.rig.start.z
-    np.testing.assert_allclose(moved, [0, 20e-6, 0, 0, 0, 0], atol=1e-15)
-
-
-@pytest.mark.slow
-def test_exact_sweep_over_modes_reduces_each_case(matrix_folder):
-    """A sweep over the number of modes computes a reduction for each case, equal to single runs within 1e-9."""
-    table = pf.sweep(write_scene(matrix_folder, SCENE), {"structure.reduced.modes": [2, 30]})
-    found = table["relative_displacement_amplitude"].values
-    wanted = [
-        run_scene(matrix_folder, SCENE, **{"structure.reduced.modes": k})
-        .measures["relative_displacement_amplitude"]
-        .value
-        for k in (2, 30)
-    ]
-    np.testing.assert_allclose(found, wanted, rtol=1e-9)
-    assert found[0] != found[1]
-
-
-@pytest.mark.parametrize(
-    "method, rubs",
-    [
-        ("balance", False),
-        ("quasi-static", False),
-        ("balance", True),
-        ("quasi-static", True),
-    ],
-)
-def test_always_backbone_errors_cover_full_matrices(matrix_folder, method, rubs):
-    """The errors of a backbone of a reduced chain cover the values of the full matrices.
-
-    One frequency of the reduced chain is off by 13 %.
-    """
-    reduced, full = (
-        text if rubs else text.split("[[")[0] + "[drive]" + text.split("[drive]")[1]
-        for text in (SCENE.replace("modes = 4", "modes = 1"), WHOLE)
-    )
-    reduced_curve, full_curve = (
-        pf.backbone(
-            write_scene(matrix_folder, text),
-            mode="31"[rubs],
-            amplitudes=[1e-6, 1e-5],
-            method=method,
-        )
-        for text in (reduced, full)
-    )
-    for name in (f"{method.replace('-', '_')}_{what}" for what in ("frequency", "damping")):
-        gap = np.abs(reduced_curve[name].values - full_curve[name].values)
-        assert (gap > 0).all() and (gap <= reduced_curve[f"{name}_error"].values).all(), name

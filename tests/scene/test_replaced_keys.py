@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from scene_texts import COULOMB, DRIVE, MODE, NONLOCAL, PATCH, POINT, SECOND
+from scene_texts import COULOMB, DRIVE, MODE, PATCH, POINT, SECOND
 
 from patchfem.scene import BaseScene, loads, require_files
 from patchfem.scene.scene import SceneError
@@ -57,42 +57,6 @@ def test_exact_changed_scene_equals_scene_read_with_settings(text, sets):
     assert (
         describe_scene(lambda: base.override(sets)) == expected
     )  # reuses the tables of the first call
-
-
-def test_exact_changed_scene_keeps_earlier_settings():
-    """A scene read with settings can be changed again, and mistakes at keys set before are reported equally."""
-    first = loads(RIG, "scene.toml", ["normal.load=7 N", "structure.mode.axial.damping=0.1"])
-    base = BaseScene(first)
-    expected = describe_scene(
-        lambda: loads(RIG, "scene.toml", (*first.sets, "structure.mode.second.damping=0.2"))
-    )
-    assert describe_scene(lambda: base.override(["structure.mode.second.damping=0.2"])) == expected
-    # a mistake at a key set before
-    assert describe_scene(lambda: base.override(["normal.load=-2 N"])) == describe_scene(
-        lambda: loads(RIG, "scene.toml", (*first.sets, "normal.load=-2 N"))
-    )
-
-
-def test_exact_mistake_of_reused_table_names_setting():
-    """A mistake in a table that was read before is reported as one of the setting."""
-    text = RIG.replace(COULOMB, NONLOCAL)
-    base = BaseScene(loads(text, "scene.toml"))
-    base.override(["friction.spread=1 um", "normal.width=1 mm"])
-    expected = describe_scene(lambda: loads(text, "scene.toml", ["friction.spread=1 um"]))
-    assert (
-        expected[0] == "refused"
-        and describe_scene(lambda: base.override(["friction.spread=1 um"])) == expected
-    )
-
-
-def test_always_change_does_not_affect_original_scene():
-    """A change, also an invalid one, leaves the original scene and later changes unaffected."""
-    base = BaseScene(loads(RIG, "scene.toml"))
-    before = describe_scene(lambda: base.override([]))
-    with pytest.raises(SceneError):
-        base.override(["structure.mode.axial.damping=-1", "friction.lw=coulomb"])
-    assert base.override(["structure.mode.axial.damping=0.5"]).structure.mode[0].damping == 0.5
-    assert describe_scene(lambda: base.override([])) == before
 
 
 def test_exact_reused_tables_are_independent_of_order():

@@ -5,13 +5,10 @@ from __future__ import annotations
 import pickle
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 from scene_texts import BENCH, FULL, LINEAR, PATCH, RIG
 
-from patchfem.scene import Scene, load, loads
+from patchfem.scene import load, loads
 from patchfem.scene.lines import find_key_lines
-from patchfem.scene.scene import SceneError
 
 
 def test_exact_rig_scene_has_si_values():
@@ -110,54 +107,3 @@ v = 1979-05-27 07:32:00
                 "s.m.1.sub.w": 16, "s.m.1.sub.v": 17}  # fmt: skip
     assert {key: lines.get(key) for key in expected} == expected
     assert "no" not in lines and not any("x = 1" in key for key in lines)
-
-
-PIECES = [
-    "contact", "friction", "structure", "mode", "drive", "slide", "normal", "law", "load", "=", "[", "]", "[[", "]]",
-    "{", "}", '"', "'", '"""', "\n", ",", ".", "#", "1", "-1", "1e999", "nan", "true", '"5 mm"', '"26 lbf"', '"x"',
-    "[]", "{}", "1979-05-27", "\\", "\x7f", "é",
-]  # fmt: skip
-
-
-ODD_SETS = [
-    *FULL,
-    "contact=5",
-    "structure.mode=1",
-    "a.b.c=[",
-    "drive={}",
-    "=",
-    "friction.order=1e200",
-]
-
-
-@st.composite
-def mutated_scenes(draw):
-    """Draw a scene text with up to four random edits."""
-    text = draw(st.sampled_from([RIG, BENCH, PATCH, LINEAR]))
-    for _ in range(draw(st.integers(1, 4))):
-        lines = text.splitlines(keepends=True) or ["\n"]
-        at = draw(st.integers(0, len(lines) - 1))
-        how = draw(st.sampled_from(["drop", "double", "value", "key", "splice"]))
-        key, _, _ = lines[at].partition("=")
-        piece = draw(st.sampled_from(PIECES))
-        if how == "splice":
-            place = draw(st.integers(0, len(text)))
-            text = text[:place] + piece + text[place + draw(st.integers(0, 3)) :]
-            continue
-        lines[at] = {"drop": "", "double": lines[at] * 2, "value": f"{key.strip()} = {piece}\n",
-                     "key": f"{piece} = 1\n"}[how]  # fmt: skip
-        text = "".join(lines)
-    return text
-
-
-@given(mutated_scenes(), st.lists(st.sampled_from(ODD_SETS), max_size=2))
-def test_always_random_text_loads_or_raises_scene_error(text, sets):
-    """A randomly edited scene loads, or raises a SceneError with one-line messages."""
-    try:
-        scene = loads(text, "a.toml", sets)
-    except SceneError as error:
-        assert error.mistakes
-        assert all("\n" not in m and m.startswith(("a.toml:", "--set: ")) for m in error.mistakes)
-    else:
-        assert isinstance(scene, Scene)
-        assert loads(scene.resolved()).tables() == scene.tables()

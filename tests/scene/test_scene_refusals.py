@@ -5,17 +5,11 @@ from __future__ import annotations
 import re
 
 import pytest
-from proposals import draw_mistaken_scene, find_failed_proposals
 from scene_texts import (
     BENCH,
-    COULOMB,
-    FORCED,
     LINEAR,
-    MODE,
-    PAIR,
     PATCH,
     PIECE,
-    POINT,
     RIG,
     STRUCTURE,
     find_line,
@@ -156,15 +150,6 @@ def test_refuses_missing_key_of_selected_kind(sets, key, says):
     assert f": {key}: missing" in message and says in message
 
 
-def test_refuses_misspelt_alternative_key():
-    """A misspelt `stiffness` is the only mistake: the alternative `bond_length` is not reported as missing."""
-    law = '"elastic-plastic"\nstifness = "2e6 N/m"'
-    text = BENCH.replace('"coulomb"', law)
-    assert get_only_mistake(text).endswith(
-        "friction.stifness: unknown key; did you mean 'stiffness'?"
-    )
-
-
 @pytest.mark.parametrize("law", ["tanh", "elastic-plastic", "convolution"])
 def test_refuses_kinetic_for_laws_with_one_coefficient(law):
     """A kinetic coefficient is refused for laws that have only one coefficient of friction."""
@@ -228,12 +213,6 @@ def test_refuses_free_roll_without_load_or_strips():
     assert "|offset| < 0.0047625 m" in get_only_mistake(text, f"{at}=-4.7625 mm")
     approach = text.replace('load = "26 lbf"', "") + '[contact.approach]\ndistance = "1 um"\n'
     assert "use contact.load in place of [contact.approach]" in get_only_mistake(approach)
-
-
-def test_refuses_approach_together_with_load():
-    """[contact.approach] together with contact.load is refused."""
-    message = get_only_mistake(PATCH + '[contact.approach]\ndistance = "0.2 um"\n')
-    assert message.startswith("a.toml:12: contact.approach: ") and "exclude each other" in message
 
 
 COMBINATIONS = [
@@ -407,11 +386,6 @@ def test_refuses_unsupported_features_by_name(text, sets, key):
     assert any(f"{key}: " in message for message in found), found
 
 
-def test_refuses_other_mistakes_before_unsupported_features():
-    """Unsupported features are reported only if the scene is valid otherwise."""
-    assert "not supported yet" not in get_only_mistake(RIG, "friction.order=2", "drive.cycles=0")
-
-
 def test_always_masses_and_interfaces_are_read():
     """Masses, springs and interfaces of a structure are read, and a kinetic coefficient above the static one is refused."""
     text = """
@@ -487,29 +461,3 @@ def test_refuses_invalid_outlines(tables, sets, key, words):
     assert any(f"{key}: " in line and words in line for line in list_mistakes(text, *sets)), (
         list_mistakes(text, *sets)
     )
-
-
-@pytest.mark.share(*range(0, 60, 8))
-@pytest.mark.parametrize("first", range(0, 1000, 10))
-def test_always_proposed_value_resolves_mistake(first):
-    """Every value that a message proposes resolves the mistake or leads to another one."""
-    assert not [
-        one
-        for seed in range(first, first + 10)
-        for one in find_failed_proposals(*draw_mistaken_scene(seed))
-    ]
-
-
-def test_exact_same_law_is_not_proposed_again():
-    """The message on an unsupported reading of a law proposes another reading or another law."""
-    law = 'law = "nonlocal"\nreading = "report"\nstatic = 0.2'
-    text = PAIR.replace('law = "elastic-plastic"\nstatic = 0.2', law) + FORCED
-    assert "use reading = \"stretch\" with order = 1, or law 'coulomb'" in get_only_mistake(text)
-    assert loads(text.replace('"report"', '"stretch"\norder = 1')).kind == "rig"
-
-
-def test_exact_wear_of_free_decay_names_periodic_drives():
-    """Wear with a free decay is refused with the names of the periodic drives."""
-    text = POINT + COULOMB + MODE + '[drive]\nkind = "free"\ndisplacement = "1 mm"\ncycles = 5\n'
-    text += '[wear]\ncoefficient = "1e-14 m^2/N"\ncycles = 100\n'
-    assert "use kind 'base' or 'force'" in get_only_mistake(text)

@@ -4,16 +4,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scene_texts import BLOCK, COULOMB, LINEAR, MODE, STRUCTURE, find_line, get_only_mistake
+from scene_texts import COULOMB, LINEAR, MODE, STRUCTURE, get_only_mistake
 
 import patchfem as pf
-from patchfem.core import PatchfemError
-from patchfem.model import build, compute_named_motions, locate_errors
+from patchfem.model import build, compute_named_motions
 from patchfem.model.structure import build_modes, compute_initial_state
 from patchfem.runs.plan import plan
 from patchfem.runs.run import run
-from patchfem.scene import BaseScene, load, loads
-from patchfem.scene.scene import SceneError
+from patchfem.scene import load, loads
 
 MASSES = """\
 [structure]
@@ -177,14 +175,6 @@ def test_refuses_unknown_masses(sets, key, says):
     assert message.startswith(f"--set: {key}: ") and says in message
 
 
-def test_refuses_unknown_mass_at_its_line():
-    """An unknown mass in a file is refused at its line."""
-    text = (RUB + MASSES).replace("between = [2, 0]", "between = [2, 5]")
-    assert get_only_mistake(text).startswith(
-        f"a.toml:{find_line(text, 'between = [2, 5]')}: structure.interface[1].between: "
-    )
-
-
 @pytest.mark.parametrize("text, key, says", [
     (MASSES + '[normal]\nload = "1 N"\n' + COULOMB, "structure.interface",
      "write [[structure.interface]]"),
@@ -244,87 +234,6 @@ def test_exact_matrices_equal_masses(tmp_path):
     assert scene.kind == "rig"
 
 
-def test_exact_modes_of_file_equal_modes_of_scene(tmp_path):
-    """Modes from a .mat file give the same measures as modes in the scene, within 1e-9."""
-    from scipy.io import savemat
-
-    savemat(
-        tmp_path / "rig.mat",
-        {"frequency": [143.0], "damping": [0.003], "slide": [1.0], "base": [1.0]},
-    )
-    text = STRUCTURE[STRUCTURE.index("[drive]") :]
-    scene = write_scene(
-        tmp_path, '[structure]\nfile = "rig.mat"\nmoving_mass = "0.884 kg"\n' + POINT + text
-    )
-    ours = run(plan(scene))
-    want = run(plan(loads(POINT + STRUCTURE)))
-    assert_same_measures(ours, want, 1e-9)
-    assert ours.plan.groups == pytest.approx(want.plan.groups)
-
-
-def test_exact_frequency_response_file_gives_its_mode(tmp_path):
-    """The accelerance of one mode in a universal file gives the measures of this mode within 1e-5.
-
-    The digits of the file limit the precision.
-    """
-    import pyuff
-
-    f = np.arange(100.0, 200.0, 0.25)
-    w = 2 * np.pi * f
-    w0 = 2 * np.pi * 143
-    data = -(w**2) / 0.884 / (w0**2 - w**2 + 2j * 0.003 * w0 * w)
-    one = {
-        "type": 58,
-        "func_type": 4,
-        "rsp_node": 7,
-        "rsp_dir": 1,
-        "ref_node": 7,
-        "ref_dir": 1,
-        "abscissa_spacing": 1,
-        "abscissa_spec_data_type": 18,
-        "ordinate_spec_data_type": 12,
-        "orddenom_spec_data_type": 13,
-        "x": f,
-        "data": data,
-        "ordinate_axis_units_lab": "m/s^2",
-        "orddenom_axis_units_lab": "slug",
-    }
-    pyuff.UFF(str(tmp_path / "rig.uff")).write_sets([one], mode="overwrite")
-    text = '[structure]\nfile = "rig.uff"\nmoving_mass = "0.884 kg"\nslide_at = "7:+x"\n' + POINT
-    ours = run(plan(write_scene(tmp_path, text + STRUCTURE[STRUCTURE.index("[drive]") :])))
-    assert_same_measures(ours, run(plan(loads(POINT + STRUCTURE))), 1e-5)
-    assert any("'slug' is not known" in line for line in ours.warnings)
-
-
-def test_refuses_unsuitable_structure_files(tmp_path):
-    """Structure files without required arrays, or of a wrong size, are refused at the line of the scene."""
-    np.savez(tmp_path / "rig.npz", M=M, K=K)
-    with pytest.raises(PatchfemError) as caught:
-        plan(write_scene(tmp_path, FILE))
-    assert str(caught.value).startswith(
-        f"{tmp_path / 'scene.toml'}:2: structure.file: lacks output"
-    )
-    np.savez(tmp_path / "rig.npz", M=M, K=K, output=[0, 1])
-    with pytest.raises(PatchfemError, match=r"structure\.file: lacks `slide`"):
-        build_modes(write_scene(tmp_path, POINT + FILE))
-    late = write_scene(tmp_path, FILE + '[structure.start]\nvelocity = ["1 m/s"]\n')
-    with pytest.raises(
-        PatchfemError, match=r":8: structure\.start: 1 values are given for 2 modes or masses"
-    ):
-        compute_initial_state(late, build_modes(late))
-    with pytest.raises(SceneError, match=r"structure\.file: there is no file"):
-        write_scene(tmp_path, FILE.replace("rig.npz", "other.npz"))
-    for text, says in (
-        (FILE.replace("rig.npz", "rig.uff"), "structure.moving_mass: missing"),
-        (FILE.replace("rig.npz", "rig.uff"), "structure.slide_at: missing"),
-        (FILE.replace("[drive]", 'slide_at = "1:x"\n[drive]'), "contains the array slide"),
-        (RUB + FILE.replace("rig.npz", "rig.uff"), "a universal file has nodes"),
-    ):
-        with pytest.raises(SceneError) as caught:
-            loads(text)
-        assert says in str(caught.value)
-
-
 @pytest.mark.parametrize("output", ["", "output = 0.5\n"])
 def test_exact_force_drive_acts_where_first_mode_moves_by_one(output):
     """At resonance a force F at the output point moves it by phi^2 F/(2 zeta m omega^2), where phi is 1 by default.
@@ -344,105 +253,3 @@ def test_exact_force_drive_acts_where_first_mode_moves_by_one(output):
     notes = [note for note in result.notes if "(default of `output`)" in note]
     assert len(notes) == (not output)
     assert all("the patch moves by 0.0118" in note for note in notes)
-
-
-MODES = (
-    STRUCTURE
-    + '[[structure.mode]]\nname = "3"\nfrequency = "160 Hz"\ndamping = 0.003\nslide = 0.0\n'
-)
-
-
-@pytest.mark.parametrize(
-    "key, message, text",
-    [
-        ("structure.mode[1].frequency", "structure.mode.axial.frequency: a bare number", MODES),
-        (
-            "structure.mode[2].frequency",
-            "structure.mode[2].frequency: a bare number",
-            MODES,
-        ),  # its name is "3"
-        (
-            "structure.spring[9].stiffness",
-            "structure.spring[9]: no such item here; structure.spring has 2, numbered from 1 "
-            "as in structure.spring[1]",
-            MASSES,
-        ),
-        (
-            "structure.mode[9].damping",
-            "structure.mode[9]: no such item here; use one of axial, 3",
-            MODES,
-        ),
-        (
-            "structure.mode.9.damping",
-            "structure.mode.9: no such item here; use one of axial, 3; structure.mode.0, "
-            "with a dot, means structure.mode[1]",
-            MODES,
-        ),
-    ],
-)
-def test_exact_messages_count_items_from_one(key, message, text):
-    """Messages count the items of an array of tables from one."""
-    text = POINT + text if text is MODES else text
-    assert get_only_mistake(text, f"{key}=-1").startswith(f"--set: {message}")
-
-
-def test_exact_item_numbers_in_brackets_count_from_one():
-    """structure.spring[2] and structure.spring.1 set the same item."""
-    scene = loads(MASSES, sets=["structure.spring[2].stiffness=3 N/mm", "structure.masses[1]=5 kg"])
-    assert scene.structure.spring[1].stiffness == 3e3 and scene.structure.masses[0] == 5.0
-    from_zero = ["structure.spring.1.stiffness=3 N/mm", "structure.masses.0=5 kg"]
-    from_one = ["structure.spring[2].stiffness=3 N/mm", "structure.masses[1]=5 kg"]
-    assert scene.tables() == loads(MASSES, sets=from_zero).tables()
-    assert scene.tables() == BaseScene(loads(MASSES)).override(from_one).tables()
-    with (
-        pytest.raises(
-            PatchfemError, match=r"structure\.interface\[2\]\.law: as structure\.masses\[1\] has$"
-        ),
-        locate_errors(build(scene).source),
-    ):
-        raise PatchfemError("as structure.masses.0 has", "structure.interface.1.law")
-
-
-SPRING = """\
-[structure]
-masses = ["3 kg"]
-[[structure.spring]]
-between = [1, 0]
-stiffness = "100 kN/m"
-[[structure.spring]]
-between = [0, 1]
-stiffness = "100 kN/m"
-"""
-DAMPER = '[[structure.damper]]\nbetween = [1, 0]\ncoefficient = "12 N s/m"\n'
-PUSH = '[drive]\nkind = "force"\nfrequency = "90 Hz"\nforce = "300 N"\ncycles = 40\n'
-
-
-def test_exact_mass_beside_contact_is_proposed_as_mode():
-    """A mass of 3 kg on 200 kN/m with 12 N s/m beside [contact] is refused, with the equivalent mode:
-
-    41.0936 Hz and a damping ratio of 0.00775.
-    """
-    message = get_only_mistake(BLOCK + COULOMB + SPRING + DAMPER + PUSH)
-    assert ": structure.masses: " in message
-    assert 'moving_mass = "3 kg"' in message
-    assert "[normal]" not in message
-    assert '[[structure.mode]] with frequency = "41.0936 Hz"' in message
-    assert "damping = 0.00775" in message
-    assert "its damping ratio" in get_only_mistake(BLOCK + COULOMB + SPRING + PUSH)
-
-
-@pytest.mark.parametrize("rest", ['masses = ["1 kg", "2 kg"]\n', 'moving_mass = "3 kg"\n'])
-def test_refuses_several_masses_beside_contact(rest):
-    """Several masses beside [contact] are refused without the proposal of [[structure.interface]]."""
-    pair = "[1, 2]" if "masses" in rest else "[1, 0]"
-    spring = f'[[structure.spring]]\nbetween = {pair}\nstiffness = "200 kN/m"\n'
-    found = read_refusal(BLOCK + COULOMB + "[structure]\n" + rest + spring + PUSH)
-    assert "with [contact], " in found and "write [[structure.interface]]" not in found
-    assert ('frequency = "41.0936 Hz"' in found) == ("moving" in rest)
-
-
-def read_refusal(text: str) -> str:
-    """Return the message with which a text is refused."""
-    with pytest.raises(SceneError) as caught:
-        loads(text)
-    return str(caught.value)

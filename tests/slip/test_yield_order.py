@@ -68,28 +68,6 @@ def test_exact_yield_order_agrees_with_repeated_solution(
     assert group.n_reluctant == np.sum(rates[0] <= 0)
 
 
-@pytest.mark.parametrize("count", [8, 400])
-def test_exact_symmetric_points_yield_in_pairs(count):
-    """Equally loaded points on a uniform line yield in symmetric pairs, with equal forces within
-    1e-12."""
-    distance = np.abs(np.subtract.outer(np.arange(float(count)), np.arange(float(count))))
-    c = np.log(3 * count / np.where(distance > 0, distance, 0.3))
-    group = jenkins_set(c, np.ones(count))
-    assert (
-        group.yield_displacement.size == count // 2
-        and np.count_nonzero(group.force_matrix[:, 0]) == count
-    )
-    np.testing.assert_allclose(
-        group.force_matrix[: count // 2],
-        group.force_matrix[: count // 2 - 1 : -1],
-        rtol=0,
-        atol=1e-12 * group.force_matrix.max(),
-    )
-    np.testing.assert_allclose(
-        group.force_matrix @ group.yield_displacement, np.ones(count), rtol=1e-12
-    )
-
-
 def test_refuses_indefinite_compliance():
     """A compliance matrix that is not positive definite is refused."""
     with pytest.raises(PatchfemError, match="not positive definite"):

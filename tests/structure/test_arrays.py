@@ -1,11 +1,7 @@
 """Structures from .npz and .mat files: the same basis as from the arrays, and messages for missing data."""
 
-import io
-import zipfile
-
 import numpy as np
 import pytest
-from numpy.lib import format as npy
 from scipy.io import savemat
 from scipy.sparse import csc_matrix
 
@@ -41,16 +37,6 @@ def test_exact_basis_from_file_equals_basis_from_arrays(tmp_path, ending):
     for key in ("omega", "zeta", "damping", "slide", "base", "output", "normal", "shapes"):
         np.testing.assert_array_equal(getattr(basis, key), getattr(expected, key))
     assert basis.names == ("1", "2") and basis.faces is None
-
-
-def test_exact_single_coordinate_from_matlab_file(tmp_path):
-    """A MATLAB file of one coordinate is read, although MATLAB stores scalars and vectors as matrices."""
-    names = np.array(["block"], dtype=object)
-    savemat(tmp_path / "rig.mat", {"M": 2.0, "K": 8.0, "C": 0.4, "slide": 1.0, "names": names})
-    basis = arrays.build_basis(arrays.read_arrays(tmp_path / "rig.mat"))
-    assert basis.names == ("block",) and (basis.omega[0], basis.zeta[0]) == pytest.approx(
-        (2.0, 0.05)
-    )
 
 
 def test_exact_interfaces_of_file_equal_interfaces_of_masses():
@@ -134,20 +120,6 @@ def test_refuses_incomplete_or_invalid_modes(change, message):
     assert str(caught.value).startswith("structure.file: ") and message in str(caught.value)
 
 
-def test_refuses_unknown_interface_coordinates():
-    """Interfaces and driven masses with coordinates that the file does not contain are refused."""
-    undamped = {key: FULL[key] for key in "MK"} | {"output": np.ones(2)}
-    for data, pairs, driven_mass, message in (
-        (undamped, [(3, 0)], None, "there is no coordinate 3: M has 2"),
-        (FULL, [(1, 0)], None, "contains `slide`, but"),
-        (FULL, [], 9, "no coordinate 9"),
-        (MODAL, [(1, 0)], None, "no numbered masses"),
-    ):
-        with pytest.raises(PatchfemError) as caught:
-            arrays.build_basis(data, pairs, driven_mass, is_forced=driven_mass is not None)
-        assert message in str(caught.value)
-
-
 @pytest.mark.parametrize("name, content", [
     ("a.npz", b"nothing of the kind"), ("a.mat", b"MATLAB"),
 ])  # fmt: skip
@@ -156,26 +128,3 @@ def test_refuses_unreadable_array_files(tmp_path, name, content):
     (tmp_path / name).write_bytes(content)
     with pytest.raises(PatchfemError, match="cannot be read"):
         arrays.read_arrays(tmp_path / name)
-
-
-def test_refuses_object_arrays(tmp_path):
-    """An array of Python objects is refused."""
-    np.savez(tmp_path / "a.npz", M=np.array([{}], dtype=object))
-    with pytest.raises(PatchfemError, match="not objects"):
-        arrays.read_arrays(tmp_path / "a.npz")
-
-
-def test_refuses_oversized_array_by_header(tmp_path):
-    """An array whose values or names are too large is refused before its data are read.
-
-    The file contains only a header, so reading the data would fail with another error.
-    """
-    header = io.BytesIO()
-    npy.write_array_header_1_0(
-        header, {"descr": "|S1024", "fortran_order": False, "shape": (2000, 2000)}
-    )
-    for key in ("M", "names"):
-        with zipfile.ZipFile(tmp_path / "a.npz", "w") as file:
-            file.writestr(f"{key}.npy", header.getvalue())
-        with pytest.raises(PatchfemError, match=f"{key} of shape 2000x2000 is larger than"):
-            arrays.read_arrays(tmp_path / "a.npz")

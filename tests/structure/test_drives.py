@@ -7,12 +7,12 @@ from scene_texts import MODE, PLASTIC, POINT
 from scipy.integrate import quad
 
 from patchfem import SceneError, plan, run
-from patchfem.core import InitialState, Outcome, PatchfemError, SineDrive
+from patchfem.core import InitialState, Outcome, SineDrive
 from patchfem.dynamics import coulomb_model, jenkins_model
 from patchfem.dynamics.march.march import march
 from patchfem.scene import loads
 from patchfem.structure import make_release
-from patchfem.structure.drives import RecordedDrive, SweepDrive, make_levels, make_step
+from patchfem.structure.drives import SweepDrive, make_levels, make_step
 
 OMEGA = 2 * np.pi * 143
 
@@ -52,13 +52,6 @@ def test_exact_level_change_preserves_phase():
     t = np.linspace(0, 5 * sine.period, 101)[:-1]
     amplitude = np.where(t < 2.5 * sine.period - 1e-12, 2.0, 3.0)
     assert drive.values(t) == pytest.approx(amplitude * np.sin(OMEGA * t), abs=1e-12)
-
-
-def test_refuses_recorded_signal_without_increasing_time():
-    """A recorded signal whose time does not increase from 0 is refused."""
-    for time in ([0.0], [0.0, 0.0], [1.0, 2.0]):
-        with pytest.raises(PatchfemError, match=r"drive\.file"):
-            RecordedDrive(np.array(time), np.zeros(len(time)), 1.0)
 
 
 # ---- the march
@@ -143,28 +136,6 @@ def test_exact_force_drive_equals_base_drive_in_relative_motion():
     )
 
 
-def test_exact_recorded_drive_equals_sine_drive(tmp_path):
-    """A recorded sine gives the amplitude of the sine drive within 0.2 %."""
-    t = np.arange(0, 0.1, 2e-5)
-    table = tmp_path / "shake.csv"
-    table.write_text(
-        "time [ms],acceleration [g]\n"
-        + "\n".join(f"{1e3 * s!r},{5 * float(np.sin(OMEGA * s))!r}" for s in t.tolist()),
-        "utf-8",
-    )
-    scene = loads(
-        RIG + '[drive]\nkind = "base"\nwaveform = "file"\nfile = "shake.csv"\n',
-        tmp_path / "scene.toml",
-    )
-    recorded = {name: m.value for name, m in run(plan(scene)).measures.items()}
-    _, expected = run_drive(
-        f'kind = "base"\nfrequency = "143 Hz"\nacceleration = "5 g"\nduration = "{float(t[-1])!r} s"'
-    )
-    assert recorded["relative_displacement_amplitude"] == pytest.approx(
-        expected["relative_displacement_amplitude"], rel=2e-3
-    )
-
-
 @pytest.mark.parametrize(
     "drive, key",
     [
@@ -189,22 +160,3 @@ def test_refuses_incomplete_drive(drive, key):
     """A drive with a missing, superfluous or invalid key is refused with the name of the key."""
     with pytest.raises(SceneError, match=key.replace(".", r"\.")):
         loads(f"{RIG}[drive]\n{drive}")
-
-
-@pytest.mark.parametrize(
-    "text, word",
-    [
-        ("time [s],acceleration [g]\n0,0\n1,0\n", "0 in every row"),
-        ("time [s],acceleration [g]\n0,1\n0,2\n", "strictly rise"),
-        ("time [s],acceleration\n0,1\n1,2\n", "acceleration"),
-    ],
-)
-def test_refuses_invalid_signal_file(tmp_path, text, word):
-    """A signal file without motion, without the right columns or without increasing time is refused."""
-    (tmp_path / "shake.csv").write_text(text, "utf-8")
-    scene = loads(
-        RIG + '[drive]\nkind = "base"\nwaveform = "file"\nfile = "shake.csv"\n',
-        tmp_path / "scene.toml",
-    )
-    with pytest.raises(PatchfemError, match=word):
-        run(plan(scene))

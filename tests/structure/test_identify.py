@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from patchfem.core import PatchfemError
-from patchfem.structure import compute_receptance, masses
 from patchfem.structure.modal_fit import fit_poles, identify_modes
 
 BAND = np.arange(20.0, 400.0, 0.5)
@@ -73,33 +72,6 @@ def test_always_noise_causes_small_modal_errors(name, absolute):
     residues = poles.fit.compute_residues(poles.theta).modes
     expected = (shape * shape[0]).T
     assert np.all(np.abs(residues - expected) < 0.07 * np.abs(expected).max(axis=1, keepdims=True))
-
-
-def test_always_out_of_band_modes_leave_in_band_modes_accurate():
-    """Modes at 5 Hz and 900 Hz outside the band leave the two modes inside accurate within 0.01 % in frequency."""
-    frequencies = [5, 100, 200, 900]
-    zeta = [0.01] * 4
-    shape = np.random.default_rng(2).normal(size=(4, 4))
-    data = synthetic_responses(frequencies, zeta, shape, 0, 1e-3)
-    measured = {((k + 1, 0), (1, 0)): (data[:, k], 0) for k in range(4)}
-    modes = identify_modes(BAND, measured, [])
-    inside = [np.abs(modes.frequency - frequency).argmin() for frequency in (100, 200)]
-    np.testing.assert_allclose(modes.frequency[inside], [100, 200], rtol=1e-4)
-    assert np.all((modes.frequency > 20) & (modes.frequency < 400))
-    motions = np.stack([modes.motion[k + 1, 0][inside] for k in range(4)])
-    signs = np.sign(shape[0, 1:3])
-    np.testing.assert_allclose(motions, shape[:, 1:3] * signs, atol=0.02 * np.abs(shape).max())
-
-
-def test_always_missing_rigid_mode_is_reported():
-    """For two free masses the elastic mode is found, and a note reports the missing rigid-body mode."""
-    basis = masses.build_basis([1.0, 1.0], [((1, 2), 4e5)], [((1, 2), 8.0)], [], 1)
-    H = compute_receptance(basis, 2 * np.pi * BAND, basis.shapes, basis.shapes[0])[:, :, 0]
-    notes = []
-    modes = identify_modes(BAND, {((k, 0), (0, 0)): (H[:, k], 0) for k in range(2)}, notes)
-    np.testing.assert_allclose(2 * np.pi * modes.frequency, basis.omega[1:], rtol=1e-9)
-    np.testing.assert_allclose(modes.motion[0, 0], np.sqrt(0.5), rtol=1e-6)
-    assert len(notes) == 1 and "rigid-body modes" in notes[0]
 
 
 def test_refuses_responses_without_driven_point_or_modes():

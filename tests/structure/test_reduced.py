@@ -1,6 +1,5 @@
 """Reduced structures: exact without truncation, exact statics and rigid motions, and orders of convergence."""
 
-import mpmath
 import numpy as np
 import pytest
 from scipy import sparse
@@ -88,45 +87,6 @@ def test_exact_rigid_mode_carries_total_mass(method):
     np.testing.assert_allclose(basis.base[0] ** 2, M.sum(), rtol=1e-9)
 
 
-@pytest.mark.parametrize("method", METHODS)
-def test_always_truncated_reduction_equals_smaller_reduction(method):
-    """Truncating a reduction equals a reduction to fewer modes, and the frequencies decrease with more modes."""
-    K, M, _ = chain_matrices(30)
-    large, small = (
-        reduce_dense(K, M, None, n_modes, method, np.array([29, 10]), np.ones(30))
-        for n_modes in (6, 1)
-    )
-    truncated, expected = (reduced.build_basis(reduction, 1) for reduction in (large, small))
-    np.testing.assert_allclose(truncated.omega, expected.omega, rtol=1e-8)
-    omegas = np.array([reduced.build_basis(large, n_modes).omega[:3] for n_modes in (2, 4, 8, 16)])
-    full = matrices.build_basis(M, K).omega[:3]
-    assert (np.diff(omegas, axis=0) <= 1e-9 * full).all() and (omegas >= full * (1 - 1e-9)).all()
-
-
-@pytest.mark.parametrize("method", METHODS)
-@pytest.mark.parametrize("n_links", [40, 12])
-def test_exact_slender_beam_frequencies_agree_with_mpmath(method, n_links):
-    """The frequencies of a slender beam agree with a computation of 40 digits.
-
-    They span a factor of 260 or 3000. Eigenvalues of both reduced matrices had errors of 5e-10 with
-    free-interface modes.
-    """
-    n = n_links
-    D = np.eye(n) - 2 * np.eye(n, k=-1) + np.eye(n, k=-2)
-    K = D.T @ D
-    M = np.diag(np.random.default_rng(4).integers(1, 9, n) / 4.0)
-    with mpmath.workdps(40):
-        root = mpmath.diag([1 / mpmath.sqrt(value) for value in np.diag(M)])
-        square = mpmath.eigsy(root * mpmath.matrix(K.tolist()) * root, eigvals_only=True)
-        expected = np.array([float(mpmath.sqrt(value)) for value in square])
-    basis = reduced.build_basis(
-        reduce_dense(K, M, None, n, method, np.array([n - 1, 4])), n, driven_mass=1
-    )
-    np.testing.assert_allclose(
-        basis.omega, expected, rtol=2e-16 * (expected[-1] / expected[0]) ** 1.5
-    )
-
-
 def test_order_of_reduction_methods():
     """The error of the lowest frequency falls with the third power of the number of fixed-interface modes.
 
@@ -179,13 +139,6 @@ def test_exact_massless_coordinate_is_condensed_statically():
     np.testing.assert_allclose(basis.omega, full.omega, rtol=1e-12)
 
 
-def test_exact_damping_ratio_applies_to_elastic_modes():
-    """A given damping ratio applies to every elastic mode and not to the rigid mode."""
-    K, M, _ = chain_matrices(is_fixed=False)
-    basis = reduced.build_basis(reduce_dense(K, M, base_motion=np.ones(12)), 3, ratio=0.02)
-    assert basis.damping is None and basis.zeta[0] == 0 and (basis.zeta[1:] == 0.02).all()
-
-
 INVALID_CHANGES = {
     "the mass matrix is not positive semidefinite: the diagonal entry of coordinate 3": lambda K, M: (
         M.__setitem__((2, 2), -1.0)
@@ -219,38 +172,3 @@ def test_refuses_matrices_not_positive_definite(message, method):
     assert expected in str(caught.value) and caught.value.key.startswith("structure.reduced."), (
         caught.value
     )
-
-
-def test_refuses_loose_part_in_fixed_interface_method():
-    """A part that is not connected to the boundary is refused by the fixed-interface method.
-
-    Free-interface modes include its rigid motion.
-    """
-    K, M, _ = chain_matrices()
-    K[6, 6] += K[6, 7]
-    K[7, 7] += K[6, 7]
-    K[6, 7] = K[7, 6] = 0
-    with pytest.raises(PatchfemError, match="add a coordinate of each loose part"):
-        reduce_dense(K, M, boundary=np.array([4]))
-    basis = reduced.build_basis(
-        reduce_dense(K, M, None, 4, "free-interface", np.array([4])), 4, driven_mass=1
-    )
-    assert (basis.omega == 0).sum() == 1
-
-
-def test_refuses_dependent_attachment_modes():
-    """Boundary coordinates joined by a very stiff spring are refused, because their attachment modes are equal."""
-    springs = np.full(12, 1e6)
-    springs[-1] *= 1e10
-    stiffness = (
-        np.diag(springs + np.append(springs[1:], 0))
-        - np.diag(springs[1:], 1)
-        - np.diag(springs[1:], -1)
-    )
-    mass = sparse.csr_array(0.01 * np.eye(12))
-    reduction = reduced.reduce_matrices(
-        sparse.csr_array(stiffness), mass, None, np.array([10, 11]), 2, "free-interface"
-    )
-    with pytest.raises(PatchfemError, match="use method = 'craig-bampton'") as refusal:
-        reduced.build_basis(reduction, 2)
-    assert refusal.value.key == "structure.reduced.modes"

@@ -185,18 +185,6 @@ def test_exact_modes_are_identified_from_responses(tmp_path, response_type):
     assert not modes.notes
 
 
-def test_exact_acceleration_in_g_is_converted(tmp_path):
-    """Accelerations in g are converted, and an unknown unit gives a note."""
-    datasets = make_responses(12, ordinate_axis_units_lab="g")
-    for dataset in datasets:
-        dataset["data"] = dataset["data"] / 9.80665
-    check_modes(universal.read_universal(write_universal(tmp_path / "a.uff", datasets)), 1e-6, 1e-6)
-    with_unknown_unit = universal.read_universal(
-        write_universal(tmp_path / "b.uff", make_responses(12, ordinate_axis_units_lab="furlong"))
-    )
-    assert any("'furlong' is not known" in note for note in with_unknown_unit.notes)
-
-
 def test_exact_basis_from_node_directions(tmp_path):
     """The rows of the basis are those of the node directions in the scene, scaled to the moving mass."""
     shapes = universal.read_universal(write_universal(tmp_path / "a.uff", normal_modes()))
@@ -236,39 +224,6 @@ def test_exact_basis_from_node_directions(tmp_path):
             places.build_basis(shapes, 0.5, {"slide_at": "12:+y"}, is_forced=False)
         )[0]
     )
-
-
-@pytest.mark.parametrize("places_of, message", [
-    ({"slide_at": "99:+y"}, "structure.slide_at: the file has no motion of 99:y; the file has 11:x, 11:y, 11:z"),
-    ({"slide_at": "twelve"}, "structure.slide_at: 'twelve' is not a node with a direction; write node:direction"),
-    ({"slide_at": "12:+x"}, "structure.slide_at: no mode of the file moves '12:+x'"),
-    ({"slide_at": "12:+y", "output_at": "11:+z"}, "structure.output_at: no mode of the file moves"),
-    ({"slide_at": "12:+ry"}, "structure.slide_at: the file has no motion of 12:ry"),
-    ({"slide_at": "12:+y", "base_at": "13:y"}, "structure.base_at: at this place the modes contain 4 times "
-                                               "structure.moving_mass"),
-])  # fmt: skip
-def test_refuses_unknown_node_directions(tmp_path, places_of, message):
-    """A node or direction that the file does not contain is refused with the key."""
-    shapes = universal.read_universal(write_universal(tmp_path / "a.uff", normal_modes()))
-    with pytest.raises(PatchfemError) as caught:
-        places.build_basis(shapes, 2.0, places_of, is_forced=False)
-    assert message in str(caught.value)
-
-
-@pytest.mark.parametrize("datasets, message", [
-    (normal_modes((1.0, 0.0, 1.0)), "mode 2 ("), (normal_modes(modal_damp_vis=-0.01), "both must be >= 0"),
-    (make_responses(12, orddenom_spec_data_type=12), "is a response of type 12 per input of type 12; displacement (8)"),
-    (make_responses(8, func_type=1), "dataset 58 contains no frequency response function"),
-    (make_responses(12, ref_node=99), "a response at the driven point itself (99:y)"),
-    (make_responses(12)[:2] + make_responses(12, spacing=0.25)[2:], "is given at other frequencies than the first"),
-    ([{"type": 164, "units_code": 1, "units_description": "SI", "temp_mode": 1, "length": 1.0, "force": 1.0,
-       "temp": 1.0, "temp_offset": 0.0}], "has neither mode shapes (dataset 55"),
-])  # fmt: skip
-def test_refuses_universal_file_without_required_data(tmp_path, datasets, message):
-    """A universal file without usable shapes or responses is refused with the reason."""
-    with pytest.raises(PatchfemError) as caught:
-        universal.read_universal(write_universal(tmp_path / "a.uff", datasets))
-    assert message in str(caught.value)
 
 
 @pytest.mark.parametrize(

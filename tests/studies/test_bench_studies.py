@@ -26,20 +26,6 @@ def test_exact_friction_against_velocity_is_a_lorentzian(tmp_path):
     assert "<svg" in (tmp_path / "picture.svg").read_text()
 
 
-@pytest.mark.slow
-def test_exact_complete_velocity_study_agrees_with_lorentzian():
-    """All velocities agree with the Lorentzian; the fastest depart by the figures of the study."""
-    rows = load_study("bench/stribeck.py").main(path=None)
-    check_speeds(rows)
-    departure = {
-        row["slip"]: {p: row[p][0] / row["promised"] - 1 for p in (0, 1)}
-        for row in rows
-        if row["share"] > 99
-    }
-    assert departure[0.1] == pytest.approx({0: -0.027, 1: 0.021}, abs=6e-4)
-    assert departure[1.0] == pytest.approx({0: -0.63, 1: -0.15}, abs=6e-3)
-
-
 def integrate_peak_after_rest(fraction, start, before):
     """Return the largest z/eps_0 of z' = 1 - z/eps, eps by equation 2.10, after a period at rest."""
     rate = 2e-6 / 1e-6 + 1 / (fraction * 2e-6)
@@ -82,13 +68,3 @@ def test_exact_ageing_is_exponential_and_bounds_the_friction_peak(tmp_path):
     assert report_rows[-1]["before"] == pytest.approx(0.517, abs=1e-3) and report_rows[-1][
         "rested"
     ] == pytest.approx(1, 1e-6)
-
-
-@pytest.mark.slow
-def test_exact_peak_after_ageing_of_the_longest_bonds():
-    """Bonds of 50 slip lengths show 92 % of their ageing in the friction peak after rest."""
-    study_ = load_study("bench/ageing.py")
-    before, rested, peak = study_.dwell(10.0, 50.0)
-    assert before == rested and (peak - before) / (
-        study_.aged(10.0, 50.0) - before
-    ) == pytest.approx(0.92, abs=5e-3)

@@ -9,14 +9,6 @@ from study_module import make_study_fixture
 orders = make_study_fixture("contact/order_four.py")
 
 
-def test_exact_lobatto_weights_integrate_degree_seven(orders):
-    """The Gauss-Lobatto weights of order 4 are positive and integrate polynomials of degree 7."""
-    points, weights = orders.lobatto(4)
-    assert weights.min() > 0
-    exact = [2 / (k + 1) if k % 2 == 0 else 0 for k in range(8)]
-    assert [weights @ points**k for k in range(8)] == pytest.approx(exact, abs=1e-14)
-
-
 @pytest.mark.parametrize("order", [1, 4])
 def test_exact_rigid_motion_of_an_element_causes_no_force(orders, order):
     """A translation and a rotation of an element cause no nodal force."""

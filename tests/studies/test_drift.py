@@ -5,8 +5,6 @@ import numpy as np
 import pytest
 from study_module import make_study_fixture
 
-from patchfem.friction import FirstOrderBonds
-
 table = make_study_fixture("drift/drift_table.py")
 
 
@@ -26,20 +24,6 @@ def test_exact_drift_of_the_bond_law_agrees_with_closed_form(table):
                 )
 
 
-def test_exact_laws_with_closed_loops_do_not_drift(table):
-    """Laws whose loops close, such as Iwan's, do not drift under an oscillating force."""
-    for name, engine in table.laws_without_bonds().items():
-        for case in table.CASES:
-            steps = 3 if name == "elastic-plastic" else 2
-            last = (
-                table.row(name, engine, case, steps).last
-                if name == "elastic-plastic" or case != "both"
-                else 0.0
-            )
-            assert last == pytest.approx(0.0, abs=1e-12), (name, case)
-    assert all(table.closed_form_rows(case)[0].last == 0 for case in table.CASES)
-
-
 def test_always_oscillating_load_causes_drift_only_at_order_zero(table):
     """At a constant tangential force, an oscillating load causes drift only with bonds of order 0."""
     for name, engine in table.engines(False, shares=(0.0, 0.3)).items():
@@ -52,38 +36,6 @@ def test_always_oscillating_load_causes_drift_only_at_order_zero(table):
             )
     name, engine = next(iter(table.engines(False, (0.0,), (0.3,)).items()))
     assert table.row(name, engine, "load +-10 %", 3).last == pytest.approx(0.2048, abs=5e-4)
-
-
-def test_exact_drift_of_tanh_and_bouc_wen_agrees_with_integrals(table):
-    """The creep of the tanh law and the drift of Bouc-Wen agree with integrals of their equations."""
-    rows = {row.law: row.last for row in table.closed_form_rows("force .5+-.1")}
-    time = (np.arange(4000) + 0.5) / 4000
-    mean_creep = 1e-3 * np.arctanh(0.4 + 0.2 * time).mean() / 143 / 2e-6
-    assert (
-        rows["tanh, v_0 = 1 mm/s"]
-        == pytest.approx(mean_creep, rel=1e-6)
-        == pytest.approx(1.93, abs=2e-3)
-    )
-    z = 0.4
-    displacement = 0.0
-    while z < 0.6:
-        z, displacement = z + 1e-5, displacement + 1e-5 / (1 - (z + 5e-6) ** 2)
-    assert rows["Bouc-Wen n = 2"] == pytest.approx(displacement - 0.2, abs=1e-4)
-
-
-def test_always_bond_growth_needs_a_larger_elastic_range(table):
-    """If bonds grow at rest, drift stops only at a larger elastic range, by the factor 1/0.7."""
-
-    def last_drift(share, case):
-        """Return the drift of the last cycle."""
-        law = table.ladder.bonds(breakaway=share, **table.ladder.GROWTH)
-        return table.row("", FirstOrderBonds(law), case, 4).last
-
-    assert last_drift(0.1, "force .5+-.1") == pytest.approx(0.0014, abs=1e-4)
-    assert last_drift(0.3, "force .3+-.3") == pytest.approx(0.033, abs=1e-3)
-    assert last_drift(0.1 / 0.7, "force .5+-.1") == pytest.approx(0.0, abs=1e-12)
-    assert last_drift(0.3 / 0.7, "force .3+-.3") == pytest.approx(0.0, abs=1e-12)
-    assert last_drift(0.5, "force .5+-.3") is None  # the displacement grows without bound
 
 
 def test_exact_drift_of_the_report_law_decays_with_the_square(table):

@@ -1,12 +1,8 @@
 """The comparison of friction laws: inexpensive cases against closed forms and an integrated law."""
 
-import friction_forms
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
 from study_module import make_study_fixture
-
-from patchfem.friction import FirstOrderBonds
 
 table = make_study_fixture("friction_ladder/ladder.py")
 
@@ -20,64 +16,12 @@ def today(ladder):
     return ladder.today
 
 
-@pytest.mark.parametrize("amplitude", [0.3, 3.0])
-def test_exact_loop_areas_without_bond_growth(ladder, amplitude):
-    """Without growth of bonds, the loop areas of the Dahl and Jenkins laws agree with closed forms."""
-    dahl = ladder.last_cycle(ladder.points(ladder.bonds()), amplitude)
-    elastic_plastic = ladder.elastic_plastic(amplitude)
-    assert dahl.area == pytest.approx(friction_forms.stretch_loop(amplitude, 1.0)[0], rel=2e-6)
-    assert elastic_plastic.area == pytest.approx(
-        friction_forms.jenkins_loop(amplitude, 1.0)[0], abs=1e-12
-    )
-    difference = ladder.error(ladder.coulomb(dahl), dahl)[0]
-    assert difference == pytest.approx(np.tanh(amplitude) / amplitude, rel=2e-6)
-
-
 def test_exact_rms_error_of_coulomb_at_large_amplitude(ladder):
     """The rms difference of Coulomb's law from Dahl's falls with the fourth root of the amplitude."""
     dahl = ladder.last_cycle(ladder.points(ladder.bonds()), 400.0, 48_000)
     assert ladder.error(ladder.coulomb(dahl), dahl)[1] == pytest.approx(
         (4 / np.pi / 400) ** 0.25, rel=0.01
     )
-
-
-def test_exact_lugre_is_the_bond_law_with_instant_growth(ladder):
-    """The bond law with instantaneous growth agrees with the integrated LuGre equation within 4e-6."""
-    amplitude = 1.0
-    steps = ladder.STEPS
-    omega = 2 * np.pi * ladder.HERTZ
-    length = ladder.LENGTH
-    ratio = ladder.RATIO
-    rest = ladder.GROWTH["rest_growth"]
-    slip = ladder.GROWTH["slip_growth"]
-
-    def rate(t, z):
-        """Return the rate of the LuGre state."""
-        v = amplitude * length * omega * np.cos(omega * t)
-        return v - abs(v) * z / friction_forms.steady_bond_length(v, length, ratio, rest, slip)
-
-    time = np.arange(4 * steps, 5 * steps + 1) / steps / ladder.HERTZ
-    z = (
-        solve_ivp(
-            rate, (0, time[-1]), [0.0], "LSODA", time, rtol=1e-10, atol=1e-17, max_step=1e-4
-        ).y[0]
-        / length
-    )
-    cycle = ladder.last_cycle(ladder.points(ladder.at_once()), amplitude)
-    assert cycle.force == pytest.approx((z[1:] + z[:-1]) / 2, abs=4e-6)
-
-
-def test_exact_bouc_wen_of_exponent_one_is_dahl(ladder, today):
-    """Bouc-Wen with the exponent 1 equals the bond law of constant length on a random path."""
-    path = np.random.default_rng(1).normal(0, 0.7, 200).cumsum()
-    law = FirstOrderBonds(ladder.bonds())
-    unit = np.ones(1)
-    state = law.initial_state(unit)
-    force = [0.0]
-    for dq in np.diff(path):
-        state = law.step(state, dq * ladder.LENGTH, unit, unit, 1.0).state
-        force.append(law.traction(state)[0])
-    assert today.bouc_wen(path[:, None], 1, 1.0)[:, 0] == pytest.approx(force, abs=1e-14)
 
 
 @pytest.mark.parametrize("count", [5, 20, 100])
@@ -88,15 +32,6 @@ def test_order_of_iwan_elements_on_the_virgin_curve(today, count):
     gap = np.abs(np.minimum(x[:, None], s) @ k + np.expm1(-x)).max()
     assert gap * count**2 == pytest.approx(0.5, abs=0.01)
     assert (k.sum(), k @ s) == pytest.approx((1, 1), abs=1e-14)
-
-
-@pytest.mark.parametrize("amplitude", [0.3, 3.0])
-def test_exact_iwan_loop_area_is_short_by_four_bond_lengths(ladder, today, amplitude):
-    """The loop area of Iwan elements is 4 mu N eps smaller than that of Dahl's law (Masing's rule)."""
-    assert ladder.iwan(amplitude, 400).area == pytest.approx(today.iwan_loop(amplitude), rel=3e-3)
-    dahl = friction_forms.stretch_loop(12.5, 1.0)[0]
-    assert today.iwan_loop(12.5) - dahl == pytest.approx(-4, abs=1e-3)
-    assert today.iwan_loop(12.5, 0.5) == pytest.approx(dahl, abs=1e-8)
 
 
 def test_always_laws_with_bond_growth_differ_as_stated(ladder, table):
@@ -117,15 +52,6 @@ def test_always_laws_with_bond_growth_differ_as_stated(ladder, table):
         assert [rms for _, rms in differences] == pytest.approx(expected, rel=0.05, abs=1e-4)
         assert abs(differences[0][0]) < 2e-4
     assert table.slow_path(3.0)[0].above == pytest.approx((-0.0098, 0.0152), rel=0.01)
-
-
-def test_always_best_velocity_scale_of_the_tanh_law(ladder):
-    """The velocity scale of the tanh law that fits Dahl's loop best, and its rms error, are as stated."""
-    for amplitude, expected, rms in ((1.0, 3.23, 0.520), (50.0, 0.257, 0.287)):
-        dahl = ladder.last_cycle(ladder.points(ladder.bonds()), amplitude)
-        fraction = dahl.dq / np.abs(dahl.dq).max()
-        assert ladder.today.best_rate(fraction, dahl.force) == pytest.approx(expected, rel=0.01)
-        assert ladder.error(ladder.rate(dahl), dahl)[1] == pytest.approx(rms, abs=2e-3)
 
 
 @pytest.mark.slow

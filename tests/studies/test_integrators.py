@@ -3,52 +3,10 @@
 import json
 import sys
 
-import numpy as np
 import pytest
-from report_methods import accepted_force_error
 from study_module import make_study_fixture
 
 from patchfem.core import Missing
-
-failure = make_study_fixture("integrators/failure.py")
-
-
-@pytest.mark.slow
-def test_exact_failures_of_the_report_method_are_those_stated(failure, capsys):
-    """Early slip, force errors and failed steps of the report's method are those stated."""
-    rows, curves = failure.main(draw=False)
-    by_name = {r.name: r for r in rows}
-    loose = by_name["Fig 17, 18: displacement 1e-2"]
-    speed = by_name["Fig 19, 20: velocity 1e-4"]
-    assert (loose.early, loose.moves, loose.force) == pytest.approx((0.1146, 5.5, 2.56), abs=5e-3)
-    assert loose.worst == pytest.approx(5.4, abs=0.05) and loose.failed == 0
-    assert (
-        f"friction force reached {loose.worst:.1f}, although the friction limit is only 3"
-        in failure.ANSWER
-    )
-    accepted = accepted_force_error(failure.TWO, 0.05, "displacement", 1e-2, 0.1)
-    assert accepted == pytest.approx(80 * 3, rel=1e-3)
-    for tight in (by_name["displacement 1e-6"], speed):
-        assert tight.early < 0.0095 and 0.3 < tight.failed < 0.37 and 0.15 < tight.jumps < 0.25
-    assert 0.2 < by_name["force 1e-3"].failed < 0.26 and by_name["force 1e-3"].jumps > 0.2
-    static_branch = by_name["static branch, force 1e-6"]
-    elastic = by_name["Fig 21, 22: elastic 0.01, velocity 1e-6"]
-    assert (
-        static_branch.early < 2e-4
-        and abs(static_branch.error) < 3e-3
-        and static_branch.jumps < 0.01
-    )
-    assert elastic.early == pytest.approx(0.0099, abs=1e-4)
-    assert abs(elastic.error) < 5e-3
-    assert elastic.failed == 0
-    assert by_name["3.12 as printed, eps 0.03"].error < -90
-    without_force = curves[1e-3, False]
-    with_force = curves[1e-3, True]
-    assert [without_force[1], without_force[3]] == pytest.approx([0.057, -0.19], abs=5e-3)
-    assert np.all(np.array(without_force[4:]) < -0.99)
-    assert with_force[4] == pytest.approx(-9e-4, abs=1e-4) and abs(with_force[-1]) < 2e-5
-    assert "Newmark" in capsys.readouterr().out
-
 
 work = make_study_fixture("integrators/work_precision.py")
 
@@ -100,14 +58,6 @@ def test_exact_free_decay_by_the_event_driven_solver(engines, problem):
     assert "decay" in problems and case.error(run(case, settings[0])) < 1e-11
 
 
-def test_exact_dop853_without_step_limit_misses_events(engines, problem):
-    """Without a limit of its step, DOP853 finds 4 of 240 events and gives no warning."""
-    case = problem("block")
-    slide, events = engines.slide_and_events(case, 1e-8, 1e9)
-    assert events == 4 and case.error(slide) > 0.5
-    assert engines.slide_and_events(case, 1e-8, 1 / 8)[1] == 240
-
-
 def test_exact_saved_errors_are_reproduced(engines, problem, table):
     """The errors of the inexpensive rows of the saved table are reproduced within 2 %."""
     for where in ("decay", "block", "two"):
@@ -152,19 +102,6 @@ def test_exact_saved_table_supports_the_stated_conclusions(work, table):
     assert curve("block", "DOP853 + events")[1].min() > 300 * seconds[0]
 
 
-def test_refuses_missing_peer_programs_and_continues(work, engines, monkeypatch, capsys, tmp_path):
-    """A missing peer program is named in a message, and the other integrators are still measured."""
-    for _, _, _, _, variable, _ in work.PEERS.values():
-        monkeypatch.setenv(variable, "/nowhere/python")
-    integrators = {"newmark, and force": (engines.newmark_cured, (100,), ("block",))}
-    table = work.main(("block",), integrators, repeats=1, path=tmp_path / "t.json")
-    assert [r["engine"] for r in table["rows"]] == ["newmark, and force"]
-    assert set(table["absent"]) == set(work.PEERS)
-    output = capsys.readouterr()
-    assert "/nowhere/python" in output.err and "PATCHFEM_SUNDIALS_PYTHON" in output.err
-    assert "skipped: Siconos, theta 1/2 is not installed" in output.out
-
-
 @pytest.mark.share(0, 3)
 @pytest.mark.parametrize(
     "name, knob, error", [("SUNDIALS CVODE", 1e-8, 5e-6), ("Siconos, theta 1/2", 1000, 5e-4)]
@@ -183,16 +120,3 @@ def test_exact_peer_programs_agree_with_the_reference_motion(
         case = problem(where)
         slide, seconds = ask(peer, case, knob)
     assert case.error(slide) < error and seconds > 0
-
-
-@pytest.mark.slow
-def test_exact_patch_motion_by_two_integrators(engines, problem):
-    """The time march and DOP853 between reversals agree on elastic-plastic elements.
-
-    DOP853 with longer steps misses reversals.
-    """
-    case = problem("patch")
-    assert case.error(engines.dop853(case, 1e-10)) < 1e-6
-    assert case.error(engines.march(case, 3200)) < 1e-4
-    slide, events = engines.slide_and_events(case, 1e-8, 1 / 8)
-    assert events < 202 and case.error(slide) > 1e-2

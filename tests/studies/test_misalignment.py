@@ -83,38 +83,6 @@ def test_always_error_estimates_cover_an_independent_solution(tilted, fixtures):
         assert abs(measures[name].value - value) <= measures[name].error <= 0.2 * value
 
 
-def test_always_free_piece_loses_contact_inside_the_kern(tilted, fixtures):
-    """A load offset within the middle third opens the contact of elastic pieces, unlike rigid ones."""
-    for offset, fraction in ((0.15, 1.0), (1 / 3, 0.445)):
-        measures = solve_coarse(tilted, fixtures.free(offset))
-        assert measures["contact_fraction"] == pytest.approx(fraction, abs=0.02)
-        assert measures["pressure_centre"] == pytest.approx(-offset * LENGTH, rel=1e-9)
-    assert (
-        solve_coarse(tilted, fixtures.free(0.16))["contact_fraction"]
-        < 1
-        == exact.core_contact_fraction(0.16, 1.0)
-    )
-
-
-def test_always_soft_surface_layer_keeps_its_normal_stiffness(tilted, fixtures):
-    """The softer the surface layer, the less normal stiffness is lost at a tilt of 10 mrad."""
-    aligned, inclined = (
-        {
-            skin: solve_coarse(tilted, fixtures.held_pieces(tilt, None, skin))
-            for skin in tilted.SKINS
-        }
-        for tilt in (1e-6, 1e-2)
-    )
-    for skin, expected in (
-        ("bare", 0.052),
-        ("linear", 0.05),
-        ("peaks", 0.112),
-        ("exponential", 0.824),
-    ):
-        ratio = inclined[skin]["normal_stiffness"] / aligned[skin]["normal_stiffness"]
-        assert ratio == pytest.approx(expected, rel=0.03)
-
-
 def test_exact_soft_layer_is_a_rigid_wedge_on_asperities(tilted):
     """With a layer much softer than the pieces, the contact agrees with a rigid wedge on asperities."""
     measures = solve_coarse(
@@ -130,18 +98,6 @@ def test_exact_soft_layer_is_a_rigid_wedge_on_asperities(tilted):
 
 
 # ---- conclusion 5
-
-
-def test_exact_fixture_spring_adds_its_rotation(tilted, conclusion, fixtures):
-    """A fixture spring adds its own rotation to the tilt that gives a contact fraction of 0.5."""
-    for skin in tilted.SKINS:
-        for spring in (1e4, 300.0):
-            angle = conclusion.neutral(0.5, skin, spring, 0)
-            patch = solve_patch_contact(fixtures.held_pieces(angle, spring, skin), tilted.pair(0))
-            assert tilted.rubbed_portion(patch) == pytest.approx(0.5, abs=1e-4)
-            assert patch.pressure.rotation == pytest.approx(
-                conclusion.rigid(0.5, skin, 0)[0], rel=1e-3
-            )
 
 
 def test_always_tilt_and_moment_of_a_contact_fraction(conclusion):
@@ -166,68 +122,7 @@ def test_always_tilt_and_moment_of_a_contact_fraction(conclusion):
 # ---- roll
 
 
-def test_exact_roll_by_strips_agrees_with_linear_foundation(tilted, roll):
-    """A patch divided into strips and rolled agrees with a wedge on a linear foundation."""
-    pair = tilted.pair(0)
-    k = (
-        compute_static_values(solve_patch_contact(tilted.case(0.0), pair))["normal_stiffness"]
-        / LENGTH**2
-    )
-    for angle in (5e-6, 1e-4):
-        fraction, centre, _, _ = exact.wedge_on_linear_foundation(angle, LOAD, LENGTH, LENGTH, k)
-        measures = compute_static_values(
-            solve_patch_contact(roll.rolled_pieces(angle, 128, "bare"), pair)
-        )
-        assert measures["pressure_centre_lateral"] == pytest.approx(centre, rel=2e-4)
-        assert measures["contact_fraction"] == pytest.approx(fraction, abs=1 / 128)
-
-
-def test_always_yaw_moment_of_a_rolled_patch(roll):
-    """The yaw moment of a rolled patch is friction force times centre of pressure, as stated."""
-    for skin, angle, moment in (
-        ("bare", 1e-5, 0.074),
-        ("bare", 1e-4, 0.173),
-        ("linear", 1e-5, 0.0346),
-        ("exponential", 1e-3, 0.133),
-    ):
-        measures = roll.case(angle, 16, skin)
-        assert measures["yaw"] == pytest.approx(moment, rel=0.01)
-        assert measures["yaw"] == pytest.approx(
-            0.3 * LOAD * abs(measures["pressure_centre_lateral"].value), rel=1e-9
-        )
-    assert roll.roll_for(3.8e-3, "bare") == pytest.approx(2.7e-5, rel=0.02)
-
-
 # ---- the rough skin
-
-
-def test_exact_stiffness_of_equal_ridges_and_peaks(asperities):
-    """Stiffnesses of equal ridges and equal peaks agree with Westergaard's and Hertz's solutions."""
-    flat = np.zeros(16)
-    modulus = exact.combined_modulus(*asperities.CARBIDE)
-    closed = exact.westergaard_stiffness(
-        asperities.MEAN, asperities.WAVE, asperities.HEIGHT, modulus
-    )
-    stiffness = asperities.one_each(flat)[0]
-    assert stiffness == pytest.approx(closed, rel=1e-12) and stiffness == pytest.approx(
-        4.48e14, rel=2e-3
-    )
-    assert asperities.one_each(flat, coat=(600e9, 0.22))[0] == pytest.approx(9.9e14, rel=2e-3)
-    force = asperities.MEAN * asperities.WAVE**2
-    slope = 2 / 3 * (9 / (16 * asperities.RADIUS * modulus**2 * force)) ** (1 / 3)
-    lattice = asperities.LATTICE / (np.pi * modulus * asperities.WAVE)
-    stiffness = asperities.one_each(flat, True)[0]
-    assert stiffness == pytest.approx(1 / (slope + lattice) / asperities.WAVE**2, rel=1e-3)
-    assert stiffness == pytest.approx(2.74e13, rel=2e-3)
-
-
-@pytest.mark.parametrize("scatter", [1e-6, 5e-6])
-def test_exact_one_force_per_ridge_agrees_with_resolved_ridges(asperities, scatter):
-    """One force per ridge gives the stiffness of the resolved ridges within 1 %."""
-    depth = asperities.depths(32, scatter, "uniform")
-    assert asperities.one_each(depth)[0] == pytest.approx(
-        asperities.explicit(depth, 2**15), rel=0.01
-    )
 
 
 def test_always_height_scatter_for_a_stiffness_of_1e13(rough, asperities):
@@ -244,15 +139,6 @@ def test_always_height_scatter_for_a_stiffness_of_1e13(rough, asperities):
     assert row["separate"] == pytest.approx(7.2e12, rel=2e-3)
     assert row["peaks"] == pytest.approx(row["separate"], rel=0.02)
     assert row["touching"] == pytest.approx(0.18, abs=0.01)
-
-
-def test_always_opening_tilts_of_pieces_and_layer_add(rough):
-    """The tilt at which contact opens is the sum of those of the pieces and of the surface layer."""
-    pieces_alone = rough.opening(None, 1)
-    assert pieces_alone == pytest.approx(9.28e-6, rel=3e-3)
-    for k in (1e15, 1e13, 5e11):
-        rigid = exact.wedge_opening_tilt(LOAD, LENGTH, LENGTH, k)
-        assert pieces_alone < rough.opening(k, 1) == pytest.approx(pieces_alone + rigid, rel=0.01)
 
 
 # ---- in motion

@@ -11,8 +11,6 @@ from jupyter_client import KernelManager
 from nbclient import NotebookClient
 
 import patchfem as pf
-from patchfem.friction import protocol_kernels
-from patchfem.friction.laws import bouc_wen_kernels
 
 ROOT = Path(__file__).parents[2]
 PICTURES = {
@@ -103,26 +101,6 @@ def test_always_every_notebook_is_tested_and_linked():
     assert {path.stem for path in tasks if "code-cell" in path.read_text("utf-8")} == set(TASKS)
 
 
-def test_always_notebook_law_exports_the_protocol_functions():
-    """The compiled law of the notebook defines or imports all functions of the kernel protocol."""
-    text = next(
-        cell for cell in cell_sources("own_law", "code") if "dahl_kernels.py" in cell
-    ).split("'''")[1]
-    tree = ast.parse(text)
-    imported = {
-        alias.name
-        for node in tree.body
-        if isinstance(node, ast.ImportFrom) and node.module == "protocol_kernels"
-        for alias in node.names
-    }
-    defined = {node.name for node in tree.body if isinstance(node, ast.FunctionDef)}
-    page = (ROOT / "patchfem/ADDING.md").read_text("utf-8")
-    table = set(re.findall(r"^\| `(\w+)\(", page, re.M))
-    assert len(table) == 7 and table <= imported | defined
-    assert all(hasattr(protocol_kernels, name) for name in imported)
-    assert all(hasattr(bouc_wen_kernels, name) for name in table)
-
-
 @pytest.mark.parametrize("name", NAMES)
 def test_always_notebook_is_valid_and_without_output(name):
     """A notebook has a valid format and no stored output."""
@@ -132,16 +110,6 @@ def test_always_notebook_is_valid_and_without_output(name):
         for cell in NOTEBOOKS[name].cells
         if cell.cell_type == "code"
     )
-
-
-@pytest.mark.parametrize("name", NAMES)
-def test_always_notebook_takes_under_five_minutes_to_read(name):
-    """Reading takes less than five minutes at 200 words or 40 lines of code per minute."""
-    words = sum(len(text.split()) for text in cell_sources(name, "markdown"))
-    lines = sum(
-        bool(line.strip()) for text in cell_sources(name, "code") for line in text.splitlines()
-    )
-    assert words / 200 + lines / 40 < 5
 
 
 @pytest.mark.parametrize("name", NAMES)

@@ -1,10 +1,7 @@
 """The studies of the report's figures: their stated figures, computed again."""
 
-import json
-
 import numpy as np
 import pytest
-from command_line import run_cli
 from scipy.integrate import solve_ivp
 from study_module import assert_contains, load_study
 from vibration_forms import bounded_input, decay_rest, sliding_amplitude
@@ -184,36 +181,6 @@ def test_figure_15_time_of_rest_agrees_with_closed_form():
         f"{100 * failed:.0f} % of them do not converge",
     )
     assert figure.VERDICT.startswith("in part: ")
-
-
-@pytest.mark.slow
-def test_figures_30_and_31_few_sets_of_traces(tmp_path):
-    """Four sets of traces have the stated amplitude ratios, and `patchfem compare` gives the same."""
-    figure = load_study("report/figures_30_31.py")
-    ((sets, row),) = figure.main((2,), 4, None).values()
-    assert_contains(figure.ANSWER, f"{row.after[0]:.2f} along x and {row.after[1]:.2f} along y")
-    assert figure.count_held(sets, row) >= 7 and not any(
-        part.verdict.code == "worn" for set_of_traces in sets for part in set_of_traces.parts
-    )
-    printed = np.divide(*figure.PRINTED_HEIGHTS[::-1])
-    assert_contains(
-        " ".join(figure.__doc__.split()),
-        f"is {printed[0]:.2f} and {printed[1]:.2f}, if each figure",
-    )
-    for direction in (0, 1):
-        before, after = figure.totals(sets, direction)
-        # Pt is the total height about the least-squares line
-        new = [set_of_traces.traces[direction][0] for set_of_traces in sets]
-        total = [
-            np.ptp(trace.z - np.polyval(np.polyfit(trace.x, trace.z, 1), trace.x)) for trace in new
-        ]
-        assert (after < before).all() and before == pytest.approx(total)
-    files = [str(path) for path in figure.write(figure.middle(sets), tmp_path)]
-    for pair, part in zip((files[:2], files[2:]), figure.middle(sets).parts):
-        found = json.loads(run_cli("compare", *pair, "-o", tmp_path / "out", "--json").out)
-        assert found["amplitude_ratio"]["value"] == pytest.approx(
-            part.values["amplitude_ratio"].value, rel=1e-5
-        )
 
 
 @pytest.mark.slow

@@ -2,7 +2,7 @@
 
 import json
 
-from study_module import ROOT, load_study, make_study_fixture
+from study_module import ROOT, make_study_fixture
 
 page = make_study_fixture("report/table.py")
 
@@ -26,14 +26,3 @@ def test_always_figure_studies_have_a_verdict(page):
     for path in figures:
         verdict = studies[f"report/{path.name}"].reproduced
         assert verdict == "yes" or verdict.startswith(("in part: ", "no: ")), path.name
-
-
-def test_exact_study_texts_are_read_without_import(page):
-    """Question, answer and verdict are read from the source and equal those of the imported module."""
-    module = load_study("report/figures_28_29.py")
-    study = next(study for study in page.studies() if study.path == "report/figures_28_29.py")
-    assert study[1:] == (
-        " ".join(module.__doc__.split("\n\n")[0].split()),
-        module.ANSWER,
-        module.VERDICT,
-    )

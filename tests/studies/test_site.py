@@ -56,12 +56,6 @@ def test_always_page_of_an_effect_shows_its_records(scene_folder):
     )
 
 
-def test_always_every_effect_has_a_description():
-    """The description of every effect is a sentence."""
-    descriptions = [made.about(name) for name in made.SHOWN_EFFECTS]
-    assert all(len(text) > 20 and text.endswith(".") for text in descriptions)
-
-
 def test_always_glossary_lists_measures_and_terms_once():
     """The glossary lists every measure and every term once."""
     headings = re.findall(r"^(\S[^\n]*)\n  \S", made.glossary(), re.M)
@@ -71,12 +65,6 @@ def test_always_glossary_lists_measures_and_terms_once():
         headings
     )
     assert terms["slide"] != terms["slip"] and "Irreversible part" in terms["slip"]
-
-
-def test_always_every_package_folder_is_described():
-    """The page on the code describes the folders in the order of the package's docstring."""
-    order = re.findall(r"^\d+\. `(\w+)`", pf.__doc__, re.M)
-    assert re.findall(r"^## (\w+)$", made.code(), re.M) == order and len(order) > 20
 
 
 def find_source_pages() -> list:
@@ -161,22 +149,6 @@ def test_always_commands_of_the_paraview_page_run(tmp_path, monkeypatch):
     for command in commands:
         program, *words = shlex.split(command)
         assert program == "patchfem" and run_cli(*words).code == 0, command
-
-
-def test_always_site_check_finds_broken_links_and_commands(tmp_path):
-    """The check finds broken links, pictures without alternative text and commands that fail."""
-    (tmp_path / "a.html").write_text(
-        '<h1 id="top"></h1><a href="#top"><a href="b.html#no"><a href="c.html">'
-    )
-    (tmp_path / "b.html").write_text("<p>")
-    assert check.links(tmp_path) == (3, ["a.html: b.html#no", "a.html: c.html"])
-    (tmp_path / "c.html").write_text(
-        '<img src="a.svg" alt="a loop"><img src="b.svg" alt="b.svg"><img src="d.svg">'
-    )
-    assert check.mute(tmp_path) == ["c.html: b.svg", "c.html: d.svg"]
-    page = tmp_path / "page.md"
-    page.write_text("```bash\ntrue\nfalse\n```\n")
-    assert check.faults(page) == ["page.md: false: "]
 
 
 @pytest.mark.slow

@@ -1,8 +1,7 @@
 """The studies of steady motions: their inexpensive cases; complete studies are marked slow."""
 
-import numpy as np
 import pytest
-from study_module import load_study, make_study_fixture
+from study_module import make_study_fixture
 
 march = make_study_fixture("steady/against_march.py")
 
@@ -67,18 +66,6 @@ fold = make_study_fixture("steady/fold.py")
 
 
 @pytest.mark.slow
-def test_exact_swept_motion_jumps_beyond_the_fold(fold):
-    """A sweep upwards jumps 0.1 to 0.5 Hz beyond the fold of the steady curve."""
-    steady = fold.curve(145.5, 148.2)
-    assert steady.folds == pytest.approx((147.6777, 146.4509), abs=1e-3)
-    up = fold.sweep(steady, True, 0.4, 200, 145.5, 148.4)
-    assert steady.folds[0] + 0.1 < up.jump < steady.folds[0] + 0.5 and up.miss < 0.02
-    assert not steady.stable.all() and steady.multiplier.max() > 1.02
-    # the sweep ends before the fold
-    assert np.isnan(fold.sweep(steady, False, 0.8, 100, 147.5, 148.8).jump)
-
-
-@pytest.mark.slow
 def test_exact_jumps_of_both_sweeps_approach_the_folds(fold, tmp_path):
     """The jumps in both directions lie beyond the folds and approach them with a slower sweep."""
     steady, sweeps = fold.main((0.4, 0.1), path=tmp_path / "x.svg")
@@ -105,27 +92,3 @@ def test_exact_jumps_of_both_sweeps_approach_the_folds(fold, tmp_path):
 
 
 backbone = make_study_fixture("steady/backbone.py")
-
-
-@pytest.mark.slow
-def test_exact_backbone_of_one_harmonic_agrees_with_bench_loop(backbone, tmp_path):
-    """The backbone from one harmonic agrees with the bench loop; many harmonics differ at large amplitude."""
-    rows = [backbone.case(name, (0.5, 2.0, 20.0), 400) for name in ("elastic-plastic", "bonds")]
-    elastic_plastic, bonds = rows
-    # limits of errors at 400 steps per cycle of the bench
-    assert max(elastic_plastic.miss("single")) < 3e-4 and max(bonds.miss("single")) < 2e-3
-    # frequency of the stuck contact, sqrt((k + mu N/eps)/m)
-    assert elastic_plastic.bench[0][0] == pytest.approx(1007.29, rel=5e-5)
-    stuck_frequency = np.sqrt(
-        143.0**2 + 0.3 * 26 * 4.4482216152605 / 1e-6 / 0.884 / (2 * np.pi) ** 2
-    )
-    assert elastic_plastic.single[0][0] == pytest.approx(stuck_frequency, rel=1e-9)
-    # damping ratio without slip
-    assert elastic_plastic.bench[1][0] == pytest.approx(0.003 * 143 / stuck_frequency, rel=4e-5)
-    assert (
-        abs(elastic_plastic.many[0][1] / elastic_plastic.bench[0][1] - 1)
-        < 0.02
-        < abs(elastic_plastic.many[0][2] / elastic_plastic.bench[0][2] - 1)
-    )
-    text = load_study("steady/steady_pictures.py").backbone(rows, tmp_path / "x.svg").read_text()
-    assert "damping ratio" in text and "bonds" in text

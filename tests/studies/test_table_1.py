@@ -3,7 +3,6 @@
 import pytest
 from study_module import load_study
 
-PATCH = {"fitted": (0.063, 0.060, 0.062), "held_out": (0.155, 0.280, 0.184)}
 POINT = {"fitted": (0.065, 0.058, 0.063), "held_out": (0.156, 0.284, 0.186)}
 
 
@@ -14,11 +13,6 @@ def check_scores(scores, expected, within=0.0011):
         assert (score["acceleration"], score["displacement"], score["all"]) == pytest.approx(
             values, abs=within
         )
-
-
-def test_table_1_scores_of_the_second_path_without_a_fit():
-    """The scene of the second path scores 0.062 at 143 Hz and 0.184 at the other frequencies."""
-    check_scores(load_study("table_1/second_path.py").as_it_stands(), PATCH)
 
 
 def test_table_1_point_contact_scores_like_the_patch():
@@ -56,18 +50,6 @@ def test_table_1_scores_of_the_rigid_coulomb_block():
     assert scores["coulomb"]["all"] == pytest.approx(2.26, abs=0.01)
     assert scores["null"] == pytest.approx(0.116, abs=0.001)
     assert scores["coulomb"]["cells"][0, 6] == pytest.approx(5.42 * 9.80665, abs=0.1)  # 143 Hz, 5 g
-
-
-@pytest.mark.parametrize(
-    "frequency, measured", [(143.0, 0.08), pytest.param(135.0, 0.25, marks=pytest.mark.slow)]
-)
-def test_table_1_patch_moves_at_four_g(frequency, measured):
-    """Partial slip and yaw give the measured amplitude at 4 g within 15 %; a Coulomb block would stick."""
-    cell = load_study("table_1/unfitted.py").answer("patch", frequency, 4 * 9.80665, 400)[
-        "relative_displacement_amplitude"
-    ]
-    assert cell.value == pytest.approx(measured * 25.4e-6, rel=0.15)
-    assert cell.error < 0.05 * cell.value
 
 
 @pytest.mark.slow

@@ -6,9 +6,6 @@ from study_module import ROOT, load_study, make_study_fixture
 
 from patchfem.campaigns.rows.cells import read_response_table
 
-ROOT2 = "fundamental x sqrt2"
-
-
 fitting = make_study_fixture("table_1/fitting.py")
 
 
@@ -43,77 +40,6 @@ def test_exact_gain_comes_from_training_readings_only(fitting):
     assert fitting.computed_for("second path", fitting.STUCK_READING, cells, seen).gains[
         0
     ] == pytest.approx(1.25, rel=1e-12)
-
-
-def test_exact_rods_are_equivalent_to_two_masses(fitting):
-    """Without friction at 150 Hz, the modes of `rods` give the motion of two masses within 1e-9."""
-    derived = load_study("table_1/derived.py")
-    share = 0.3
-    mass = 0.05
-    omega = 2 * np.pi * 150
-    numbers = dict(one.split("=") for one in derived.rods(share, mass))
-    of = {
-        name: [
-            float(numbers[f"structure.mode.{mode}.{name}"].split()[0]) for mode in ("axial", "rods")
-        ]
-        for name in ("frequency", "slide", "base", "accelerometer", "gauge")
-    }
-    turn = (2 * np.pi * np.array(of["frequency"])) ** 2
-    modal = -np.array(of["base"]) / (turn - omega**2)
-    block = np.array(of["slide"]) @ modal
-    gauge = np.array(of["gauge"]) @ modal
-    assert of["frequency"][0] == 143 and of["accelerometer"] == of["slide"]
-    stiff = np.array([[1 / share, -1 / share], [-1 / share, 1 / share + 1 / (1 - share)]])
-    scale = turn[0] / np.linalg.eigvals(np.diag([1, 1 / mass]) @ stiff).min()
-    x = np.linalg.solve(scale * stiff - omega**2 * np.diag([1, mass]), [-1, -mass])
-    assert (block, gauge * (1 - share)) == pytest.approx(tuple(x), rel=1e-9)
-    assert float(numbers["structure.moving_mass"].split()[0]) == pytest.approx(1.05 * 1.19396625)
-
-
-def test_exact_wear_factor_one_gives_the_unworn_model(fitting):
-    """With a wear factor of 1 the rows are those of "spring and yaw".
-
-    A factor of 2 doubles the friction per um of depth.
-    """
-    cells = read_response_table(fitting.TABLE)
-    rows = fitting.cells_for("spring and yaw, worn")
-    training = fitting.training(cells, "143")
-    values = [0.45, 5e6, 0.09]
-    conditions = [0, 1]
-    worn = fitting.computed_for("spring and yaw, worn", ROOT2, rows, fitting.training(rows, "143"))
-    plain = fitting.computed_for("spring and yaw", ROOT2, cells, training)
-    assert np.array(worn([*values, 1.0], conditions))[:, conditions] == pytest.approx(
-        np.array(plain(values, conditions))[:, conditions], rel=1e-9
-    )
-    amplitude = worn([*values, 2.0], conditions)[1][0]
-    distance = 4 * (amplitude - 0.243e-6) * 135 * 600
-    depth = 1e-14 * 26 * 4.4482216152605 / 0.0127**2 * distance
-    thicker = plain([values[0] * (1 + depth / 1e-6), *values[1:]], [1])
-    assert worn([*values, 2.0], conditions)[0][1] == pytest.approx(thicker[0][1], rel=1e-9)
-    assert depth > 1e-8
-    assert np.array_equal(rows.row, rows.condition) and len(rows.conditions) == 28
-
-
-@pytest.mark.slow
-def test_always_fit_record_is_complete_with_consistent_scores(fitting):
-    """A fit at 143 Hz gives a complete record, whose scores follow from its logarithms.
-
-    It starts at one random point and at its optimum with each of two parameters set to zero.
-    """
-    record = fitting.fit_rung("second path", "peak", "143", starts=1)
-    assert record["keys"][0] == "friction.static"
-    assert len(record["values"]) == 4
-    assert len(record["cells"][0]) == 20
-    assert record["valleys"]["starts"] == len(record["starts"]) == 3 and record["gain"] is None
-    assert record["valleys"]["best"] == sum(
-        score < 1.001 * min(record["starts"]) for score in record["starts"]
-    )
-    logs = np.array(record["logs"])
-    training = fitting.training(read_response_table(fitting.TABLE), "143")
-    assert record["fitted"]["all"] == pytest.approx(np.sqrt(np.mean(logs[training] ** 2)), rel=1e-3)
-    assert record["others"]["all"] == pytest.approx(
-        np.sqrt(np.mean(logs[~training] ** 2)), rel=1e-3
-    )
 
 
 @pytest.fixture(scope="module")
@@ -213,21 +139,3 @@ def test_table_1_onset_and_slip_phase_of_the_path_of_figure_27(records):
     assert (found["onset"], found["runaway"]) == (4.2, None) and found[
         "slip_phase"
     ] == pytest.approx(49, abs=1)
-
-
-@pytest.mark.slow
-def test_table_1_grooves_run_away_first_at_155_hz(records):
-    """The model with grooves runs away at 8.75 g at 135 Hz and at 8.25 g at 155 Hz.
-
-    The rig was unstable at 135 Hz from 6 g.
-    """
-    levels = load_study("table_1/levels.py")
-    fit = ("grooves, lift and yaw", "fundamental x gain")
-    question = levels.RUNGS[fit[0]].question(fit[1])
-    values = records[*fit, "143", ""]["values"]
-    assert [levels.runaway(question, values, f) for f in (135.0, 143.0, 150.0, 155.0)] == [
-        8.75,
-        8.75,
-        8.5,
-        8.25,
-    ]

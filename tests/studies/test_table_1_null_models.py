@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from study_module import make_study_fixture
 
-from patchfem.campaigns.rows.cells import compute_rms_scores, read_response_table
+from patchfem.campaigns.rows.cells import read_response_table
 
 models = make_study_fixture("table_1/null_models.py")
 fitting = make_study_fixture("table_1/fitting.py")
@@ -28,40 +28,3 @@ def test_exact_table_1_null_models_agree_with_closed_forms(models, fitting):
     assert numbers["acceleration"] == pytest.approx(
         {"factor": np.exp(factor[0]), "input": factor[1], "frequency": factor[2]}, rel=1e-6
     )
-
-
-def test_exact_table_1_null_scores_with_frequency_left_out(models, fitting):
-    """The scores of null models of table 1 with one frequency left out agree with an independent program:
-
-    0.125 and 0.090.
-    """
-    cells = read_response_table(fitting.TABLE)
-    every = np.ones(cells.row.size, bool)
-    found = {}
-    for name in models.NULL_MODELS:
-        left = np.full(cells.row.size, np.nan)
-        for part in cells.group_by_column("frequency", every).values():
-            left[part] = models.fit_null_model(cells, name, ~part)[0][part]
-        found[name] = compute_rms_scores(cells, left, every)
-    assert found["constant"] == pytest.approx(
-        {"acceleration": 0.125, "displacement": 0.580, "all": 0.298}, abs=6e-4
-    )
-    assert found["power_input_frequency"]["acceleration"] == pytest.approx(0.090, abs=6e-4)
-
-
-def test_exact_null_model_keeps_undetermined_powers(models, tmp_path):
-    """A null model keeps a power of 0 for a single frequency, and of 1 for a single input."""
-    path = tmp_path / "rows.csv"
-    header = "frequency [Hz],input [g],acceleration [g],displacement [mil],flag"
-    path.write_text("\n".join([header, "143,4,5,,", "143,5,7,,", "150,4,9,,"]), "utf-8")
-    cells = read_response_table(path)
-    one = models.fit_null_model(cells, "power_input_frequency", np.array([True, True, False]))[1][
-        "acceleration"
-    ]
-    assert one["frequency"] == pytest.approx(0.0, abs=1e-12)
-    assert one["input"] == pytest.approx(np.log(7 / 5) / np.log(5 / 4), rel=1e-12)
-    two = models.fit_null_model(cells, "power_input_frequency", np.array([True, False, True]))[1][
-        "acceleration"
-    ]
-    assert two["input"] == pytest.approx(1.0, abs=1e-12)
-    assert two["frequency"] == pytest.approx(np.log(9 / 5) / np.log(150 / 143), rel=1e-12)

@@ -7,15 +7,6 @@ from study_module import make_study_fixture
 repeats = make_study_fixture("report/repeats.py")
 
 
-def test_exact_readings_are_in_the_order_of_columns(repeats):
-    """The readings are in the order of the columns of Table 1, six series in all."""
-    found = repeats.columns()
-    assert [column for column, _ in found] == [0] * 4 + [1] * 5 + [2] * 5 + [3] * 5 + [4] * 4 + [
-        5
-    ] * 5
-    assert len(repeats.ONSETS) == 6 and found[8][1].acceleration is None
-
-
 def test_always_wear_accumulates_and_changes_a_repeat_little(repeats, tmp_path):
     """Wear continues from run to run.
 

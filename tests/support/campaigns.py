@@ -28,7 +28,6 @@ import numpy as np
 KINDS = {  # Name on the command line -> module and function.
     "rigs": ("random_rigs", "compare_rig"),
     "harmonic": ("random_rigs", "compare_harmonic_rig"),
-    "reduced": ("reduced_chains", "compare_chain"),
     "point-benches": ("point_benches", "compare_bench"),
     "partial-slip": ("micro_slip", "compare_bench"),
     "shear-joints": ("shear_scenes", "compare_joint"),
@@ -39,8 +38,10 @@ KINDS = {  # Name on the command line -> module and function.
     "traces": ("random_traces", "compare_trace"),
     "wear": ("wear_scenes", "compare_bench"),
     "predicted-wear": ("predicted_pairs", "compare_pair"),
+    "hybrid-rigs": ("hybrid_campaign", "compare_rig"),
     "stick-together": ("sticks_together", "compare_rig"),
     "decay-fits": ("decay_fits", "compare_fit"),
+    "trace-pairs": ("surface_pairs", "compare_traces"),
     "scan-pairs": ("surface_pairs", "compare_scans"),
     "backbone-bands": ("backbone_band", "compare_band"),
     "backbone-forces": ("backbone_forces", "compare_force"),

@@ -3,7 +3,6 @@
 One browser process serves many pages.
 """
 
-import base64
 import fcntl
 import json
 import os
@@ -131,30 +130,6 @@ class Chromium:
         self.call_and_wait("Page.loadEventFired", "Page.navigate", url=path.as_uri())
         return self
 
-    def open_html(
-        self, text: str, width: int = 1200, height: int = 900, dark: bool = False
-    ) -> "Chromium":
-        """Load a page given as HTML and wait until its charts are drawn."""
-        self._open_new_tab()
-        self.set_size(width, height)
-        self.set_theme(dark)
-        self._load_html(text)
-        self.wait_for_charts()
-        return self
-
-    def html_after(self, text: str, milliseconds: float) -> str:
-        """Return the HTML of a page after some milliseconds of virtual time."""
-        self._open_new_tab()
-        self.set_size(1200, 900)
-        self._load_html(text)
-        self.call_and_wait(
-            "Emulation.virtualTimeBudgetExpired",
-            "Emulation.setVirtualTimePolicy",
-            policy="pauseIfNetworkFetchesPending",
-            budget=milliseconds,
-        )
-        return self.evaluate("document.documentElement.outerHTML")
-
     def _open_new_tab(self) -> None:
         """Replace the page by a new one, because the virtual clock of the old page may have stopped."""
         old = self.target
@@ -162,13 +137,6 @@ class Chromium:
         self.target = self.call("Target.createTarget", url="about:blank")["targetId"]
         self.call("Target.closeTarget", targetId=old)
         self._attach()
-
-    def _load_html(self, text: str) -> None:
-        """Write HTML to a file and load it."""
-        path = self.home / f"page{self.number}.html"
-        path.write_text(text, "utf-8")
-        self.faults = []
-        self.call_and_wait("Page.loadEventFired", "Page.navigate", url=path.as_uri())
 
     def wait_for_charts(self) -> None:
         """Wait until every chart of the page is drawn."""
@@ -206,14 +174,6 @@ class Chromium:
             mobile=False,
         )
 
-    def set_theme(self, dark: bool, media: str = "") -> None:
-        """Set the preferred color scheme and the media type."""
-        self.call(
-            "Emulation.setEmulatedMedia",
-            media=media,
-            features=[{"name": "prefers-color-scheme", "value": "dark" if dark else "light"}],
-        )
-
     def evaluate(self, text: str):
         """Return the value of a JavaScript expression in the page; a promise is awaited."""
         reply = self.call(
@@ -221,46 +181,6 @@ class Chromium:
         )
         assert "exceptionDetails" not in reply, reply["exceptionDetails"]
         return reply["result"].get("value")
-
-    def send_pointer(self, x: float, y: float, kind: str = "mouseMoved", **more) -> None:
-        """Move or press the pointer at a position in the window."""
-        self.call("Input.dispatchMouseEvent", type=kind, x=x, y=y, **more)
-
-    def press_key(self, key: str) -> None:
-        """Press a key on the focused element."""
-        code = {
-            "ArrowRight": 39,
-            "ArrowLeft": 37,
-            "ArrowUp": 38,
-            " ": 32,
-            "Home": 36,
-            "End": 35,
-            "+": 187,
-            "0": 48,
-        }[key]
-        for kind in ("keyDown", "keyUp"):
-            text = {"text": key} if key == " " and kind == "keyDown" else {}
-            self.call(
-                "Input.dispatchKeyEvent",
-                type=kind,
-                key=key,
-                code=key.strip() or "Space",
-                windowsVirtualKeyCode=code,
-                **text,
-            )
-
-    def take_screenshot(self, path: Path | None = None, full_page: bool = False) -> bytes:
-        """Return the window as a PNG image, or the full page if `full_page` is set."""
-        image = base64.b64decode(
-            self.call("Page.captureScreenshot", captureBeyondViewport=full_page)["data"]
-        )
-        if path is not None:
-            Path(path).write_bytes(image)
-        return image
-
-    def print_pdf(self) -> bytes:
-        """Return the page as a PDF."""
-        return base64.b64decode(self.call("Page.printToPDF", printBackground=True)["data"])
 
     def close(self) -> None:
         """End the browser."""

@@ -21,26 +21,6 @@ class DrivePiece(NamedTuple):
     constant: float = 0.0
 
 
-def split_drive(drive, count: int) -> list:
-    """Return the first smooth pieces of a drive without segments, each with its own formula."""
-    starts = [0.0, *map(float, drive.breaks)][:count]
-
-    def make_value(number):
-        """Return the drive in a piece as a function of time."""
-        # The sampled drive is linear between samples and is extended beyond them.
-        if hasattr(drive, "time"):
-            t, v = (part[number : number + 2] for part in (drive.time, drive.value))
-            return lambda x: (
-                v[0] + (v[1] - v[0]) / (t[1] - t[0]) * (x - t[0]) if len(t) == 2 else 0.0
-            )
-        return lambda x: float(drive.values(x))
-
-    return [
-        DrivePiece(start, make_value(k), drive.max_acceleration, drive.rate)
-        for k, start in enumerate(starts)
-    ]
-
-
 def choose_directions(
     interfaces, mass, pull, active, signs, static, kinetic, tol, most_sliding=False
 ):

@@ -27,20 +27,3 @@ def make_modal_basis(
         damping,
         faces,
     )
-
-
-def make_random_modal_basis(rng, n, faces, coupled=True, rigid=False):
-    """Return a random basis of n modes, with coupled damping or a rigid-body mode on request."""
-    omega = rng.uniform(0.3, 3, n)
-    root = rng.normal(size=(n, n)) * 0.15
-    if rigid:
-        omega[0] = 0.0
-    return make_modal_basis(
-        omega,
-        0.01,
-        rng.normal(size=(faces, n)),
-        rng.normal(size=n),
-        rng.normal(size=n),
-        1.3,
-        root @ root.T + 0.02 * np.eye(n) if coupled else None,
-    )

@@ -195,24 +195,6 @@ class StretchLaw(Law):
         return super().apply_event(k, s, v, accel)
 
 
-class MaturingLaw(StretchLaw):
-    """Bonds of which only a fraction m has formed: z' = m v - |v| z/eps, m' = |v| (1 - m)/eps."""
-
-    def __init__(self, limit, **keys):
-        super().__init__(limit, **keys)
-        self.size = 2
-
-    def start(self):
-        """Return the initial state."""
-        return np.array([0.0, self.keys["initial"]])
-
-    def rate(self, s, v, t):
-        """Return the rates of the stretch and of the fraction."""
-        length = self.keys["bond_length"]
-        speed = self.mode * v
-        return np.array([s[1] * v - speed * s[0] / length, speed * (1 - s[1]) / length])
-
-
 class BoucWenLaw(Law):
     """z' = v/eps (1 - |z|^n (s sgn(v z) + 1 - s)), F = mu N z."""
 

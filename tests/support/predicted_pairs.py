@@ -3,7 +3,7 @@
 This is the campaign "predicted-wear" of `campaigns.py`.
 
 The measured wear is that of `wear_scenes.integrate_depth`, which uses nothing of the package, with the
-true coefficient. It is subtracted from a rough surface of `known_pairs`, and a stylus measures the
+true coefficient. It is subtracted from a rough surface of `surface_pairs`, and a stylus measures the
 surface before and after: each trace has its own start, tilt, offset and noise; the zero of its x
 differs from that of the patch, and in half of the pairs its direction is reversed. The wear varies
 locally about Archard's law (a stationary process along the trace with mean 1), and a quarter of the
@@ -24,10 +24,10 @@ from typing import NamedTuple
 import numpy as np
 import wear_scenes
 from campaigns import Row
-from known_pairs import draw_surface
 from scipy.ndimage import gaussian_filter1d
 from static_reference import BodySection, PatchScene
 from static_scenes import MATERIALS, format_scene
+from surface_pairs import draw_surface
 from wear_scenes import WearScene
 
 import patchfem as pf

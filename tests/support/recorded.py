@@ -12,7 +12,6 @@ names made from hashes.
 
 import csv
 import io
-import itertools
 import json
 import os
 import re
@@ -20,6 +19,7 @@ import shlex
 import sys
 import tempfile
 import tomllib
+from collections import Counter
 from html.parser import HTMLParser
 from pathlib import Path
 
@@ -32,8 +32,9 @@ sys.path[:0] = [str(HERE), str(TESTS)] if __name__ == "__main__" else []
 
 import same_answers  # noqa: E402
 import scene_texts  # noqa: E402
-from known_pairs import KINDS, draw_pair  # noqa: E402
-from traces import format_trace  # noqa: E402
+from surface_pairs import KINDS, draw_pair, write_traces  # noqa: E402
+
+from patchfem.scene import UNIT_FACTORS  # noqa: E402
 
 GROUPS = tomllib.loads((RECORDED / "commands.toml").read_text("utf-8"))
 SCENES = GROUPS.pop("scenes")
@@ -49,6 +50,13 @@ MIN_CHECK = 1e-7
 # Difference that passes of the shares of a variance, which are sums of terms of order 1.
 MIN_SHARE = 1e-9
 NUMBER = re.compile(r"(?<![\w.])[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
+# A text of so many words is prose, of which only numbers with their units, keys and quoted words are compared.
+MIN_WORDS = 4
+WORD = re.compile(r"[A-Za-z]{2,}")
+QUANTITY = re.compile(rf"({NUMBER.pattern})" + r"(?: ?([^\s,;:)]+))?")
+# Keys of scenes and names of measures have a dot or an underscore; names of laws and files are quoted.
+KEY = re.compile(r"[A-Za-z]\w*(?:\.[A-Za-z]\w*)+|[A-Za-z]+(?:_\w+)+|\"[^\"\n]*\"|'[^'\n]*'")
+UNITS = {unit for units in UNIT_FACTORS.values() for unit in units} | {"%"} - {"in"}
 UNSTABLE_KEYS = re.compile(
     r"seconds|versions|\bpatchfem$|version|sha256|\bdate\b|\bcreated\b|\.motions$"
 )
@@ -117,10 +125,7 @@ def write_measurements(folder: Path) -> None:
 def write_surfaces(folder: Path) -> None:
     """Write a pair of traces of each kind, a table of two pairs, and a pair of scans."""
     for kind in KINDS:
-        pair = draw_pair(kind, 41003)
-        for name, (x, z) in {"before": pair.before, "after": pair.after}.items():
-            path = folder / f"{kind}_{name}.csv"
-            path.write_text(format_trace(1e6 * x, 1e6 * z, digits=9), "utf-8")
+        write_traces(draw_pair(kind, 41003), folder, f"{kind}_before", f"{kind}_after")
     (folder / "pairs.csv").write_text(
         "before,after\ngroove_before.csv,groove_after.csv\ngroove_after.csv,groove_before.csv\n",
         "utf-8",
@@ -293,11 +298,10 @@ def find_differences(recorded: dict, found: dict) -> list:
 
 
 def find_first_difference(old: object, new: object) -> tuple:
-    """Return two values, or the first lines of two texts that differ."""
+    """Return two values, or the facts of each text that the other one does not have."""
     if is_text(old) and is_text(new):
-        for a, b in itertools.zip_longest(old, new, fillvalue=""):
-            if not have_equal_words(a, b):
-                return a, b
+        facts = [Counter(read_facts("\n".join(text))) for text in (old, new)]
+        return tuple(list(one - other)[:9] for one, other in (facts, facts[::-1]))
     return old, new
 
 
@@ -310,10 +314,11 @@ def is_equal(key: str, recorded: dict, found: dict) -> bool:
     """Return whether two values agree within the tolerances of this module."""
     old = recorded[key]
     new = found[key]
-    if isinstance(old, str) and isinstance(new, str):
-        return have_equal_words(old, new)
     if is_text(old) and is_text(new):
-        return len(old) == len(new) and all(map(have_equal_words, old, new))
+        old, new = "\n".join(old), "\n".join(new)
+    if isinstance(old, str) and isinstance(new, str):
+        is_prose = min(len(WORD.findall(text)) for text in (old, new)) >= MIN_WORDS
+        return have_equal_facts(old, new) if is_prose else have_equal_words(old, new)
     is_error = "error" in key.rpartition("/")[2]
     is_check = re.search("energy_balance|work_check", key) is not None
     relative = RELATIVE_OF_ERRORS if is_error else RELATIVE
@@ -334,18 +339,39 @@ def is_equal(key: str, recorded: dict, found: dict) -> bool:
     return abs(new - old) <= tolerance or (np.isnan(old) and np.isnan(new))
 
 
+def read_facts(text: str) -> list[tuple]:
+    """Return (unit, number as text) of the numbers of a text, and (key, "") of its keys and quoted words."""
+    facts = []
+    for number, word in QUANTITY.findall(text):
+        unit = word.rstrip(".")
+        facts.append((unit if unit in UNITS else "", number))
+    return facts + [(key, "") for key in KEY.findall(text)]
+
+
+def have_equal_facts(old: str, new: str) -> bool:
+    """Return whether two texts contain the same keys and, for each unit, the same numbers, in any order and words."""
+    facts = [
+        sorted(read_facts(text), key=lambda fact: (fact[0], float(fact[1] or 0.0)))
+        for text in (old, new)
+    ]
+    return len(facts[0]) == len(facts[1]) and all(
+        a[0] == b[0] and are_equal_numbers(a[1] or "0", b[1] or "0") for a, b in zip(*facts)
+    )
+
+
 def have_equal_words(old: str, new: str) -> bool:
-    """Return whether two texts have the same words, and numbers that differ by a unit of their last place at most."""
-    if NUMBER.split(old) != NUMBER.split(new):
-        return False
-    for a, b in zip(NUMBER.findall(old), NUMBER.findall(new)):
-        mantissa, _, exponent = a.partition("e")
-        unit = 10.0 ** (int(exponent or 0) - len(mantissa.partition(".")[2]))
-        if abs(float(a) - float(b)) > max(
-            1.01 * unit * ("." in mantissa), RELATIVE * abs(float(a))
-        ):
-            return False
-    return True
+    """Return whether two texts have the same words, and equal numbers."""
+    return NUMBER.split(old) == NUMBER.split(new) and all(
+        map(are_equal_numbers, NUMBER.findall(old), NUMBER.findall(new))
+    )
+
+
+def are_equal_numbers(old: str, new: str) -> bool:
+    """Return whether two printed numbers differ by a unit of their last place at most."""
+    mantissa, _, exponent = old.partition("e")
+    unit = 10.0 ** (int(exponent or 0) - len(mantissa.partition(".")[2]))
+    margin = max(1.01 * unit * ("." in mantissa), RELATIVE * abs(float(old)))
+    return abs(float(old) - float(new)) <= margin
 
 
 def run_recorded(name: str, folder: Path) -> dict:

@@ -108,19 +108,6 @@ def make_binary_sdf(z) -> bytes:
     return head + (z / 1e-9).astype("<f8").tobytes()
 
 
-def make_ascii_sdf(z) -> bytes:
-    """Return heights (m, n) [m] as an ASCII SDF file in micrometres."""
-    head = (
-        f"aISO-1.0\nManufacID = tests\nNumPoints = {z.shape[1]}\nNumProfiles = {z.shape[0]}\nXscale = 5e-07\n"
-        "Yscale = 7.5e-07\nZscale = 1e-06\nZresolution = -1\nCompression = 0\nDataType = 7\n"
-        "CheckType = 0\n*\n"
-    )
-    rows = "\n".join(
-        " ".join("BAD" if np.isnan(v) else repr(float(v / 1e-6)) for v in row) for row in z
-    )
-    return f"{head}{rows}\n*\n< PartName > test < /PartName >\n*".encode()
-
-
 def make_npy(array) -> bytes:
     """Return an array as an .npy file."""
     out = io.BytesIO()

@@ -36,21 +36,6 @@ def read_mitutoyo_trace(data) -> Profile:
     return read_surface(data / "mitutoyo-2.csv.gz")
 
 
-def read_dektak_trace(data) -> Profile:
-    """Return the measured trace of a Dektak instrument."""
-    return read_surface(data / "dektak-1.csv")
-
-
-def test_exact_dektak_step_is_length_over_points(data_folder):
-    """The step of a Dektak trace is 1500 um over 9600 points, although the export prints x to 0.1 um."""
-    profile = read_dektak_trace(data_folder)
-    assert np.diff(profile.x) == pytest.approx(np.full(9599, 1500e-6 / 9600), rel=1e-9)
-    assert profile.x[0] == 0 and profile.x[-1] == pytest.approx(9599 * 0.15625e-6, rel=1e-14)
-    assert profile.notes[0].endswith(
-        "x is rounded to 100 nm in the file; the step 1.5 mm/9600 = 156.2 nm of the header is used"
-    )
-
-
 @pytest.mark.parametrize("name", ["nanovea-test1.txt.gz", "nanovea-test2.txt.gz"])
 def test_exact_plane_agrees_with_three_codes(data_folder, reference_values, name):
     """The slopes of the plane of a scan agree with three other codes within 1e-6."""
@@ -108,13 +93,3 @@ def test_exact_spectrum_agrees_with_filtered_rms(data_folder, reference_values):
         "% of its rms height in waves shorter than 2 elements (200 um), which the mesh cannot resolve: add "
         '[contact.asperities], or set element_size = "20 um"'
     ) in str(describe_lost_waves(profile, 100e-6))
-
-
-def test_exact_trace_without_header_is_read_with_given_units(data_folder):
-    """An uneven trace without a header is read with given units to the last digits."""
-    profile = read_surface(data_folder / "xy-1.txt", ("um", "um"))
-    expected = np.loadtxt(data_folder / "xy-1.txt") * 1e-6
-    assert profile.x == pytest.approx(expected[:, 0], rel=1e-14) and profile.z == pytest.approx(
-        expected[:, 1], rel=1e-14
-    )
-    assert profile.notes == ()

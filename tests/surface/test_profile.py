@@ -129,20 +129,3 @@ def test_refuses_long_gap_and_empty_trace():
         PatchfemError, match=r"before\.csv: 0 usable heights; a trace needs at least two"
     ):
         clean(Profile(x, np.full(12, np.nan), "before.csv"), 1.0)
-
-
-@pytest.mark.parametrize(
-    "length, text",
-    [
-        (12.7e-3, "12.7 mm"),
-        (200e-6, "200 um"),
-        (1e-3, "1 mm"),
-        (2.5, "2.5 m"),
-        (-3e-9, "-3 nm"),
-        (0.0, "0 um"),
-        (1e-6, "1 um"),
-    ],
-)
-def test_exact_lengths_are_formatted_in_suitable_units(length, text):
-    """Lengths in messages are formatted in suitable units."""
-    assert format_length(length) == text

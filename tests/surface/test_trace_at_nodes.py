@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -12,7 +11,6 @@ from hypothesis import strategies as st
 
 from patchfem.core import PatchfemError
 from patchfem.surface import Profile, average_at_nodes, place_over_patch
-from patchfem.surface.nodes import AS_LONG
 
 HALF_LENGTH = 6.35e-3
 NODES = np.linspace(-HALF_LENGTH, HALF_LENGTH, 201)
@@ -76,27 +74,6 @@ def test_exact_covering_trace_keeps_its_coordinate():
     assert np.array_equal(place_over_patch(profile, NODES).x, profile.x)
 
 
-def test_exact_trace_of_patch_length_is_centred_with_note():
-    """A trace as long as the patch is centred, with a note of its own wording."""
-    x = np.linspace(0, 2 * HALF_LENGTH, 5000)
-    profile = place_over_patch(make_trace(x, x), NODES)
-    assert average_at_nodes(profile, NODES) == pytest.approx(NODES + HALF_LENGTH, abs=1e-14)
-    assert profile.notes == (
-        f"before.csv: {AS_LONG}, 12.7 mm, and is centred on it, which adds -6.35 mm to x",
-    )
-
-
-def test_exact_coarse_samples_give_note():
-    """A trace with samples wider apart than the elements is interpolated, with a note."""
-    profile = place_over_patch(
-        make_trace(np.linspace(-HALF_LENGTH, HALF_LENGTH, 51), np.zeros(51)), NODES
-    )
-    assert profile.notes == (
-        "before.csv: samples lie 254 um apart, but elements are only 63.5 um long; the "
-        "surface between samples is interpolated",
-    )
-
-
 def test_exact_trace_is_extended_by_half_element():
     """A trace that ends up to half an element inside the patch is extended horizontally; a shorter one is refused."""
     x = np.linspace(-HALF_LENGTH + 0.49 * H, HALF_LENGTH - 0.49 * H, 4000)
@@ -154,13 +131,3 @@ def test_refuses_missing_heights_invalid_nodes_and_placing():
         place_over_patch(make_trace(x, x), NODES, "middle")
     with pytest.raises(PatchfemError, match=r"before\.csv: 1 heights; a trace needs at least two"):
         place_over_patch(make_trace(x, np.where(x == x[50], 0, np.nan)), NODES)
-
-
-@given(node_grids(), st.floats(-1e-2, 1e-2), st.sampled_from(["auto", "centred"]))
-def test_always_placing_is_idempotent(grid, shift, placing):
-    """A trace that is placed over the patch twice does not change."""
-    nodes, x = grid
-    placed = place_over_patch(make_trace(x + shift, np.sin(x)), nodes, placing)
-    placed_twice = place_over_patch(placed, nodes)
-    assert np.array_equal(placed.x, placed_twice.x) and np.array_equal(placed.z, placed_twice.z)
-    assert replace(placed_twice, notes=()).source == placed.source

@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from synthetic import self_affine, sine, waves
+from synthetic import self_affine, waves
 
 from patchfem.closed_forms import contact as closed_forms
-from patchfem.core import PatchfemError
 from patchfem.surface import Profile, describe_lost_waves, fine_fraction, level
 from patchfem.surface.fine import wave_spectrum
 
@@ -75,17 +74,6 @@ def test_exact_lost_waves_are_reported_with_remedy():
     assert describe_lost_waves(make_cosines([20, 500], [2.0, 0.1]), 100e-6) is None
     assert describe_lost_waves(Profile(X, 0 * X, "flat.csv"), 1.0) is None
     assert describe_lost_waves(profile, 100e-6, max_lost=0.5) is None
-
-
-def test_refuses_missing_heights_and_invalid_fraction():
-    """Missing heights and a fraction outside 0 to 1 are refused; a flat trace allows any element."""
-    with pytest.raises(
-        PatchfemError, match=r"a\.csv: 1 heights are missing; clean the trace first"
-    ):
-        fine_fraction(Profile(X, np.where(X == X[7], np.nan, X), "a.csv"), 1.0)
-    with pytest.raises(PatchfemError, match="must lie between 0 and 1, but is 1"):
-        wave_spectrum(sine(X, 1.0, LENGTH)).element_length(1.0)
-    assert wave_spectrum(Profile(X, 0 * X, "a")).element_length(0.9) == np.inf
 
 
 @pytest.mark.parametrize("pressure_ratio", [0.01, 0.3, 0.9])

@@ -15,14 +15,11 @@ pytestmark = pytest.mark.skipif(not hasattr(os, "fork"), reason="a trial is a fo
 ALWAYS = {
     "grammar": 0.0005,
     "bytes": 0.001,
-    "words": 0.003,
-    "energy": 0.002,
     "profiles": 0.002,
     "tables": 0.002,
     "hostile": 0.004,
 }
 SEED = 4
-SEEDS = {"energy": 25}  # this seed draws only laws whose loops other tests compile as well
 
 
 def run_trials(names, fraction, seed):
@@ -47,7 +44,7 @@ def warm_up(tmp_path_factory):
 @pytest.mark.parametrize("name", ALWAYS)
 def test_always_sample_of_campaign_passes(name):
     """A small sample of every campaign finds no fault and has the requested number of trials."""
-    (row,) = run_trials([name], ALWAYS[name], SEEDS.get(name, SEED))
+    (row,) = run_trials([name], ALWAYS[name], SEED)
     assert row.tried == max(1, round(ALWAYS[name] * CAMPAIGNS[name].size))
 
 

@@ -3,11 +3,8 @@
 import numpy as np
 import pytest
 from command_line import run_cli
-from scipy.io import loadmat
 
-import patchfem as pf
 from patchfem.response import DecayCurve
-from patchfem.scene import read_template
 
 MODE = """\
 [structure]
@@ -113,85 +110,3 @@ def test_exact_imported_decay_agrees_with_run(decay_folders, tmp_path, name, end
         assert np.mean(ratio[inside] <= 1) >= 0.95 and ratio[inside].max() < 2
     assert np.median(frequency_error / frequency) < 5e-3
     assert np.median(damping_error / np.abs(damping)) < 0.25
-
-
-def test_always_export_states_time_of_reduced_rows(decay_folders, tmp_path):
-    """The export states up to which time the rows of a long run are only turning points."""
-    answer = run_cli("export", decay_folders("exact"), "-o", tmp_path / "whole.csv", "--histories")
-    assert "turning points" not in answer.out
-    (tmp_path / "long.toml").write_text(
-        (IWAN + RELEASED).replace("cycles = 40", "cycles = 1100"), "utf-8"
-    )
-    assert run_cli("run", tmp_path / "long.toml", "-o", tmp_path / "long", "--no-page").code == 0
-    answer = run_cli("export", tmp_path / "long", "-o", tmp_path / "long.csv", "--histories")
-    assert "before 10.9 s the rows are turning points" in answer.out
-    assert "fewer drive.cycles give even rows" in answer.out
-
-
-def test_always_decay_import_reports_sparse_samples(tmp_path):
-    """The import reports sparsely sampled parts of a record and omits amplitudes without useful information.
-
-    Earlier samples half a period apart gave a damping ratio of -0.009 ± 0.082 without a warning.
-    """
-    time = np.r_[np.arange(0, 0.0225, 2e-4), np.arange(0.0225, 0.5, 5e-3)]
-    value = 1e-3 * np.exp(-12 * time) * np.cos(2 * np.pi * 100 * time)
-
-    def import_decay(time, value):
-        """Write a record and return the answer of its import as a decay."""
-        np.savetxt(
-            tmp_path / "a.csv",
-            np.column_stack([time, value]),
-            delimiter=",",
-            comments="",
-            header="time [s],output_displacement [m]",
-        )
-        return run_cli("import", tmp_path / "a.csv", "--decay", "-o", tmp_path / "decay.csv")
-
-    answer = import_decay(time, value)
-    assert answer.code == 0
-    assert "the decay is followed up to 0.0" in answer.err
-    assert "and at least 5 are needed" in answer.err
-    columns_of_decay = read_decay_columns(tmp_path / "decay.csv")
-    assert (columns_of_decay[5] <= 2 * np.abs(columns_of_decay[4])).all()
-    early = time < 0.0095
-    answer = import_decay(
-        np.r_[time[early], time[time > 0.03]], np.r_[value[early], value[time > 0.03]]
-    )
-    assert answer.code == 2
-    assert "fewer than three half cycles of a free decay have samples enough" in answer.err
-    noise = np.random.default_rng(5).normal(size=(2, 200))
-    time = np.arange(200) / 4000
-    answer = import_decay(time, 1e-3 * np.cos(2 * np.pi * 100 * time) + 3e-5 * noise[0])
-    assert answer.code == 0 and "1 of 2 amplitudes are left out" in answer.err
-
-
-def test_refuses_record_without_response(tmp_path):
-    """A record without a column of a response is refused, and the message lists its columns."""
-    (tmp_path / "a.csv").write_text(
-        "time [s],tip [mm],base_acceleration [g]\n0,0,1\n1,1,0\n", "utf-8"
-    )
-    answer = run_cli("import", tmp_path / "a.csv", "--decay", "-o", tmp_path / "decay.csv")
-    assert answer.code == 2
-    assert "--map displacement=CHANNEL among 1 'time' [s], 2 'tip' [mm], 3 'base_" in answer.err
-
-
-def test_exact_export_of_scene_ignores_its_sweep(tmp_path):
-    """The scene of a blade with dampers has a table [sweep]; without it the exported matrices are the same."""
-    text = read_template("damper")
-    assert "[sweep]" in text
-    (tmp_path / "damper.toml").write_text(text, "utf-8")
-    answer = run_cli("export", tmp_path / "damper.toml", "-o", tmp_path / "damper.mat")
-    assert answer.code == 0
-    assert "[sweep] is left out: structure.interface[1].load as the scene gives it" in answer.err
-    scene_without_sweep = "\n".join(
-        line
-        for line in text.splitlines()
-        if not line.startswith(("[sweep]", '"structure.interface'))
-    )
-    (tmp_path / "alone.toml").write_text(scene_without_sweep, "utf-8")
-    pf.export(tmp_path / "alone.toml", tmp_path / "alone.mat")
-    exported, reference = (loadmat(tmp_path / f"{name}.mat") for name in ("damper", "alone"))
-    assert set(exported) == set(reference)
-    names = [name for name in exported if not name.startswith("__")]
-    assert all(np.array_equal(exported[name], reference[name]) for name in names)
-    assert exported["limit"].item() == pytest.approx(0.3 * 1140.0, rel=1e-12)

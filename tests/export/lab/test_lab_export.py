@@ -1,7 +1,6 @@
 """Histories and loops in laboratory formats agree to the last bit when other programs read them."""
 
 import json
-import shutil
 
 import h5netcdf
 import numpy as np
@@ -15,33 +14,6 @@ from patchfem.core import PatchfemError
 from patchfem.export import store
 from patchfem.export.answer import Answer, Variable
 from patchfem.export.lab.write import export_histories
-from patchfem.inputs import read_loop
-
-TWO_MODES = """\
-[normal]
-load = "50 N"
-[friction]
-law = "coulomb"
-static = 0.3
-[structure]
-moving_mass = "1 kg"
-[[structure.mode]]
-name = "axial"
-slide = 1.0
-frequency = "50 Hz"
-damping = 0.05
-[[structure.mode]]
-name = "yaw"
-frequency = "90 Hz"
-damping = 0.05
-slide = 0.4
-output = -0.3
-[drive]
-kind = "base"
-frequency = "40 Hz"
-acceleration = "5 g"
-cycles = 60
-"""
 
 
 def read_uff_functions(path):
@@ -143,34 +115,6 @@ def test_exact_exported_histories_equal_result_file(bench_folder, tmp_path):
     assert units["length"] == units["force"] == 1.0 and units["units_code"] == 1
 
 
-@pytest.mark.share(0)
-@pytest.mark.parametrize("method", ["exact", "march"])
-def test_exact_loop_over_slide_encloses_loop_area(method, tmp_path):
-    """The loop of the friction force over the slide encloses the loop area within its error.
-
-    The loop over the output displacement does not, because the second mode moves the output.
-    """
-    (tmp_path / "rig.toml").write_text(TWO_MODES + f'[accuracy]\nmethod = "{method}"\n')
-    answer = run_cli(
-        "run", tmp_path / "rig.toml", "-o", tmp_path / "out", "-q", "--json", "--no-page"
-    )
-    assert answer.code == 0, answer.err
-    area = json.loads(answer.out)["measures"]["loop_area"]
-    with h5netcdf.File(tmp_path / "out/result.nc", "r") as file:
-        assert file["slide"].attrs["units"] == "m" and file["slide"].dimensions == ("time",)
-        time, slide, output, force = (
-            np.asarray(file[name][...])
-            for name in ("time", "slide", "relative_displacement", "friction_force")
-        )
-    last = slice(np.searchsorted(time, time[-1] - 1 / 40 - 1e-9), None)
-    enclosed, output_area = (np.trapezoid(force[last], x[last]) for x in (slide, output))
-    assert abs(enclosed - area["value"]) <= area["error"] + area["floor"]
-    assert abs(output_area - area["value"]) > 10 * (area["error"] + area["floor"])
-    assert run_cli("export", tmp_path / "out", "-o", tmp_path / "a.uff", "--histories").code == 0
-    functions = read_uff_functions(tmp_path / "a.uff")
-    assert [name for name in functions if " over " in name] == ["friction_force over slide"]
-
-
 @pytest.mark.parametrize(
     "arguments, code, message",
     [
@@ -190,20 +134,6 @@ def test_refuses_history_export_with_wrong_options(
     assert not list(tmp_path.iterdir())
 
 
-def test_refuses_folder_without_histories(bench_folder, tmp_path):
-    """A folder that is absent, empty or has a damaged result.nc is refused with a message that states the cause."""
-    for folder, out, code, message in (
-        ("none", "a.uff", 4, "no such results folder"),
-        (".", "a.mat", 2, "it has no summary.json"),
-    ):
-        answer = run_cli("export", tmp_path / folder, "-o", tmp_path / out)
-        assert answer.code == code and message in answer.err, answer.err
-    shutil.copytree(bench_folder, tmp_path / "damaged")
-    (tmp_path / "damaged/result.nc").write_bytes(b"\x89HDF\r\n\x1a\n spoilt")
-    answer = run_cli("export", tmp_path / "damaged", "-o", tmp_path / "a.uff")
-    assert answer.code == 2 and "a file of this folder is damaged" in answer.err
-
-
 def test_refuses_non_finite_values_in_universal_file(tmp_path):
     """A value that is not finite is refused, because a universal file would store it as 0."""
     columns = {
@@ -220,26 +150,3 @@ def test_refuses_non_finite_values_in_universal_file(tmp_path):
         export_histories(tmp_path, tmp_path / "a.uff")
     assert not (tmp_path / "a.uff").exists()
     assert "2 rows of slide, force" in export_histories(tmp_path, tmp_path / "a.mat")
-
-
-def test_exact_exported_run_is_readable_as_measured_loop(bench_folder, tmp_path):
-    """The exported histories of a run are a valid measured loop: displacement and force come back unchanged.
-
-    This holds after an import too.
-    """
-    assert run_cli("export", bench_folder, "-o", tmp_path / "loop.csv", "--histories").code == 0
-    measured = read_loop(tmp_path / "loop.csv")
-    with h5netcdf.File(bench_folder / "result.nc", "r") as file:
-        slide, force = (
-            np.asarray(file[name][...]) for name in ("relative_displacement", "friction_force")
-        )
-    assert np.array_equal(measured.displacement, slide - slide[0]) and np.array_equal(
-        measured.reading, force
-    )
-    assert measured.quantity == "force" and "normal_load" in measured.labels
-    assert run_cli("import", tmp_path / "loop.csv", "-o", tmp_path / "lab.csv").code == 0
-    imported = read_loop(tmp_path / "lab.csv")
-    assert np.array_equal(imported.displacement, measured.displacement) and np.array_equal(
-        imported.reading, force
-    )
-    assert (tmp_path / "lab.csv").read_text().startswith("time [s],displacement [m],force [N]\n")

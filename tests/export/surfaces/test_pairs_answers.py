@@ -7,7 +7,6 @@ import pytest
 from comparisons import compare_traces
 from scipy.stats import t
 
-from patchfem.campaigns.surface_pairs import read_pairs
 from patchfem.export import page, quantities, store
 from patchfem.export.surfaces import compare, pairs
 
@@ -52,19 +51,3 @@ def test_exact_means_of_groups(tmp_path):
     assert "Worn depth of the pairs" in html and "x.csv: there is no such file" in html
     page.write_page(tmp_path)
     assert html == (tmp_path / "report.html").read_text("utf-8")
-
-
-def test_always_pairs_with_one_first_surface_are_noted():
-    """Pairs that share the surface before wear get a note, others do not."""
-    rows = make_rows()
-    assert pairs.SHARED_NOTE not in pairs.make_answer(rows, "p").remarks.notes
-    rows[1]["before"] = rows[0]["before"]
-    assert pairs.SHARED_NOTE in pairs.make_answer(rows, "p").remarks.notes
-
-
-def test_exact_table_keeps_labels_and_folder(tmp_path):
-    """Names are relative to the table, a direction belongs to its line, and other columns are labels."""
-    (tmp_path / "pairs.csv").write_text("before,after,direction,group\na.csv,b.csv,y,steel\n")
-    (line,) = read_pairs(tmp_path / "pairs.csv")
-    assert line.paths == (tmp_path / "a.csv", tmp_path / "b.csv")
-    assert (line.line, line.direction, dict(line.labels)) == (2, "y", {"group": "steel"})

@@ -69,23 +69,6 @@ def test_exact_profiles_are_curves(sine_folder):
     assert peak == pytest.approx(WAVELENGTH, rel=0.1)
 
 
-def test_exact_page_of_roughness_is_made_again(sine_folder):
-    """The page is made again byte for byte, and its tiles are the numbers of summary.json with definitions."""
-    answer, folder = sine_folder
-    text = (folder / "report.html").read_text("utf-8")
-    page.write_page(folder)
-    assert text == (folder / "report.html").read_text("utf-8")
-    for title in ("Primary profile", "Roughness profile", "Abbott curve", "Power spectral density"):
-        assert f">{title}</h" in text
-    tiles = page.make_tiles(store.read(folder))
-    assert [tile["label"] for tile in tiles][:3] == ["Ra", "Rq", "Rz"]
-    for tile in tiles:
-        assert tile["text"] == quantities.format_quantity(
-            tile["label"], answer.quantities[tile["label"]]
-        )
-        assert tile["meaning"].endswith(".")
-
-
 def test_exact_mean_of_files_uses_student_t():
     """The means over three traces are those of their values, with the interval of Student's t of the logarithm."""
     sizes = (1.0, 1.1, 1.3)
@@ -105,38 +88,6 @@ def test_exact_mean_of_files_uses_student_t():
     assert answer.data["abbott"].values.shape[0] == 3 and not answer.remarks.warnings
 
 
-def test_always_intervals_that_say_nothing_are_left_out():
-    """Two files of different roughness, and four sections, give no interval but the range or the reason."""
-    traces = [make_sine(size * AMPLITUDE, f"{size}.csv") for size in (1.0, 1.5)]
-    answer = roughness.make_answer([make_report(trace) for trace in traces])
-    assert answer.quantities["Pa"].low is None and answer.quantities["Pa"].high is None
-    assert answer.quantities["Pa"].reason == "no interval from so few files"
-    assert " nm in the files)" in answer.verdict[0] and "(0 to" not in answer.verdict[0]
-
-    trace = make_sine()
-    report = make_report(trace, trace.length / 5)
-    answer = roughness.make_answer([report])
-    assert answer.details["profiles"][0]["confidence"] is None
-    assert answer.quantities["Ra"].reason == "no interval from fewer than five sections"
-    assert any("hold 4 sections of" in note for note in answer.remarks.notes)
-    # extremes and high moments of the whole trace never have an interval
-    answer = roughness.make_answer([make_report(trace, trace.length / 10)])
-    assert answer.details["profiles"][0]["confidence"] == 0.9
-    assert answer.quantities["Rz"].low > 0
-    assert [answer.quantities[name].low for name in ("Rt", "Rsk", "Rku")] == [None] * 3
-
-
-def test_always_doubtful_means_are_warned_of():
-    """A file that is given twice, and traces of different lengths, give a warning."""
-    twice = roughness.make_answer([make_report(make_sine())] * 2)
-    assert twice.remarks.warnings == (roughness.TWICE_NOTE,)
-    assert twice.details["means"][0]["notes"] == [roughness.TWICE_NOTE]
-    trace = make_sine()
-    part = Profile(trace.x[:5000], trace.z[:5000], "part.csv")
-    other = roughness.make_answer([make_report(trace), make_report(part)])
-    assert other.remarks.warnings == (roughness.SIZES_NOTE,)
-
-
 def test_exact_scan_has_areal_parameters_and_a_map():
     """A scan of four waves along x has Sq = A/sqrt(2), its map and no profile."""
     x = np.arange(160) * 2e-6
@@ -147,12 +98,3 @@ def test_exact_scan_has_areal_parameters_and_a_map():
     assert answer.data["height_map"].values.shape == (90, 160) and "primary" not in answer.data
     for name in answer.quantities:
         assert quantities.describe(name, "profile")
-
-
-def test_exact_treatment_names_filters_and_window():
-    """The sentence on the treatment names window, filter and resampling, and a cut-off that would fit."""
-    trace = make_sine()
-    assert '--cutoff "250 um"' in roughness.describe_treatment(make_report(trace))
-    text = roughness.describe_treatment(make_report(trace, 8e-5, (1e-3, 3e-3), short=2.5e-6))
-    for words in ("cut-off 80 um", "window 1 mm, 3 mm", "S-filter 2.5 um", "4001 heights"):
-        assert words in text

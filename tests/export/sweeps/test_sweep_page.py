@@ -4,24 +4,15 @@ import csv
 import gzip
 import json
 import re
-import shutil
 from base64 import b64decode
 
 import numpy as np
 import pytest
 from command_line import run_cli
 from scene_texts import COULOMB, PATCH, POINT, SHORT
-from sweep_tables import make_random_table, make_table
 
-from patchfem.campaigns.sweeps.changes import analyse
-from patchfem.export import page, store
-from patchfem.export.answer import Answer, Variable
-from patchfem.export.charts import panels, plotly
-from patchfem.export.charts.sweeps import MAX_DRAWN_CASES, make_measure_panel
-from patchfem.export.charts.table import CHARTS
-from patchfem.export.sweeps.words import make_verdict
+from patchfem.export import store
 
-MAX_PAGE_BYTES = 1_500_000
 KINDS = {
     "one key": ("rig", ("--over", "friction.static=0.3,0.35,0.6,0.1")),
     "two keys": (
@@ -118,15 +109,6 @@ def test_exact_page_shows_numbers_of_table(folders, kind):
     )
 
 
-@pytest.mark.parametrize("kind", KINDS)
-def test_exact_page_is_made_again_from_its_folder(folders, kind, tmp_path):
-    """The page is made again with equal bytes from a copy of the folder without the scene."""
-    copy = shutil.copytree(folders[kind], tmp_path / folders[kind].name)
-    (copy / "report.html").unlink()
-    page.write_page(copy)
-    assert (copy / "report.html").read_bytes() == (folders[kind] / "report.html").read_bytes()
-
-
 def test_exact_numbers_of_verdict_agree_with_closed_form(folders):
     """The headline of a patch has its values, and the limit of the tilt is in sentence, table and quantities."""
     answer = store.read(folders["patch"])
@@ -141,101 +123,3 @@ def test_exact_numbers_of_verdict_agree_with_closed_form(folders):
     assert "How far the key may go" in text and "contact fraction" in text
     values = answer.data["pressure_peak"].values
     assert f"{values[-1] / 1e6:.4g} MPa" in answer.verdict[0]
-
-
-def test_exact_words_of_given_tables():
-    """The sentences state the largest change, the peak, the shares, and cases that are missing or over the tolerance."""
-    tilt = [1.0, 2.0, 3.0]
-    measures = {"loop_area": [1.0, 1.02, 1.2], "pressure_peak": [1.0, 1.1, 1.15]}
-    table = make_table({"contact.tilt.angle": tilt}, measures)
-    assert make_verdict(table, analyse(table)) == (
-        "With contact.tilt.angle, loop area changes most: from 1 at 1 to 1.2 at 3.",
-        "contact.tilt.angle may reach 2.17 before loop area changes by 5 % (between the cases at 2 and 3).",
-        "All 3 cases settled and meet the tolerance.",
-    )
-    assert make_verdict(table, analyse(table, "pressure_peak"))[0].startswith(
-        "With contact.tilt.angle, pressure peak changes from 1 at 1 to 1.15 at 3"
-    )
-    outcome = np.array(["steady", "transient", ""], object)
-    broken = make_table({"normal.load": tilt}, measures, errors=0.1, outcome=outcome)
-    assert make_verdict(broken, analyse(broken))[-1] == (
-        "3 cases: 1 unfinished, 1 unsettled, 3 over the tolerance in loop area and 1 more."
-    )
-    empty = make_table({"normal.load": tilt}, {}, outcome=np.full(3, "", object))
-    assert make_verdict(empty, analyse(empty))[0] == "No case has a result."
-    points = np.random.default_rng(0).random((256, 2))
-    random = make_random_table(points, {"loop_area": 3 * points[:, 0] + points[:, 1]})
-    verdict = make_verdict(random, analyse(random))
-    assert "mainly with k0 (90 % of its variance)" in verdict[0]
-    assert verdict[1].startswith("Shares of the variance of loop area: k0 90 % (")
-    assert verdict[2].startswith("90 % of the cases have a loop area of 0.")
-
-
-def make_answer(shape, outcome=None, **errors) -> Answer:
-    """Return the answer of a sweep of a measure over x (and y) with random values."""
-    values = np.random.default_rng(1).random(shape)
-    dims = ("x", "y")[: len(shape)]
-    data = {
-        name: Variable((name,), np.linspace(1, 2, size), "m") for name, size in zip(dims, shape)
-    }
-    data["loop_area"] = Variable(dims, values, "J")
-    data["loop_area_error"] = Variable(dims, errors.get("error", 0 * values), "J")
-    outcome = np.full(shape, "steady") if outcome is None else outcome
-    data["outcome"] = Variable(dims, outcome, "")
-    details = {"of": {"keys": list(dims)}, "tolerance": 0.01, "ranking": {}}
-    return Answer("sweep", "", ("", ""), data=data, details=details)
-
-
-def test_exact_marks_of_missed_and_unsettled_cases():
-    """Cases over the tolerance are hollow and unsettled ones are crosses, with bars of their errors."""
-    outcome = np.array(["steady", "steady", "transient", "stuck"])
-    answer = make_answer((4,), outcome, error=np.array([0.0, 1.0, 1.0, 0.0]))
-    panel = make_measure_panel({"": answer}, "loop_area")
-    (curve,) = panel.curves
-    assert curve.symbols.tolist() == ["circle", "circle-open", "x", "circle"]
-    trace = plotly.draw(panel)["data"][0]
-    assert trace["marker"]["symbol"] == curve.symbols.tolist()
-    scale = panel.y.scale
-    np.testing.assert_allclose(unpack(trace["error_y"]["array"]), scale * np.array([0, 1, 1, 0]))
-
-
-@pytest.mark.parametrize("shape", [(20_000,), (200, 300)])
-def test_exact_large_sweeps_are_thinned(shape):
-    """A chart of many cases draws at most 1000 and few more, and among them the smallest and the largest value."""
-    answer = make_answer(shape)
-    panel = make_measure_panel({"": answer}, "loop_area")
-    drawn = np.concatenate([curve.y for curve in panel.curves])
-    assert drawn.size <= MAX_DRAWN_CASES + 2 * len(panel.curves)
-    for curve in panel.curves:
-        line = answer.data["loop_area"].values * panel.y.scale
-        line = line if len(shape) == 1 else None
-        if line is not None:
-            assert (curve.y.min(), curve.y.max()) == (line.min(), line.max())
-    figures = [plotly.draw(panel) for panel in panels.make_panels({"": answer}, CHARTS["sweep"])]
-    library = len(page.read_library())
-    assert library + len(page.pack_figures(figures)) < MAX_PAGE_BYTES
-
-
-def test_exact_sweeps_beside_each_other(folders, tmp_path):
-    """The page of two sweeps has a curve of each in the units of the first one, and the headline of each."""
-    other = shutil.copytree(folders["one key"], tmp_path / "second")
-    text = page.make_page([folders["one key"], other])
-    names = {
-        trace["name"]
-        for figure in read_figures(text)
-        for trace in figure["data"]
-        if trace.get("mode") == "lines+markers"
-    }
-    assert names == {"one_key", "second"}
-    headline = store.read(other).verdict[0]
-    assert f"one_key: {headline}" in text and f"second: {headline}" in text
-
-
-@pytest.mark.parametrize("name", ["sweep.nc", "sweep.json", "summary.json"])
-def test_refuses_report_of_damaged_folder(folders, tmp_path, name):
-    """The report of a sweep with a damaged file ends with exit code 2 and one sentence."""
-    folder = shutil.copytree(folders["one key"], tmp_path / "damaged")
-    data = (folder / name).read_bytes()
-    (folder / name).write_bytes(data[: len(data) // 2])
-    answer = run_cli("report", folder, "-o", tmp_path / "page.html")
-    assert answer.code == 2 and "damaged" in answer.err and len(answer.err.splitlines()) == 1

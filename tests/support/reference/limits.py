@@ -186,11 +186,6 @@ def _format_compatibility(columns: tuple) -> str:
     )
 
 
-def _join_names(names) -> str:
-    """Return names as an enumeration."""
-    return "; ".join(f"*{name}*" for name in names) or "none"
-
-
 def _format_bounds() -> str:
     """Return the table of permitted values."""
     return format_table(

@@ -32,13 +32,9 @@ class Campaign(NamedTuple):
 CAMPAIGNS = {
     "grammar": Campaign(7000, "scenes.run_grammar_trial", "scenes with wrong keys and values"),
     "bytes": Campaign(3000, "scenes.run_bytes_trial", "scenes with wrong bytes"),
-    "words": Campaign(1000, "words.run_words_trial", "command lines with odd words"),
     "profiles": Campaign(1000, "tables.run_profiles_trial", "traces of a surface"),
     "tables": Campaign(3000, "tables.run_table_trial", "drives, slides, rows and loops"),
-    "energy": Campaign(1000, "physics.run_trial", "books of energy of laws and engines"),
-    "hostile": Campaign(240, "hostile.run_trial", "files made to harm, twelve kinds"),
-    "memory": Campaign(50, "processes.run_memory_trial", "limits of memory"),
-    "determinism": Campaign(20, "processes.run_determinism_trial", "runs again, more threads"),
+    "hostile": Campaign(240, "hostile.run_trial", "files made to harm"),
 }
 WARM = (  # Scenes that load the modules of most trials, so that a forked trial already has them.
     '[normal]\nload = "26 lbf"\n[friction]\nlaw = "tanh"\nstatic = 0.3\nreference_speed = "1 mm/s"\n[structure]\n'

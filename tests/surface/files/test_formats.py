@@ -3,15 +3,14 @@
 import gzip
 import sys
 import types
-from importlib.util import find_spec
 
 import numpy as np
 import pytest
 import surfaces as write
 from scipy.io import savemat
 
-from patchfem.core import Missing, PatchfemError
-from patchfem.surface import Profile, read_profile, read_surface
+from patchfem.core import PatchfemError
+from patchfem.surface import Profile, read_surface
 from patchfem.surface.areal import Areal
 
 Z = write.draw_scan()
@@ -196,28 +195,6 @@ def test_refuses_faulty_file(tmp_path, data, name, units, message):
 
 
 @pytest.mark.parametrize(
-    "data", [write.make_binary_sdf(Z), write.make_ascii_sdf(Z)], ids=["binary", "text"]
-)
-@pytest.mark.skipif(
-    find_spec("SurfaceTopography") is None, reason="the extra `profiles` is not installed"
-)
-def test_exact_sdf_is_read_by_surface_topography(tmp_path, data):
-    """Binary and text SDF files are read with the optional package SurfaceTopography."""
-    assert read_bytes(tmp_path, data, "scan.sdf").z == pytest.approx(Z, rel=1e-9)
-
-
-def test_always_steep_heights_in_metres_give_note(tmp_path):
-    """An X3P file whose heights exceed its length is read with a note.
-
-    The samples of the standard have heights of a metre.
-    """
-    found = read_bytes(tmp_path, write.heights_to_x3p(Z * 1e6), "a.x3p")
-    assert found.z == pytest.approx(Z * 1e6, rel=1e-14)
-    assert found.notes[0].startswith(f"{tmp_path / 'a.x3p'}: heights span ")
-    assert found.notes[0].endswith("over a length of 2.5 um: the file states these units")
-
-
-@pytest.mark.parametrize(
     "table", [TRACE, TRACE.T, TRACE.astype("f4"), TRACE.astype(">f8"), np.asfortranarray(TRACE)]
 )
 def test_exact_npy_columns_give_trace(tmp_path, table):
@@ -240,61 +217,6 @@ def test_exact_dektak_export_agrees(tmp_path):
         tmp_path, write.make_dektak(z).decode("latin-1").encode("utf-16"), "scan.csv"
     )
     assert np.array_equal(utf16_trace.z, found.z)
-
-
-def test_always_truncated_dektak_export_keeps_printed_x(tmp_path):
-    """A truncated Dektak export keeps its printed x, with a note that its length does not fit the header."""
-    z = np.random.default_rng(1).normal(size=320)
-    found = read_bytes(tmp_path, b"\n".join(write.make_dektak(z).split(b"\n")[:200]), "scan.csv")
-    assert "the length of 50 um in the header does not fit" in found.notes[0]
-    assert found.x == pytest.approx(np.arange(found.x.size) * 0.15625e-6, abs=0.06e-6)
-
-
-def test_exact_read_profile_accepts_traces_only(tmp_path):
-    """The function read_profile reads a trace of any format, also from a .zip, and refuses a scan."""
-    (tmp_path / "a.x3p").write_bytes(write.heights_to_x3p(Z))
-    with pytest.raises(
-        PatchfemError, match="scan of 4 x 6 heights, but a single trace is needed; write one row of"
-    ):
-        read_profile(tmp_path / "a.x3p")
-    (tmp_path / "a.zip").write_bytes(
-        write.make_zip({"one/a.csv": b"x [um],z [nm]\n0,1\n1,2\n2,4\n"})
-    )
-    assert read_profile(tmp_path / "a.zip").z == pytest.approx([1e-9, 2e-9, 4e-9], rel=1e-15)
-
-
-def test_exact_netcdf_scan_through_surface_topography(tmp_path):
-    """A NetCDF scan is read by SurfaceTopography with its units, and a damaged file is refused."""
-    pytest.importorskip("SurfaceTopography")
-    from scipy.io import netcdf_file
-
-    with netcdf_file(tmp_path / "scan.nc", "w") as file:
-        for name, values, size in (("x", np.arange(6) * 0.5, 3.0), ("y", np.arange(4) * 0.75, 3.0)):
-            file.createDimension(name, values.size)
-            axis = file.createVariable(name, "f8", (name,))
-            axis[:] = values
-            axis.length = size
-            axis.unit = "um"
-        heights = file.createVariable("heights", "f8", ("x", "y"))
-        heights[:] = Z.T * 1e6
-        heights.unit = "um"
-    found = read_surface(tmp_path / "scan.nc")
-    assert_scan_equal(found, Z, 1e-18)
-    assert "read as NC by SurfaceTopography 1." in found.notes[0]
-    notes = read_surface(tmp_path / "scan.nc", ("mm", "mm")).notes
-    assert notes[1].endswith("the units that you gave are ignored")
-    (tmp_path / "scan.opdx").write_bytes(b"\x00\x01junk" * 50)
-    with pytest.raises(PatchfemError, match="SurfaceTopography cannot read this file"):
-        read_surface(tmp_path / "scan.opdx")
-
-
-def test_refuses_instrument_file_without_surface_topography(tmp_path, monkeypatch):
-    """Without SurfaceTopography a file of an instrument is refused, and the message names the package to install."""
-    monkeypatch.setitem(sys.modules, "SurfaceTopography", None)
-    with pytest.raises(
-        Missing, match=r"pip install 'patchfem\[profiles\]', or export the surface as text"
-    ):
-        read_bytes(tmp_path, b"\x00\x01\x02" * 99, "scan.opdx")
 
 
 class StandIn:
@@ -346,23 +268,6 @@ def test_exact_scan_of_reader_library(tmp_path, monkeypatch, packed):
     with pytest.raises(PatchfemError, match="the unit of x is not given"):
         read_bytes(tmp_path, data, "scan.opdx")
     assert read_bytes(tmp_path, data, "scan.opdx", ("mm", "m")).x[1] == 1e-3
-
-
-def test_refuses_what_reader_library_cannot_read(tmp_path, monkeypatch):
-    """An error of the reader library, and a scan without a size, are refused in one sentence."""
-
-    def fail(file):
-        raise ValueError("bad")
-
-    use_library(monkeypatch, fail)
-    data = b"\x00\x01\x02" * 99
-    with pytest.raises(PatchfemError, match=r"cannot read this file \(ValueError: bad\); export"):
-        read_bytes(tmp_path, data, "scan.opdx")
-    scan = StandIn("um")
-    scan.physical_sizes = None
-    use_library(monkeypatch, lambda file: scan)
-    with pytest.raises(PatchfemError, match="the file does not give the size of the scan"):
-        read_bytes(tmp_path, data, "scan.opdx")
 
 
 def test_exact_mat_files_of_scipy_agree(tmp_path):

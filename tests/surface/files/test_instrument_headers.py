@@ -6,7 +6,6 @@ refused with a remedy is read after the remedy is applied.
 
 import numpy as np
 import pytest
-import surfaces as write
 
 from patchfem.core import PatchfemError
 from patchfem.surface import Profile, read_surface
@@ -70,24 +69,6 @@ def test_exact_matrix_of_long_rows_with_missing_heights(tmp_path):
     )
 
 
-OTHER_PROGRAMS = {
-    "spip": "# File Format = ASCII\n# x-pixels = 4\n# y-pixels = 3\n# x-length = 2000\n# Bit2nm = 0.5\n",
-    "attocube": "# Daisy frame view snapshot\n# x-pixels: 4\n# x-length: 8\n# x-unit: um\n",
-    "nova": "File Format = ASCII\nCreated by Nova\nNX = 4\nNY = 3\nScale X = 0.5\nUnit X = um\n",
-}
-
-
-@pytest.mark.parametrize("header", OTHER_PROGRAMS.values(), ids=OTHER_PROGRAMS)
-def test_refuses_headers_of_other_programs_with_valid_remedy(tmp_path, header):
-    """A matrix under the header of another program needs its sizes in the lines of Gwyddion, or a pixel size."""
-    with pytest.raises(PatchfemError, match="the width of the scan is not given; write the scan's"):
-        read_text(tmp_path, header + ROWS)
-    sizes = "# Width: 4.0 um\n# Height: 3.0 um\n# Value units: nm\n"
-    assert_scan_equal(read_text(tmp_path, sizes + header + ROWS), (1e-6, 1e-6), Z * 1e-9)
-    given = read_text(tmp_path, header + ROWS, ("0.5 um", "nm"))
-    assert_scan_equal(given, (0.5e-6, 0.5e-6), Z * 1e-9)
-
-
 def test_exact_sizes_agree_with_surface_topography(tmp_path):
     """A matrix below its sizes gives the same scan as SurfaceTopography within 1e-12."""
     pytest.importorskip("SurfaceTopography")
@@ -95,54 +76,6 @@ def test_exact_sizes_agree_with_surface_topography(tmp_path):
     theirs = make_surface(read_instrument(fetch(tmp_path / "scan.txt")))
     for name in ("x", "y", "z"):
         assert getattr(ours, name) == pytest.approx(getattr(theirs, name), rel=1e-12)
-
-
-@pytest.mark.parametrize("count", [2, 3])
-def test_exact_matrix_of_few_columns(tmp_path, count):
-    """Two or three numbers in a row are a matrix if the header states width and height."""
-    rows = "".join(" ".join(map(str, row[:count])) + "\n" for row in Z.tolist())
-    header = f"# Width: {count} µm\n# Height: 6 µm\n# Value units: nm\n"
-    found = read_text(tmp_path, header + rows)
-    assert_scan_equal(found, (1e-6, 2e-6), Z[:, :count] * 1e-9)
-
-
-def test_exact_line_scan_in_column_or_row(tmp_path):
-    """A line scan with one height per line, or with a single row, gives a trace."""
-    heights_per_line = "# Value units: nm\n1\n2\n5\n3\n"
-    single_row = "# Width: 4.0 um\n# Value units: nm\n1 2 5 3\n"
-    for text in (
-        f"# Width: 4.0 um\n{heights_per_line}",
-        single_row,
-    ):
-        found = read_text(tmp_path, text)
-        assert isinstance(found, Profile) and found.x == pytest.approx(np.arange(4) * 1e-6)
-        assert found.z == pytest.approx(np.array([1, 2, 5, 3]) * 1e-9)
-
-
-def test_exact_gwyddion_points_with_units(tmp_path):
-    """A list of points of Gwyddion below a header with units gives a scan."""
-    rows = "".join(
-        f"{0.5 * (i + 0.5)}\t{0.25 * (j + 0.5)}\t{Z[j, i]}\n" for j in range(3) for i in range(4)
-    )
-    found = read_text(
-        tmp_path,
-        f"# Channel: Height\n# Lateral units: µm\n# Value units: nm\n{rows}",
-        name="scan.xyz",
-    )
-    assert found.z == pytest.approx(Z * 1e-9) and found.x == pytest.approx(
-        (np.arange(4) + 0.5) * 0.5e-6
-    )
-    assert found.y == pytest.approx((np.arange(3) + 0.5) * 0.25e-6)
-
-
-def test_exact_points_with_decimal_comma(tmp_path):
-    """Points with decimal commas below a line of names and a line of units give a scan."""
-    rows = "".join(
-        f"{0.5 * i}\t{0.25 * j}\t{Z[j, i]}\n".replace(".", ",") for j in range(3) for i in range(4)
-    )
-    assert_scan_equal(
-        read_text(tmp_path, f"X\tY\tZ\nµm\tµm\tnm\n{rows}"), (0.5e-6, 0.25e-6), Z * 1e-9
-    )
 
 
 X = np.array([0.0, 0.5, 1.0, 1.5, 3.0])
@@ -355,38 +288,3 @@ def test_refuses_faulty_text_with_valid_remedy(tmp_path, faulty, message, correc
     assert message in str(caught.value) and str(tmp_path / "scan.txt") in str(caught.value)
     found = read_text(tmp_path, corrected, units)
     assert np.isfinite(found.z).sum() >= 3
-
-
-def test_exact_spike_higher_than_scan_length_gives_note(tmp_path):
-    """A single spike that is higher than the scan is long is kept with a note.
-
-    If all heights are too large, the unit is questioned and the scan is refused.
-    """
-    z = np.random.default_rng(1).normal(size=(20, 30)) * 1e-7
-    z[7, 9] = 4e-5
-    rows = "\n".join(" ".join(repr(float(height)) for height in row) for row in z)
-    found = read_text(tmp_path, f"# Width: 30 um\n# Height: 20 um\n# Value units: m\n{rows}")
-    assert found.z == pytest.approx(z, rel=1e-14)
-    assert len(found.notes) == 1
-    assert "nm without the 6 highest and the 6 lowest of 600; write " in found.notes[0]
-    # here all heights are too large, not a single one
-    with pytest.raises(PatchfemError, match="is the unit of z right"):
-        read_text(
-            tmp_path,
-            "# Width: 30 um\n# Height: 20 um\n# Value units: m\n"
-            + "\n".join(" ".join(repr(float(height) * 1e3) for height in row) for row in z),
-        )
-
-
-def test_always_heights_below_atom_give_note(tmp_path):
-    """Heights smaller than an atom are read with a note that questions their unit."""
-    found = read_text(tmp_path, "x [um],z [m]\n0,0\n1,1e-13\n2,0\n")
-    assert found.notes[0].endswith("atom; is the unit of the heights right?")
-    (tmp_path / "logo.x3p").write_bytes(write.heights_to_x3p(write.draw_scan() * 1e-7))
-    assert (
-        read_surface(tmp_path / "logo.x3p")
-        .notes[0]
-        .endswith("atom; is the unit of the heights right?")
-    )
-    assert read_text(tmp_path, "x [um],z [nm]\n0,0\n1,0.2\n2,0\n").notes == ()
-    assert read_text(tmp_path, "x [um],z [nm]\n0,0\n1,0\n2,0\n").notes == ()

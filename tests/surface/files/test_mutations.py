@@ -1,8 +1,6 @@
 """Randomly damaged files of all formats are read, or refused with a message that names the file."""
 
 import gzip
-import random
-import struct
 import tempfile
 import warnings
 from collections import Counter
@@ -12,6 +10,8 @@ from time import process_time
 import numpy as np
 import pytest
 import surfaces as write
+from torture.scenes import damage_bytes
+from torture.trial import Trial
 
 from patchfem.core import Missing, PatchfemError
 from patchfem.surface import read_surface
@@ -51,49 +51,6 @@ SEEDS = {
         write.make_main_xml(AXES, write.format_matrix(6, 4) + write.format_link(raw)), raw)),
     "zip": ("a.zip", write.make_zip({"a.csv": f"x [um],y [um],z [um]\n{LINES}".encode()}), bytes),
 }  # fmt: skip
-WORDS = (
-    b"-1",
-    b"0",
-    b"65535",
-    b"2000000000",
-    b"1e400",
-    b"nan",
-    b"inf",
-    b"",
-    b"*",
-    b",",
-    b";",
-    b"\n",
-    b"\x00",
-    b"<",
-    b'"',
-    b"9" * 400,
-    struct.pack("<i", -1),
-    struct.pack("<d", np.nan),
-    struct.pack("<q", 2**62),
-)
-
-
-def mutate(seed: bytes, rng: random.Random) -> bytes:
-    """Return a copy with one to four damages: bytes changed, deleted, doubled or inserted, or the end cut off."""
-    data = bytearray(seed)
-    for _ in range(rng.randint(1, 4)):
-        at = rng.randrange(len(data) + 1)
-        size = rng.choice((1, 1, 2, 4, 8, 40))
-        kind = rng.randrange(6)
-        if kind == 0 and at < len(data):
-            data[at] ^= 1 << rng.randrange(8)
-        elif kind == 1 and at < len(data):
-            data[at] = rng.randrange(256)
-        elif kind == 2:
-            del data[at : at + size]
-        elif kind == 3:
-            data[at:at] = data[at : at + size]
-        elif kind == 4:
-            data[at : at + rng.choice((0, size))] = rng.choice(WORDS)
-        elif rng.random() < 0.3:
-            del data[at:]
-    return bytes(data)
 
 
 def read_outcome(path: Path) -> str:
@@ -119,14 +76,17 @@ def read_outcome(path: Path) -> str:
 def count_outcomes(name: str, count: int) -> Counter:
     """Return the numbers of outcomes of randomly damaged copies of one file."""
     file, seed, make_file = SEEDS[name]
-    rng = random.Random(f"surfaces {name}")
+    trial = Trial(np.random.default_rng([81, len(seed)]), None, None, None)
     outcomes = Counter()
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / file
         path.write_bytes(make_file(seed))
         assert read_outcome(path) == "read"
         for _ in range(count):
-            path.write_bytes(make_file(mutate(seed, rng)))
+            data = bytearray(seed)
+            for _ in range(trial.draw(1, 2, 3, 4)):
+                damage_bytes(trial, data)
+            path.write_bytes(make_file(bytes(data)))
             outcomes[read_outcome(path)] += 1
     return outcomes
 

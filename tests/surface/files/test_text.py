@@ -3,17 +3,13 @@
 from __future__ import annotations
 
 import gzip
-import tracemalloc
-from time import process_time
 
 import numpy as np
 import pytest
 from traces import UM, draw_uneven_trace, format_trace
 
 from patchfem.core import Missing, PatchfemError
-from patchfem.scene import UNIT_FACTORS
 from patchfem.surface import read_profile
-from patchfem.surface.files.spellings import UNITS
 
 
 def read_content(tmp_path, content, name="before.csv"):
@@ -21,11 +17,6 @@ def read_content(tmp_path, content, name="before.csv"):
     path = tmp_path / name
     path.write_bytes(content if isinstance(content, bytes) else content.encode())
     return read_profile(path)
-
-
-def test_exact_units_of_files_equal_units_of_scenes():
-    """The units of length in files are those of scenes."""
-    assert UNITS == UNIT_FACTORS["length"]
 
 
 X, Z = draw_uneven_trace()
@@ -227,35 +218,3 @@ def test_refuses_missing_damaged_and_large_files(tmp_path):
     for content in (bomb, b" " * (1 << 21)):
         with pytest.raises(PatchfemError, match="more than 1 MiB of text; thin out the samples"):
             read_content(tmp_path, content)
-
-
-@pytest.mark.usefixtures("small_text_limit")
-def test_always_hostile_files_need_little_memory(tmp_path):
-    """A .gz of 32 MiB of blanks and a line of a million columns are refused with less than 8 MiB of memory.
-
-    Unpacked or split they would take 30 MB and more.
-    """
-    columns = b"x [um],z [um]\n0,0\n" + b"," * 10**6 + b"1\n"
-    for content, megabytes in ((gzip.compress(b" " * (1 << 25)), 8), (columns, 8)):
-        (tmp_path / "before.csv").write_bytes(content)
-        tracemalloc.start()
-        with pytest.raises(PatchfemError, match=r"more than 1 MiB|the line is 1000001 characters"):
-            read_profile(tmp_path / "before.csv")
-        peak = tracemalloc.get_traced_memory()[1]
-        tracemalloc.stop()
-        assert peak < megabytes * 2**20
-
-
-@pytest.mark.parametrize(
-    "count, seconds", [(50_000, 0.5), pytest.param(1_000_000, 1.0, marks=pytest.mark.slow)]
-)
-def test_always_reading_is_fast(tmp_path, count, seconds):
-    """Reading takes at most 10 us per sample in the quick run; it took 0.4 us on one core."""
-    z = np.random.default_rng(1).normal(size=count)
-    path = tmp_path / "long.csv"
-    rows = "".join(f"{i * 0.0127:.4f},{height:.6f}\n" for i, height in enumerate(z))
-    path.write_text(f"x [um],z [um]\n{rows}")
-    start = process_time()
-    profile = read_profile(path)
-    assert process_time() - start < seconds and profile.x.size == count
-    assert np.allclose(profile.z, np.round(z, 6) * UM, rtol=1e-14, atol=0)

@@ -76,14 +76,6 @@ def test_exact_autocorrelation_is_mean_over_measured_pairs():
         )
 
 
-@pytest.mark.parametrize("degrees", [0.0, 117.0])
-def test_exact_grooves_have_length_but_no_aspect_ratio(degrees):
-    """A sine of wavelength L has Sal = L arccos(0.2) / (2 pi), and no Str, because its crests do not decorrelate."""
-    found = compute_areal_parameters(make_plane_wave(300, 400, 25.0, degrees), (1.0, 1.0))
-    assert found["Sal"] == pytest.approx(25 * np.arccos(0.2) / (2 * np.pi), rel=0.01)
-    assert found["Str"] == "not_falling"
-
-
 @pytest.mark.parametrize("degrees", [0.0, 40.0])
 def test_exact_length_and_aspect_ratio_of_gaussian_surface(degrees):
     """With autocorrelation exp(-(u/a)^2 - (v/b)^2), Sal = a sqrt(ln 5) within 5 % and Str = a/b within 10 %."""
@@ -93,18 +85,6 @@ def test_exact_length_and_aspect_ratio_of_gaussian_surface(degrees):
     assert found["Str"] == pytest.approx(1 / 3, rel=0.1)
     z[np.random.default_rng(5).random(z.shape) < 0.1] = np.nan
     assert compute_areal_parameters(z, (1.0, 1.0))["Sal"] == pytest.approx(found["Sal"], rel=0.01)
-
-
-def test_always_missing_areal_parameters_have_reason():
-    """Areal parameters without a value have the code of a reason."""
-    rng = np.random.default_rng(0)
-    for z, name, reason in (
-        (rng.normal(size=(60, 60)), "Sal", "too_short"),
-        (make_plane_wave(120, 120, 20.0, 0.0), "Str", "not_falling"),
-        (np.zeros((30, 30)), "Sk", "flat"),
-    ):
-        found = make_report(make_scan(z * UM))[name]
-        assert found.value is None and found.reason == reason
 
 
 def test_exact_wave_transmission_of_areal_filter():
@@ -135,18 +115,3 @@ def test_exact_filter_ignores_holes():
         assert found[i, j] == pytest.approx(
             (weight * np.nan_to_num(z)).sum() / weight.sum(), abs=1e-9
         )
-
-
-def test_exact_filters_of_areal_report():
-    """The S- and L-filters of a report leave only the middle of three waves, within 2 %."""
-    z = (
-        make_plane_wave(400, 400, 200.0, 0)
-        + make_plane_wave(400, 400, 40.0, 90)
-        + make_plane_wave(400, 400, 5.0, 45)
-    )
-    report = make_report(make_scan(z * UM), 100 * UM, short=12 * UM)
-    transmission = np.exp(-np.pi * (ALPHA * 12 / 40) ** 2) * (
-        1 - np.exp(-np.pi * (ALPHA * 100 / 40) ** 2)
-    )
-    assert report["Sq"].value == pytest.approx(transmission * UM / np.sqrt(2), rel=0.02)
-    assert report.surface.z.shape == (288, 288) and report.sampling.shape == (400, 400)

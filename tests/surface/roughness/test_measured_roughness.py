@@ -85,15 +85,6 @@ def test_exact_roughness_profile_agrees_with_other_code(
     assert report["Rz"].value == pytest.approx(expected["Rz_mean_of_sections"] * UM, rel=1e-4)
 
 
-@pytest.mark.parametrize("name", TRACES)
-def test_exact_core_agrees_with_other_code(measured_traces, reference_values, name):
-    """The core parameters agree within 5 % with another code, which evaluates a histogram."""
-    found = make_report(measured_traces[name])
-    expected = reference_values[name]["surfalize"]
-    for key in ("k", "pk", "vk"):
-        assert found["P" + key].value == pytest.approx(expected["R" + key] * UM, rel=0.05)
-
-
 @pytest.mark.parametrize("name", ["nanovea-test1.txt.gz", "nanovea-test2.txt.gz"])
 def test_exact_areal_parameters_agree_with_three_codes(data_folder, reference_values, name):
     """Areal parameters agree with three other codes within 1e-6, and have no intervals."""

@@ -1,12 +1,9 @@
 """Peaks of a surface from mean squares of its traces, in a scene, and in the table that `profile` prints."""
 
-import re
-
 import numpy as np
 import pytest
 from scene_texts import PIECE
 from scipy.integrate import quad
-from scipy.ndimage import gaussian_filter1d
 
 import patchfem as pf
 from patchfem import build
@@ -16,7 +13,6 @@ from patchfem.surface import (
     Moments,
     Profile,
     gaussian_peaks,
-    persson_stiffness,
     read_profile,
     trace_moments,
 )
@@ -85,25 +81,6 @@ def test_exact_peaks_agree_with_quadrature(alpha):
     assert peaks_found.deviation**2 / alpha == pytest.approx(variance, abs=1e-4 / alpha)
 
 
-def test_exact_dust_in_moments_is_reported():
-    """Five grains of dust are removed; a lower one remains, and the notes state the moments without it."""
-    step = 0.5e-6
-    z = gaussian_filter1d(np.random.default_rng(7).standard_normal(12001), 16)
-    z *= 0.4e-6 / z.std()
-    grains = np.zeros(z.size)
-    for k in range(6):
-        grains[1500 * (k + 1) : 1500 * (k + 1) + 8] = 6e-6 if k else 2.6e-6
-    clean = trace_moments(make_trace(z, step))
-    dusty = trace_moments(make_trace(z + grains, step))
-    assert clean.dust == () and "are left out" in dusty.dust[0]
-    match = re.search(
-        r"make up ([\d.]+) % .* rms_slope is (\S+) and rms_curvature (\S+) 1/m", dusty.dust[-1]
-    )
-    assert dusty.fine.curvature > 5 * clean.fine.curvature and float(match[1]) > 90
-    assert float(match[2]) == pytest.approx(clean.fine.slope, rel=0.02)
-    assert float(match[3]) == pytest.approx(clean.fine.curvature, rel=0.05)
-
-
 def test_refuses_moments_of_no_gaussian_surface():
     """Traces of a single wave, of alternating heights, without roughness or with few samples are refused."""
     x = np.arange(256) * 1e-6
@@ -160,27 +137,6 @@ def test_exact_three_ways_to_define_peaks_agree(tmp_path, monkeypatch):
     (tmp_path / "again.toml").write_text((tmp_path / "out/first/scene.resolved.toml").read_text())
     second_run = pf.run(tmp_path / "again.toml")
     assert second_run.measures["normal_stiffness"].value == pytest.approx(stiffnesses[0], rel=1e-12)
-
-
-def test_exact_note_gives_stiffness_of_persson_theory():
-    """The note names an exponential law whose stiffness lies in the range of the note.
-
-    This range is that of Persson's theory.
-    """
-    note = next(text for text in pf.plan(PATCH + RMS).verdict if "Persson" in text)
-    decay = note.split('decay_length = "')[1].split('"')[0]
-    soft, stiff = (
-        float(word) for word in note.split("lengths, gives ")[1].split(" Pa/m")[0].split(" to ")
-    )
-    pressure = 26 * 4.4482216152605 / 12.7e-3**2
-    assert (soft, stiff) == pytest.approx(persson_stiffness(pressure, 0.5e-6), rel=5e-3)
-    exponential_scene = PATCH.replace("hertz", "exponential") + f'decay_length = "{decay}"\n'
-    with_asperities, without_asperities = (
-        pf.run(text).measures["normal_stiffness"].value
-        for text in (exponential_scene, PATCH.partition("[contact.asp")[0])
-    )
-    area = 12.7e-3**2
-    assert soft < 1 / (1 / with_asperities - 1 / without_asperities) / area < stiff
 
 
 @pytest.mark.parametrize(
@@ -267,27 +223,3 @@ def test_exact_cutoff_splits_trace_between_gap_and_asperities(tmp_path):
     ).fine
     # without the cut-off the long waves would count twice
     assert moments_of_all.height > 4 * skin.rms_height
-
-
-def test_always_non_gaussian_heights_are_reported():
-    """None of 40 Gaussian traces is reported as not Gaussian; truncated tops and single peaks are, with their effect."""
-    step = 1e-6
-    for seed in range(40):
-        row = gaussian_surface(256, step, (8e-6, 6e-5), seed)[seed]
-        assert trace_moments(make_trace(row, step)).not_gaussian == "", seed
-    rows = gaussian_surface(512, step, (8e-6, 6e-5), 3)[::128].ravel() * 1e-7
-    rows /= rows.std() / 1e-7
-    for z, effect in ((np.minimum(rows, 0.3e-7), "stiffer"), (np.maximum(rows, -0.3e-7), "softer")):
-        doubt = trace_moments(make_trace(z, step)).not_gaussian
-        assert effect in doubt and "(0 and 3)" in doubt
-
-
-@pytest.mark.parametrize(
-    "cutoff, message", [("13 mm", "no wave would remain"), ("1 um", "must be at least")]
-)
-def test_refuses_cutoff_without_waves_below(tmp_path, cutoff, message):
-    """A cut-off that leaves no wave for the asperities or is too short is refused."""
-    *_, text = split_trace(tmp_path, [(1e-6, 1e-3), (1e-7, 1e-4), (1e-8, 2e-5)])
-    with pytest.raises(PatchfemError, match=message) as caught:
-        pf.run(loads(text.replace("0.4 mm", cutoff), tmp_path / "scene.toml"))
-    assert "contact.asperities.cutoff" in str(caught.value)

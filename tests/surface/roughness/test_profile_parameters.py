@@ -5,7 +5,7 @@ import pytest
 from scipy.stats import norm
 
 from patchfem.core import PatchfemError
-from patchfem.surface import Profile, abbott_curve, fitting_cutoff, make_report
+from patchfem.surface import Profile, fitting_cutoff, make_report
 from patchfem.surface.roughness.form import parse_form_option, subtract_form
 from patchfem.surface.roughness.parameters import compute_core, compute_parameters
 
@@ -43,17 +43,6 @@ def test_exact_sections_of_growing_sine():
     assert found["t"] == pytest.approx(198, rel=1e-9)
 
 
-def test_exact_small_hills_are_ignored_in_spacing():
-    """A ripple of 4 % on a wave crosses the mean line more often, but the spacing stays that of the wave."""
-    x = np.arange(40_000.0)
-    z = np.sin(2 * np.pi * x / 4000 + 0.5) + 0.04 * np.sin(2 * np.pi * x / 50)
-    assert compute_parameters(z, UM, 8000 * UM)["Sm"] == pytest.approx(4000 * UM, rel=0.005)
-    spiked = z.copy()
-    spiked[200:210] -= 3  # the valley is deep enough, but narrower than 1 % of the section
-    assert compute_parameters(spiked, UM, 8000 * UM)["Sm"] == pytest.approx(4000 * UM, rel=0.005)
-    assert compute_parameters(np.sin(np.linspace(0, 6, 100)), UM)["Sm"] is None
-
-
 def test_exact_core_of_gaussian_heights():
     """The core parameters of Gaussian heights agree with those of the normal law within 0.1 %."""
     n = 200_001
@@ -80,12 +69,6 @@ def test_exact_core_of_plateau_with_valleys():
     assert found["vk"] == pytest.approx(2.1 - 0.125, rel=1e-3)
 
 
-def test_exact_abbott_curve_of_sine():
-    """The Abbott curve of a sine agrees with A cos(pi p), where p is the material ratio, within 1 % of A."""
-    ratio, level = abbott_curve(np.sin(2 * np.pi * np.arange(8000) / 400), 101)
-    assert level == pytest.approx(np.cos(np.pi * ratio), abs=0.01)
-
-
 def test_exact_report_splits_waves_at_cutoff():
     """Of a wave of 1 mm and one of 50 um, a cut-off of 250 um leaves the short one in the roughness."""
     x = np.arange(12_000) * UM
@@ -99,16 +82,16 @@ def test_exact_report_splits_waves_at_cutoff():
 
 
 def test_always_intervals_hold_the_mean_of_a_rough_surface():
-    """The 90 % interval of Rq from the sections of one trace contains its mean in 82 to 98 of 100 traces."""
+    """The 90 % interval of Rq from the sections of one trace contains its mean in at least 24 of 30 traces."""
     found = []
-    for seed in range(60):
-        noise = np.random.default_rng(seed).normal(size=6_000)
+    for seed in range(30):
+        noise = np.random.default_rng(seed).normal(size=4_000)
         found.append(
             make_report(make_trace(np.convolve(noise, np.ones(9), "same") * UM), 80 * UM)["Rq"]
         )
     mean = np.mean([quantity.value for quantity in found])
     held = sum(quantity.low <= mean <= quantity.high for quantity in found)
-    assert 0.8 * 60 <= held
+    assert 0.8 * 30 <= held
 
 
 @pytest.mark.parametrize("sign", [1, -1])
