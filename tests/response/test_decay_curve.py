@@ -2,14 +2,17 @@
 
 import numpy as np
 import pytest
-from scene_texts import DRIVE, KILOGRAM, POINT, make_friction_table
-from scipy.integrate import solve_ivp
+from scene_texts import CROWNED_JOINT, DRIVE, KILOGRAM, POINT, make_friction_table
+from scipy.integrate import quad, solve_ivp
+from scipy.optimize import brentq
 
 import patchfem as pf
 from patchfem.response import (
     fit_decay_curve,
+    locate_reversals,
     make_half_cycles,
 )
+from patchfem.runs.rig.decays import estimate_decay_mesh_errors
 
 RELEASED = DRIVE[: DRIVE.index("kind")] + 'kind = "free"\ndisplacement = "2 mm"\ncycles = 30\n'
 
@@ -25,6 +28,42 @@ def test_exact_viscous_decay_has_constant_damping(zeta):
     assert found.damping == pytest.approx(zeta, rel=1e-9)
     assert found.frequency == pytest.approx(own / (2 * np.pi), rel=1e-12)
     assert found.amplitude.size > 6 and (np.diff(found.amplitude) < 0).all()
+
+
+def make_viscous_decay(zeta: float, omega: float, samples: int):
+    """Return times, displacement and velocity of a viscous decay over 40 periods."""
+    t = np.linspace(0, 40 * 2 * np.pi / omega, samples)
+    lam = complex(-zeta * omega, omega * np.sqrt(1 - zeta**2))
+    y = np.exp(lam * t)
+    return t, y.real, (lam * y).real
+
+
+def test_order_reversals_between_samples_is_four():
+    """The error of the damping falls with the fourth power of the step, as reversals are found by cubic interpolation."""
+    off = []
+    for samples in (407, 1627):
+        found = fit_decay_curve(
+            make_half_cycles(*locate_reversals(*make_viscous_decay(0.01, 300.0, samples)))
+        )
+        off.append(np.abs(found.damping - 0.01).max())
+    assert off[0] < 1e-4 and 50 < off[0] / off[1] < 500
+
+
+def test_exact_decay_curve_interpolation():
+    """Interpolation returns the curve at its own points and NaN outside, and differences are added to the errors."""
+    found = fit_decay_curve(make_half_cycles(np.pi * np.arange(9), (-0.9) ** np.arange(9.0)))
+    there = found.interpolate(found.amplitude[2:5])
+    assert there.damping == pytest.approx(found.damping[2:5], rel=1e-12)
+    assert np.isnan(found.interpolate([2.0, 1e-3]).frequency).all()
+    wider = there.add_difference(
+        there, there._replace(damping=there.damping + np.array([1.0, np.nan, 0.0]))
+    )
+    assert wider.damping_error == pytest.approx(there.damping_error + np.array([1.0, np.inf, 0.0]))
+    assert np.isnan(
+        fit_decay_curve(make_half_cycles(np.arange(3.0), np.array([1.0, -0.5, 0.2])))
+        .interpolate([0.3])
+        .damping
+    ).all()
 
 
 def test_always_decay_intervals_cover_nonlinear_damping():
@@ -58,6 +97,19 @@ def test_always_decay_intervals_cover_nonlinear_damping():
         true = fall(found.amplitude)
         held.append(np.abs(found.damping - true / np.hypot(np.pi, true)) <= found.damping_error)
     assert np.concatenate(held).mean() > 0.95
+
+
+def test_exact_growing_or_few_half_cycles_end_decay_curve():
+    """A decay curve ends at a half cycle that grows, and is empty for fewer than four reversals."""
+    assert (
+        fit_decay_curve(make_half_cycles(np.arange(3.0), np.array([1.0, -0.5, 0.2]))).time.size == 0
+    )
+    assert make_half_cycles(np.arange(5.0), np.array([1.0, -0.5, 0.2, -0.9, 0.1])).size.size == 2
+    assert (
+        make_half_cycles(np.arange(6.0), np.array([1.0, -0.5, 0.25, -0.1, 0.02, 0.02])).size.size
+        == 4
+    )
+    assert locate_reversals(np.arange(3.0), np.arange(3.0), np.ones(3))[0].size == 0
 
 
 def test_exact_coulomb_decay_agrees_with_closed_form():
@@ -132,3 +184,85 @@ def test_exact_decay_that_ends_stuck_has_stuck_eigenvalue():
     assert ring["ring_damping"].value == pytest.approx(damping[k], rel=1e-7)
     amplitude = np.ptp(done.window.output) / 2
     assert decay.amplitude[-1] < 1.2 * amplitude
+
+
+CROWNED = (
+    CROWNED_JOINT
+    + """\
+[structure]
+moving_mass = "2 kg"
+[[structure.mode]]
+name = "first"
+frequency = "150 Hz"
+damping = 0.002
+slide = 1.0
+output = 1.0
+[drive]
+kind = "free"
+displacement = "20 um"
+cycles = 60
+"""
+)
+
+
+def mindlin_damping(amplitude, stuck: float, slide: float):
+    """Damping ratio of CROWNED at amplitudes [m] of the output, its mode held at `stuck` [Hz].
+
+    A crown gives way by du/dQ = 1/K - ln(1 - Q/(mu P))/(pi E* b) under a force Q (Jaeger 1998: as under the normal load
+    P of a half-plane, whose stiffness goes with its half width a, a^2 with P), and unloads by Masing's rule."""
+    held = (2 * np.pi * stuck) ** 2
+    own = (2 * np.pi * 150) ** 2
+    stiffness = 2.0 * (held - own) / slide**2
+    limit = 0.2 * 8e3
+    modulus = 2.1e11 / (2 * (1 - 0.3**2))
+    soft = np.pi * modulus * 0.03
+
+    def way(q):
+        return q / stiffness + limit / soft * ((1 - q / limit) * np.log1p(-q / limit) + q / limit)
+
+    out = []
+    for one in np.atleast_1d(amplitude):
+        top = brentq(
+            lambda q, one=one: way(q) - slide * one, 0.0, (1 - 1e-9) * limit, xtol=1e-14, rtol=1e-14
+        )
+        lost = 4 * top * slide * one - 8 * quad(way, 0.0, top, epsabs=0.0, epsrel=1e-12)[0]
+        out.append(0.002 * np.sqrt(own / held) + lost / (2 * np.pi * 2.0 * held * one**2))
+    return np.array(out)
+
+
+def test_always_release_and_ringing_errors_cover_mindlin_damping():
+    """The errors of the decay curve and of the ringing cover Mindlin's damping."""
+    result = pf.run(CROWNED)
+    decay = result.extra["decay"]
+    ring = result.measures["ring_damping"]
+    stuck = result.measures["ring_frequency"].value
+    known = np.flatnonzero(np.isfinite(decay.damping_error))[::20]
+    law = mindlin_damping(decay.amplitude[known], stuck, 1.0)
+    assert known.size > 20 and law.max() > 2e-4
+    assert (np.abs(decay.damping[known] - law) <= decay.damping_error[known]).all()
+    beside = mindlin_damping(result.measures["relative_displacement_amplitude"].value, stuck, 1.0)[
+        0
+    ]
+    assert abs(ring.value - beside) <= ring.error and beside > 1.5 * ring.value
+
+
+@pytest.mark.parametrize(
+    "old, new, why",
+    [
+        (
+            "[contact.shear]",
+            '[contact.shear]\n[contact.grooves]\nwavelength = "80 um"\namplitude = "2 um"',
+            "the contact slides on grooves",
+        ),
+        ("slide = 1.0", "slide = 1.0\nnormal = 0.1", "the normal load changes"),
+    ],
+)
+def test_always_missing_static_loop_gives_reason(old, new, why):
+    """If the friction law has no static loop, the mesh error of a decay is zero and has a reason."""
+    scene = CROWNED.replace('"coulomb"', '"elastic-plastic"\nbond_length = "1 um"').replace(
+        old, new, 1
+    )
+    error, said = estimate_decay_mesh_errors(
+        pf.build(scene), None, None, np.array([1e-7, 1e-6]), int
+    )
+    assert said == why and not error.any()
