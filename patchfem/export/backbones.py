@@ -44,7 +44,7 @@ def compute_answer(
     if cases.axis is None:
         answer = make_answer(cases.backbones[0], cases.source)
     else:
-        answer = _make_answer_over(cases)
+        answer = _make_cases_answer(cases)
     return replace(answer, origin=answer.origin | ({"command": command} if command else {}))
 
 
@@ -237,7 +237,7 @@ def _make_details(backbone: Backbone) -> dict:
     }
 
 
-def _make_answer_over(cases: BackboneCases) -> Answer:
+def _make_cases_answer(cases: BackboneCases) -> Answer:
     """Return the answer of the backbones for several values of a key: all curves, and what the change does."""
     axis = cases.axis
     first = cases.backbones[0]
@@ -266,14 +266,14 @@ def _make_answer_over(cases: BackboneCases) -> Answer:
         title=cases.source.title,
         verdict=verdict,
         quantities=measures,
-        data=_make_data_over(cases),
+        data=_make_cases_data(cases),
         remarks=Remarks(notes=tuple(notes)),
         details=details | {"cases": [_make_details(one) for one in cases.backbones]},
         origin=make_origin(cases.source, "backbone"),
     )
 
 
-def _make_data_over(cases: BackboneCases) -> dict[str, Variable]:
+def _make_cases_data(cases: BackboneCases) -> dict[str, Variable]:
     """Return the recommended curves of all values of the key at common amplitudes; NaN where one has no motion."""
     data = {"case": Variable(("case",), np.array(cases.axis.texts), "", cases.axis.key)}
     for method in METHODS:

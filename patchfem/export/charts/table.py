@@ -349,7 +349,7 @@ BACKBONE = (
         log="x",
         y2=("balance_force",),
         labels=("amplitude at the output", "frequency"),
-        caption="Use the first curve. Its band contains the numerical error and what the other kinds of test read.",
+        caption="Where two methods are shown, use the first; its band contains the numerical error and the difference.",
     ),
     Chart(
         "Damping ratio",
@@ -357,7 +357,7 @@ BACKBONE = (
         _METHOD_CURVES["damping"],
         log="x auto",
         labels=("amplitude at the output", "damping ratio"),
-        caption="Structure and friction together. Use the first curve; its band contains what other kinds of test read.",
+        caption="Structure and friction together. Where two methods are shown, use the first, with its band.",
     ),
     Chart(
         "Force of the phase resonance",
