@@ -26,10 +26,7 @@ PUBLIC = {
         "is_sinusoidal",
     ),
     "drives": ("make_release",),
-    "modal_fit": (
-        "ModalFit",
-        "add_mode",
-    ),
+    "modal_fit": ("ModalFit",),
     "places": (
         "DIRECTION_NAMES",
         "MeasuredModes",

@@ -172,7 +172,11 @@ def test_exact_backbone_files_agree(folders):
             for head in heads[1:]:
                 name = head.partition(" ")[0]
                 stored = data[f"{method.replace('-', '_')}_{name}"].values
-                assert [float(row[head]) for row in mine] == curve[name] == stored.tolist()
+                # No force in phase resonance is found where the damping ratio is near 1; a note says so.
+                read = [float(row[head]) if row[head] else None for row in mine]
+                assert read == curve[name]
+                assert read == [None if np.isnan(value) else value for value in stored.tolist()]
+                assert None not in read or "force" in name
         for name in ("frequency", "damping"):
             value = data[f"balance_{name}"]
             assert (data[f"balance_{name}_low"] <= value).all()

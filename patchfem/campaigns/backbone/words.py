@@ -58,6 +58,7 @@ def write_notes(joint: JointMode, amplitudes, backbone: Backbone) -> tuple[str, 
         notes.append("no friction acts, so frequency and damping are the same at all amplitudes")
     for method, curve in curves.items():
         notes += _note_gaps(amplitudes, method, curve)
+        notes += _note_missing_forces(method, curve)
     if not joint.is_linear:
         if backbone.exponents.micro_theory is not None and backbone.exponents.micro is None:
             notes.append(_note_micro_slip(joint, amplitudes))
@@ -98,6 +99,18 @@ def _note_micro_slip(joint: JointMode, amplitudes) -> str:
         f"error of the loss; give amplitudes up to {format_length(edge, 2)}, or a smaller "
         "accuracy.tolerance"
     )
+
+
+def _note_missing_forces(method: str, curve: Curve) -> list[str]:
+    """Return a list of notes on the amplitudes of a curve whose force in phase resonance is not known."""
+    missing = curve.amplitude[np.isnan(curve.force)]
+    if not missing.size:
+        return []
+    ends = [format_length(missing[k], 3) for k in (0, -1)]
+    return [
+        f"method {method}: no force in phase resonance was found at {missing.size} of {curve.amplitude.size} amplitudes, "
+        f"from {ends[0]} to {ends[1]}"
+    ]
 
 
 def _note_gaps(amplitudes, method: str, curve: Curve) -> list[str]:
@@ -168,7 +181,7 @@ def write_advice(joint: JointMode, backbone: Backbone) -> tuple[str, ...]:
     if lost_fraction[k] > MIN_REPORTED_LOSS:
         sentences.append(
             f"A ring-down reads other values where it decays fast: at {format_length(curve.amplitude[k], 3)} a cycle "
-            f"takes {100 * lost_fraction[k]:.2g} % of the amplitude."
+            f"takes {100 * lost_fraction[k]:.0f} % of the amplitude."
         )
     for method, reason in backbone.missing.items():
         sentences.append(f"Method {method} has no curve here: {reason}.")
