@@ -20,6 +20,10 @@ MAX_ITERATIONS = 30
 N_FIRST_CYCLES = 8  # cycles before the first correction
 N_RELAXED = 6  # cycles without a correction after one that did not help
 MAX_CHANGE = 100.0  # largest change over a periodic motion, relative to the step tolerance
+# Largest change over a periodic motion with laws of many elements, whose map has kinks close together.
+MAX_KINKED_CHANGE = 1e-6
+N_CHECKED = 10  # periods that such a motion is followed
+CHECK_FACTOR = 10.0  # largest distance after these periods, relative to the change of a period that counts as none
 # Largest Floquet multiplier of a stable motion; above 1, because the derivatives of the map are differences.
 MAX_STABLE_MULTIPLIER = 1 + 1e-3
 # Distance of a multiplier from 1 that differences do not resolve; a mode with a damping ratio of 3e-7 has it.
@@ -67,7 +71,12 @@ class PeriodicMotion(NamedTuple):
 
 
 def find_periodic_motion(
-    case: Case, *, is_free: bool = False, n_first: int = N_FIRST_CYCLES, start: State | None = None
+    case: Case,
+    *,
+    is_free: bool = False,
+    n_first: int = N_FIRST_CYCLES,
+    start: State | None = None,
+    has_kinks: bool = False,
 ) -> PeriodicMotion:
     """Find the periodic motion that follows some first cycles of a case.
 
@@ -81,17 +90,25 @@ def find_periodic_motion(
         Number of first cycles.
     start : State, optional
         State of another motion of the same rig at the start of a period, from which the first cycles begin.
+    has_kinks : bool
+        Whether a law has many elements, so that a change of MAX_KINKED_CHANGE counts as none. The derivatives of the
+        map are then those between two kinks; stability and error follow from N_CHECKED periods of the motion itself.
     """
     shooting = _Shooting(case, is_free=is_free)
     if start is not None:
         shooting.state = _copy(start)
     shooting.relax(n_first - 1)
     tolerance = MAX_CHANGE * float(case.rig.settings[Setting.RTOL])
+    if has_kinks:
+        tolerance = max(tolerance, MAX_KINKED_CHANGE)
     before, change = shooting.converge(tolerance)
-    multipliers, error = shooting.find_multipliers(before)
+    if has_kinks:
+        multipliers, error = shooting.check(before, tolerance)
+    else:
+        multipliers, error = shooting.find_multipliers(before)
 
     # Near the periodic motion one more correction costs a period, because the derivatives are known.
-    if change < tolerance and error > change:
+    if not has_kinks and change < tolerance and error > change:
         nearer, nearer_change = shooting.correct_once(before)
         if nearer_change < change and shooting.has_same_regime(nearer):
             before = nearer
@@ -123,7 +140,7 @@ def _grows_for_ever(case: Case, size: float) -> bool:
     `size` is the largest coordinate or velocity of the periodic motion that was found, which a motion that grows for ever
     does not come near; inf if none was found.
     """
-    shooting = _Shooting(case, is_free=False)
+    shooting = _Shooting(case)
     sizes = []
     for _ in range(3):
         shooting.relax(N_GROWTH_CYCLES)
@@ -138,7 +155,7 @@ def _grows_for_ever(case: Case, size: float) -> bool:
 class _Shooting:
     """State of a motion at the start of a period, and its map."""
 
-    def __init__(self, case: Case, *, is_free: bool):
+    def __init__(self, case: Case, *, is_free: bool = False):
         self.is_free = is_free
         self.case = case
         self.state = make_batch([case])[1]
@@ -217,6 +234,23 @@ class _Shooting:
         if best < np.inf and change > MAX_REMAINDER * best:
             self.slopes = None
         return before, change
+
+    def check(self, before: State, tolerance: float) -> tuple[np.ndarray, float]:
+        """Follow a motion that was found for some periods.
+
+        Returns
+        -------
+        multipliers : (0,) or (1,) array
+            Growth of the distance per period if it becomes much larger than the tolerance.
+        error : float
+            Distance after these periods, enlarged for a distance that decays slowly.
+        """
+        self.state = _copy(before)
+        self.relax(N_CHECKED)
+        distance = self.measure_change(before)
+        if distance <= CHECK_FACTOR * tolerance:
+            return np.zeros(0), CHECK_FACTOR * distance
+        return np.array([(distance / tolerance) ** (1 / N_CHECKED)]), np.inf
 
     def correct_once(self, before: State) -> tuple[State, float]:
         """Return the state after a correction of another one, and its change over a period."""

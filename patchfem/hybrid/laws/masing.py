@@ -235,6 +235,11 @@ def has_stick(law: LawNumbers) -> bool:
     return law.law == "masing" and law.numbers[1] < 0
 
 
+def has_many_elements(law: LawNumbers) -> bool:
+    """Return whether a law is that of elements that yield at several displacements."""
+    return law.law == "masing" and law.numbers[4] > 1
+
+
 def from_keys(friction, load, speed):
     """Return the elastic-plastic law, or Segalman's for law "iwan".
 

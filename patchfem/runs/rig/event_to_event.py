@@ -259,7 +259,10 @@ class LumpedEvaluator(RunEvaluator):
             return None
         schedule = cases.Schedule(1.0, 1, np.zeros(0), np.inf)
         case = cases.make_rig_case(self.model.rig, self.joints.laws, schedule, rtol=STEADY_RTOL)
-        return find_stable_amplitude(periodic.find_periodic_motion(case, start=run.end, n_first=0))
+        motion = periodic.find_periodic_motion(
+            case, start=run.end, n_first=0, has_kinks=self.joints.has_kinks
+        )
+        return find_stable_amplitude(motion)
 
     def _choose_times(self, drive, cycles: float, frames: int) -> tuple:
         """Return the times [s] of samples before the last cycles, in the last cycles, and of snapshots."""

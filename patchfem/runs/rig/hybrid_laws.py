@@ -14,7 +14,7 @@ from ...friction import record
 from ...hybrid.cases import Load
 from ...hybrid.laws import make_law, smooth_grooves
 from ...hybrid.laws.grooves import make_grooves
-from ...hybrid.laws.masing import from_elements, with_all_reversals
+from ...hybrid.laws.masing import from_elements, has_many_elements, with_all_reversals
 from ...hybrid.records import LawNumbers
 from ...model.model import Model
 from ..bench import averaged_law
@@ -38,6 +38,11 @@ class Joints(NamedTuple):
     elements: tuple = ()
     contact: object = None
     stick_tolerance: float = 0.0
+
+    @property
+    def has_kinks(self) -> bool:
+        """Whether a law has elements that yield at several displacements."""
+        return any(has_many_elements(law) for law, _ in self.laws)
 
     @property
     def springs(self) -> np.ndarray:

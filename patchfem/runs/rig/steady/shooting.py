@@ -76,7 +76,9 @@ class ShootingFinder(TracedCurve):
             self.model.rig, self.joints.laws, schedule, signal=drive, rtol=RTOL
         )
         n_first = periodic.N_FIRST_CYCLES if guess is None else N_NEAR_CYCLES
-        motion = periodic.find_periodic_motion(case, start=guess, n_first=n_first)
+        motion = periodic.find_periodic_motion(
+            case, start=guess, n_first=n_first, has_kinks=self.joints.has_kinks
+        )
         if motion.grows:
             return motion
         status = Status(int(motion.batch.states.clock[0, Clock.STATUS]))
