@@ -11,7 +11,7 @@ PUBLIC = {
     "compare.records": (
         "Comparison",
         "Finding",
-        "ScanMaps",
+        "DepthMap",
         "Track",
     ),
     "files.read": (

@@ -132,36 +132,16 @@ class Track:
 
 
 @dataclass(frozen=True, eq=False)
-class TraceCurves:
-    """Curves of two aligned traces at x (n,) [m] of the second one.
+class DepthMap:
+    """Aligned traces at x (n,) [m] of the second one, or scans (m, n) on the points x (n,), y (m,) [m] of the first one.
 
-    - before, after: heights (n,) [m] about the least-squares line of the first trace.
-    - depth, noise: worn depth and the standard deviation of an unworn one, (n,) [m].
-    - unworn, worn, grown: masks (n,).
-    """
-
-    x: np.ndarray
-    before: np.ndarray
-    after: np.ndarray
-    depth: np.ndarray
-    noise: np.ndarray
-    unworn: np.ndarray
-    worn: np.ndarray
-    grown: np.ndarray
-
-
-@dataclass(frozen=True, eq=False)
-class ScanMaps:
-    """Maps (m, n) of two aligned scans at x (n,), y (m,) [m] of the first one; NaN where unknown.
-
-    - before, after: heights [m] about the least-squares plane of the first scan.
-    - depth: worn depth [m], missing heights filled from their neighbours.
-    - noise: standard deviation of an unworn depth [m].
+    - before, after: heights [m] about the least-squares line or plane of the first surface.
+    - depth, noise: worn depth, filled where it is missing, and the standard deviation of an unworn one [m].
     - unworn, worn, grown: masks.
+    - y: None for traces.
     """
 
     x: np.ndarray
-    y: np.ndarray
     before: np.ndarray
     after: np.ndarray
     depth: np.ndarray
@@ -169,6 +149,7 @@ class ScanMaps:
     unworn: np.ndarray
     worn: np.ndarray
     grown: np.ndarray
+    y: np.ndarray | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -176,7 +157,7 @@ class Evidence:
     """What the numbers of a comparison rest on; None where there is no common place.
 
     - placement, datum: how the second surface was laid on the first.
-    - curves: of traces, or maps of scans.
+    - curves: depths and heights of the aligned surfaces.
     - roughness: {"inside", "outside": {"before", "after", "ratio": {"Ra", "Rq", "slope": Quantity}}}
       of the track, with the ratio after/before; {} without a track. `cutoff` [m] is that of these values.
     - removed: heights left out before and after as spikes, dropouts or dust.
@@ -184,7 +165,7 @@ class Evidence:
 
     placement: Placement | None = None
     datum: Datum | None = None
-    curves: TraceCurves | ScanMaps | None = None
+    curves: DepthMap | None = None
     roughness: dict[str, dict[str, dict[str, Quantity]]] = field(default_factory=dict)
     cutoff: float | None = None
     removed: tuple[int, int] = (0, 0)
