@@ -5,7 +5,7 @@ from scipy import ndimage, special
 
 from ..profile import find_runs
 from ..quantity import SIDE, Quantity
-from ..roughness.filter import mean_line
+from ..roughness.filter import mean_surface
 from ..roughness.report import fitting_cutoff
 from ..roughness.spectrum import BAND
 from .records import DEFINITIONS, name_quantity, name_unknown
@@ -136,7 +136,7 @@ def measure_roughness(x, heights: dict, spans) -> tuple[dict, float | None]:
     rough = {}
     for side, z in heights.items():
         even = np.interp(places, x, z)
-        rough[side] = even - mean_line(even, cutoff / step)
+        rough[side] = even - mean_surface(even, (cutoff / step,))
     edge = int(np.ceil(cutoff / 2 / step))
     regions = {}
     for region, runs in pieces.items():
