@@ -6,7 +6,7 @@ import numpy as np
 
 from .fit import Fit, evaluate, fit_unworn
 from .model import Model
-from .place import MIN_SIGNIFICANCE, Place, change_second, find_places, order
+from .place import Place, change_second, find_place, order
 from .raster import MIN_HEIGHTS, Raster, fill_gaps
 from .statistics import (
     UNWORN_LIMIT,
@@ -22,7 +22,6 @@ MAX_FIT_POINTS = (
     40_000  # number of points to which the place is fitted; more would hardly improve it
 )
 MIN_COMMON = 0.2  # smallest common part relative to the own surface
-CLEAR_MISFIT = 0.9  # misfit of a place relative to that of a more significant one that it replaces
 MAX_STRETCH = 0.015  # largest error of length of a place
 N_TERMS = {1: (2, 3), 2: (3,)}  # numbers of terms of the datums that are tried
 # Noise about a parabola relative to that about a line, from which on the parabola is subtracted.
@@ -31,7 +30,7 @@ MAX_NEW_GROWTH = 0.01  # fraction of the heights above the first trace that a pa
 SURE_SIGNIFICANCE = (
     12.0  # the same as MIN_SIGNIFICANCE, of a place among others nearly as significant
 )
-LIKELY_SIGNIFICANCE = 6.0  # significance of a clear place that suffices if enough heights agree
+LIKELY_SIGNIFICANCE = 6.0  # significance of a place that suffices if enough heights agree
 MIN_EXCESS = 0.2  # fraction of the heights, beyond those by chance, that agree at such a place
 MIN_AGREEMENT = 3.0  # heights that agree, relative to those of unrelated surfaces
 MIN_AGREEING = 0.05  # fraction of heights that agree, in addition to that
@@ -75,20 +74,14 @@ def align(
     is_straight : bool
         Whether the datum of traces is known to be straight.
     """
-    places = [Place(-np.array([shift]), 0.0)] if shift is not None else find_places(first, second)
-    best = None
-    for place in places:
-        model = _make_model(first, second, place)
-        if model is None:
-            continue
-        state, misfit = model.refine_place()
-        is_possible = first.z.ndim > 1 or abs(state[1]) < MAX_STRETCH
-        if is_possible and (best is None or misfit < CLEAR_MISFIT * best[1]):
-            best = place, misfit, model, state
-    if best is None:
+    place = Place(-np.array([shift]), 0.0) if shift is not None else find_place(first, second)
+    model = _make_model(first, second, place)
+    if model is None:
         return Aligned(_find_reason(first, second))
-    place, _, model, state = best
+    state = model.refine_place()
     model.keep_common(state)
+    if model.known.sum() < MIN_HEIGHTS:
+        return Aligned(_find_reason(first, second))
 
     digit = EVEN_DEVIATION * float(np.hypot(_find_digit(first.z), _find_digit(second.z)))
     digit = max(digit, MIN_NOISE)
@@ -115,7 +108,7 @@ def align(
         error = np.hypot(error, gain - 1)
     aligned = Aligned("", model, fit, place, total, float(min(error, MAX_GAIN_ERROR)))
 
-    if shift is None and not _is_same_place(places, place, aligned):
+    if shift is None and not _is_same_place(aligned):
         return replace(aligned, reason=_find_reason(first, second))
     if fit.unworn.mean() < MIN_AGREEING:
         return replace(aligned, reason="no_datum")
@@ -161,7 +154,7 @@ def _move(place: Place, state) -> Place:
     return place._replace(shift=state[:n_axes], turn=float(state[n_axes]))
 
 
-def _is_same_place(places: list[Place], place: Place, aligned: Aligned) -> bool:
+def _is_same_place(aligned: Aligned) -> bool:
     """Return whether the surfaces have a place in common: by its significance, or by the heights that agree."""
     model = aligned.model
     fit = aligned.fit
@@ -170,13 +163,12 @@ def _is_same_place(places: list[Place], place: Place, aligned: Aligned) -> bool:
     is_stretched = model.n_axes == 1 and abs(fit.state[1]) > MAX_STRETCH
     if is_stretched or noise > second[model.known].std():
         return False
+    significance = aligned.place.significance
+    if significance > SURE_SIGNIFICANCE:
+        return True
     chance = _estimate_chance(first, second, noise)
     agreeing = fit.unworn.mean()
-    is_clear = len(places) == 1
-    if place.significance > (MIN_SIGNIFICANCE if is_clear else SURE_SIGNIFICANCE):
-        return True
-    is_likely = place.significance > (LIKELY_SIGNIFICANCE if is_clear else MIN_SIGNIFICANCE)
-    if is_likely and agreeing - chance > MIN_EXCESS * (1 - chance):
+    if significance > LIKELY_SIGNIFICANCE and agreeing - chance > MIN_EXCESS * (1 - chance):
         return True
     return agreeing > MIN_AGREEMENT * chance + MIN_AGREEING
 

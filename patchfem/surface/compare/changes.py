@@ -1,4 +1,4 @@
-"""Heights that noise does not explain: single ones, means over windows, shallow tracks, worn tops."""
+"""Heights that noise does not explain: single ones, means over windows, shallow tracks."""
 
 from functools import lru_cache
 from typing import NamedTuple
@@ -7,11 +7,9 @@ import numpy as np
 from scipy import ndimage
 
 from .statistics import (
-    UNWORN_LIMIT,
     compute_threshold,
     estimate_correlation,
     estimate_one_sided_scale,
-    remove_long_waves,
 )
 
 WINDOWS = {1: (1, 4, 16, 64), 2: (1, 3, 9, 25)}  # sides of the windows whose mean depth is tested
@@ -20,9 +18,6 @@ MIN_SPOT_SIDE = {1: 1, 2: 3}  # the same of points that are changed alone
 MAX_PULL = {1: 4.0, 2: 8.0}  # standard deviations to which a single depth counts in a mean
 # Fraction of the means above or below zero that are unchanged at least.
 UNCHANGED_FRACTION = {1: 0.5, 2: 0.25}
-TOP_FRACTIONS = (0.05, 0.1, 0.2, 0.4)  # fractions of the heights that are tested as worn tops
-MIN_TOP_DEVIATIONS = 6.0  # standard deviations of their mean depth above which tops are worn
-MIN_QUIET = 40  # smallest number of unworn depths that show their correlation
 N_PARTS = 60  # parts of the trace whose means show a shallow track
 FLANK_PARTS = 5  # smallest number of parts on either side of a shallow track
 MIN_TRACK_PARTS = 3  # smallest number of parts in a shallow track
@@ -31,15 +26,13 @@ DATUM_DEGREE = 3  # degree of the polynomial that a datum may add to shallow dep
 MIN_STEP = 8.0
 
 
-def find_changed(depth, noise, heights=None) -> np.ndarray:
+def find_changed(depth, noise) -> np.ndarray:
     """Find the points whose depth, alone or in means over windows, noise does not explain.
 
     Parameters
     ----------
     depth, noise : (n,) or (m, n) array [m]
         Depth and the standard deviation of an unworn one; NaN where unknown.
-    heights : array of the same shape, optional
-        Means of both surfaces [m], in which worn tops of traces are sought.
 
     Returns
     -------
@@ -76,43 +69,7 @@ def find_changed(depth, noise, heights=None) -> np.ndarray:
     places = np.flatnonzero(known)
     shallow = find_shallow_track(np.clip(depth, -pull * noise, pull * noise)[known])
     changed[places[shallow.samples]] = True
-    changed = ndimage.binary_opening(ndimage.binary_dilation(changed), np.ones(MIN_SIDE + 2))
-    if not changed.any() and heights is not None:
-        changed[places] = find_changed_tops(heights[known], relative[known])
-    return changed & known
-
-
-def find_changed_tops(heights, relative) -> np.ndarray:
-    """Return the tops (n,) bool of a surface whose mean depth shows wear below the noise of a height.
-
-    The mean over the tops must differ from that of the middle heights by more than the mean of the
-    valleys does; an error of the gain of the instrument changes both alike.
-
-    Parameters
-    ----------
-    heights : (n,) array [m]
-        Means of both surfaces, whose noise is independent of that of the depth.
-    relative : (n,) array
-        Depth in standard deviations.
-    """
-    tops = np.zeros(heights.size, bool)
-    quiet = relative[np.abs(relative) < UNWORN_LIMIT]
-    if quiet.size < MIN_QUIET:
-        return tops
-    correlation = estimate_correlation(quiet)
-    rank = np.argsort(np.argsort(remove_long_waves(heights))) / heights.size
-    relative = np.clip(relative, -MAX_PULL[1], MAX_PULL[1])
-    highest = MIN_TOP_DEVIATIONS
-    middle = relative[np.abs(rank - 0.5) < 0.1].mean()
-    for fraction in TOP_FRACTIONS:
-        is_top = rank > 1 - fraction
-        rise = relative[is_top].mean() - middle
-        fall = middle - relative[rank < fraction].mean()
-        deviations = (rise - 2 * abs(fall)) * np.sqrt(is_top.sum() / correlation / 2)
-        if deviations > highest:
-            highest = deviations
-            tops = is_top
-    return tops
+    return ndimage.binary_opening(ndimage.binary_dilation(changed), np.ones(MIN_SIDE + 2)) & known
 
 
 class Boxes(NamedTuple):
@@ -176,10 +133,8 @@ def find_detection_limit(depth, noise) -> float:
     """Return the mean depth [m] from which on a track of a trace, or a worn square of a scan, is found."""
     if depth.ndim == 1:
         return find_shallow_track(depth).limit
-    known = np.isfinite(noise)
     side = max(side for side in WINDOWS[2] if side <= min(depth.shape) / 4)
-    relative = np.clip(np.where(known, depth / noise, 0.0), -MAX_PULL[2], MAX_PULL[2])
-    mean = ndimage.uniform_filter(relative, side)
-    scatter = max(estimate_one_sided_scale(mean[known], UNCHANGED_FRACTION[2]), 1 / side)
-    n_tests = len(WINDOWS[2]) * known.sum()
-    return float(compute_threshold(n_tests) * scatter * np.median(noise[known]))
+    mean = ndimage.uniform_filter(np.clip(depth / noise, -MAX_PULL[2], MAX_PULL[2]), side)
+    scatter = max(estimate_one_sided_scale(mean.ravel(), UNCHANGED_FRACTION[2]), 1 / side)
+    threshold = compute_threshold(len(WINDOWS[2]) * depth.size)
+    return float(threshold * scatter * np.median(noise))

@@ -20,13 +20,13 @@ from ..quantity import SIDE, Quantity
 from . import waves
 from .alignment import Aligned, align
 from .changes import find_detection_limit
-from .depths import Depths, make_depths, measure_largest
+from .depth_map import DepthMap
+from .depths import make_depths, measure_largest
 from .flanks import find_flanked_track
 from .raster import Raster, clean_surface, fill_gaps, make_raster
 from .records import (
     Comparison,
     Datum,
-    DepthMap,
     Evidence,
     Finding,
     Placement,
@@ -267,7 +267,7 @@ def _describe_place(aligned: Aligned) -> Placement:
     return Placement(values, "x" if place.mirrored else "", place.inverted)
 
 
-def _describe_alignment(aligned: Aligned, placement: Placement, depths: Depths) -> list[Finding]:
+def _describe_alignment(aligned: Aligned, placement: Placement, depths: DepthMap) -> list[Finding]:
     """Return what a reader must know of the place, the datum and the gain."""
     findings = []
     bend = _get_bend(aligned)
@@ -286,8 +286,8 @@ def _describe_alignment(aligned: Aligned, placement: Placement, depths: Depths) 
     if scale is not None and not scale.low - MIN_OTHER_LENGTH < 1 < scale.high + MIN_OTHER_LENGTH:
         numbers = {"scale": scale.value, "low": scale.low, "high": scale.high}
         findings.append(Finding("other_length", numbers))
-    if depths.drift > depths.noise_level:
-        findings.append(Finding("drift", {"height": depths.drift}))
+    if depths.errors.drift > depths.noise_level:
+        findings.append(Finding("drift", {"height": depths.errors.drift}))
     return findings
 
 
@@ -300,7 +300,7 @@ def _note_steps(first: Raster, second: Raster) -> tuple[Finding, ...]:
 
 def _judge(
     surfaces: tuple[Profile | Areal, Profile | Areal],
-    depths: Depths,
+    depths: DepthMap,
     placement: Placement,
     bend: float,
     first: Raster,
@@ -322,13 +322,12 @@ def _judge(
     limit = find_detection_limit(depths.depth, depths.noise)
     limit = None if placement.basis == "flanks" else limit
     datum = Datum(
-        unworn=float(depths.unworn[np.isfinite(depths.noise)].mean()),
+        unworn=float(depths.unworn[depths.inside & ~depths.missing].mean()),
         noise=depths.noise_level,
         bend=bend,
-        correlation=depths.correlation,
+        correlation=depths.errors.correlation,
         detection_limit=limit,
     )
-    curves = _draw_curves(depths)
     tracks = _measure_tracks(depths, spans, bounds, first) if code.startswith("worn") else ()
     numbers = {"lost": area, "grown": grown, "basis": placement.basis}
     numbers |= limit_wear(bounds[2] / depths.size, limit)
@@ -341,7 +340,7 @@ def _judge(
     values = {name: name_unknown(name, reason) for name in names.wear} | placement.values
     values[names.region] = name_quantity(names.region, depths.size, None, None)
     values[names.grown] = name_estimate(names.grown, grown, grown_error, 0.0)
-    evidence = Evidence(placement, datum, curves)
+    evidence = Evidence(placement, datum, depths)
     findings = [Finding("exchanged", {})] if code == "grown" else []
     if code.startswith("worn"):
         values[names.lost] = name_quantity(names.lost, *bounds)
@@ -352,8 +351,7 @@ def _judge(
             values |= _name_ends(tracks, placement, float(np.mean(depths.x[[0, -1]])))
             findings += _describe_tracks(depths, spans, tracks)
             if placement.basis == "place":
-                heights = {"before": curves.before, "after": curves.after}
-                regions, cutoff = waves.measure_roughness(depths.x, heights, spans[:1])
+                regions, cutoff = waves.measure_roughness(depths, spans[:1])
                 evidence = replace(evidence, roughness=regions, cutoff=cutoff)
         else:
             values["worn_share"] = _measure_share(depths)
@@ -367,7 +365,7 @@ def _enlarge(part) -> np.ndarray:
     return ndimage.binary_dilation(part, np.ones((MARGIN,) * part.ndim))
 
 
-def _cover_loss(depths: Depths, spans: list[tuple[int, int]]) -> np.ndarray:
+def _cover_loss(depths: DepthMap, spans: list[tuple[int, int]]) -> np.ndarray:
     """Return the mask of worn places with their flanks."""
     if depths.depth.ndim > 1:
         return _enlarge(depths.worn) & depths.inside & ~depths.grown
@@ -379,22 +377,8 @@ def _cover_loss(depths: Depths, spans: list[tuple[int, int]]) -> np.ndarray:
     return covered & (depths.depth > -UNWORN_LIMIT * depths.noise) & ~depths.grown
 
 
-def _draw_curves(depths: Depths) -> DepthMap:
-    return DepthMap(
-        x=depths.x,
-        before=depths.after + depths.depth,
-        after=depths.after,
-        depth=depths.depth,
-        noise=depths.noise,
-        unworn=depths.unworn,
-        worn=depths.worn,
-        grown=depths.grown,
-        y=depths.places[0] if depths.depth.ndim > 1 else None,
-    )
-
-
 def _measure_tracks(
-    depths: Depths, spans: list[tuple[int, int]], bounds: tuple, first: Raster
+    depths: DepthMap, spans: list[tuple[int, int]], bounds: tuple, first: Raster
 ) -> tuple[Track, ...]:
     """Measure the tracks of a trace, or the track across a scan."""
     if depths.depth.ndim > 1:
@@ -406,7 +390,7 @@ def _measure_tracks(
 
 def _doubt(
     code: str,
-    depths: Depths,
+    depths: DepthMap,
     spans: list[tuple[int, int]],
     tracks: tuple[Track, ...],
     sizes: tuple[float, float, float, float],
@@ -417,7 +401,7 @@ def _doubt(
     ----------
     code : str
         Verdict on lost and grown material.
-    depths : Depths
+    depths : DepthMap
     spans, tracks
         Tracks of a trace.
     sizes : tuple of float
@@ -426,7 +410,7 @@ def _doubt(
     area, grown, bow, bend = sizes
     is_cut = bool(tracks) and any(tracks[0].cut)
     if code == "grown" and _has_grown_at_ends(depths):
-        height = grown / float(depths.sizes[depths.grown].sum())
+        height = grown / (float(depths.grown.sum()) * depths.cell)
         return "growth_at_ends", {"scar_depth": height, "growth_height": height}
     if depths.depth.ndim > 1:
         return code, {}
@@ -443,7 +427,7 @@ def _doubt(
     return code, {}
 
 
-def _has_grown_at_ends(depths: Depths) -> bool:
+def _has_grown_at_ends(depths: DepthMap) -> bool:
     """Return whether material grew along two opposite ends or borders, which a scar between them resembles."""
     axes = set(range(depths.depth.ndim))
     for axis in axes:
@@ -455,7 +439,7 @@ def _has_grown_at_ends(depths: Depths) -> bool:
     return False
 
 
-def _locate_largest(depths: Depths) -> dict[str, Quantity]:
+def _locate_largest(depths: DepthMap) -> dict[str, Quantity]:
     """Return the largest depth and its place."""
     largest, near = measure_largest(depths)
     values = {"worn_depth_max": largest}
@@ -466,19 +450,19 @@ def _locate_largest(depths: Depths) -> dict[str, Quantity]:
         return values
     row, column = np.unravel_index(np.argmax(np.where(near, depths.depth, -np.inf)), near.shape)
     values["worn_depth_max_x"] = name_quantity("worn_depth_max_x", depths.x[column], None, None)
-    y = depths.places[0][row]
-    return values | {"worn_depth_max_y": name_quantity("worn_depth_max_y", y, None, None)}
+    values["worn_depth_max_y"] = name_quantity("worn_depth_max_y", depths.y[row], None, None)
+    return values
 
 
-def _measure_share(depths: Depths) -> Quantity:
+def _measure_share(depths: DepthMap) -> Quantity:
     """Return the worn fraction of a scan, known but for a line of points around the worn places."""
-    cell = depths.sizes.flat[0]
+    cell = depths.cell
     share = float(depths.worn.sum()) * cell / depths.size
     edge = float(ndimage.binary_dilation(depths.worn).sum()) * cell / depths.size - share
     return name_quantity("worn_share", share, max(share - edge, 0.0), share + edge)
 
 
-def _describe_tracks(depths: Depths, spans: list, tracks: tuple[Track, ...]) -> list[Finding]:
+def _describe_tracks(depths: DepthMap, spans: list, tracks: tuple[Track, ...]) -> list[Finding]:
     """Return what the numbers of the longest track leave out."""
     findings = []
     if len(tracks) > 1:
@@ -516,22 +500,16 @@ def _name_ends(
 def _compare_waves(
     rasters: tuple[Raster, Raster], result: Comparison, direction: str
 ) -> dict[str, Quantity]:
-    """Compare the waves along the common part of traces, or along the lines of scans."""
-    curves = result.evidence.curves
-    datum = result.evidence.datum
-    noise = 0.0 if datum is None else datum.noise
+    """Compare the waves along the lines of the common part, or of both surfaces without one."""
     axis = 0 if direction == "y" else -1
+    depths = result.evidence.curves
     steps = [float(raster.steps[axis]) for raster in rasters]
-    if rasters[0].z.ndim == 1:
-        step = max(steps)
-        pairs = [(raster.axes[0], fill_gaps(raster.z)) for raster in rasters]
-        if curves is not None and result.evidence.placement.basis == "place":
-            step = steps[1]
-            pairs = [(curves.x, curves.before), (curves.x, curves.after)]
-        lines = [np.interp(np.arange(x[0], x[-1], step), x, z)[None] for x, z in pairs]
-        return waves.compare_waves(lines, step, noise)
-    if max(steps) > MAX_STEP_RATIO * min(steps):
+    if depths is not None and result.evidence.placement.basis == "place":
+        lines = [np.moveaxis(z, axis, -1) for z in (depths.before, depths.after)]
+        steps = steps[1:] if depths.y is None else steps[:1]
+    elif max(steps) > MAX_STEP_RATIO * min(steps):
         return {name: name_unknown(name, "other_step") for name in RATIO_NAMES}
-    lines = [np.moveaxis(fill_gaps(raster.z), axis, -1) for raster in rasters]
-    count = min(map(len, lines))
-    return waves.compare_waves([line[:count] for line in lines], steps[0], noise)
+    else:
+        lines = [np.moveaxis(fill_gaps(raster.z), axis, -1) for raster in rasters]
+    noise = 0.0 if result.evidence.datum is None else result.evidence.datum.noise
+    return waves.compare_waves([np.atleast_2d(line) for line in lines], steps[0], noise)

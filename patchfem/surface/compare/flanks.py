@@ -7,7 +7,7 @@ the first trace was measured at another place and shows the roughness only.
 import numpy as np
 
 from .changes import MIN_TRACK_PARTS, N_PARTS, make_boxes
-from .depths import Depths
+from .depth_map import DepthErrors, DepthMap
 from .raster import Raster, fill_gaps
 from .statistics import estimate_correlation, solve_biweight_step
 
@@ -19,7 +19,7 @@ MIN_PART_SAMPLES = 4  # smallest number of samples of a part
 SPECTRUM_ERROR = 1.4  # widens the errors, because the spectrum of one trace is an estimate itself
 
 
-def find_flanked_track(first: Raster, second: Raster) -> Depths | None:
+def find_flanked_track(first: Raster, second: Raster) -> DepthMap | None:
     """Find a track between flanks in the second trace; None if its roughness explains what is seen.
 
     A line with a box is fitted to means of parts. The box is a track if it is deeper than in all random
@@ -56,20 +56,23 @@ def find_flanked_track(first: Raster, second: Raster) -> Depths | None:
         stop += 1
     worn = np.zeros(z.size, bool)
     worn[edges[start] : edges[stop]] = True
-    step = float(second.steps[0])
-    return Depths(
-        places=(second.axes[0],),
+    missing = np.isnan(second.z)
+    return DepthMap(
+        x=second.axes[0],
+        before=0.0 * depth,
+        after=-depth,
         depth=depth,
         noise=np.full(z.size, float(errors[:, beside].std())),
         unworn=beside,
         worn=worn,
         grown=np.zeros(z.size, bool),
         inside=np.ones(z.size, bool),
-        after=-depth,
-        sizes=np.full(z.size, step),
-        missing=np.where(np.isnan(second.z), step, 0.0),
-        variance=lambda weights: SPECTRUM_ERROR**2 * float(np.var(errors @ weights)),
-        correlation=estimate_correlation(traces[0]),
+        missing=missing,
+        cell=float(second.steps[0]),
+        errors=DepthErrors(
+            variance=lambda part: SPECTRUM_ERROR**2 * float(np.var(errors[:, part].sum(axis=1))),
+            correlation=estimate_correlation(traces[0]),
+        ),
     )
 
 

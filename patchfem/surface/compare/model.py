@@ -129,13 +129,10 @@ class Model:
 
     def find_changed(self, depth, noise) -> np.ndarray:
         """Return the points (n,) bool that noise does not explain, of positive depth."""
-        heights = self.own.z[self.known]
-        # Means of both surfaces have another noise than the depth.
-        heights = heights - self.sign * depth / 2
-        return find_changed(self.draw(depth), self.draw(noise), self.draw(heights))[self.known]
+        return find_changed(self.draw(depth), self.draw(noise))[self.known]
 
-    def refine_place(self) -> tuple[np.ndarray, float]:
-        """Return the state with the place of the short waves, and the misfit of those that agree.
+    def refine_place(self) -> np.ndarray:
+        """Return the state with the place of the short waves.
 
         Biweight steps on both surfaces, smoothed less and less, find it.
         """
@@ -149,8 +146,7 @@ class Model:
             jacobian = np.column_stack([self._filter(column, width) for column in columns])
             sigma = max(robust_deviation(depth), 1e-15)
             state[place] += solve_biweight_step(depth, jacobian, sigma)
-        depth = self._filter(self.compute_depth(state), 0)
-        return state, float(np.quantile(np.abs(depth), 0.3))
+        return state
 
     @cached_property
     def smoothing(self) -> np.ndarray:

@@ -1,6 +1,6 @@
 """Search for the place of a second surface on the first one, by the correlation of their short waves."""
 
-from collections.abc import Iterator
+from itertools import product
 from typing import NamedTuple
 
 import numpy as np
@@ -24,13 +24,9 @@ IMAGE_WAVES = {
     2: 12,
 }  # side of an image relative to the deviation of the Gaussian of its long waves
 MIN_OVERLAP = 0.33  # smallest common part relative to the smaller image
-N_PARTS = 3  # number of parts whose places are sought if that of the whole surface is not clear
-N_PEAKS = 3  # number of peaks of a correlation that are tried
-PEAK_REACH = 10  # pixels around a peak that belong to it
-N_CANDIDATES = 6  # number of places that are refined if none leads clearly
-CLEAR_SIGNIFICANCE = 20.0  # significance of a place beyond which no other one is tried
-MIN_SIGNIFICANCE = 8.0  # significance of a place that no unrelated surfaces have
-CLEAR_LEAD = 1.3  # significance of a place relative to that of the next one, which makes it clear
+CLEAR_SIGNIFICANCE = (
+    20.0  # significance of a place beyond which no mirrored or inverted scan is tried
+)
 
 
 class Place(NamedTuple):
@@ -66,8 +62,8 @@ def order(first: Raster, second: Raster) -> tuple[Raster, Raster]:
     return (second, first) if first.z.ndim == 1 else (first, second)
 
 
-def find_places(first: Raster, second: Raster) -> list[Place]:
-    """Find places of the second surface, the most significant first; a single one if it is clear.
+def find_place(first: Raster, second: Raster) -> Place:
+    """Find the place of the second surface with the most significant correlation.
 
     The significance is Fisher's z times the root of the number of common points, relative to its scatter over all lags.
     """
@@ -75,56 +71,31 @@ def find_places(first: Raster, second: Raster) -> list[Place]:
     longest = max(first.lengths.max(), second.lengths.max())
     finest = min(first.steps.min(), second.steps.min())
     pixel = max(finest, longest / MAX_PIXELS[n_axes])
-    found: list[Place] = []
-    # A part of the surface may show its place although new roughness in a track hides that of the whole.
-    for n_parts in (1, N_PARTS):
-        for mirrored, inverted in VARIANTS[n_axes]:
-            changed = change_second(second, mirrored=mirrored, inverted=inverted)
-            for shift, turn, significance in _correlate_turned(
-                *order(first, changed), pixel, n_parts
-            ):
-                found.append(Place(shift, turn, mirrored, inverted, significance))
-            found.sort(key=lambda place: -place.significance)
-            if found[0].significance > CLEAR_SIGNIFICANCE and n_axes > 1:
-                break
-        if found[0].significance > CLEAR_SIGNIFICANCE:
-            return found[:1]
-        if found[0].significance > MIN_SIGNIFICANCE:
-            break
-
-    # Places whose shifts differ by less than the waves are the same.
-    distinct: list[Place] = []
-    for place in found:
-        is_new = all(
-            np.abs(place.shift - earlier.shift).max() > 2 * PEAK_REACH * pixel
-            or place[2:4] != earlier[2:4]
-            for earlier in distinct
-        )
-        if is_new:
-            distinct.append(place)
-    is_clear = len(distinct) < 2 or distinct[0].significance > CLEAR_LEAD * distinct[1].significance
-    return distinct[: 1 if is_clear else N_CANDIDATES]
-
-
-def _correlate_turned(
-    own: Raster, other: Raster, pixel: float, n_parts: int
-) -> Iterator[tuple[np.ndarray, float, float]]:
-    """Yield shift, turn and significance of the best places of parts of the own surface, for each turn of the other."""
-    images = [_make_images(surface, pixel) for surface in (own, other)]
-    for turn in TURNS[own.z.ndim]:
-        matrix = make_matrix(turn, own.z.ndim)
-        for image, other_image in zip(*images):
+    best = Place(np.zeros(n_axes), 0.0, significance=-np.inf)
+    for mirrored, inverted in VARIANTS[n_axes]:
+        changed = change_second(second, mirrored=mirrored, inverted=inverted)
+        own, other = order(first, changed)
+        images = [_make_images(surface, pixel) for surface in (own, other)]
+        for turn, (image, other_image) in product(TURNS[n_axes], zip(*images)):
+            matrix = make_matrix(turn, n_axes)
             center = (np.array(other_image.shape) - 1) / 2
             offset = center - matrix @ center
             turned = ndimage.affine_transform(other_image, matrix, offset, order=1)
-            count = image.shape[-1] // n_parts
-            for start in range(0, n_parts * count, count):
-                for lag, significance in _find_peaks(image[..., start : start + count], turned):
-                    # The middle of the own surface lies at this point of the turned image.
-                    lag[-1] += start
-                    at = (own.middle - own.origin) / pixel - lag
-                    place = other.origin + pixel * (center + matrix @ (at - center))
-                    yield place - own.middle, float(turn), significance
+            significance = correlate(image, turned)
+            peak = np.unravel_index(np.argmax(significance), significance.shape)
+            if significance[peak] <= best.significance:
+                continue
+            lag = np.where(
+                np.array(peak) < image.shape, peak, np.subtract(peak, significance.shape)
+            )
+            # The middle of the own surface lies at this point of the turned image.
+            at = (own.middle - own.origin) / pixel - lag
+            place = other.origin + pixel * (center + matrix @ (at - center))
+            found = (float(turn), mirrored, inverted, float(significance[peak]))
+            best = Place(place - own.middle, *found)
+        if best.significance > CLEAR_SIGNIFICANCE and n_axes > 1:
+            break
+    return best
 
 
 def _make_images(surface: Raster, pixel: float) -> tuple[np.ndarray, ...]:
@@ -150,21 +121,6 @@ def _whiten(z) -> np.ndarray:
     spectrum = fft.rfftn(z)
     size = np.abs(spectrum)
     return fft.irfftn(spectrum / (size + np.median(size) + TINY), z.shape)
-
-
-def _find_peaks(first, second) -> list[tuple[np.ndarray, float]]:
-    """Return the lags (d,) of the highest peaks of the correlation of two images, and their significance."""
-    significance = correlate(first, second)
-    size = np.array(significance.shape)
-    peaks = []
-    for _ in range(N_PEAKS if first.ndim == 1 else 1):
-        best = np.array(np.unravel_index(np.argmax(significance), size))
-        lag = np.where(best < first.shape, best, best - size)
-        peaks.append((lag, float(significance[tuple(best)])))
-        # The neighbourhood of a peak belongs to it.
-        near = [(at + np.arange(-PEAK_REACH, PEAK_REACH + 1)) % n for at, n in zip(best, size)]
-        significance[np.ix_(*near)] = -np.inf
-    return peaks
 
 
 def correlate(first, second) -> np.ndarray:

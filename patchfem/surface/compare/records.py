@@ -12,6 +12,7 @@ import numpy as np
 from ..areal import Areal
 from ..profile import Profile
 from ..quantity import SIDE, Quantity
+from .depth_map import DepthMap
 
 # Unit and definition of each quantity of a comparison.
 DEFINITIONS = {
@@ -129,27 +130,6 @@ class Track:
     cut: tuple[bool, bool] = (False, False)
     section: tuple[np.ndarray, np.ndarray, np.ndarray] | None = None
     n_sections: int = 1
-
-
-@dataclass(frozen=True, eq=False)
-class DepthMap:
-    """Aligned traces at x (n,) [m] of the second one, or scans (m, n) on the points x (n,), y (m,) [m] of the first one.
-
-    - before, after: heights [m] about the least-squares line or plane of the first surface.
-    - depth, noise: worn depth, filled where it is missing, and the standard deviation of an unworn one [m].
-    - unworn, worn, grown: masks.
-    - y: None for traces.
-    """
-
-    x: np.ndarray
-    before: np.ndarray
-    after: np.ndarray
-    depth: np.ndarray
-    noise: np.ndarray
-    unworn: np.ndarray
-    worn: np.ndarray
-    grown: np.ndarray
-    y: np.ndarray | None = None
 
 
 @dataclass(frozen=True, eq=False)

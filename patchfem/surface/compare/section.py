@@ -3,7 +3,8 @@
 import numpy as np
 
 from .changes import find_changed
-from .depths import Depths, estimate_variance
+from .depth_map import DepthErrors, DepthMap
+from .depths import estimate_variance
 from .records import Track, name_quantity
 from .statistics import UNWORN_LIMIT, estimate_one_sided_scale
 from .track import find_spans, measure_track
@@ -13,9 +14,9 @@ END_QUANTILE = 0.05  # fraction of the worn points beyond each end of the sectio
 MIN_SECTIONS = 8  # smallest number of sections across a track
 
 
-def average_section(scan: Depths) -> tuple[Track, ...]:
+def average_section(scan: DepthMap) -> tuple[Track, ...]:
     """Measure the mean section across an elongated worn place; () if it is not one."""
-    y, x = np.meshgrid(*scan.places, indexing="ij")
+    y, x = np.meshgrid(scan.y, scan.x, indexing="ij")
     weights = np.maximum(scan.depth[scan.worn], 0.0)
     points = np.array([x[scan.worn], y[scan.worn]])
     moments, axes = np.linalg.eigh(np.cov(points, aweights=weights))
@@ -29,9 +30,9 @@ def average_section(scan: Depths) -> tuple[Track, ...]:
     places = across[0] * x + across[1] * y
     lengths = along[0] * x + along[1] * y
     ends = np.quantile(lengths[scan.worn], (END_QUANTILE, 1 - END_QUANTILE))
-    step = float(max(np.diff(axis).mean() for axis in scan.places))
+    step = float(max(np.diff(axis).mean() for axis in (scan.y, scan.x)))
     n_sections = int(np.ptp(ends) / step)
-    use = (scan.missing == 0) & (lengths >= ends[0]) & (lengths <= ends[1])
+    use = scan.inside & ~scan.missing & (lengths >= ends[0]) & (lengths <= ends[1])
     bins = ((places[use] - places.min()) / step).astype(int)
     counts = np.bincount(bins)
     full = np.flatnonzero(counts > n_sections / 2)
@@ -52,20 +53,19 @@ def average_section(scan: Depths) -> tuple[Track, ...]:
         return ()
     base = np.vander(np.linspace(-1, 1, v.size), 2, increasing=True).T
     variance, drift = estimate_variance(depth, noise, unworn, base)
-    section = Depths(
-        places=(v,),
+    section = DepthMap(
+        x=v,
+        before=after + depth,
+        after=after,
         depth=depth,
         noise=noise,
         unworn=unworn,
         worn=worn,
         grown=find_changed(-depth, noise) & ~worn,
         inside=np.ones(v.size, bool),
-        after=after,
-        sizes=np.gradient(v),
-        missing=np.zeros(v.size),
-        variance=variance,
-        drift=drift,
-        model_error=scan.model_error,
+        missing=np.zeros(v.size, bool),
+        cell=step,
+        errors=DepthErrors(variance, drift, model=scan.errors.model),
     )
     track = measure_track(section, find_spans(section)[0])
     length = float(np.ptp(lengths[scan.worn]))

@@ -10,7 +10,7 @@ import numpy as np
 
 from ..profile import find_runs
 from ..quantity import SIDE, Quantity
-from .depths import Depths
+from .depth_map import DepthMap
 from .records import Track, name_estimate, name_quantity, name_unknown
 from .statistics import UNWORN_LIMIT
 
@@ -48,7 +48,7 @@ class End(NamedTuple):
     high: float
 
 
-def find_spans(depths: Depths) -> list[tuple[int, int]]:
+def find_spans(depths: DepthMap) -> list[tuple[int, int]]:
     """Return the first and last worn sample of each track, the widest one first.
 
     Gaps of a twentieth of the width are bridged, and wider ones in which most heights changed: new
@@ -82,7 +82,7 @@ def get_margin(span: tuple[int, int]) -> int:
     return max(int(FLANK_FRACTION * (span[1] - span[0])), MIN_FLANK_SAMPLES)
 
 
-def find_ends(depths: Depths, span: tuple[int, int]) -> tuple[End, End]:
+def find_ends(depths: DepthMap, span: tuple[int, int]) -> tuple[End, End]:
     """Find where a track begins and ends; both ends are sought from outside to the middle."""
     # Pile-up beside a track is no flank; the windows that found the worn samples may reach into it.
     relative = depths.depth / depths.noise
@@ -104,7 +104,7 @@ def find_ends(depths: Depths, span: tuple[int, int]) -> tuple[End, End]:
     return start, End(-end.value, -end.high, -end.low)
 
 
-def _find_change_point(x, relative, worn: int, depths: Depths) -> End:
+def _find_change_point(x, relative, worn: int, depths: DepthMap) -> End:
     """Find the place before the sample `worn` at which the depth leaves zero.
 
     Parameters
@@ -113,7 +113,7 @@ def _find_change_point(x, relative, worn: int, depths: Depths) -> End:
         Place [m] and depth in standard deviations, from outside to the middle of the track.
     worn : int
         First worn sample.
-    depths : Depths
+    depths : DepthMap
         For the correlation of the errors, and the error of the level.
     """
     step = float(np.median(np.diff(x)))
@@ -137,7 +137,7 @@ def _find_change_point(x, relative, worn: int, depths: Depths) -> End:
     # A flank begins between two samples.
     places = part[2:-1:stride] - step / 2
     levels = np.array([values, values + level, values - level])
-    deviance = _fit_flanks(part, levels, places, depths.correlation)
+    deviance = _fit_flanks(part, levels, places, depths.errors.correlation)
     lowest = deviance.min(axis=2, keepdims=True)
     is_likely = deviance < lowest + SIDE**2
     is_likely &= lowest < lowest.min(axis=1, keepdims=True) + CLEAR_DEVIANCE
@@ -162,18 +162,18 @@ def _fit_flanks(x, depths, places, correlation: float) -> np.ndarray:
         fitted = base @ np.linalg.solve(normal, right)
         residual = depths.T - fitted
         deviance[:, form] = np.minimum(residual**2, MAX_SQUARE).sum(axis=1).T
-    # Depths whose scatter exceeds the noise carry less information.
+    # DepthMap whose scatter exceeds the noise carry less information.
     return deviance / max(correlation, float(deviance[0].min()) / x.size)
 
 
 def measure_track(
-    depths: Depths, span: tuple[int, int], lost: tuple[float, float, float] | None = None
+    depths: DepthMap, span: tuple[int, int], lost: tuple[float, float, float] | None = None
 ) -> Track:
     """Measure a track: its ends, width, depths, areas and the material beside it.
 
     Parameters
     ----------
-    depths : Depths
+    depths : DepthMap
         Of a trace or a mean section.
     span : tuple of int
         First and last worn sample.
@@ -182,7 +182,7 @@ def measure_track(
     """
     start, end = find_ends(depths, span)
     x = depths.x
-    width = max(end.value - start.value, float(np.median(depths.sizes)))
+    width = max(end.value - start.value, depths.cell)
     # An error of the level of the datum moves both ends outwards, or both inwards.
     shorter = start.high - start.value + end.value - end.low
     longer = start.value - start.low + end.high - end.value
@@ -229,7 +229,7 @@ def measure_track(
     return Track(values, cut)
 
 
-def _average_parts(depths: Depths, name: str, edges) -> list[Quantity]:
+def _average_parts(depths: DepthMap, name: str, edges) -> list[Quantity]:
     """Return the mean depth between neighbouring edges [m]."""
     parts = []
     for first, last in pairwise(edges):
@@ -237,12 +237,12 @@ def _average_parts(depths: Depths, name: str, edges) -> list[Quantity]:
         if not inside.any():
             inside[int(np.argmin(np.abs(depths.x - (first + last) / 2)))] = True
         area, error = depths.integrate(inside)
-        length = float(depths.sizes[inside].sum())
+        length = float(inside.sum()) * depths.cell
         parts.append(name_estimate(name, area / length, error / length, 0.0))
     return parts
 
 
-def _measure_step(depths: Depths, start: float, width: float) -> Quantity:
+def _measure_step(depths: DepthMap, start: float, width: float) -> Quantity:
     """Return the mean depth of the middle third of the width, if its three parts are equally deep."""
     edges = start + width * np.arange(N_STEP_PARTS, 2 * N_STEP_PARTS + 1) / 3 / N_STEP_PARTS
     parts = _average_parts(depths, "step", edges)
@@ -254,13 +254,13 @@ def _measure_step(depths: Depths, start: float, width: float) -> Quantity:
     return step
 
 
-def _measure_floor(depths: Depths, start: float, width: float) -> Quantity:
+def _measure_floor(depths: DepthMap, start: float, width: float) -> Quantity:
     """Return the mean depth of the deepest fifth of the width."""
     edges = start + width * np.arange(N_FIFTHS + 1) / N_FIFTHS
     return max(_average_parts(depths, "depth_floor", edges), key=lambda part: part.value)
 
 
-def _measure_pile_up(depths: Depths, name: str, end: End, width: float) -> Quantity:
+def _measure_pile_up(depths: DepthMap, name: str, end: End, width: float) -> Quantity:
     """Return the area above the first surface beside a track.
 
     It reaches from the end of the track to behind the ridge, whose low flanks are not found as grown. Where nothing is
@@ -268,7 +268,7 @@ def _measure_pile_up(depths: Depths, name: str, end: End, width: float) -> Quant
 
     Parameters
     ----------
-    depths : Depths
+    depths : DepthMap
     name : str
     end : End
         End of the track.

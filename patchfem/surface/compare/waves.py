@@ -8,6 +8,7 @@ from ..quantity import SIDE, Quantity
 from ..roughness.filter import mean_surface
 from ..roughness.report import fitting_cutoff
 from ..roughness.spectrum import BAND
+from .depth_map import DepthMap
 from .records import DEFINITIONS, name_quantity, name_unknown
 
 MAX_BLOCKS = 12  # largest number of blocks whose ratios show the scatter of a ratio
@@ -38,11 +39,11 @@ def compare_waves(lines: list[np.ndarray], step: float, noise: float) -> dict[st
     noise : float
         Standard deviation of the depth [m], of both surfaces together.
     """
-    count = min(line.shape[1] for line in lines)
+    n_lines, count = np.min([line.shape for line in lines], axis=0)
     length = count * step
     if length < MIN_WAVES * BAND[1] or step > BAND[0] / MIN_STEPS:
         return {name: name_unknown(name, "band") for name in ("amplitude_ratio", "slope_ratio")}
-    lines = [_level(line[:, :count]) for line in lines]
+    lines = [_level(line[:n_lines, :count]) for line in lines]
     passed = [_pass_band(z, step) for z in lines]
     slopes = [np.diff(z, axis=1) / step for z in lines]
     # White noise has the slope noise sqrt(2)/step, and the fraction of its band in the amplitude.
@@ -102,16 +103,15 @@ def _level(lines) -> np.ndarray:
     return lines - (base @ np.linalg.lstsq(base, lines.T, rcond=None)[0]).T
 
 
-def measure_roughness(x, heights: dict, spans) -> tuple[dict, float | None]:
+def measure_roughness(depths: DepthMap, spans) -> tuple[dict, float | None]:
     """Measure Ra, Rq and slope inside and outside of the tracks, before and after wear.
 
     Half a cut-off of the roughness profile is trimmed on both sides of an end of a track.
 
     Parameters
     ----------
-    x : (n,) array [m]
-    heights : dict of str to (n,) array [m]
-        Aligned traces "before" and "after".
+    depths : DepthMap
+        Of traces.
     spans : list
         First and last sample of each track.
 
@@ -122,11 +122,10 @@ def measure_roughness(x, heights: dict, spans) -> tuple[dict, float | None]:
     cutoff : float or None
         Cut-off [m] that fits both regions.
     """
-    step = float(np.median(np.diff(x)))
-    places = np.arange(x[0], x[-1], step)
-    inside = np.zeros(places.size, bool)
+    step = depths.cell
+    inside = np.zeros(depths.x.size, bool)
     for first, last in spans:
-        inside |= (places >= x[first]) & (places <= x[last])
+        inside[first : last + 1] = True
     pieces = {"inside": find_runs(inside), "outside": find_runs(~inside)}
     lengths = [max((last - first for first, last in runs), default=0) for runs in pieces.values()]
     cutoff = fitting_cutoff(min(lengths) * step, step)
@@ -134,9 +133,9 @@ def measure_roughness(x, heights: dict, spans) -> tuple[dict, float | None]:
         return {}, None
 
     rough = {}
-    for side, z in heights.items():
-        even = np.interp(places, x, z)
-        rough[side] = even - mean_surface(even, (cutoff / step,))
+    for side in ("before", "after"):
+        z = getattr(depths, side)
+        rough[side] = z - mean_surface(z, (cutoff / step,))
     edge = int(np.ceil(cutoff / 2 / step))
     regions = {}
     for region, runs in pieces.items():
