@@ -154,14 +154,9 @@ def compare_surfaces(
     first, second = (make_raster(surface) for surface in cleaned)
     names = NAMES[first.z.ndim]
     if np.array_equal(first.z, second.z, equal_nan=True) and (first.origin == second.origin).all():
-        values = {name: name_unknown(name, "identical") for name in (*names.wear, *names.place)}
-        result = Comparison(
-            before,
-            after,
-            Finding("identical", {}),
-            values | _name_hidden("identical"),
-            findings=(Finding("identical_files", {}),),
-        )
+        values = _name_unknowns((*names.wear, *names.place, "hidden_wear"), "identical")
+        findings = (Finding("identical_files", {}),)
+        result = Comparison(before, after, Finding("identical", {}), values, (), findings)
     else:
         aligned = align(first, second, options.shift, is_straight=bool(options.datum))
         result = _measure(surfaces, (first, second), aligned)
@@ -194,8 +189,8 @@ def _check_options(surfaces: tuple[Profile | Areal, Profile | Areal], options: O
             raise PatchfemError(f"compare: {message}")
 
 
-def _name_hidden(reason: str) -> dict[str, Quantity]:
-    return {"hidden_wear": name_unknown("hidden_wear", reason)}
+def _name_unknowns(names: tuple[str, ...], reason: str) -> dict[str, Quantity]:
+    return {name: name_unknown(name, reason) for name in names}
 
 
 def _measure(
@@ -204,34 +199,78 @@ def _measure(
     aligned: Aligned,
 ) -> Comparison:
     """Measure the depth at a common place, or below the flanks of the second trace, or say why there is none."""
+    is_trace = rasters[0].z.ndim == 1
     names = NAMES[rasters[0].z.ndim]
-    findings = []
     if not aligned.reason:
         depths = make_depths(aligned.model, aligned.fit, aligned.gain_error)
         placement = _describe_place(aligned)
-        findings = _describe_alignment(aligned, placement, depths)
-        hidden = {"hidden_wear": name_unknown("hidden_wear", "no_limit")._replace(low=0.0)}
+        hidden = name_unknown("hidden_wear", "no_limit")._replace(low=0.0)
     else:
-        depths = find_flanked_track(*rasters) if rasters[0].z.ndim == 1 else None
-        unknown = {name: name_unknown(name, "elsewhere") for name in names.place}
-        placement = Placement(unknown, basis="flanks")
-        hidden = _name_hidden("not_hidden")
+        depths = find_flanked_track(*rasters) if is_trace else None
+        placement = Placement(_name_unknowns(names.place, "elsewhere"), basis="flanks")
+        hidden = name_unknown("hidden_wear", "not_hidden")
     if depths is None:
         numbers = {}
         if aligned.reason == "no_datum":
             numbers["unworn"] = float(aligned.fit.unworn.mean())
         if aligned.reason == "mirror_finish":
             numbers = find_mirror_finish([fill_gaps(raster.z) for raster in rasters])
-        values = {name: name_unknown(name, aligned.reason) for name in (*names.wear, *names.place)}
-        return Comparison(*surfaces, Finding(aligned.reason, numbers), values | hidden)
-    if aligned.reason:
-        ends = depths.x[depths.worn][[0, -1]]
-        numbers = {"from": float(ends[0]), "to": float(ends[1])}
-        findings.append(Finding("no_old_surface_left", numbers))
+        values = _name_unknowns((*names.wear, *names.place), aligned.reason)
+        verdict = Finding(aligned.reason, numbers)
+        return Comparison(*surfaces, verdict, values | {"hidden_wear": hidden})
+
+    # What the same tests find above the first surface is a control for what they find below it.
+    spans = find_spans(depths) if is_trace else []
+    area, error = depths.integrate(_cover_loss(depths, spans))
+    bounds = (area, max(area - SIDE * error, 0.0), area + SIDE * error + depths.measure_hidden())
+    is_grown = _enlarge(depths.grown) & depths.inside & ~depths.worn
+    grown, grown_error = depths.integrate(is_grown, -1.0)
+    sure_area = depths.integrate(depths.worn)[0]
+    code = judge_change(bounds, sure_area, error, grown, grown_error)
+    is_placed = placement.basis == "place"
+    if not is_placed and code != "worn":
+        code = "elsewhere"
+    tracks = ()
+    if code.startswith("worn"):
+        # The area of a single track is that of the common part.
+        whole = bounds if len(spans) == 1 else None
+        tracks = tuple(measure_track(depths, span, whole) for span in spans)
+        tracks = tracks if is_trace else average_section(depths)
     bend = _get_bend(aligned)
-    result = _judge(surfaces, depths, placement, bend, rasters[0])
-    notes = tuple(findings) + result.findings + _note_steps(*rasters)
-    return replace(result, values=result.values | hidden, findings=notes)
+    code, possible = _doubt(code, depths, spans, tracks, (area, grown, bend))
+    tracks = tracks if code.startswith("worn") else ()
+
+    values = _name_unknowns(names.wear, code if possible else "no_wear") | placement.values
+    values["hidden_wear"] = hidden
+    values[names.region] = name_quantity(names.region, depths.size, None, None)
+    values[names.grown] = name_estimate(names.grown, grown, grown_error, 0.0)
+    regions = {}
+    cutoff = None
+    if code.startswith("worn"):
+        means = [bound / depths.size for bound in bounds]
+        values[names.lost] = name_quantity(names.lost, *bounds)
+        values["worn_depth_mean"] = name_quantity("worn_depth_mean", *means)
+        values |= _locate_largest(depths)
+        if is_trace:
+            values |= _name_ends(tracks[0].values, placement, float(rasters[1].middle[0]))
+        else:
+            values["worn_share"] = _measure_share(depths)
+        if is_trace and is_placed:
+            regions, cutoff = waves.measure_roughness(depths, spans[:1])
+    limit = find_detection_limit(depths.depth, depths.noise) if is_placed else None
+    datum = Datum(
+        unworn=float(depths.unworn[depths.inside & ~depths.missing].mean()),
+        noise=depths.noise_level,
+        bend=bend,
+        correlation=depths.errors.correlation,
+        detection_limit=limit,
+    )
+    numbers = {"lost": area, "grown": grown, "basis": placement.basis}
+    numbers |= limit_wear(bounds[2] / depths.size, limit) | possible
+    verdict = Finding(code, numbers)
+    evidence = Evidence(placement, datum, depths, regions, cutoff)
+    findings = _collect_findings(verdict, evidence, spans, tracks, rasters)
+    return Comparison(*surfaces, verdict, values, tracks, findings, evidence)
 
 
 def _get_bend(aligned: Aligned) -> float:
@@ -267,98 +306,56 @@ def _describe_place(aligned: Aligned) -> Placement:
     return Placement(values, "x" if place.mirrored else "", place.inverted)
 
 
-def _describe_alignment(aligned: Aligned, placement: Placement, depths: DepthMap) -> list[Finding]:
-    """Return what a reader must know of the place, the datum and the gain."""
-    findings = []
-    bend = _get_bend(aligned)
-    if bend:
-        # A scar is deepest in the middle of its parabola, wear of both ends at its ends.
-        area = abs(bend) * (2 if bend > 0 else 1) / 3 * float(np.ptp(depths.x))
-        findings.append(Finding("bow_subtracted", {"height": abs(bend), "area": area}))
-    findings.append(Finding("hidden_even_wear", {"limit": None}))
-    if placement.mirrored:
-        findings.append(Finding("mirrored", {}))
-    if placement.turned:
-        findings.append(Finding("turned", {}))
-    if aligned.gain != 1.0:
-        findings.append(Finding("other_gain", {"gain": aligned.gain}))
+def _collect_findings(
+    verdict: Finding, evidence: Evidence, spans: list, tracks: tuple[Track, ...], rasters: tuple
+) -> tuple[Finding, ...]:
+    """Return what a reader must know of the place, the datum, the gain and the tracks."""
+    placement, datum, depths = evidence.placement, evidence.datum, evidence.curves
+    is_placed = placement.basis == "place"
+    gain = placement.values["gain"].value
     scale = placement.values.get("scale")
-    if scale is not None and not scale.low - MIN_OTHER_LENGTH < 1 < scale.high + MIN_OTHER_LENGTH:
-        numbers = {"scale": scale.value, "low": scale.low, "high": scale.high}
-        findings.append(Finding("other_length", numbers))
-    if depths.errors.drift > depths.noise_level:
-        findings.append(Finding("drift", {"height": depths.errors.drift}))
-    return findings
-
-
-def _note_steps(first: Raster, second: Raster) -> tuple[Finding, ...]:
-    steps = (float(first.steps[-1]), float(second.steps[-1]))
-    if first.z.ndim > 1 or max(steps) <= MAX_STEP_RATIO * min(steps):
-        return ()
-    return (Finding("other_step", {"before": steps[0], "after": steps[1]}),)
-
-
-def _judge(
-    surfaces: tuple[Profile | Areal, Profile | Areal],
-    depths: DepthMap,
-    placement: Placement,
-    bend: float,
-    first: Raster,
-) -> Comparison:
-    """Find the verdict on lost and grown material, and measure what the verdict allows."""
-    is_trace = depths.depth.ndim == 1
-    names = NAMES[depths.depth.ndim]
-    spans = find_spans(depths) if is_trace else []
-    part = _cover_loss(depths, spans)
-    area, error = depths.integrate(part)
-    bounds = (area, max(area - SIDE * error, 0.0), area + SIDE * error + depths.measure_hidden())
-    grown_part = depths.grown if is_trace else _enlarge(depths.grown) & depths.inside & ~depths.worn
-    grown, grown_error = depths.integrate(grown_part, -1.0)
-    sure_area = depths.integrate(depths.worn)[0] if is_trace else area
-    code = judge_change(bounds, sure_area, error, grown, grown_error)
-    if placement.basis == "flanks" and code != "worn":
-        code = "elsewhere"
-
-    limit = find_detection_limit(depths.depth, depths.noise)
-    limit = None if placement.basis == "flanks" else limit
-    datum = Datum(
-        unworn=float(depths.unworn[depths.inside & ~depths.missing].mean()),
-        noise=depths.noise_level,
-        bend=bend,
-        correlation=depths.errors.correlation,
-        detection_limit=limit,
+    is_longer = False
+    if is_placed and scale is not None:
+        is_longer = not scale.low - MIN_OTHER_LENGTH < 1 < scale.high + MIN_OTHER_LENGTH
+    # A scar is deepest in the middle of its parabola, wear of both ends at its ends.
+    bow = abs(datum.bend)
+    bow_area = bow * (2 if datum.bend > 0 else 1) / 3 * float(np.ptp(depths.x))
+    has_tops = bool(tracks and spans) and _is_broken(depths, spans[0], MIN_TOPS_FRACTION)
+    lost, grown = verdict.numbers["lost"], verdict.numbers["grown"]
+    has_deposits = verdict.code.startswith("worn") and grown > MIN_DEPOSITS * lost
+    steps = [float(raster.steps[-1]) for raster in rasters]
+    is_uneven = depths.y is None and max(steps) > MAX_STEP_RATIO * min(steps)
+    first, last = depths.x[depths.worn][[0, -1]] if not is_placed else (0.0, 0.0)
+    rows = (
+        (not is_placed, "no_old_surface_left", {"from": float(first), "to": float(last)}),
+        (bow, "bow_subtracted", {"height": bow, "area": bow_area}),
+        (is_placed, "hidden_even_wear", {"limit": None}),
+        (placement.mirrored, "mirrored", {}),
+        (placement.turned, "turned", {}),
+        (gain not in (None, 1.0), "other_gain", {"gain": gain}),
+        (
+            is_longer,
+            "other_length",
+            {} if scale is None else scale._asdict() | {"scale": scale.value},
+        ),
+        (
+            depths.errors.drift > depths.noise_level,
+            "drift",
+            {"height": depths.errors.drift},
+        ),
+        (verdict.code == "grown", "exchanged", {}),
+        (len(tracks) > 1, "other_tracks", {"count": len(tracks) - 1}),
+        (tracks and any(tracks[0].cut), "track_cut", {}),
+        (has_tops, "worn_tops", {}),
+        (has_deposits, "deposits", {"area" if depths.y is None else "volume": grown}),
+        (is_uneven, "other_step", dict(zip(("before", "after"), steps))),
     )
-    tracks = _measure_tracks(depths, spans, bounds, first) if code.startswith("worn") else ()
-    numbers = {"lost": area, "grown": grown, "basis": placement.basis}
-    numbers |= limit_wear(bounds[2] / depths.size, limit)
-    bow = 2 / 3 * max(bend, 0.0) * depths.size
-    code, possible = _doubt(code, depths, spans, tracks, (area, grown, bow, bend))
-    numbers |= possible
-    tracks = tracks if code.startswith("worn") else ()
+    return tuple(Finding(code, numbers) for applies, code, numbers in rows if applies)
 
-    reason = code if possible else "no_wear"
-    values = {name: name_unknown(name, reason) for name in names.wear} | placement.values
-    values[names.region] = name_quantity(names.region, depths.size, None, None)
-    values[names.grown] = name_estimate(names.grown, grown, grown_error, 0.0)
-    evidence = Evidence(placement, datum, depths)
-    findings = [Finding("exchanged", {})] if code == "grown" else []
-    if code.startswith("worn"):
-        values[names.lost] = name_quantity(names.lost, *bounds)
-        means = (bound / depths.size for bound in bounds)
-        values["worn_depth_mean"] = name_quantity("worn_depth_mean", *means)
-        values |= _locate_largest(depths)
-        if is_trace:
-            values |= _name_ends(tracks, placement, float(np.mean(depths.x[[0, -1]])))
-            findings += _describe_tracks(depths, spans, tracks)
-            if placement.basis == "place":
-                regions, cutoff = waves.measure_roughness(depths, spans[:1])
-                evidence = replace(evidence, roughness=regions, cutoff=cutoff)
-        else:
-            values["worn_share"] = _measure_share(depths)
-        if grown > MIN_DEPOSITS * area:
-            findings.append(Finding("deposits", {"area" if is_trace else "volume": grown}))
-    verdict = Finding(code, numbers)
-    return Comparison(*surfaces, verdict, values, tracks, tuple(findings), evidence)
+
+def _is_broken(depths: DepthMap, span: tuple[int, int], fraction: float) -> bool:
+    """Return whether less than a fraction of the heights in a track are worn."""
+    return bool(depths.worn[span[0] : span[1] + 1].mean() < fraction)
 
 
 def _enlarge(part) -> np.ndarray:
@@ -377,23 +374,12 @@ def _cover_loss(depths: DepthMap, spans: list[tuple[int, int]]) -> np.ndarray:
     return covered & (depths.depth > -UNWORN_LIMIT * depths.noise) & ~depths.grown
 
 
-def _measure_tracks(
-    depths: DepthMap, spans: list[tuple[int, int]], bounds: tuple, first: Raster
-) -> tuple[Track, ...]:
-    """Measure the tracks of a trace, or the track across a scan."""
-    if depths.depth.ndim > 1:
-        return average_section(depths)
-    # The area of a single track is that of the common part.
-    whole = bounds if len(spans) == 1 else None
-    return tuple(measure_track(depths, span, whole) for span in spans)
-
-
 def _doubt(
     code: str,
     depths: DepthMap,
     spans: list[tuple[int, int]],
     tracks: tuple[Track, ...],
-    sizes: tuple[float, float, float, float],
+    sizes: tuple[float, float, float],
 ) -> tuple[str, dict[str, float]]:
     """Return the verdict, or that of two possible causes with the numbers of both.
 
@@ -405,9 +391,10 @@ def _doubt(
     spans, tracks
         Tracks of a trace.
     sizes : tuple of float
-        Lost and grown area or volume, mean loss that the bow would be, and height of the bow.
+        Lost and grown area or volume, and height of the bow.
     """
-    area, grown, bow, bend = sizes
+    area, grown, bend = sizes
+    bow = 2 / 3 * max(bend, 0.0) * depths.size
     is_cut = bool(tracks) and any(tracks[0].cut)
     if code == "grown" and _has_grown_at_ends(depths):
         height = grown / (float(depths.grown.sum()) * depths.cell)
@@ -415,9 +402,8 @@ def _doubt(
     if depths.depth.ndim > 1:
         return code, {}
     if code.startswith("worn") and not is_cut:
-        start, stop = spans[0]
         is_wide = tracks[0].values["width"].value > MAX_TRACK_FRACTION * depths.size
-        if is_wide and depths.worn[start : stop + 1].mean() > MIN_SCAR_FRACTION:
+        if is_wide and not _is_broken(depths, spans[0], MIN_SCAR_FRACTION):
             height = tracks[0].values["depth_mean"].value
             return "growth_at_ends", {"scar_depth": area / depths.size, "growth_height": height}
     waves_height = robust_deviation(remove_long_waves(depths.after))
@@ -462,38 +448,25 @@ def _measure_share(depths: DepthMap) -> Quantity:
     return name_quantity("worn_share", share, max(share - edge, 0.0), share + edge)
 
 
-def _describe_tracks(depths: DepthMap, spans: list, tracks: tuple[Track, ...]) -> list[Finding]:
-    """Return what the numbers of the longest track leave out."""
-    findings = []
-    if len(tracks) > 1:
-        findings.append(Finding("other_tracks", {"count": len(tracks) - 1}))
-    if tracks and any(tracks[0].cut):
-        findings.append(Finding("track_cut", {}))
-    first, last = spans[0]
-    if depths.worn[first : last + 1].mean() < MIN_TOPS_FRACTION:
-        findings.append(Finding("worn_tops", {}))
-    return findings
-
-
 def _name_ends(
-    tracks: tuple[Track, ...], placement: Placement, middle: float
+    track: dict[str, Quantity], placement: Placement, middle: float
 ) -> dict[str, Quantity]:
-    """Return the mean depth within the longest track, and its ends in both traces."""
-    if not tracks:
-        return {name: name_unknown(name, "no_track") for name in ("worn_depth_within", *END_NAMES)}
-    track = tracks[0].values
+    """Return the mean depth within the longest track, and its ends in both traces; middle: of the second one [m]."""
     values = {"worn_depth_within": name_quantity("worn_depth_within", *track["depth_mean"][:3])}
     shift = placement.values["shift"].value
-    for name in END_NAMES:
-        end, side = name.split("_")[1:]
+    for end in ("from", "to"):
         places = track[end][:3]
-        if places[0] is None or (side == "before" and shift is None):
-            values[name] = name_unknown(name, "cut_off" if places[0] is None else "elsewhere")
-            continue
-        if side == "before":
+        reason = "cut_off" if places[0] is None else ""
+        values[f"worn_{end}_after"] = places, reason
+        if not reason and shift is None:
+            reason = "elsewhere"
+        if not reason:
             scale = placement.values["scale"].value
             places = [middle + (x - middle) / scale - shift for x in places]
-        values[name] = name_quantity(name, *places)
+        values[f"worn_{end}_before"] = places, reason
+    for name in END_NAMES:
+        places, reason = values[name]
+        values[name] = name_unknown(name, reason) if reason else name_quantity(name, *places)
     return values
 
 
@@ -508,7 +481,7 @@ def _compare_waves(
         lines = [np.moveaxis(z, axis, -1) for z in (depths.before, depths.after)]
         steps = steps[1:] if depths.y is None else steps[:1]
     elif max(steps) > MAX_STEP_RATIO * min(steps):
-        return {name: name_unknown(name, "other_step") for name in RATIO_NAMES}
+        return _name_unknowns(RATIO_NAMES, "other_step")
     else:
         lines = [np.moveaxis(fill_gaps(raster.z), axis, -1) for raster in rasters]
     noise = 0.0 if result.evidence.datum is None else result.evidence.datum.noise
