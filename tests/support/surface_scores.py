@@ -3,7 +3,7 @@
     python tests/support/surface_scores.py SEED COUNT
 
 `draw_bench` makes tracks of a tribometer on ground, turned, blasted and lapped surfaces, with drift, gain, gaps and few
-samples; `draw_field` makes parts from service: a ball tip traces scratches, and wear cuts to a floor, polishes, spalls or grows.
+samples; `draw_field` makes parts from service: a ball tip traces scratches; wear cuts to a floor, polishes, spalls or grows.
 
 Rules: a headline is false if it states a loss or growth where there is none, or "no wear" where a track has more area than
 the comparison says it would have found. A pair is refused if something can be said of it and no place or datum is found.
