@@ -24,9 +24,8 @@ IMAGE_WAVES = {
     2: 12,
 }  # side of an image relative to the deviation of the Gaussian of its long waves
 MIN_OVERLAP = 0.33  # smallest common part relative to the smaller image
-CLEAR_SIGNIFICANCE = (
-    20.0  # significance of a place beyond which no mirrored or inverted scan is tried
-)
+# Significance of a place beyond which no mirrored or inverted scan is tried.
+CLEAR_SIGNIFICANCE = 9.0
 
 
 class Place(NamedTuple):
