@@ -3,10 +3,10 @@
 import numpy as np
 
 from patchfem.surface.areal import Areal
-from patchfem.surface.compare.depth_map import DepthMap
 from patchfem.surface.compare.records import (
     Comparison,
     Datum,
+    DepthMap,
     Evidence,
     Finding,
     Placement,

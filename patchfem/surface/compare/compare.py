@@ -169,7 +169,8 @@ def compare_surfaces(
 def _check_options(surfaces: tuple[Profile | Areal, Profile | Areal], options: Options) -> None:
     """Raise PatchfemError if the options do not suit the surfaces, or a trace stands beside a scan."""
     n_scans = sum(isinstance(surface, Areal) for surface in surfaces)
-    datum, direction = options.datum, options.direction
+    datum = options.datum
+    direction = options.direction
     needs = "is needed"
     rules = (
         (datum not in ("", "straight"), f"datum {datum!r}: straight {needs}, or nothing"),
@@ -310,7 +311,9 @@ def _collect_findings(
     verdict: Finding, evidence: Evidence, spans: list, tracks: tuple[Track, ...], rasters: tuple
 ) -> tuple[Finding, ...]:
     """Return what a reader must know of the place, the datum, the gain and the tracks."""
-    placement, datum, depths = evidence.placement, evidence.datum, evidence.curves
+    placement = evidence.placement
+    datum = evidence.datum
+    depths = evidence.curves
     is_placed = placement.basis == "place"
     gain = placement.values["gain"].value
     scale = placement.values.get("scale")
@@ -321,8 +324,10 @@ def _collect_findings(
     bow = abs(datum.bend)
     bow_area = bow * (2 if datum.bend > 0 else 1) / 3 * float(np.ptp(depths.x))
     has_tops = bool(tracks and spans) and _is_broken(depths, spans[0], MIN_TOPS_FRACTION)
-    lost, grown = verdict.numbers["lost"], verdict.numbers["grown"]
-    has_deposits = verdict.code.startswith("worn") and grown > MIN_DEPOSITS * lost
+    grown = verdict.numbers["grown"]
+    has_deposits = (
+        verdict.code.startswith("worn") and grown > MIN_DEPOSITS * verdict.numbers["lost"]
+    )
     steps = [float(raster.steps[-1]) for raster in rasters]
     is_uneven = depths.y is None and max(steps) > MAX_STEP_RATIO * min(steps)
     first, last = depths.x[depths.worn][[0, -1]] if not is_placed else (0.0, 0.0)

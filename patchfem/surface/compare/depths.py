@@ -23,7 +23,16 @@ MAX_NOISE_RATIO = 4.0  # noise relative to the median above which a depth cannot
 
 
 def make_depths(model: Model, fit: Fit, gain_error: float = 0.0) -> DepthMap:
-    """Return the depths of aligned surfaces over the part that both show, with the errors of the unworn heights."""
+    """Return the depths of aligned surfaces over the part that both show, with the errors of the unworn heights.
+
+    Parameters
+    ----------
+    model : Model
+    fit : Fit
+        Depths at the known points of the model.
+    gain_error : float, optional
+        Standard deviation of the gain of the instrument.
+    """
     box = tuple(slice(place.min(), place.max() + 1) for place in np.nonzero(model.common))
     depth = fill_gaps(model.draw(fit.depth))[box]
     noise = model.draw(fit.noise)[box]

@@ -79,7 +79,19 @@ def fit_unworn(model: Model, state, n_free: int, digit: float) -> Fit:
 
 
 def evaluate(model: Model, state, n_free: int, digit: float, worn=None) -> Fit:
-    """Return the depths at a state, their noise, and the changed heights; worn: those known before, (n,) bool."""
+    """Return the depths at a state, their noise, and the changed heights.
+
+    Parameters
+    ----------
+    model : Model
+    state : (k,) array
+    n_free : int
+        Number of fitted parameters.
+    digit : float
+        Smallest standard deviation of a depth [m].
+    worn : (n,) bool array, optional
+        Heights that are known to be worn before.
+    """
     depth = model.compute_depth(state)
     worn = np.zeros(depth.size, bool) if worn is None else worn
     sigma = max(estimate_one_sided_scale(depth[~worn]), digit)

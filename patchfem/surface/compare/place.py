@@ -51,7 +51,15 @@ def make_matrix(turn: float, n_axes: int) -> np.ndarray:
 
 
 def change_second(second: Raster, *, mirrored: bool, inverted: bool) -> Raster:
-    """Undo a mirrored measurement and a replica."""
+    """Undo a mirrored measurement and a replica.
+
+    Parameters
+    ----------
+    second : Raster
+        As it was measured.
+    mirrored, inverted : bool
+        Whether it was measured against the direction of x, and with inverted heights.
+    """
     second = second.mirror() if mirrored else second
     return second._replace(z=-second.z) if inverted else second
 

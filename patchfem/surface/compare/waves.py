@@ -142,11 +142,8 @@ def measure_roughness(depths: DepthMap, spans) -> tuple[dict, float | None]:
         sections = []
         for first, last in runs:
             kept = np.arange(first + edge, last + 1 - edge)
-            sections += (
-                np.array_split(kept, max(int(kept.size * step / cutoff), 1))
-                if kept.size > edge
-                else []
-            )
+            if kept.size > edge:
+                sections += np.array_split(kept, max(int(kept.size * step / cutoff), 1))
         if not sections:
             return {}, None
         tables = {side: _tabulate(z, sections, step) for side, z in rough.items()}

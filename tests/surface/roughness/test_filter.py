@@ -8,9 +8,10 @@ from synthetic import sine
 
 from patchfem.core import PatchfemError
 from patchfem.surface import Profile, mean_line, resample_evenly
-from patchfem.surface.roughness.filter import ALPHA, filter_surface, mean_surface
+from patchfem.surface.roughness.filter import filter_surface, mean_surface
 
 UM = 1e-6
+ALPHA = np.sqrt(np.log(2) / np.pi)  # ISO 16610-21
 WAVE = 400 * UM
 
 
