@@ -4,12 +4,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from .depth_map import UNWORN_LIMIT
 from .fit import Fit, evaluate, fit_unworn
 from .model import Model
 from .place import Place, change_second, find_place, order
 from .raster import MIN_HEIGHTS, Raster, fill_gaps
 from .statistics import (
-    UNWORN_LIMIT,
     WAVES_PER_SIDE,
     estimate_gain,
     find_mirror_finish,

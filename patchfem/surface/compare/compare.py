@@ -20,7 +20,7 @@ from ..quantity import SIDE, Quantity
 from . import waves
 from .alignment import Aligned, align
 from .changes import find_detection_limit
-from .depth_map import DepthMap
+from .depth_map import UNWORN_LIMIT, DepthMap
 from .depths import make_depths, measure_largest
 from .flanks import find_flanked_track
 from .raster import Raster, clean_surface, fill_gaps, make_raster
@@ -36,7 +36,7 @@ from .records import (
     name_unknown,
 )
 from .section import average_section
-from .statistics import TINY, UNWORN_LIMIT, find_mirror_finish, remove_long_waves
+from .statistics import TINY, find_mirror_finish, remove_long_waves
 from .track import find_spans, get_margin, measure_track
 from .verdict import judge_change, limit_wear
 

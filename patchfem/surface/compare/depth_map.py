@@ -6,8 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .statistics import UNWORN_LIMIT
-
+UNWORN_LIMIT = 2.5  # standard deviations within which a depth counts as unworn
 MODEL_ERROR = 0.004  # relative standard deviation of an area or volume due to tip and interpolation
 EVEN_DEVIATION = 1 / np.sqrt(
     12

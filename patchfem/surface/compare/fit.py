@@ -4,11 +4,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from .depth_map import UNWORN_LIMIT
 from .model import Model
 from .statistics import (
     TINY,
     TRUNCATED_VARIANCE,
-    UNWORN_LIMIT,
     estimate_one_sided_scale,
     solve_biweight_step,
 )

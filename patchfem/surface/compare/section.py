@@ -3,10 +3,10 @@
 import numpy as np
 
 from .changes import find_changed
-from .depth_map import DepthErrors, DepthMap
+from .depth_map import UNWORN_LIMIT, DepthErrors, DepthMap
 from .depths import estimate_variance
 from .records import Track, name_quantity
-from .statistics import UNWORN_LIMIT, estimate_one_sided_scale
+from .statistics import estimate_one_sided_scale
 from .track import find_spans, measure_track
 
 MIN_ELONGATION = 2.0  # length of a worn place relative to its width, from which on it is a track

@@ -5,7 +5,6 @@ from scipy import fft, special
 
 from ..profile import robust_deviation
 
-UNWORN_LIMIT = 2.5  # standard deviations within which a depth counts as unworn
 BIWEIGHT = 4.685  # tuning constant of Tukey's biweight; 95 % efficient for normal noise
 MODE_FRACTION = 0.3  # fraction of the values in the shortest interval, whose mean is the mode
 MIN_SIDE = 20  # smallest number of depths on one side of zero that shows their scale

@@ -10,9 +10,8 @@ import numpy as np
 
 from ..profile import find_runs
 from ..quantity import SIDE, Quantity
-from .depth_map import DepthMap
+from .depth_map import UNWORN_LIMIT, DepthMap
 from .records import Track, name_estimate, name_quantity, name_unknown
-from .statistics import UNWORN_LIMIT
 
 MAX_GAP_FRACTION = 0.05  # largest unworn gap in a track relative to its width
 # Number of worn parts from which on they may be tops of one track between valleys.
