@@ -4,7 +4,7 @@ from itertools import product
 from typing import NamedTuple
 
 import numpy as np
-from scipy import fft, ndimage
+from scipy import fft, ndimage, signal
 
 from ..profile import robust_deviation
 from .raster import Raster, fill_gaps
@@ -23,6 +23,7 @@ IMAGE_WAVES = {
     1: 40,
     2: 12,
 }  # side of an image relative to the deviation of the Gaussian of its long waves
+BORDER_FRACTION = 0.1  # part of an image that falls to zero at its borders before it is whitened
 MIN_OVERLAP = 0.33  # smallest common part relative to the smaller image
 # Significance of a place beyond which no mirrored or inverted scan is tried.
 CLEAR_SIGNIFICANCE = 9.0
@@ -124,7 +125,13 @@ def _make_images(surface: Raster, pixel: float) -> tuple[np.ndarray, ...]:
 
 
 def _whiten(z) -> np.ndarray:
-    """Return heights whose waves are equally high, so that a periodic lay does not hide the others."""
+    """Return heights whose waves are equally high, so that a periodic lay does not hide the others.
+
+    They fall to zero at the borders, whose jumps would be short waves that both surfaces share.
+    """
+    for axis, count in enumerate(z.shape):
+        window = signal.windows.tukey(count, BORDER_FRACTION)
+        z = z * np.expand_dims(window, tuple({*range(z.ndim)} - {axis}))
     spectrum = fft.rfftn(z)
     size = np.abs(spectrum)
     return fft.irfftn(spectrum / (size + np.median(size) + TINY), z.shape)
