@@ -23,7 +23,7 @@ IMAGE_WAVES = {
     1: 40,
     2: 12,
 }  # side of an image relative to the deviation of the Gaussian of its long waves
-BORDER_FRACTION = 0.1  # part of an image that falls to zero at its borders before it is whitened
+BORDER_FRACTION = 0.1  # part of a trace that falls to zero at its ends before it is whitened
 MIN_OVERLAP = 0.33  # smallest common part relative to the smaller image
 # Significance of a place beyond which no mirrored or inverted scan is tried.
 CLEAR_SIGNIFICANCE = 9.0
@@ -127,11 +127,10 @@ def _make_images(surface: Raster, pixel: float) -> tuple[np.ndarray, ...]:
 def _whiten(z) -> np.ndarray:
     """Return heights whose waves are equally high, so that a periodic lay does not hide the others.
 
-    They fall to zero at the borders, whose jumps would be short waves that both surfaces share.
+    Those of a trace fall to zero at its ends, whose jumps would be short waves that both traces share.
     """
-    for axis, count in enumerate(z.shape):
-        window = signal.windows.tukey(count, BORDER_FRACTION)
-        z = z * np.expand_dims(window, tuple({*range(z.ndim)} - {axis}))
+    if z.ndim == 1:
+        z = z * signal.windows.tukey(z.size, BORDER_FRACTION)
     spectrum = fft.rfftn(z)
     size = np.abs(spectrum)
     return fft.irfftn(spectrum / (size + np.median(size) + TINY), z.shape)
