@@ -25,6 +25,7 @@ VERDICTS = {
     "grew at the ends: both are possible.",
     "scar_or_bow": "Either a scar over all of the surface, up to {scar_depth} deep on average, or a bent datum of the "
     "instrument: both are possible.",
+    "scar_or_drift": "Either wear of {scar_depth}, the mean over {region}, or drift of the instrument: both are possible.",
     "elsewhere": "Not comparable: the two surfaces have no part in common, and no unworn flanks of a track show a depth.",
     "no_datum": "No worn depth: the place is the same, but too few heights agree ({unworn} of all) to measure depths from.",
     "mirror_finish": "Not comparable: the short waves of the surface (rms height {rq}) hardly exceed the noise ({noise}).",
@@ -38,6 +39,7 @@ ADVICE = {
     "no_datum": "Measure a longer part, so that more of the unworn surface is on both traces.",
     "mirror_finish": "Measure with less noise; for traces, the start may be marked on the part and its shift given.",
     "growth_at_ends": "Measurements that end on unworn surface on both sides would decide.",
+    "scar_or_drift": "Unworn parts drift nearly as much as the deepest place is worn; repeated measurements would decide.",
     "scar_or_bow": "Longer traces with unworn surface on both sides, or a datum that is known to be straight, would decide.",
 }
 
@@ -96,6 +98,7 @@ REASONS = {
     "no_datum": "too few heights agree to measure depths from",
     "growth_at_ends": "a scar and growth at the ends are both possible",
     "scar_or_bow": "a scar and a bent datum are both possible",
+    "scar_or_drift": "wear and drift of the instrument are both possible",
     "flat": "the surface is flat",
     "undetermined": "the heights do not determine it",
     "holes": "missing heights prevent it",

@@ -1,8 +1,8 @@
 """Comparison of two surfaces before and after wear: place, datum, worn parts, verdict, numbers.
 
 Traces and scans take the same way (see the package); what differs by the number of axes stands in tables. Codes of the
-verdict: "worn", "no_wear", "grown", "worn_and_grown", "growth_at_ends", "scar_or_bow", "elsewhere", "no_datum",
-"mirror_finish", "identical".
+verdict: "worn", "no_wear", "grown", "worn_and_grown", "growth_at_ends", "scar_or_bow", "scar_or_drift", "elsewhere",
+"no_datum", "mirror_finish", "identical".
 """
 
 from dataclasses import replace
@@ -38,7 +38,7 @@ from .records import (
 from .section import average_section
 from .statistics import TINY, find_mirror_finish, remove_long_waves
 from .track import find_spans, get_margin, measure_track
-from .verdict import judge_change, limit_wear
+from .verdict import find_sure_loss, judge_change, limit_wear
 
 END_SAMPLES = 7  # number of lines from an end at which growth includes it
 MIN_GROWN_LINE = 0.5  # fraction of a line near an end that grew, from which on the end grew
@@ -227,8 +227,10 @@ def _measure(
     is_grown = _enlarge(depths.grown) & depths.inside & ~depths.worn
     grown, grown_error = depths.integrate(is_grown, -1.0)
     sure_area = depths.integrate(depths.worn)[0]
-    code = judge_change(bounds, sure_area, error, grown, grown_error)
     is_placed = placement.basis == "place"
+    # The flanks of a track were compared with random traces, which choose their deepest place too.
+    sure_loss = find_sure_loss(depths) if is_placed else SIDE
+    code = judge_change(area, error, sure_loss, sure_area, grown, grown_error)
     if not is_placed and code != "worn":
         code = "elsewhere"
     tracks = ()
@@ -404,6 +406,8 @@ def _doubt(
     if code == "grown" and _has_grown_at_ends(depths):
         height = grown / (float(depths.grown.sum()) * depths.cell)
         return "growth_at_ends", {"scar_depth": height, "growth_height": height}
+    if code == "scar_or_drift":
+        return code, {"scar_depth": area / depths.size}
     if depths.depth.ndim > 1:
         return code, {}
     if code.startswith("worn") and not is_cut:

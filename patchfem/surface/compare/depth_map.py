@@ -20,12 +20,14 @@ class DepthErrors(NamedTuple):
 
     - variance: function of a mask, variance [m2] of the sum of its depths.
     - drift: standard deviation [m] of the mean depth of an unworn tile.
+    - freedom: number of independent tiles, beyond those that determine the datum, that show the variance.
     - correlation: number of neighbouring heights that share an error.
     - model: relative standard deviation of all depths due to gain, tip and interpolation.
     """
 
     variance: Callable[[np.ndarray], float]
     drift: float = 0.0
+    freedom: float = np.inf
     correlation: float = 1.0
     model: float = MODEL_ERROR
 

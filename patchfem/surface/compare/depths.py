@@ -1,6 +1,5 @@
 """Depths of aligned surfaces, their errors from the means of unworn tiles, and the largest depth."""
 
-from collections.abc import Callable
 from itertools import pairwise, product
 
 import numpy as np
@@ -16,6 +15,9 @@ from .statistics import estimate_correlation
 
 N_TILES = {1: 40, 2: 8}  # number of tiles along each side, whose means show the errors of the datum
 MIN_TILES = 6  # smallest number of tiles that show these errors
+MIN_FREEDOM = (
+    3.0  # smallest number of independent tiles, as the correlation of few tiles is uncertain
+)
 MIN_TILE_HEIGHTS = 5  # smallest number of unworn heights in such a tile
 MEDIAN_SIZE = {1: 5, 2: 3}  # side of the window whose median depths give the largest depth
 MEDIAN_VARIANCE = 1.57  # variance of a median relative to that of a mean, of normal errors
@@ -47,7 +49,7 @@ def make_depths(model: Model, fit: Fit, gain_error: float = 0.0) -> DepthMap:
     columns = base[: 1 + model.n_axes].reshape(1 + model.n_axes, -1).T
     trend = columns @ np.linalg.lstsq(columns, first.ravel(), rcond=None)[0]
     before = first - trend.reshape(first.shape)
-    variance, drift = estimate_variance(depth, noise, masks["unworn"], base)
+    errors = estimate_errors(depth, noise, masks["unworn"], base)
     correlation = 1.0
     if model.n_axes == 1:
         correlation = estimate_correlation((depth / noise)[masks["unworn"]])
@@ -66,11 +68,11 @@ def make_depths(model: Model, fit: Fit, gain_error: float = 0.0) -> DepthMap:
         inside=inside,
         missing=inside & ~model.known[box],
         cell=float(np.prod(model.own.steps)),
-        errors=DepthErrors(variance, drift, correlation, model_error),
+        errors=errors._replace(correlation=correlation, model=model_error),
     )
 
 
-def estimate_variance(depth, noise, unworn, base) -> tuple[Callable[[np.ndarray], float], float]:
+def estimate_errors(depth, noise, unworn, base) -> DepthErrors:
     """Estimate the errors of sums of depths from the means of unworn heights in tiles about the datum.
 
     With white noise, the mean of c heights has the variance s^2/c; noise that neighbours share and slow errors of the
@@ -83,13 +85,6 @@ def estimate_variance(depth, noise, unworn, base) -> tuple[Callable[[np.ndarray]
         Depths and noise [m], and the mask of heights that are unworn.
     base : (k, n) or (k, m, n) array
         Functions of which the datum is a combination.
-
-    Returns
-    -------
-    callable
-        Variance [m2] of the sum of depths as a function of their mask.
-    float
-        Standard deviation [m] of the mean of a tile.
     """
     edges = [np.linspace(0, count, N_TILES[depth.ndim] + 1).astype(int) for count in depth.shape]
     tiles = []
@@ -104,12 +99,15 @@ def estimate_variance(depth, noise, unworn, base) -> tuple[Callable[[np.ndarray]
     centers = np.array(centers).T * root[:, None]
     # Where tiles are few, a tile may share a single error.
     variance = float(np.median(noise) ** 2 * depth.size / N_TILES[depth.ndim] ** depth.ndim)
-    freedom = counts.size - len(base)
+    freedom = MIN_FREEDOM
     if counts.size >= MIN_TILES:
         fitted = np.linalg.lstsq(centers, means * root, rcond=None)[0]
         residual = means * root - centers @ fitted
+        # A slow drift makes neighbouring tiles share their errors, so that fewer of them are independent.
+        correlation = estimate_correlation(residual)
+        freedom = max(counts.size / correlation - len(base), MIN_FREEDOM)
         student = special.stdtrit(freedom, 0.975) / SIDE
-        scatter = residual @ residual / freedom * estimate_correlation(residual)
+        scatter = residual @ residual / (counts.size - len(base)) * correlation
         variance = float(scatter * student**2)
     inverse = np.linalg.pinv(centers.T @ centers, rcond=1e-10, hermitian=True)
 
@@ -117,7 +115,8 @@ def estimate_variance(depth, noise, unworn, base) -> tuple[Callable[[np.ndarray]
         moments = base[:, part].sum(axis=1)
         return variance * float(moments @ inverse @ moments + part.sum())
 
-    return compute_variance, float(np.sqrt(variance / max(counts.mean(), 1.0)))
+    drift = float(np.sqrt(variance / max(counts.mean(), 1.0)))
+    return DepthErrors(compute_variance, drift, freedom)
 
 
 def measure_largest(depths: DepthMap) -> tuple[Quantity, np.ndarray]:

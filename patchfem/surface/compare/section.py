@@ -3,8 +3,8 @@
 import numpy as np
 
 from .changes import find_changed
-from .depth_map import UNWORN_LIMIT, DepthErrors, DepthMap
-from .depths import estimate_variance
+from .depth_map import UNWORN_LIMIT, DepthMap
+from .depths import estimate_errors
 from .records import Track, name_quantity
 from .statistics import estimate_one_sided_scale
 from .track import find_spans, measure_track
@@ -52,7 +52,7 @@ def average_section(scan: DepthMap) -> tuple[Track, ...]:
     if not worn.any() or unworn.sum() < MIN_SECTIONS:
         return ()
     base = np.vander(np.linspace(-1, 1, v.size), 2, increasing=True).T
-    variance, drift = estimate_variance(depth, noise, unworn, base)
+    errors = estimate_errors(depth, noise, unworn, base)
     section = DepthMap(
         x=v,
         before=after + depth,
@@ -65,7 +65,7 @@ def average_section(scan: DepthMap) -> tuple[Track, ...]:
         inside=np.ones(v.size, bool),
         missing=np.zeros(v.size, bool),
         cell=step,
-        errors=DepthErrors(variance, drift, model=scan.errors.model),
+        errors=errors._replace(model=scan.errors.model),
     )
     track = measure_track(section, find_spans(section)[0])
     length = float(np.ptp(lengths[scan.worn]))

@@ -1,35 +1,49 @@
 """Verdict on lost and grown material, for traces and scans alike."""
 
+from scipy import special
+
+from ..quantity import SIDE
+from .depth_map import DepthMap
+from .statistics import FALSE_POSITIVE_RATE
+
 CONTROL = 3.0  # lost over grown material, beyond which it is wear; and the reverse
 MIN_GROWTH = 5.0  # standard deviations of grown material that is reported
 MIN_LOSS = 4.0  # standard deviations of lost material that is reported beside as much growth
 
 
+def find_sure_loss(depths: DepthMap) -> float:
+    """Return the number of standard deviations of lost material that drift and noise do not explain.
+
+    The worn places were chosen as the deepest ones out of as many as the common part contains. Drift is known
+    from few independent tiles, so the quantile is that of Student's t; stated errors contain its ratio at 95 %.
+    """
+    n_places = depths.inside.sum() / max(depths.worn.sum(), 1)
+    freedom = depths.errors.freedom
+    student = special.stdtrit(freedom, (0.975, 1 - FALSE_POSITIVE_RATE / n_places))
+    return float(SIDE * student[1] / student[0])
+
+
 def judge_change(
-    bounds: tuple[float, float, float],
-    lost: float,
-    error: float,
-    grown: float,
-    grown_error: float,
+    area: float, error: float, sure_loss: float, lost: float, grown: float, grown_error: float
 ) -> str:
-    """Return "worn", "grown", "worn_and_grown" or "no_wear" for areas [m2] or volumes [m3].
+    """Return "worn", "scar_or_drift", "grown", "worn_and_grown" or "no_wear" for areas [m2] or volumes [m3].
 
     Noise is as often above zero as below, so what the same tests find above the first surface is a
     control for what they find below it.
 
     Parameters
     ----------
-    bounds : tuple of float
-        Lost material in all tracks, with its interval.
+    area, error : float
+        Lost material in all tracks, and its standard deviation.
+    sure_loss : float
+        Standard deviations from which on the loss is no drift.
     lost : float
         Material in places that are worn beyond doubt.
-    error : float
-        Standard deviation of the lost material.
     grown, grown_error : float
         Material above the first surface, and its standard deviation.
     """
-    if bounds[1] > 0 and lost > CONTROL * grown:
-        return "worn"
+    if area > SIDE * error and lost > CONTROL * grown:
+        return "worn" if area > sure_loss * error else "scar_or_drift"
     is_grown = grown > MIN_GROWTH * grown_error
     if is_grown and grown > CONTROL * max(lost, 0.0):
         return "grown"

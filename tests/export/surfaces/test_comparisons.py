@@ -21,6 +21,7 @@ STATED = {
     "worn_and_grown": "(596.0 to 604.0), the mean over the common length, and material grew: 35 um^2 lost",
     "growth_at_ends": "a scar of 2 um over nearly all of the surface, or 2.1 um of material that grew at the ends: both are",
     "scar_or_bow": "Either a scar over all of the surface, up to 2 um deep on average, or a bent datum",
+    "scar_or_drift": "Either wear of 20 nm, the mean over the",
     "elsewhere": "Not comparable: the two surfaces have no part in common",
     "no_datum": "too few heights agree (0.12 of all)",
     "mirror_finish": "(rms height 2 nm) hardly exceed the noise (3 nm)",

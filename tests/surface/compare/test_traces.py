@@ -119,6 +119,24 @@ def test_exact_shallow_track_is_found_above_limit():
         assert area.low <= 2 * limit * 1000 * UM <= area.high
 
 
+def test_always_drift_alone_is_hardly_ever_called_wear():
+    """Of 8 unworn pairs whose datum drifts by five times the noise at most one is called worn; a deep track is found."""
+    drifts = []
+    for seed in range(8):
+        drift = gaussian_filter1d(np.random.default_rng([seed, 5]).normal(size=1500), 125.0)
+        drifts.append(25 * NM * drift / drift.std())
+    found = [compare_surfaces(*make_pair(drift, seed)) for seed, drift in enumerate(drifts)]
+    codes = [each.verdict.code for each in found]
+    assert set(codes) <= {"no_wear", "scar_or_drift", "worn"} and codes.count("worn") <= 1
+    unsure = next(each for each in found if each.verdict.code == "scar_or_drift")
+    assert unsure.verdict.numbers["scar_depth"] > 0
+    assert unsure.values["worn_depth_mean"].reason == "scar_or_drift"
+    worn = make_parabola(UM, 500, 900, 1500)
+    for seed, drift in enumerate(drifts[:2]):
+        area = compare_surfaces(*make_pair(worn + drift, seed)).values["worn_area"]
+        assert area.value == pytest.approx(worn.sum() * UM, rel=0.1)
+
+
 def test_always_identical_files_are_named():
     """Identical heights are no comparison."""
     before, _ = make_pair(np.zeros(2000))
