@@ -80,6 +80,8 @@ FINDINGS = {
     "identical_files": {},
     "mirrored": {},
     "turned": {},
+    "sure_place": {"significance": 57.3, "sure": 12.0},
+    "likely_place": {"significance": 7.3, "sure": 12.0},
     "no_old_surface_left": {"from": 1e-3, "to": 2e-3},
     "bow_subtracted": {"height": 4e-7, "area": 3e-10},
     "other_length": {"scale": 1.002, "low": 1.0018, "high": 1.0022},

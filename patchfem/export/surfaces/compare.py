@@ -199,6 +199,7 @@ def _describe_place(comparison: Comparison) -> dict:
     """Return how the second surface lies on the first one: `reference` and `registration` of compare.json."""
     placement = comparison.evidence.placement
     names = ("shift_x", "shift_y", "rotation") if comparison.is_areal else ("shift",)
+    names += ("significance",)
     values = comparison.values if placement is None else comparison.values | placement.values
     registration = to_json({name: values[name] for name in names if name in values})
     registration["mirrored"] = bool(placement and placement.mirrored)

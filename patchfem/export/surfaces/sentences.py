@@ -68,11 +68,15 @@ WARNINGS = {
     "exchanged": "Material stands above the first surface: maybe the files are in the wrong order.",
     "other_step": "The traces have different steps, {before} before and {after} after; slopes and the largest depth depend "
     "on them.",
+    "likely_place": "The place is likely, not sure: there the surfaces agree by {significance} standard deviations more "
+    "than at other places ({sure} are sure); compare their curves.",
     "drift": "The datum drifts by {height}, more than the noise; the intervals contain this error.",
     "either_plane": "Another plane fits the unworn heights as well, and would give other depths.",
 }
 NOTES = {
     "other_tracks": "{count} more tracks were found; compare.json lists them.",
+    "sure_place": "The place is sure: there the surfaces agree by {significance} standard deviations more than at "
+    "other places ({sure} are sure).",
     "track_cut": "The track leaves the common part, so that it may be wider than stated.",
     "deposits": "{amount} of material lie above the first surface: deposits or pile-up.",
     "mirrored": "The second surface was measured in the opposite direction; it was mirrored, so that its x counts from "
@@ -109,7 +113,8 @@ REASONS = {
 }
 
 # SI units of the numbers of findings other than lengths; of areas between traces, and of volumes between scans
-UNITS = {"unworn": "1", "scale": "1", "low": "1", "high": "1", "gain": "1", "volume": "m3"}
+RATIOS = ("unworn", "scale", "low", "high", "gain", "significance", "sure")
+UNITS = {"volume": "m3"} | dict.fromkeys(RATIOS, "1")
 AMOUNTS = ("grown", "lost", "area")
 
 

@@ -18,7 +18,7 @@ from ..files.read import read_surface
 from ..profile import Profile, robust_deviation
 from ..quantity import SIDE, Quantity
 from . import waves
-from .alignment import Aligned, align
+from .alignment import SURE_SIGNIFICANCE, Aligned, align
 from .changes import find_detection_limit
 from .depth_map import UNWORN_LIMIT, DepthMap
 from .depths import make_depths, measure_largest
@@ -306,6 +306,8 @@ def _describe_place(aligned: Aligned) -> Placement:
     placed["gain"] = (aligned.gain, aligned.gain_error)
     values = {name: name_estimate(name, *estimate) for name, estimate in placed.items()}
     place = aligned.place
+    if np.isfinite(place.significance):
+        values["significance"] = name_quantity("significance", place.significance, None, None)
     return Placement(values, "x" if place.mirrored else "", place.inverted)
 
 
@@ -330,6 +332,10 @@ def _collect_findings(
     has_deposits = (
         verdict.code.startswith("worn") and grown > MIN_DEPOSITS * verdict.numbers["lost"]
     )
+    known = placement.values.get("significance")
+    significance = known.value if known else np.inf
+    is_sure = significance > SURE_SIGNIFICANCE
+    place = {"significance": float(np.rint(significance)), "sure": SURE_SIGNIFICANCE}
     steps = [float(raster.steps[-1]) for raster in rasters]
     is_uneven = depths.y is None and max(steps) > MAX_STEP_RATIO * min(steps)
     first, last = depths.x[depths.worn][[0, -1]] if not is_placed else (0.0, 0.0)
@@ -337,6 +343,7 @@ def _collect_findings(
         (not is_placed, "no_old_surface_left", {"from": float(first), "to": float(last)}),
         (bow, "bow_subtracted", {"height": bow, "area": bow_area}),
         (is_placed, "hidden_even_wear", {"limit": None}),
+        (np.isfinite(significance), "sure_place" if is_sure else "likely_place", place),
         (placement.mirrored, "mirrored", {}),
         (placement.turned, "turned", {}),
         (gain not in (None, 1.0), "other_gain", {"gain": gain}),

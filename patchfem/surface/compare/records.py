@@ -27,6 +27,10 @@ DEFINITIONS = {
         "1",
         "factor by which the heights of the second surface were divided; 1 if no other gain of the instrument shows",
     ),
+    "significance": (
+        "1",
+        "agreement of both surfaces at this place, in standard deviations of that at all other places",
+    ),
     "common_length": ("m", "length that both traces show"),
     "common_area": ("m2", "area that both scans show"),
     "worn_depth_mean": ("m", "lost area or volume divided by the size of the common part"),
@@ -84,7 +88,7 @@ class Finding(NamedTuple):
 class Placement:
     """Place of the second surface on the first.
 
-    - values: shift, tilt, scale of a trace; shift_x, shift_y, rotation of a scan.
+    - values: shift, tilt, scale of a trace; shift_x, shift_y, rotation of a scan; significance unless the place was given.
     - mirrored: whether the second surface was mirrored, along "x" (traces) or "x", "y" (scans); "".
     - turned: whether the heights of a scan were inverted (a replica).
     - basis: "place" if heights are compared at the same place, "flanks" if the depth is measured
