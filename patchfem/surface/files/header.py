@@ -1,8 +1,8 @@
 """Header of a text file: names and units of columns, or size and units of a matrix.
 
-A line above the first row of numbers is a comment (#, % or //) or text. A line that names columns with their units ends
-the header; names and units may also stand in a line each. The lines `# Width: 12.34 um`, `# Height: 8 um` and
-`# Value units: nm`, as Gwyddion writes them, describe a matrix of heights, and `# Lateral units: um` points.
+What stands above the first row of numbers is the header. A line of names with their units ends it; names and units may
+also stand in a line each. The lines `# Width: 12.34 um`, `# Height: 8 um` and `# Value units: nm`, as Gwyddion writes
+them, describe a matrix of heights, `# Lateral units: um` points, and `Length,1500.0 um` a scan of Dektak.
 """
 
 import re
@@ -14,20 +14,26 @@ from ...core import PatchfemError
 from ...inputs.cells import NUMBER_PATTERN
 from .spellings import HEADER_EXAMPLE, MISSING, NO_UNIT, ROLES, parse_length_unit, shorten
 
-MAX_LINE = 1000  # largest number of characters in a line that is no row of a matrix
+MAX_LINE = 1000  # largest number of characters of a line in which names of columns are sought
 MAX_LINES = 500  # largest number of lines in a header; instruments write fewer than 200
 MAX_NAME = 80  # largest number of characters in the name of a column with its unit
 MAX_COLUMNS = 4  # largest number of columns: x, y, z, and one with row numbers
 DELIMITERS = (";", ",", "\t", "|")
 COMMENT = ("#", "%", "//")
 DECIMAL_COMMA = re.compile(r"[+-]?[0-9]*,[0-9]+(?:[eE][+-]?[0-9]+)?")
-_COLUMN = re.compile(r"(\w[\w .-]*?)\s*(?:\[([^\[\]]*)\]|\(([^()]*)\)|[_/]\s*(\w+)|\s+in\s+(\w+))")
+# Name and unit of a column: x [um], x (um), x_um, x/um, x in um, x um.
+_COLUMN = re.compile(
+    r"([^\W\d][\w .-]*?)(?:\s*\[([^\[\]]*)\]|\s*\(([^()]*)\)|\s*[_/]\s*(\w+)|\s+in\s+(\w+)|\s+(\w+))"
+)
 _CELL = re.compile(r"[^\s\[\](]+\s*(?:\[[^\]]*\]|\([^)]*\))|[^\W\d_]+\s+in\s+[^\W\d_]+|\S+")
-_FACT = re.compile(r"(width|height|lateral units|value units)\s*:\s*(.*)", re.IGNORECASE)
+_FACT = re.compile(
+    r"(?:(width|height|lateral units|value units)\s*:|(length),(?=[0-9.]+ \w+$))\s*(.*)",
+    re.IGNORECASE,
+)
 
 
 class Column(NamedTuple):
-    """Role of a column ("x", "y", "z", "index" or an unknown name), its unit and its name in the file."""
+    """Role of a column ("x", "y", "z", "index", an unknown name, or "" of a unit alone), its unit and its text."""
 
     role: str
     unit: str | None = None
@@ -38,14 +44,13 @@ class Header(NamedTuple):
     """What stands above the numbers of a text file.
 
     columns: those that a line names, [] without one; facts: what is said of a matrix or of points, such as {"width":
-    "4 um"}; count: numbers in the first row, 0 if a line of names with units ended the header; delimiter: of this
-    line; number: of the line of names, or of the first row.
+    "4 um"}; count: numbers in the first row, or columns that a line names with their units; number: of the line of
+    names, or of the first row.
     """
 
     columns: list[Column]
     facts: dict[str, str]
     count: int
-    delimiter: str | None
     number: int
 
 
@@ -54,87 +59,87 @@ def read_header(path, lines: Iterator[tuple[int, str]]) -> tuple[Header, Iterato
 
     Raises PatchfemError if no row of numbers follows.
     """
-    named: dict[int, list[Column]] = {}
+    named: dict[int, tuple[int, list[Column]]] = {}  # lines by their number of cells
+    units: dict[int, list[Column]] = {}
     facts = {}
     number = 0
-    has_text = False
     for number, raw_line in lines:
         line = raw_line.strip()
         is_comment = line.startswith(COMMENT)
-        text = line[:MAX_LINE].lstrip("#%/").strip() if is_comment else line
-        fact = _FACT.fullmatch(text[:MAX_NAME])
-        cells, delimiter = split_cells(line)
-        is_row = any(map(str.isdigit, line)) and all(is_number(cell, delimiter) for cell in cells)
+        text = line.lstrip("#%/").strip() if is_comment else line
+        cells, delimiter = split_cells(text)
+        count = len(cells)
+        is_row = any(map(str.isdigit, text)) and all(is_number(cell, delimiter) for cell in cells)
         if is_row and cells[0] and not is_comment:
-            start, columns = _find_columns(named, len(cells))
-            header = Header(columns, facts, len(cells), delimiter, start or number)
-            return header, chain([(number, raw_line)], lines)
-        if len(line) > MAX_LINE and not is_comment:
-            raise PatchfemError(
-                f"{path}:{number}: a line is {len(line)} characters long; two columns are needed, "
-                f"{HEADER_EXAMPLE}"
-            )
+            start, columns = named.get(count, (number, []))
+            columns = _join(columns or _name_columns(count, units), units.get(count))
+            return Header(columns, facts, count, start), chain([(number, raw_line)], lines)
+        fact = _FACT.fullmatch(text[:MAX_NAME])
         if fact:
-            facts[fact[1].lower()] = fact[2]
+            facts[(fact[1] or fact[2]).lower()] = fact[3]
             continue
 
-        cells, delimiter = split_cells(text)
         columns = [parse_column(cell) for cell in cells]
-        if is_comment and columns and columns[-1].unit is None:
-            # words may follow the last column
-            match = _COLUMN.match(cells[-1][:MAX_NAME])
-            columns[-1] = parse_column(match[0]) if match else columns[-1]
-        n_units = sum(column.unit is not None for column in columns)
-        if 1 < n_units and len(columns) <= MAX_COLUMNS:
-            others = {column.role for column in columns if column.unit is None}
-            is_known = not {column.role for column in columns}.isdisjoint("xyz")
-            if others <= {"index"} and (is_known or not is_comment):
-                return Header(columns, facts, 0, delimiter, number), lines
-        if text:
-            named[number] = columns
-            has_text |= not is_comment
+        if columns and not any(column.role for column in columns):
+            units[count] = columns
+        elif _are_names(columns):
+            named[count] = (number, columns)
+        start, columns = named.get(count, (number, []))
+        columns = _join(columns, units.get(count))
+        # Names of a comment count if one of them is known.
+        is_known = not is_comment or any(column.role in ("x", "y", "z") for column in columns)
+        if is_known and _have_units(columns):
+            return Header(columns, facts, count, start), lines
         if number == MAX_LINES:
             break
-    if not has_text:
-        raise PatchfemError(f"{path}: no data, only comments")
     raise PatchfemError(
         f"{path}: no row of numbers in the first {number} lines; {HEADER_EXAMPLE} above rows of two "
         "numbers"
     )
 
 
-def _find_columns(named: dict[int, list[Column]], count: int) -> tuple[int, list[Column]]:
-    """Return the line that names so many columns and the columns, whose units may stand in a line of their own."""
-    start = 0
-    names: list[Column] = []
-    units: list[str | None] = [None] * count
-    for number, columns in named.items():
-        cells = [column.name for column in columns]
-        factors = [parse_length_unit(cell) for cell in cells]
-        is_unit = [cell in NO_UNIT or bool(factor) for cell, factor in zip(cells, factors)]
-        if len(cells) != count:
-            continue
-        if any(factors) and all(is_unit):
-            units = [cell if factor else None for cell, factor in zip(cells, factors)]
-            continue
-        is_named = len({column.role for column in columns} & {"x", "y", "z", "index"}) > 1
-        is_plain = 1 < count < MAX_COLUMNS and not re.search("[:=]", " ".join(cells))
-        if is_named or is_plain:
-            start = number
-            names = columns
-    if not names and any(units) and 1 < count < MAX_COLUMNS:
-        names = [Column(role) for role in ("x", "y", "z")[3 - count :]]
-        names[0] = Column("x")
-    units = [column.unit or unit for column, unit in zip(names, units)]
-    return start, [column._replace(unit=unit) for column, unit in zip(names, units)]
+def _are_names(columns: list[Column]) -> bool:
+    """Return whether a line names columns: two of them are known, or it is a short line without signs of other text."""
+    n_known = len({column.role for column in columns} & {"x", "y", "z", "index"})
+    is_other = any(re.search("[:=]", column.name) for column in columns)
+    return n_known > 1 or (1 < len(columns) <= MAX_COLUMNS and not is_other)
+
+
+def _have_units(columns: list[Column]) -> bool:
+    """Return whether at least two columns have units, and all others but row numbers."""
+    with_unit = [column for column in columns if column.unit is not None]
+    others = {column.role for column in columns if column.unit is None}
+    return 1 < len(with_unit) and len(columns) <= MAX_COLUMNS and others <= {"index"}
+
+
+def _name_columns(count: int, units: dict) -> list[Column]:
+    """Return the columns of a file that states their units alone, [] without them."""
+    roles = {2: "xz", 3: "xyz"}.get(count, "") if count in units else ""
+    return [Column(role) for role in roles]
+
+
+def _join(columns: list[Column], units: list[Column] | None) -> list[Column]:
+    """Return columns with the units of a line of their own, where they have none."""
+    if units is None:
+        return columns
+    return [
+        column if column.unit is not None else column._replace(unit=unit.unit)
+        for column, unit in zip(columns, units)
+    ]
 
 
 def parse_column(cell: str) -> Column:
-    """Parse the heading of a column with its unit, such as `x [um]`, `height (nm)` or `x in mm`."""
+    """Parse the heading of a column with its unit, such as `x [um]`, `height (nm)` or `x in mm`, or a unit alone."""
+    if cell in NO_UNIT or parse_length_unit(cell):
+        return Column("", None if cell in NO_UNIT else cell, cell)
     match = _COLUMN.fullmatch(cell) if len(cell) <= MAX_NAME else None
-    unit = None
-    if match:
-        unit = next(part.strip() for part in match.groups()[1:] if part is not None)
+    if match and match[6] and not parse_length_unit(match[6]):
+        match = None  # the second word of a name
+    unit = (
+        next((part.strip() for part in match.groups()[1:] if part is not None), None)
+        if match
+        else None
+    )
     name = (match[1] if match else cell).strip(" _").lower()
     return Column(ROLES.get(name, name), unit, cell)
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from ...core import PatchfemError
 from ...inputs.cells import NUMBER_PATTERN
-from .header import COMMENT, MAX_COLUMNS, MAX_LINE, split_cells
+from .header import COMMENT, split_cells
 from .spellings import MISSING, shorten
 
 _NOT_FINITE = re.compile(r"[+-]?(?:nan|inf)", re.IGNORECASE)
@@ -22,105 +22,70 @@ class Rows(NamedTuple):
     lines: np.ndarray
 
 
-def read_rows(
-    path, lines: Iterator[tuple[int, str]], roles: list[str], delimiter: str | None
-) -> Rows:
-    """Read all rows of numbers of a text file.
+def read_rows(path, lines: Iterator[tuple[int, str]], roles: list[str]) -> Rows:
+    """Read all rows of numbers of a text file; a million rows of two columns take a second.
 
     Parameters
     ----------
     path : Path
         For messages.
     lines : iterator of (int, str)
-        Numbers and texts of the lines below the header.
+        Numbers and texts of the lines below the header. The first row shows the delimiter of all.
     roles : list of str
-        Role of each column; a height "z" may be missing.
-    delimiter : str or None
-        Expected between columns; the first row may show another.
-
-    Returns
-    -------
-    Rows
-        In the units of the file; a million rows of two columns take a second.
+        Role of each column; a height "z" may be missing, and an "index" is not read.
     """
-    width = len(roles)
     is_matrix = set(roles) == {"z"}
     numbers = array("d")
     row_lines = array("q")
+    delimiter = None
     has_comma = has_point = False
     for number, line in lines:
-        line = line.strip("\r\n " if delimiter == "\t" else None)
+        line = line.strip(" \r\n")
+        place = f"{path}:{number}: '{shorten(line)}'"
         if line.startswith(COMMENT):
             if is_matrix and re.search("[:=]", line):
                 raise PatchfemError(
-                    f"{path}:{number}: '{shorten(line)}' ends the scan or begins another one; keep only one "
-                    "scan per file"
+                    f"{place} ends the scan or begins another one; keep only one scan per file"
                 )
             continue
         if not line.strip(" \t,;|"):
             continue
-        if len(line) > MAX_LINE and width <= MAX_COLUMNS:
-            raise PatchfemError(
-                f"{path}:{number}: the line is {len(line)} characters long; {width} numbers are needed"
-            )
         if not row_lines:
-            delimiter = _find_delimiter(line, delimiter, width)
+            delimiter = split_cells(line)[1]
 
         # All rows must have the same decimal sign.
         has_point |= "." in line
-        if delimiter != "," and "," in line:
-            has_comma = True
+        has_comma |= delimiter != "," and "," in line
         if has_comma and has_point:
             raise PatchfemError(
-                f"{path}:{number}: '{shorten(line)}': a decimal comma and a decimal point in one file; use the "
-                "same sign in the whole file"
+                f"{place}: a decimal comma and a decimal point in one file; use the same sign in the whole file"
             )
         cells = (line.replace(",", ".") if has_comma else line).split(delimiter)
         try:
             # The function float also accepts 1_0 and digits of other scripts.
-            if len(cells) != width or "_" in line or not line.isascii():
+            if len(cells) != len(roles) or "_" in line or not line.isascii():
                 raise ValueError
             numbers.extend([float(cell) for cell in cells])
         except ValueError:
-            numbers.extend(_parse_cells(f"{path}:{number}", line, cells, roles, delimiter))
+            cells = [cell.strip() for cell in cells]
+            while len(cells) > len(roles) and not cells[-1]:
+                cells.pop()
+            if len(cells) != len(roles):
+                is_decimal = delimiter == "," and len(cells) == 2 * len(roles)
+                remedy = "with a decimal comma, separate the columns by semicolons or tabs"
+                remedy = remedy if is_decimal else "write nan for a missing height"
+                raise PatchfemError(f"{place}: {len(roles)} numbers are needed; {remedy}") from None
+            numbers.extend([_parse_cell(f"{path}:{number}", *pair) for pair in zip(roles, cells)])
         row_lines.append(number)
-    return Rows(np.array(numbers).reshape(-1, width), np.array(row_lines))
+    return Rows(np.array(numbers).reshape(-1, len(roles)), np.array(row_lines))
 
 
-def _find_delimiter(line: str, expected: str | None, width: int) -> str | None:
-    """Return the delimiter of the first row, which may differ from that of the header."""
-    cells, delimiter = split_cells(line)
-    return delimiter if len(cells) == width else expected
-
-
-def _parse_cells(
-    place: str, line: str, cells: list[str], roles: list[str], delimiter: str | None
-) -> list[float]:
-    """Parse a row with missing heights or empty cells at its end; a PatchfemError says what is wrong in it."""
-    cells = [cell.strip() for cell in cells]
-    while len(cells) > len(roles) and not cells[-1]:
-        cells.pop()
-    if len(cells) != len(roles):
-        remedy = "write nan for a missing height"
-        if delimiter == "," and len(cells) == 2 * len(roles):
-            remedy = "with a decimal comma, separate the columns by semicolons or tabs"
-        raise PatchfemError(
-            f"{place}: '{shorten(line)}': {len(roles)} numbers are needed; {remedy}"
-        )
-    numbers = []
-    for role, cell in zip(roles, cells):
-        if NUMBER_PATTERN.fullmatch(cell) or _NOT_FINITE.fullmatch(cell):
-            numbers.append(float(cell))
-        elif role == "z" and MISSING.fullmatch(cell):
-            numbers.append(np.nan)
-        elif role == "z":
-            raise PatchfemError(
-                f"{place}: '{shorten(cell)}' is not a height; write a missing height as nan"
-            )
-        elif role != "index":
-            raise PatchfemError(
-                f"{place}: '{shorten(cell)}' is not a number for {role}; correct the line or delete it"
-            )
-        else:
-            numbers.append(0.0)
-    return numbers
+def _parse_cell(place: str, role: str, cell: str) -> float:
+    """Return the number in a cell, NaN for a missing height; raise PatchfemError for other text."""
+    if NUMBER_PATTERN.fullmatch(cell) or _NOT_FINITE.fullmatch(cell):
+        return float(cell)
+    if role == "index" or (role == "z" and MISSING.fullmatch(cell)):
+        return np.nan
+    raise PatchfemError(
+        f"{place}: '{shorten(cell)}' is not a number for {role}; correct the line, or write a missing height as nan"
+    )

@@ -30,7 +30,7 @@ _PREFIXES = {"": 1.0, "milli": 1e-3, "micro": 1e-6, "mikro": 1e-6, "nano": 1e-9}
 _COLUMN_NAMES = {
     "x": "x, x axis, x-achse, distance, position, lateral, lateral position, abstand, weg, strecke, position x",
     "y": "y, y axis, y-achse, position y",
-    "z": "z, z axis, z-achse, height, heights, höhe, hoehe, profile, profil",
+    "z": "z, z axis, z-achse, height, heights, höhe, hoehe, profile, profil, raw",
     "index": "index, no, no., nr, nr., number, nummer, sample, point, punkt, #",
 }
 ROLES = {name: role for role, names in _COLUMN_NAMES.items() for name in names.split(", ")}

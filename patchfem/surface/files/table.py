@@ -22,8 +22,6 @@ from .spellings import (
 MAX_POINTS = 50_000_000  # largest number of heights
 MAX_LENGTH = 10.0  # length or coordinate [m] above which a number has a wrong unit
 MIN_LENGTH = 1e-9  # length [m] below which a trace has a wrong unit
-ATOM_WIDTH = 1e-10  # span of heights [m] below which they have a wrong unit
-OUTLIER_FRACTION = 0.01  # fraction of the heights at either end that may be measurement faults
 MIN_ROUNDED = (
     10  # smallest number of positions that shows whether they are even apart from rounding
 )
@@ -333,33 +331,15 @@ def find_printed_digit(x) -> float:
 
 
 def _check_span(path, length: float, heights, stated: str) -> tuple[str, ...]:
-    """Return a note on heights [m] that span more than the length, or less than an atom.
-
-    Raises PatchfemError for most of them above the length [m] if nobody states their unit.
-    """
-    heights = np.sort(heights)
-    if heights.size < 2:
-        raise PatchfemError(f"{path}: {heights.size} heights; a trace needs at least two")
-    span = float(heights[-1] - heights[0])
+    """Return a note on heights [m] that span more than the length [m]; raise PatchfemError if nobody states their unit."""
     if length < MIN_LENGTH:
         raise PatchfemError(
             f"{path}: the profile is {format_length(length, 3)} long; is the unit of x right?"
         )
-    if 0 < span < ATOM_WIDTH:
-        return (
-            f"{path}: heights span {format_length(span)}, which is less than the width of an atom; is the "
-            "unit of the heights right?",
-        )
+    span = float(np.ptp(heights))
     if span <= length:
         return ()
     text = f"{path}: heights span {format_length(span)} over a length of {format_length(length)}"
-    count = max(1, int(OUTLIER_FRACTION * heights.size)) if heights.size >= MIN_ROUNDED else 0
-    inner_span = float(heights[-1 - count] - heights[count])
-    if inner_span <= length:
-        return (
-            f"{text}, but only {format_length(inner_span)} without the {count} highest and the {count} lowest of "
-            f"{heights.size}; write nan for each of these heights that is a fault of the measurement",
-        )
     if not stated:
         raise PatchfemError(
             f"{text}; is the unit of z right? If not, correct the header or give --units to "

@@ -149,7 +149,7 @@ REFUSED = {  # bytes, file name, given units, and the expected message
     "two numbers": (b"x [um],y [um],z [um]\n0,0,1\n1,0,1\n0,1\n", "a.txt", None,
                     ":4: '0,1': 3 numbers are needed"),
     "an unknown column": (b"x [um],y [um],w [um]\n0,0,1\n", "a.txt", None,
-                          "column 'w' is not known; the columns x, y and z are needed"),
+                          "the columns .*'w .um.' are not x, y, z, which are needed"),
     "too steep": (b"x [um],y [um],z [mm]\n0,0,1\n1,0,1\n0,1,1\n1,1,9\n", "a.txt", None,
                   "heights span 8 mm over a length of 1 um; is the unit"),
     **{
@@ -180,10 +180,10 @@ REFUSED = {  # bytes, file name, given units, and the expected message
     "mat cut off": (write.make_mat(points=POINTS)[:-9], "a.mat", UM, "no readable MATLAB file .*; save it anew"),
     "dektak without its columns": (
         write.make_dektak(Z.ravel()).replace(b"Lateral", b"Time"), "a.csv", None,
-        "without the columns `Lateral um,Raw Micrometer`"),
+        "the columns 'Time um', 'Raw Micrometer' are not x, z"),
     "dektak in volts": (
         write.make_dektak(Z.ravel()).replace(b"Raw Micrometer", b"Raw Volt"), "a.csv", None,
-        r":13: unknown unit 'Volt' of z; use one of m, km"),
+        ":13: the columns 'Lateral um', 'Raw Volt' are not x, z"),
 }  # fmt: skip
 
 

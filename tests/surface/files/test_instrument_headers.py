@@ -206,7 +206,7 @@ REMEDIES = {  # refused text, message, text after the remedy, and given units
     ),
     "a word": (
         "# Width: 4 um\n# Height: 3 um\n# Value units: nm\n" + ROWS.replace("7", "lost"),
-        ":5: 'lost' is not a height; write a missing height as nan",
+        ":5: 'lost' is not a number for z; correct the line, or write a missing height as nan",
         "# Width: 4 um\n# Height: 3 um\n# Value units: nm\n" + ROWS.replace("7", "nan"),
         None,
     ),
@@ -260,7 +260,7 @@ REMEDIES = {  # refused text, message, text after the remedy, and given units
     ),
     "an unknown name": (
         f"Kanal A [um]\tKanal B [um]\n{PAIRS}",
-        "column 'Kanal A' is not known; the columns x and z are needed; write the header as",
+        "the columns 'Kanal A [um]', 'Kanal B [um]' are not x, z, which are needed; write the header as",
         f"x [um]\tz [um]\n{PAIRS}",
         None,
     ),

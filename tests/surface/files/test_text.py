@@ -138,10 +138,11 @@ EMPTY = (
     "{path}: the profile is empty; export the profile as text with two columns and write the header as "
     "`x [um],z [um]`"
 )
+WORDS = "{path}: no row of numbers in the first 1 lines; write the header as `x [um],z [um]` above rows of two numbers"
 REFUSED = {
     "": EMPTY,
     "\ufeff \n\n": EMPTY,
-    "# only words\n% more\n": "{path}: no data, only comments",
+    "# only words\n% more\n": WORDS.replace("1 lines", "2 lines"),
     **dict.fromkeys(
         ("0,1\n1,2\n", "0,0,1\n0,1,2\n", "x,z\n0,1\n"),
         "{path}:1: the unit of x is not given, and units are never guessed; write the header as `x [um],z [um]`, "
@@ -151,9 +152,10 @@ REFUSED = {
     "x [um]\n0\n": "{path}:2: only one column, but x and z are needed; write the header as `x [um],z [um]`",
     "x [um],y [um],z [um],w [um]\n0,0,1,1\n": "{path}:1: 4 columns of numbers, but x and z, or x, y and z, are needed; keep "
                                                "one trace of two columns and write the header as `x [um],z [um]`",
-    "x [um],x [um]\n0,1\n": "{path}:1: two columns are named x; write the header as `x [um],z [um]`",
-    "t [s],z [um]\n0,1\n": "{path}:1: column 't' is not known; the columns x and z are needed; write the header as `x "
-                           "[um],z [um]`",
+    "x [um],x [um]\n0,1\n": "{path}:1: the columns 'x [um]', 'x [um]' are not x, z, which are needed; write the header "
+                            "as `x [um],z [um]`",
+    "t [s],z [um]\n0,1\n": "{path}:1: the columns 't [s]', 'z [um]' are not x, z, which are needed; write the header "
+                            "as `x [um],z [um]`",
     "x [um],z [um]\n": "{path}: 0 heights; a trace needs at least two",
     "x [um],z [um]\n0,1\n1,\n2,nan\n": "{path}: 1 heights; a trace needs at least two",
     "x [um],z [um]\n0,1\n1,2\n1.5\n": "{path}:4: '1.5': 2 numbers are needed; write nan for a missing height",
@@ -167,10 +169,13 @@ REFUSED = {
                                                   "only rise or only fall, so keep one trace or scan per file",
     "x [um],z [um]\n0,0,1,5\n": "{path}:2: '0,0,1,5': 2 numbers are needed; with a decimal comma, separate the "
                                  "columns by semicolons or tabs",
-    "x [um],z [um]\n0,1\n,2\n": "{path}:3: '' is not a number for x; correct the line or delete it",
-    "x [um],z [um]\n0,1\n1,worn\n": "{path}:3: 'worn' is not a height; write a missing height as nan",
-    "x [um],z [um]\n0,1\n1,1_0\n": "{path}:3: '1_0' is not a height; write a missing height as nan",
-    "x [um],z [um]\n0,1\n1,\u0663\n": "{path}:3: '\u0663' is not a height; write a missing height as nan",
+    "x [um],z [um]\n0,1\n,2\n": "{path}:3: '' is not a number for x; correct the line, or write a missing height as nan",
+    "x [um],z [um]\n0,1\n1,worn\n":
+        "{path}:3: 'worn' is not a number for z; correct the line, or write a missing height as nan",
+    "x [um],z [um]\n0,1\n1,1_0\n":
+        "{path}:3: '1_0' is not a number for z; correct the line, or write a missing height as nan",
+    "x [um],z [um]\n0,1\n1,\u0663\n":
+        "{path}:3: '\u0663' is not a number for z; correct the line, or write a missing height as nan",
     "x [um],z [um]\n0,1\nnan,2\n3,1\n": "{path}:3: x is nan; finite numbers are needed",
     "x [um],z [um]\n0,1\n1,2\n2,-inf\n": "{path}:4: z is -inf; finite numbers are needed",
     "x [um],z [um]\n0,1\n1,2\n2,1e999\n": "{path}:4: z is inf; finite numbers are needed",
@@ -185,8 +190,9 @@ REFUSED = {
     "x [um],z [um]\n4,1\n1,2\n2,1\n0,2\n": "{path}:4: x reverses: 1 um and then 2 um; x must only rise or "
                                            "only fall, so keep one trace or scan per file",
     "x [um],z [um]\n5,1\n5,2\n": "{path}: every sample lies at x = 5 um; a surface needs at least two different x",
-    "x [um],z [um]\n" + "1" * 2000: "{path}:2: the line is 2000 characters long; 2 numbers are needed",
-    "a" * 2000: "{path}:1: a line is 2000 characters long; two columns are needed, write the header as `x [um],z [um]`",
+    "x [um],z [um]\n" + "1" * 2000: "{path}:2: '1111111111111111111111111111111111111...': 2 numbers are needed; "
+                                    "write nan for a missing height",
+    "a" * 2000: WORDS,
     "x [um],z [um]\n0,\x00\n": "{path}: not a text file; export the profile as text with two columns and write the "
                                "header as `x [um],z [um]`",
 }  # fmt: skip
