@@ -26,6 +26,9 @@ MAX_STRETCH = 0.015  # largest error of length of a place
 N_TERMS = {1: (2, 3), 2: (3,)}  # numbers of terms of the datums that are tried
 # Noise about a parabola relative to that about a line, from which on the parabola is subtracted.
 BEND_GAIN = 0.8
+CLEAR_BEND_GAIN = (
+    0.2  # the same where heights above the first trace do not matter: no line fits at all
+)
 MAX_NEW_GROWTH = 0.01  # fraction of the heights above the first trace that a parabola may add
 SURE_SIGNIFICANCE = (
     12.0  # the same as MIN_SIGNIFICANCE, of a place among others nearly as significant
@@ -208,9 +211,11 @@ def _fit_datum(model: Model, state, digit: float, *, is_straight: bool) -> Fit:
 
 def _is_bent(straight: Fit, bent: Fit) -> bool:
     """Return whether a parabolic datum explains the depths better than a straight one."""
-    is_quieter = np.median(bent.noise) < BEND_GAIN * np.median(straight.noise)
+    gain = np.median(bent.noise) / np.median(straight.noise)
+    if gain < CLEAR_BEND_GAIN:
+        return True
     has_grown = bent.grown.mean() > straight.grown.mean() + MAX_NEW_GROWTH
-    return bool((is_quieter or bent.n_changed < straight.n_changed / 2) and not has_grown)
+    return bool((gain < BEND_GAIN or bent.n_changed < straight.n_changed / 2) and not has_grown)
 
 
 def _measure_gain(model: Model, fit: Fit) -> tuple[float, float]:

@@ -161,6 +161,15 @@ def test_always_exchanged_files_show_growth():
     assert found.values["worn_depth_mean"].value is None
 
 
+def test_exact_deposit_on_a_bowed_trace_is_growth():
+    """A deposit over a third of a trace with a bow is growth of the known area, not a track between flanks."""
+    deposit = 1.2 * UM * np.sqrt(make_parabola(1.0, 1400, 2700))
+    bow = UM * np.linspace(-1, 1, 4000) ** 2
+    found = compare_surfaces(*make_pair(-deposit - bow, 3))
+    assert found.verdict.code == "grown" and found.evidence.placement.basis == "place"
+    assert found.values["grown_area"].value == pytest.approx(deposit.sum() * UM, rel=0.03)
+
+
 def test_always_other_place_has_no_depth():
     """Traces of two surfaces with the same statistics have no common place."""
     for seed in range(2):
