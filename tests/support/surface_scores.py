@@ -12,6 +12,8 @@ The intervals of mean, area and largest depth must contain the truth, those of e
 Recipe of the score of the version with the verdict "scar_or_drift", fixed before anything was computed with it: seed
 9871003, 100 pairs of `draw_bench` and 80 of `draw_field`, and 30 pairs of each of `known`, `kinds`, `tracks` and `shallow`
 of trace_scores.py (as of 79f8da06^) with the same seed: 300 pairs. Version 1.5 (45351f72) is scored on the same pairs.
+A second score, of the version in which a much better parabola counts beside deposits: seed 9873005, 100 pairs of
+`draw_bench` and 80 of `draw_field`, beside version 1.5.
 Verdicts that state two possible causes are counted as doubt: they are not false, and are missed where there is wear.
 """
 
