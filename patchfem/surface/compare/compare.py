@@ -501,4 +501,9 @@ def _compare_waves(
     else:
         lines = [np.moveaxis(fill_gaps(raster.z), axis, -1) for raster in rasters]
     noise = 0.0 if result.evidence.datum is None else result.evidence.datum.noise
-    return waves.compare_waves([np.atleast_2d(line) for line in lines], steps[0], noise)
+    ends = []
+    if depths is not None and depths.y is None:
+        places = [track.values[name].value for track in result.tracks for name in ("from", "to")]
+        known = [place for place in places if place is not None]
+        ends = np.searchsorted(depths.x, known).tolist()
+    return waves.compare_waves([np.atleast_2d(line) for line in lines], steps[0], noise, ends)

@@ -75,7 +75,7 @@ class DepthMap:
 
     def integrate(self, part, sign: float = 1.0) -> tuple[float, float]:
         """Integrate the depth over a mask; return the area [m2] or volume [m3] and its standard deviation."""
-        value = sign * float(self.depth[part].sum()) * self.cell
+        value = sign * float(self.depth[part].sum()) * self.cell + 0.0  # no negative zero
         error = SCATTER_FACTOR * np.sqrt(self.errors.variance(part)) * self.cell
         # A missing height may be as deep as its neighbour, or not worn.
         gaps = EVEN_DEVIATION * float(np.abs(self.depth[part & self.missing]).sum()) * self.cell

@@ -46,7 +46,10 @@ DEFINITIONS = {
     "worn_from_after": ("m", "x in the second trace at which the longest track begins"),
     "worn_to_after": ("m", "x in the second trace at which the longest track ends"),
     "amplitude_ratio": ("1", "rms of the waves from 60 to 110 um after wear divided by before"),
-    "slope_ratio": ("1", "rms slope after wear divided by before, at the same step"),
+    "slope_ratio": (
+        "1",
+        "rms slope of the waves up to 110 um after wear divided by before, at the same step",
+    ),
     "hidden_wear": ("m", "largest mean wear that an even or wedge-shaped loss may hide"),
     "worn_volume": ("m3", "volume lost in the common part"),
     "grown_volume": ("m3", "volume above the first scan in the common part"),

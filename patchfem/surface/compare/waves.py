@@ -1,5 +1,7 @@
 """Waves and roughness before and after wear: ratios of amplitude and slope, and sizes in a track."""
 
+from collections.abc import Sequence
+
 import numpy as np
 from scipy import ndimage, special
 
@@ -24,11 +26,14 @@ MIN_STEPS = 4.0  # smallest length of the shortest wave of the band in steps
 ROUGHNESS_NAMES = ("Ra", "Rq", "slope")
 
 
-def compare_waves(lines: list[np.ndarray], step: float, noise: float) -> dict[str, Quantity]:
+def compare_waves(
+    lines: list[np.ndarray], step: float, noise: float, ends: Sequence[float] = ()
+) -> dict[str, Quantity]:
     """Compute the ratios of amplitude and slope, after divided by before, with their intervals.
 
-    Each line is levelled. The band is cut out by two Gaussian filters. The interval of the logarithm follows from
-    the scatter of the ratios of blocks, which aligned surfaces share.
+    Each line is levelled. The band is cut out by two Gaussian filters, and longer waves have no part in the slope. The
+    ends of tracks, whose flanks have all waves, do not count, unless too little would be left. The interval of the
+    logarithm follows from the scatter of the ratios of blocks, which aligned surfaces share.
 
     Parameters
     ----------
@@ -38,14 +43,22 @@ def compare_waves(lines: list[np.ndarray], step: float, noise: float) -> dict[st
         Step [m].
     noise : float
         Standard deviation of the depth [m], of both surfaces together.
+    ends : sequence of float, optional
+        Ends of tracks, in samples.
     """
     n_lines, count = np.min([line.shape for line in lines], axis=0)
     length = count * step
     if length < MIN_WAVES * BAND[1] or step > BAND[0] / MIN_STEPS:
         return {name: name_unknown(name, "band") for name in ("amplitude_ratio", "slope_ratio")}
+    columns = np.arange(count)
+    kept = np.all([np.abs(columns - end) > BAND[1] / step for end in ends], axis=0)
+    if kept.sum() * step < MIN_WAVES * BAND[1]:
+        kept = np.ones(count, bool)
+    # The shape of a track has no part in its waves: the second filter removes what the first one leaves of a bend.
     lines = [_level(line[:n_lines, :count]) for line in lines]
-    passed = [_pass_band(z, step) for z in lines]
-    slopes = [np.diff(z, axis=1) / step for z in lines]
+    lines = [z - _filter(z, BAND[1] / step) for z in lines]
+    passed = [(_filter(z, BAND[0] / step) - _filter(z, BAND[1] / step))[:, kept] for z in lines]
+    slopes = [(np.diff(z, axis=1) / step)[:, kept[1:]] for z in lines]
     # White noise has the slope noise sqrt(2)/step, and the fraction of its band in the amplitude.
     band_noise = noise / np.sqrt(2) * np.sqrt(2 * step * (1 / BAND[0] - 1 / BAND[1]))
     count = int(np.clip(length / (BLOCK_WAVES * BAND[1]), MIN_BLOCKS, MAX_BLOCKS))
@@ -85,10 +98,9 @@ def _divide_means(before, after, power: float, text: str) -> Quantity:
     return Quantity(ratio, *ends.tolist(), "1", text)
 
 
-def _pass_band(z, step: float) -> np.ndarray:
-    """Return the waves (k, n) [m] of the band."""
-    short, long = (CUTOFF_TO_DEVIATION * wave / step for wave in BAND)
-    return ndimage.gaussian_filter1d(z, short) - ndimage.gaussian_filter1d(z, long)
+def _filter(z, wave: float) -> np.ndarray:
+    """Return the Gaussian mean lines (k, n) [m] of a cut-off in samples."""
+    return ndimage.gaussian_filter1d(z, CUTOFF_TO_DEVIATION * wave)
 
 
 def _mean_squares(values, count: int) -> np.ndarray:
@@ -154,7 +166,8 @@ def measure_roughness(depths: DepthMap, spans) -> tuple[dict, float | None]:
 
 def _tabulate(z, sections: list, step: float) -> np.ndarray:
     """Return Ra [m], mean square height [m2] and mean square slope (k, 3) of sections."""
-    parts = [z[section] for section in sections]
+    # The bottom of a track is bent, which shifts the mean line.
+    parts = [z[section] - z[section].mean() for section in sections]
     sizes = [
         (np.abs(part).mean(), np.mean(part**2), np.mean(np.diff(part) ** 2) / step**2)
         for part in parts

@@ -62,6 +62,9 @@ def test_exact_scar_in_a_measured_trace(depth):
         if not values[name].low - tol <= true <= values[name].high + tol
     }
     assert not missed
+    # The scar has waves of its own, but the roughness did not change.
+    ratios = [values["amplitude_ratio"], found.evidence.roughness["inside"]["ratio"]["Ra"]]
+    assert all(ratio.low <= 1 <= ratio.high for ratio in ratios), ratios
     assert values["worn_area"].value == pytest.approx(area, rel=0.03)
     assert found.track.values["depth_mean"].value == pytest.approx(2 / 3 * depth, rel=0.05)
 
