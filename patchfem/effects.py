@@ -290,9 +290,9 @@ EFFECTS = {
     ),
     "structure.bonded": Effect("patchfem.structure.bonded", "K += k s s^T, D += c s s^T / m"),
     "structure.start": Effect("patchfem.structure.starts", "z(0) = Phi^-1 x(0) (3.2)"),
-    "drive.kind=base": Effect("patchfem.dynamics.propagator", "G_i = -base_i a(t)"),
-    "drive.kind=force": Effect("patchfem.dynamics.propagator", "G_i = phi_i F(t)"),
-    "drive.kind=free": Effect("patchfem.dynamics.propagator", "z(0), z'(0) given, G = 0"),
+    "drive.kind=base": Effect("patchfem.structure.drives", "G_i = -base_i a(t)"),
+    "drive.kind=force": Effect("patchfem.structure.drives", "G_i = phi_i F(t)"),
+    "drive.kind=free": Effect("patchfem.structure.starts", "z(0), z'(0) given, G = 0"),
     "drive.waveform=sine": _make_waveform(
         "a(t) = a sin(2 pi f t)",
         (f"frequency {_DRIVE_SIZE_KEYS}", ""),
@@ -339,14 +339,14 @@ EFFECTS = {
         "random {what} {density}, record {seed}",
         "patchfem.structure.noise",
     ),
-    "structure.stiffening": Effect("patchfem.dynamics.march.joints", "F = k_3 x^3 at the output"),
+    "structure.stiffening": Effect("patchfem.points.contacts", "F = k_3 x^3 at the output"),
     "accuracy.method=exact": Effect(
         "patchfem.hybrid.runs",
         "Runge-Kutta steps of order 8 that end where a law changes its regime, with a step error of 1e-12",
     ),
     "accuracy.method=march": Effect(
-        "patchfem.dynamics.march.loop_kernels",
-        "exact propagator of the modes; the force is averaged over the path of each step "
+        "patchfem.points.march_kernels",
+        "exact motion of the modes; the force is averaged over the path of each step "
         "and found by Newton's method",
     ),
     "accuracy.method=harmonic": Effect(

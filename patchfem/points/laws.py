@@ -63,6 +63,11 @@ def make_bonds(bonds: Bonds, load: float = 1.0) -> PointLaw:
     return _pack(Law.BONDS, numbers, (bonds.length, bonds.initial * load), load)
 
 
+def make_list(bonds: Bonds, load: float, unit: float) -> PointLaw:
+    """Return a point whose bonds are summed over a list, under a load [N]; at the load `unit` the relative pressure is 1."""
+    return _pack(Law.LIST, (bonds.static, bonds.length, unit), load=load)
+
+
 def make_cubic(stiffness: float) -> PointLaw:
     """Return a spring of force stiffness q^3."""
     return _pack(Law.CUBIC, (stiffness,))

@@ -1,5 +1,6 @@
 """March of a rig with contact points over the cycles of its drive, and the record of its motion."""
 
+from copy import copy
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import NamedTuple
@@ -9,42 +10,72 @@ from scipy.linalg import expm
 
 from .. import compiled
 from ..contact.set_arrays import hash_set, make_set_arrays
-from ..core import ModalBasis, Outcome, Response
-from .contacts import RESULTANT, Contact
+from ..core import Missing, ModalBasis, Outcome, Response, SineDrive
+from ..formatting import format_length
+from ..friction.bonds import list_numbers
+from ..friction.bonds.list_rows_kernels import N_ROWS, STATUS
+from ..friction.laws.stretch import growth_numbers
+from ..friction.path_work import sampled_work
+from . import checkpoint
+from .contacts import LOWER, RESULTANT, Contact
 from .laws import N_MEMORY, N_NUMBERS
-from .march_kernels import DONE, EXCEEDS_TRAVEL, NO_CONTACT_SET
+from .march_kernels import (
+    DONE,
+    EXCEEDS_TRAVEL,
+    LEAVES_GROOVES,
+    LISTS_FULL,
+    NO_CONTACT_SET,
+    RESIDUAL,
+)
 from .march_rows import (
     N_PORT_COLUMNS,
+    Flank,
+    Lists,
+    Options,
     Point,
     Points,
     Port,
     Ports,
     Sample,
+    Shear,
     Structure,
     System,
     Total,
 )
+from .return_maps_kernels import Law
 
-LEVELS = 8  # lengths of the steps: whole steps and seven halvings
-SAME_CYCLE = (
-    1e-11  # change of the state between two cycles, relative to its size, below which they repeat
+RIGID_LEVELS = 12  # lengths of the steps with rigid points: whole steps and eleven halvings
+LEVELS = 4  # lengths of other steps, which are halved if they do not converge
+# Weights of the change of a shear increment for points under changing loads, and for lists, whose forces jump
+LOAD_DAMPING = 0.25
+LIST_DAMPING = 1 / 16
+FIRST_WIDTH = 1e-6  # width in bond lengths over which the initial bonds of several lists lie
+FIRST_STRIPS = 256  # first strips of each of several lists, in addition to those of one step
+MAX_STRIPS = 2_000_000  # largest number of strips of all lists, which limits the memory
+STRIP_BYTES = 8 * N_ROWS
+LONG_LIST_ADVICE = (
+    'raise accuracy.tail or accuracy.merge, or use reading = "stretch" with order = 1'
 )
+MAX_CYCLES_AT_ONCE = 8
+MAX_STEPS_AT_ONCE = 8000
+# Change of the state between two parts of a march, relative to its size, below which they repeat
+SAME_CYCLE = 1e-11
 N_KEPT = 128  # samples per cycle of the histories before the window
-REPEATED = [
-    Total.WORK_IN,
-    Total.POWER,
-    Total.VISCOUS,
-    Total.FRICTION,
-]  # sums that a repeated cycle continues
-MAX_UNSOLVED = 0  # steps without convergence of a run that is used
+EDGE = 1e-9  # distance of the samples of a drive from the ends of a step, in steps
+RUNAWAY = 10.0  # output relative to the travel of a softening spring beyond which a step has diverged
+# Sums that a repeated cycle continues
+REPEATED = [Total.WORK_IN, Total.POWER, Total.VISCOUS, Total.FRICTION]
+PRESS_COLUMNS = ("normal_load", "normal_moment", "normal_energy", "heave", "turn")
 
 
 class Snapshot(NamedTuple):
-    """State of the interface at an instant.
+    """State of the interface at an instant, m points.
 
     - time [s], slide [m], rate [m/s], force [N], slip [m] of the first port; heave [m] and pitch [rad]
-    - memory (l, m), load (m,), shear (r,): of the points and pieces
-    - nodal (k,): forces of the nodes [N]
+    - forces, stretch, bend, load (m,): friction force [N], elastic stretch [m] and load [N] of each point, and its
+      displacement by shear of the pieces [m]
+    - nodal (k,): forces of the nodes [N]; (0,) if the pressure does not change
+    - vertical: vertical force on the flanks of grooves [N]
     """
 
     time: float
@@ -54,10 +85,12 @@ class Snapshot(NamedTuple):
     slip: float
     heave: float
     pitch: float
-    memory: np.ndarray
+    forces: np.ndarray
+    stretch: np.ndarray
+    bend: np.ndarray
     load: np.ndarray
-    shear: np.ndarray
     nodal: np.ndarray
+    vertical: float
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -73,7 +106,7 @@ class Motion:
     - outcome, message: how the run ended, None and "" at its last step
     - cycles_done: number of cycles
     - snapshots: states at the ends of equal parts of the last cycle
-    - state: arrays of the engine at the end
+    - end: the march at its end, from which another one can go on
     """
 
     response: Response
@@ -87,12 +120,14 @@ class Motion:
     message: str
     cycles_done: float
     snapshots: list
-    state: System
-    marks: tuple = ()
+    end: "March"
 
 
-def make_responses(modes: ModalBasis, step: float) -> np.ndarray:
-    """Return the motion at the end of steps of LEVELS lengths, see `march_rows.Structure`.
+# ---- arrays of a march
+
+
+def make_responses(modes: ModalBasis, step: float, levels: int) -> np.ndarray:
+    """Return the motion at the end of steps of several lengths, see `march_rows.Structure`.
 
     The matrix exponential is that of the modes with the chain of derivatives of the drive and with constant forces.
     """
@@ -105,67 +140,85 @@ def make_responses(modes: ModalBasis, step: float) -> np.ndarray:
     matrix[velocities, 2 * n] = -np.asarray(modes.base)
     matrix[2 * n, 2 * n + 1] = matrix[2 * n + 1, 2 * n + 2] = 1.0
     matrix[velocities, 2 * n + 3 :] = np.eye(n)
-    return np.array([expm(matrix * (step / 2**level))[: 2 * n] for level in range(LEVELS)])
+    return np.array([expm(matrix * (step / 2**level))[: 2 * n] for level in range(levels)])
 
 
 def make_system(
-    modes: ModalBasis, contact: Contact, step: float, travel: float, start=None
+    contact: Contact, step: float, modes: ModalBasis | None = None, travel: float = np.inf, start=None
 ) -> System:
-    """Return the arrays of a rig at the start of a march, without its drive.
+    """Return the arrays of a rig or of a prescribed slide at its start, without the drive.
 
     Parameters
     ----------
-    modes : ModalBasis
     contact : Contact
     step : float
         [s]
+    modes : ModalBasis, optional
+        Without modes the displacement of the first port is prescribed.
     travel : float
         Largest output [m].
     start : core.InitialState, optional
     """
-    n = modes.omega.size
-    rows = [np.asarray(one.row, float) for one in contact.point_sets]
+    n = 0 if modes is None else modes.omega.size
+    rows = [np.zeros(n) if modes is None else np.asarray(one.row, float) for one in contact.point_sets]
     press = np.zeros(11)
     press[:2] = -1.0
     if contact.sets is not None:
         press[:2] = len(rows), len(rows) + 1
-        rows += [contact.heave, contact.pitch]
+        rows += [np.asarray(contact.heave, float), np.asarray(contact.pitch, float)]
     rows = np.array(rows).reshape(-1, n)
-    responses = make_responses(modes, step)
+    laws = {law.numbers[0] for one in contact.point_sets for law in one.laws}
+    levels = RIGID_LEVELS if Law.COULOMB in laws else LEVELS
+    mass = 1.0 if modes is None else float(modes.mass)
+    if modes is None:
+        responses = np.zeros((levels, 0, 3))
+        shape = np.zeros((3, 0))
+        damping = np.zeros((0, 0))
+    else:
+        responses = make_responses(modes, step, levels)
+        shape = np.array([modes.omega**2, modes.base, modes.output], float)
+        damping = np.array(modes.damping_matrix, float)
     by_force = responses[:, :, 2 * n + 3 :]
-    compliance = np.array(
-        [[rows @ part[:n] @ rows.T, rows @ part[n:] @ rows.T] for part in by_force]
-    )
+    compliance = [[rows @ part[:n] @ rows.T, rows @ part[n:] @ rows.T] for part in by_force]
     points = _make_points(contact, 0 if contact.sets is None else contact.sets.x.size)
-    size = len(rows) + points.stiffness.size
+    lists = _make_lists(contact, points)
     state = np.zeros((3, 2 * n))
     if start is not None:
         state[0] = [*start.z, *start.v]
+    size = len(rows) + points.stiffness.size
     ports = Ports(
         rows,
-        compliance / modes.mass,
-        rows @ rows.T / modes.mass,
+        np.array(compliance).reshape(levels, 2, len(rows), len(rows)) / mass,
+        rows @ rows.T / mass,
         np.zeros((len(Port), len(rows))),
         np.zeros((size, size)),
         np.zeros(size),
+        np.zeros(size),
         press,
     )
-    structure = Structure(
-        responses,
-        np.array([modes.omega**2, modes.base, modes.output], float),
-        np.array(modes.damping_matrix, float),
-        np.zeros((1, 3)),
-        np.zeros(0),
-        np.array([modes.mass, step, travel]),
+    structure = Structure(responses, shape, damping, np.zeros((1, 3)), np.zeros(0), np.zeros(0))
+    has_lists = Law.LIST in laws
+    damped = LIST_DAMPING if has_lists else LOAD_DAMPING if contact.has_loads else 0.0
+    options = Options(
+        mass,
+        float(step),
+        float(travel),
+        max(float(contact.limit), 1e-300),
+        damped,
+        Law.COULOMB in laws,
+        has_lists,
+        contact.has_loads,
+        bool(((points.numbers[0] == Law.BONDS) & (points.numbers[3] >= 0)).any()),
+        laws == {Law.BONDS} and len(contact.point_sets) == 1,
     )
     sets = _make_no_sets() if contact.sets is None else contact.sets.make_arrays()
-    system = System(structure, ports, points, sets, state, np.zeros(len(Total)))
-    # Energy that is released at the start counts as work of the drive.
-    squares = state[0, n:] @ state[0, n:] + np.sum((modes.omega * state[0, :n]) ** 2)
-    energy = 0.5 * modes.mass * float(squares)
-    system.totals[[Total.WORK_IN, Total.POWER, Total.STORED]] = energy
+    flank = _make_flank(contact)
+    totals = np.zeros(len(Total))
+    system = System(structure, ports, points, lists, flank, sets, state, totals, options)
     if contact.sets is not None:
         _press_first(system, contact)
+    if contact.grooves is not None and modes is not None:
+        _climb_first(system, contact)
     return system
 
 
@@ -173,41 +226,95 @@ def _make_points(contact: Contact, n_nodes: int) -> Points:
     """Return the arrays of all points."""
     laws = [law for one in contact.point_sets for law in one.laws]
     counts = [len(one.laws) for one in contact.point_sets]
-    shapes = np.zeros((sum(one.stiffness.size for one in contact.point_sets), len(laws)))
-    column = row = 0
-    for one, count in zip(contact.point_sets, counts):
-        shapes[row : row + one.stiffness.size, column : column + count] = one.shapes.reshape(
-            -1, count
-        )
-        row = row + one.stiffness.size
-        column = column + count
-    size = max([N_MEMORY, *(law.memory.size for law in laws)])
-    memory = np.zeros((size, len(laws)))
     numbers = np.zeros((N_NUMBERS, len(laws)))
+    memory = np.zeros((max([N_MEMORY, *(law.memory.size for law in laws)]), len(laws)))
     values = np.zeros((len(Point), max(len(laws), n_nodes)))
     for j, law in enumerate(laws):
         numbers[:, j] = law.numbers
         memory[: law.memory.size, j] = law.memory
         values[[Point.START_LOAD, Point.LOAD, Point.END_LOAD], j] = law.load
-    varies = contact.sets is not None or contact.load is not None
-    nodes = [
-        np.full(n, RESULTANT) if one.nodes is None else one.nodes
-        for one, n in zip(contact.point_sets, counts)
-    ]
-    share = [law.load / contact.preload if varies else law.load for law in laws]
+        if law.numbers[0] == Law.BONDS:
+            memory[4, j] = law.memory[0]  # bond length in the middle of a step
+    share = np.array([law.load / contact.preload for law in laws], float)
+    nodes = np.full(len(laws), RESULTANT, np.int64)
+    place = np.zeros(len(laws))
+    shapes = np.zeros((0, len(laws)))
+    stiffness = np.zeros(0)
+    first = 0
+    for one, count in zip(contact.point_sets, counts):
+        own = slice(first, first + count)
+        if one.nodes is not None:
+            nodes[own] = one.nodes
+        if one.shares is not None:
+            share[own] = one.shares
+            place[own] = one.places
+        if one.shear is not None:
+            shapes = np.zeros((len(one.shear.stiffness), len(laws)))
+            shapes[:, own] = np.asarray(one.shear.shape).T
+            stiffness = np.array(one.shear.stiffness, float)
+        first = first + count
+    shear = np.zeros((len(Shear), stiffness.size))
+    if stiffness.size:
+        shear[Shear.SCALE] = 1 / np.sqrt((shapes**2).mean(axis=1))
     return Points(
         np.repeat(np.arange(len(counts)), counts),
-        np.concatenate(nodes).astype(np.int64),
-        np.array(share, float),
+        nodes,
+        share,
         numbers,
         memory,
         memory.copy(),
         values,
         shapes,
-        np.concatenate([one.stiffness for one in contact.point_sets]),
-        np.zeros((3, len(shapes))),
+        stiffness,
+        shear,
         np.repeat([one.is_spring for one in contact.point_sets], counts),
+        place,
+        np.zeros((2, 0)) if contact.pressure is None else np.array(contact.pressure, float),
     )
+
+
+def _make_lists(contact: Contact, points: Points) -> Lists:
+    """Return the arrays of the lists of bonds; empty ones without lists."""
+    count = points.port.size
+    if contact.bond_sum is None:
+        empty = np.zeros(0)
+        return Lists(np.zeros((N_ROWS, 0)), np.zeros((count, 6)), np.zeros((count, 16)), *[empty] * 3)
+    bonds, reach, merge = contact.bond_sum
+    capacity = list_numbers.list_capacity(bonds, reach, merge)
+    if count > 1:
+        step = list_numbers.MAX_STRIPS_PER_LENGTH * int(min(reach, list_numbers.MAX_DAMAGE))
+        capacity = min(capacity, FIRST_STRIPS + step)
+    statuses = list_numbers.make_status(capacity, count)
+    is_list = points.numbers[0] == Law.LIST
+    start = np.zeros(count)
+    start[is_list] = points.values[Point.END_LOAD, :count][is_list] / points.numbers[3, is_list]
+    statuses[:, STATUS.pressure] = statuses[:, STATUS.initial_pressure] = start
+    # The initial bonds of a single list have no width, so that it is exact along a prescribed slide.
+    width = FIRST_WIDTH if count > 1 or contact.has_loads else 0.0
+    return Lists(
+        np.zeros((N_ROWS, count * capacity)),
+        np.tile(list_numbers.make_path_state(bonds), (count, 1)),
+        statuses,
+        list_numbers.law_numbers(bonds, reach, merge, width),
+        growth_numbers(bonds),
+        list_numbers.gamma_table(bonds),
+    )
+
+
+def _make_flank(contact: Contact) -> np.ndarray:
+    """Return the numbers of the flank of the first port, (0,) without grooves."""
+    grooves = contact.grooves
+    if grooves is None:
+        return np.zeros(0)
+    flank = np.zeros(len(Flank))
+    flank[Flank.LOAD] = flank[Flank.VERTICAL] = flank[Flank.TRIAL_VERTICAL] = contact.preload
+    flank[Flank.WAVE_NUMBER] = grooves.wave_number
+    flank[Flank.AMPLITUDE] = grooves.amplitude
+    flank[Flank.PHASE] = grooves.phase
+    flank[Flank.LIFTED_MASS] = grooves.lifted_mass
+    flank[Flank.NORMAL] = contact.preload * np.hypot(1.0, float(grooves.slope(0.0)))
+    flank[Flank.RATIO] = 1.0
+    return flank
 
 
 def _make_no_sets():
@@ -219,7 +326,7 @@ def _make_no_sets():
 
 
 def _press_first(system: System, contact: Contact) -> None:
-    """Find the contact set at the start."""
+    """Find the contact set at the start, and press the points to it."""
     press = compiled.load("contact.press_kernels")
     name = hash_set(system.sets, contact.sets.reference.in_contact)
     n = system.state.shape[1] // 2
@@ -230,22 +337,374 @@ def _press_first(system: System, contact: Contact) -> None:
     system.totals[Total.SLOT] = slot
 
 
+def _climb_first(system: System, contact: Contact) -> None:
+    """Give the lifted mass the vertical velocity of the flank, and the points the normal force there."""
+    n = system.state.shape[1] // 2
+    row = system.ports.rows[0]
+    q = float(row @ system.state[0, :n])
+    slope = float(contact.grooves.slope(q))
+    flank = system.flank
+    normal = flank[Flank.LOAD] * np.hypot(1.0, slope)
+    ratio = normal / flank[Flank.NORMAL]
+    loads = [Point.START_LOAD, Point.LOAD, Point.END_LOAD]
+    system.points.values[loads] *= ratio
+    is_bonds = system.points.numbers[0] == Law.BONDS
+    for memory in (system.points.memory, system.points.trial):
+        memory[1] *= ratio
+        memory[2:4, is_bonds] *= ratio
+    flank[Flank.NORMAL] = normal
+    flank[Flank.RISE_SPEED] = slope * float(row @ system.state[0, n:])
+
+
+def copy_system(system):
+    """Return a copy of nested tuples of arrays."""
+    if isinstance(system, np.ndarray):
+        return system.copy()
+    if isinstance(system, tuple):
+        return type(system)(*map(copy_system, system))
+    return system
+
+
 def sample_drive(drive, step: float, first: int, count: int) -> np.ndarray:
-    """Return value, slope and second derivative (count, 3) of parabolas through the drive in each step."""
-    times = step * (first + np.arange(2 * count + 1) / 2)
-    values = drive.values(times)
-    start = values[:-2:2]
-    middle = values[1::2]
-    end = values[2::2]
+    """Return value, slope and second derivative (count, 3) of parabolas through the drive in each step.
+
+    The ends are taken inside of the step, because the drive may jump there.
+    """
+    starts = first + np.arange(count)[:, None]
+    values = drive.values((step * (starts + [EDGE, 0.5, 1 - EDGE])).ravel()).reshape(count, 3)
+    start, middle, end = values.T
     slope = (4 * middle - 3 * start - end) / step
     return np.stack([start, slope, 4 * (start - 2 * middle + end) / step**2], axis=1)
 
 
+# ---- march
+
+
+class March:
+    """March of a rig, from rest or from an initial state.
+
+    - modes, drive, contact, steps, step: rig, drive, contact points, steps per cycle and their duration [s]
+    - system: arrays of the engine
+    - done: number of steps since the start
+    - outcome, message: how the march ended, None and "" as long as it goes on
+    - work_sums: friction work from samples, sum of the magnitudes of the friction works of the steps, and created energy
+      [J]
+    """
+
+    def __init__(self, modes, drive, contact: Contact, steps: int, travel: float = np.inf, start=None):
+        self.modes = modes
+        self.drive = drive
+        self.contact = contact
+        self.steps = steps
+        self.step = drive.period / steps
+        self.system = make_system(contact, self.step, modes, travel, start)
+        self.done = 0
+        self.outcome = None
+        self.message = ""
+        self.work_sums = np.zeros(3)
+        n_columns = len(contact.point_sets) + (2 if contact.sets is not None else 0)
+        self.width = 2 * modes.omega.size + Sample.PORTS + N_PORT_COLUMNS * n_columns
+        self.kernels = compiled.load("points.march_kernels")
+        self.reset_balance()
+
+    def fork(self, drive=None) -> "March":
+        """Return a copy that goes on by itself, under another drive if one is given."""
+        other = copy(self)
+        other.system = copy_system(self.system)
+        other.work_sums = self.work_sums.copy()
+        if drive is not None:
+            other.drive = drive
+        return other
+
+    def continue_from(self, other: "March") -> None:
+        """Take motion and memory of another march of this contact, which may have steps of another length."""
+        theirs = copy_system(other.system)
+        points = self.system.points._replace(
+            memory=theirs.points.memory,
+            trial=theirs.points.trial,
+            values=theirs.points.values,
+            shear=theirs.points.shear,
+        )
+        self.system = self.system._replace(points=points, flank=theirs.flank, lists=theirs.lists)
+        self.state[:] = other.state
+
+    @property
+    def state(self) -> np.ndarray:
+        """Modal coordinates [m] and velocities [m/s], (2, n)."""
+        return self.system.state[0].reshape(2, -1)
+
+    def reset_balance(self) -> None:
+        """Begin the energy balance and the time anew; the present energy counts as work of the drive."""
+        totals = self.system.totals
+        slot = totals[Total.SLOT]
+        totals[:] = 0.0
+        totals[Total.SLOT] = slot
+        totals[Total.IS_DIRTY] = 1.0
+        self.work_sums[:] = 0.0
+        self.done = 0
+        sample = np.zeros((1, self.width))
+        self._set_drive(1)
+        self.kernels.march(self.system, 0, sample)
+        totals[[Total.WORK_IN, Total.STORED]] = self.find_stored_energy(sample[0])
+        self.first_energy = float(sample[0, 2 * self.modes.omega.size + Sample.ENERGY])
+
+    def find_stored_energy(self, sample) -> float:
+        """Return the energy [J] of modes, interfaces and normal contact at a sample."""
+        z, v = self.state
+        n = 2 * z.size
+        squares = float(v @ v + (self.modes.omega * z) @ (self.modes.omega * z))
+        interface = sample[n + Sample.ENERGY] + sample[n + Sample.CONTACT_ENERGY]
+        interface += sample[n + Sample.SPRINGS]
+        return 0.5 * self.modes.mass * squares + float(interface)
+
+    def move_to(self, position, velocity) -> None:
+        """Set the modal coordinates and velocities (n,); the points slide to the new position slowly."""
+        system = self.system
+        row = system.ports.rows[0]
+        begin = float(row @ self.state[0])
+        end = float(row @ position)
+        self.state[:] = position, velocity
+        if end != begin:
+            path = np.array([begin, end])
+            no_modes = system.structure._replace(
+                path=path,
+                drive=np.zeros((2, 3)),
+                responses=system.structure.responses[:, :0],
+                modes=np.zeros((3, 0)),
+                damping=np.zeros((0, 0)),
+            )
+            ports = system.ports._replace(
+                rows=np.zeros((len(system.ports.rows), 0)),
+                compliance=np.zeros_like(system.ports.compliance),
+            )
+            still = system._replace(
+                structure=no_modes,
+                ports=ports,
+                state=np.zeros((3, 0)),
+                options=system.options._replace(step=1.0),
+            )
+            self.kernels.march(still, 1, np.zeros((2, self.width - system.state.shape[1])))
+            system.points.shear[[Shear.LAST, Shear.EARLIER]] = 0.0
+        if system.flank.size:
+            slope = float(self.contact.grooves.slope(end))
+            system.flank[Flank.RISE_SPEED] = slope * float(row @ velocity)
+
+    def _set_drive(self, count: int) -> None:
+        """Write the drive, and a prescribed load, of the next steps."""
+        structure = self.system.structure._replace(
+            drive=sample_drive(self.drive, self.step, self.done, count + 1)
+        )
+        if self.contact.load is not None:
+            times = self.step * (self.done + np.arange(count + 1.0))
+            structure = structure._replace(loads=np.asarray(self.contact.load(times), float))
+        self.system = self.system._replace(structure=structure)
+
+    def advance(self, count: int) -> np.ndarray:
+        """March over a number of steps; return the samples (steps done + 1, w) of their starts and of the end.
+
+        A part of the march whose lists of bonds are full is repeated with larger lists.
+
+        Raises
+        ------
+        Missing
+            If the lists become too long.
+        """
+        self._set_drive(count)
+        springs = any(one.is_spring for one in self.contact.point_sets)
+        may_repeat = self.system.options.has_lists or springs
+        saved = copy_system(self.system) if may_repeat else None
+        while True:
+            samples = np.zeros((count + 1, self.width))
+            n_done, status = self.kernels.march(self.system, count, samples)
+            if status != LISTS_FULL:
+                break
+            saved = enlarge_lists(saved, f"at step {self.done + n_done}")
+            self.system = copy_system(saved)
+        samples = samples[: n_done + 1]
+        if springs and status == EXCEEDS_TRAVEL and n_done and self._has_run_away(samples[-1]):
+            self.system = saved
+            self.kernels.march(self.system, n_done - 1, samples[:-1])
+            n_done = n_done - 1
+            samples = samples[:-1]
+            last = abs(float(self.modes.output @ samples[-1, : self.modes.omega.size]))
+            self.message = (
+                f"beyond a displacement of {format_length(last, 3)} the motion grows without limit, because the "
+                "force of the softening spring no longer pulls the block back; the run ended there"
+            )
+        self.done += n_done
+        self._judge(status)
+        self._add_works(samples)
+        return samples
+
+    def _has_run_away(self, sample) -> bool:
+        """Return whether the output of a sample is far beyond the travel."""
+        output = abs(float(self.modes.output @ sample[: self.modes.omega.size]))
+        return output > RUNAWAY * self.system.options.travel
+
+    def _judge(self, status: int) -> None:
+        """Set outcome and message from the status of the compiled march."""
+        advice = "raise accuracy.steps_per_cycle"
+        if status == EXCEEDS_TRAVEL:
+            self.outcome = Outcome.EXCEEDS_TRAVEL
+        elif status == LEAVES_GROOVES:
+            self.outcome = Outcome.LEAVES_GROOVES
+            self.message = self.contact.grooves.describe_lift(self.done * self.step)
+        elif status == NO_CONTACT_SET:
+            self.outcome = Outcome.NOT_CONVERGED
+            self.message = (
+                f"at step {self.done} the method could not determine which points are in contact; {advice}"
+            )
+        elif status != DONE:
+            self.outcome = Outcome.NOT_CONVERGED
+            self.message = (
+                f"at step {self.done} the computed motion is not a finite number; {advice}"
+            )
+
+    def check_steps(self) -> None:
+        """Set the outcome to not_converged if any step has not met its tolerance."""
+        unsolved = int(self.system.totals[Total.UNSOLVED])
+        if unsolved:
+            self.outcome = Outcome.NOT_CONVERGED
+            self.message = (
+                f"{unsolved} of {self.done} time steps have an error of the friction force above the permitted "
+                f"{RESIDUAL:.0e} of the friction limit; raise accuracy.steps_per_cycle"
+            )
+
+    def _add_works(self, samples) -> None:
+        """Add the friction work of samples: by the forces at the samples, its magnitude, and created energy."""
+        n = 2 * self.modes.omega.size
+        works = samples[:-1, n + Sample.WORK]
+        created = -np.minimum(split_losses(samples, n, self.system.options.scale), 0.0)
+        sampled = 0.0
+        for k, one in enumerate(self.contact.point_sets):
+            if one.is_spring:
+                continue
+            columns = samples[:, n + Sample.PORTS + N_PORT_COLUMNS * k :]
+            is_rigid = one.laws[0].numbers[0] == Law.COULOMB
+            mean = columns[:-1, 2] if is_rigid else None
+            slide = samples[:, : n // 2] @ np.asarray(one.row, float)
+            sampled += float(sampled_work(slide, columns[:, 0], mean).sum())
+        self.work_sums += sampled, float(np.abs(works).sum()), float(created.sum())
+
+    def take_snapshot(self, sample) -> Snapshot:
+        """Return the state of the interface at the end of the last step, whose sample is given."""
+        n = self.modes.omega.size
+        row = self.system.ports.rows[0]
+        rest = sample[2 * n :]
+        motion = float(row @ sample[:n]), float(row @ sample[n : 2 * n])
+        ports = rest[Sample.PORTS :]
+        place = self.done * self.step, *motion, ports[0], ports[1]
+        return make_snapshot(self.system, (*place, rest[Sample.HEAVE], rest[Sample.PITCH]))
+
+    def find_ledger(self, sample) -> dict:
+        """Return energies [J] and counters by name at a sample of the present state."""
+        n = 2 * self.modes.omega.size
+        totals = self.system.totals
+        friction = float(totals[Total.FRICTION])
+        sampled, passed, _ = self.work_sums
+        ledger = {
+            "work_in": float(totals[Total.WORK_IN]),
+            "viscous": float(totals[Total.VISCOUS]),
+            "power": float(totals[Total.POWER]),
+            "friction": friction - float(sample[n + Sample.ENERGY] - self.first_energy),
+            "peak_stored": float(totals[Total.STORED]),
+            "iterations": float(totals[Total.ITERATIONS]),
+            "worst_iterations": float(totals[Total.WORST]),
+            "stored": self.find_stored_energy(sample),
+            "booked": friction,
+            "sampled": float(sampled),
+            "passed": float(passed),
+        }
+        if self.system.options.has_lists:
+            statuses = self.system.lists.statuses
+            ledger["created"] = float(statuses[:, STATUS.created].sum())
+            ledger["dissipated"] = float(statuses[:, STATUS.dissipated].sum())
+            ledger["substeps"] = float(statuses[:, STATUS.n_extra].sum())
+            ledger["strips"] = float(statuses[:, STATUS.max_strips].max())
+        return ledger
+
+
+def enlarge_lists(system: System, place: str) -> System:
+    """Return a copy of a system whose lists of bonds have twice the room; `place` says where, for the message.
+
+    Raises
+    ------
+    Missing
+        If the lists would have more than MAX_STRIPS strips.
+    """
+    lists = system.lists
+    room = lists.bondlist.shape[1]
+    if room >= MAX_STRIPS:
+        raise Missing(
+            f"the bond list grew beyond {room} entries ({room * STRIP_BYTES / 1e6:.0f} MB) {place}; "
+            f"{LONG_LIST_ADVICE}",
+            "",
+        )
+    count = len(lists.statuses)
+    capacity = min(2 * room, MAX_STRIPS) // count
+    bondlist = np.zeros((N_ROWS, capacity * count))
+    statuses = lists.statuses.copy()
+    for j, status in enumerate(statuses):
+        head, end = status[[STATUS.head, STATUS.end]].astype(int)
+        first = j * capacity
+        bondlist[:, first : first + end - head] = lists.bondlist[:, head:end]
+        status[[STATUS.room_start, STATUS.head]] = first
+        status[STATUS.room_end] = first + capacity
+        status[STATUS.end] = first + end - head
+    return system._replace(lists=lists._replace(bondlist=bondlist, statuses=statuses))
+
+
+def count_list_bytes(n_strips: float) -> float:
+    """Return the memory [bytes] of lists of bonds, with the copy during their enlargement."""
+    return 3 * STRIP_BYTES * min(n_strips, MAX_STRIPS)
+
+
+def split_losses(samples, n: int, scale: float) -> np.ndarray:
+    """Return the loss [J] in each step between samples, friction work less the gain of stored energy.
+
+    A loss below 0 within round-off is 0. `n` is the number of columns of the motion, `scale` the friction limit [N].
+    """
+    energy = samples[:, n + Sample.ENERGY]
+    losses = samples[:-1, n + Sample.WORK] - np.diff(energy)
+    force = np.maximum(scale, np.abs(samples[:-1, n + Sample.PORTS]))
+    work = np.abs(samples[:-1, n + Sample.WORK])
+    noise = 1e-12 * work + 1e-14 * np.maximum(energy[1:], energy[:-1])
+    # The last digit of the motion.
+    motion = np.abs(samples[:, : n // 2]).sum(axis=1)
+    noise += 2e-15 * force * np.maximum(motion[1:], motion[:-1])
+    return np.where((losses < 0) & (losses > -noise), 0.0, losses)
+
+
+def make_snapshot(system: System, motion: tuple) -> Snapshot:
+    """Return the state of the points of a system; `motion` has the first seven fields of Snapshot."""
+    points = system.points
+    count = points.port.size
+    read = compiled.load("points.march_kernels").read_points
+    forces = np.zeros(count)
+    stretch = np.zeros(count)
+    read(system, forces, stretch)
+    values = points.values
+    has_nodes = system.ports.contact[0] >= 0
+    return Snapshot(
+        *motion,
+        forces,
+        stretch,
+        points.shear[Shear.VALUE] @ points.shapes,
+        values[Point.END_LOAD, :count].copy(),
+        values[Point.NODE_FORCE, : system.sets.x.size].copy() if has_nodes else np.zeros(0),
+        float(system.flank[Flank.VERTICAL]) if system.flank.size else 0.0,
+    )
+
+
 def march(
     modes: ModalBasis, drive, contact: Contact, cycles: float, steps_per_cycle: int, *,
-    window: int = 10, travel: float = np.inf, start=None, frames: int = 0, repeats: bool = True,
+    window: int = 10, travel: float = np.inf, start=None, frames: int = 0, keeps_samples: bool = True,
+    repeats: bool = True, say=None, progress=None,
 ) -> Motion:  # fmt: skip
     """March a rig over the cycles of its drive.
+
+    The march begins with the fraction of a cycle, so that the window has complete cycles. Cycles of a periodic motion
+    under a sine are not computed again.
 
     Parameters
     ----------
@@ -258,208 +717,195 @@ def march(
         Number of last cycles whose samples are all kept.
     travel : float
         Largest output [m].
-    start : core.InitialState, optional
+    start : core.InitialState or March, optional
+        Initial state, or a march that goes on under the drive.
     frames : int
         Number of snapshots in the last cycle.
+    keeps_samples : bool
+        Whether samples from before the window are kept.
     repeats : bool
         Whether a periodic motion is not computed again.
+    say, progress : callable, optional
+        Callbacks for a line of text and for the completed fraction.
+
+    Raises
+    ------
+    Missing
+        If lists of bonds become too long.
     """
-    step = drive.period / steps_per_cycle
-    system = make_system(modes, contact, step, travel, start)
-    kernels = compiled.load("points.march_kernels")
+    compiled.load("points.march_kernels", say)
+    if isinstance(start, March):
+        run = start.fork(drive)
+        run.reset_balance()
+    else:
+        run = March(modes, drive, contact, steps_per_cycle, travel, start)
     n_steps = round(cycles * steps_per_cycle)
-    n_window = min(window * steps_per_cycle, n_steps)
-    width = 2 * modes.omega.size + Sample.PORTS + N_PORT_COLUMNS * len(contact.point_sets)
-    if contact.sets is not None:
-        width += 2 * N_PORT_COLUMNS
-    # The march begins with the fraction of a cycle, so that the window has complete cycles.
-    done = 0
-    status = DONE
-    chunks: list = []
-    snapshots: list = []
-    last_state = None
-    last_totals = system.totals.copy()
+    record = Record(run, n_steps, min(window * steps_per_cycle, n_steps), keeps_samples)
+    saved = checkpoint.open_checkpoint(run, record, (n_steps, steps_per_cycle, window, frames))
     can_repeat = (
-        repeats and not drive.segments == () and hasattr(drive, "omega") and contact.load is None
+        repeats
+        and isinstance(drive, SineDrive)
+        and contact.load is None
+        and not run.system.options.has_lists
     )
-    while done < n_steps and status == DONE:
-        count = (n_steps - done) % steps_per_cycle or steps_per_cycle
-        is_last = done + count == n_steps
-        samples = np.zeros((count + 1, width))
-        structure = system.structure._replace(drive=sample_drive(drive, step, done, count + 1))
-        if contact.load is not None:
-            structure = structure._replace(
-                loads=contact.load(step * (done + np.arange(count + 1.0)))
-            )
-        stride = 1 if done + count > n_steps - n_window else max(1, steps_per_cycle // N_KEPT)
-        system = system._replace(structure=structure)
-        if frames and is_last:
-            n_done, status = _march_frames(kernels, system, done, samples, frames, snapshots)
-        else:
-            n_done, status = kernels.march(system, count, stride, samples)
-        chunks.append((done, samples[: n_done + 1]))
-        done += n_done
-        state = np.concatenate(
-            [system.state[0], system.points.memory.ravel(), system.points.shear[0]]
+    before = None
+    while run.done < n_steps and run.outcome is None:
+        n_left = n_steps - run.done
+        n_early = n_left - record.n_window
+        size = n_left % steps_per_cycle or steps_per_cycle
+        if size == steps_per_cycle and n_early > steps_per_cycle:
+            most = min(MAX_CYCLES_AT_ONCE, MAX_STEPS_AT_ONCE // steps_per_cycle)
+            size *= max(1, min(most, n_early // steps_per_cycle))
+        totals = run.system.totals.copy()
+        works = run.work_sums.copy()
+        is_last = size == n_left
+        record.add(*advance_with_frames(run, size, frames if is_last else 0))
+        count = (n_steps - record.n_window - run.done) // size
+        state = run.system.state[0]
+        memory = np.concatenate([run.system.points.memory.ravel(), run.system.points.shear[Shear.VALUE]])
+        now = np.concatenate([state, memory])
+        if can_repeat and count > 0 and before is not None and before.size == now.size:
+            scale = np.concatenate([record.find_largest_state(), np.abs(memory)])
+            if (np.abs(now - before) <= SAME_CYCLE * scale).all():
+                record.repeat(count)
+                run.done += count * size
+                run.system.totals[REPEATED] += count * (run.system.totals - totals)[REPEATED]
+                run.work_sums += count * (run.work_sums - works)
+        before = now if size % steps_per_cycle == 0 else None
+        saved.write_if_due(run, record)
+        if progress is not None:
+            progress(run.done / n_steps)
+    run.check_steps()
+    return record.make_motion()
+
+
+def advance_with_frames(run: March, size: int, frames: int) -> tuple[int, np.ndarray, list]:
+    """March over a number of steps, with snapshots at the ends of equal parts.
+
+    Returns the number of the first step, the samples and the snapshots.
+    """
+    first = run.done
+    if not frames:
+        return first, run.advance(size), []
+    parts = []
+    snapshots = []
+    for begin, end in pairwise(np.linspace(0, size, min(frames, size) + 1).round().astype(int)):
+        parts.append(run.advance(int(end - begin)))
+        snapshots.append(run.take_snapshot(parts[-1][-1]))
+        if run.outcome is not None:
+            break
+    rows = [part[:-1] for part in parts[:-1]]
+    return first, np.concatenate([*rows, parts[-1]]), snapshots
+
+
+class Record:
+    """Samples of a march: all of the window at its end, and some of each earlier cycle.
+
+    - run, n_steps, n_window: March, its number of steps, and that of the window
+    - keeps_samples: whether samples from before the window are kept
+    - numbers, rows, sums: step numbers, samples and energies (3, k) of the blocks that are kept
+    - extremes, phasors: of the output in each cycle
+    - totals (3,): friction work, dissipated and created energy up to the last sample [J]
+    - snapshots: of the last cycle
+    - last: number of the first step, samples and energies of the last part
+    """
+
+    def __init__(self, run: March, n_steps: int, n_window: int, keeps_samples: bool):
+        self.run = run
+        self.n_steps = n_steps
+        self.n_window = n_window
+        self.keeps_samples = keeps_samples
+        self.numbers = []
+        self.rows = []
+        self.sums = []
+        self.extremes = []
+        self.phasors = []
+        self.totals = np.zeros(3)
+        self.snapshots = []
+        self.last = None
+
+    def add(self, first: int, samples, snapshots=()) -> None:
+        """Add the samples (k + 1, w) from the step `first` on."""
+        run = self.run
+        n = 2 * run.modes.omega.size
+        count = len(samples) - 1
+        losses = split_losses(samples, n, run.system.options.scale)
+        parts = [samples[:-1, n + Sample.WORK], np.maximum(losses, 0), np.maximum(-losses, 0)]
+        sums = self.totals[:, None] + np.concatenate(
+            [np.zeros((3, 1)), np.cumsum(parts, axis=1)], axis=1
         )
-        n_left = (n_steps - n_window - done) // steps_per_cycle
-        if can_repeat and n_left > 0 and last_state is not None and state.size == last_state.size:
-            size = np.abs(
-                np.concatenate(
-                    [
-                        samples[:, : system.state.shape[1]].max(axis=0),
-                        state[system.state.shape[1] :],
-                    ]
-                )
-            )
-            if (np.abs(state - last_state) <= SAME_CYCLE * size).all():
-                first, samples = chunks[-1]
-                chunks += [(first + k * steps_per_cycle, samples) for k in range(1, n_left + 1)]
-                done += n_left * steps_per_cycle
-                system.totals[REPEATED] += n_left * (system.totals - last_totals)[REPEATED]
-        last_state = state
-        last_totals = system.totals.copy()
-    return _make_motion(
-        modes,
-        drive,
-        contact,
-        system,
-        chunks,
-        snapshots,
-        (status, done, n_window, steps_per_cycle, step),
-    )
+        self.last = first, samples, sums
+        self._keep(first, samples, sums)
+        self.totals = sums[:, -1].copy()
+        self.snapshots = list(snapshots)
 
+        # Extremes and phasor of each cycle; a march that ends early has a part of a cycle.
+        steps = run.steps
+        for begin in range(0, max(count, 1), steps):
+            rows = samples[begin : min(begin + steps, count) + 1]
+            self.extremes.append(find_extremes(rows, run.modes, run.step))
+            wave = np.exp(-2j * np.pi * (first + begin + np.arange(len(rows) - 1)) / steps)
+            output = rows[:-1, : n // 2] @ run.modes.output
+            self.phasors.append(2 * (output @ wave) / max(len(rows) - 1, 1))
 
-def _march_frames(
-    kernels, system: System, done: int, samples, frames: int, snapshots: list
-) -> tuple[int, int]:
-    """March in parts, with a snapshot after each; return the number of steps done and the status."""
-    structure = system.structure
-    count = len(samples) - 1
-    ends = np.linspace(0, count, min(frames, count) + 1).round().astype(int)
-    size = system.state.shape[1]
-    for first, last in pairwise(ends):
-        part = structure._replace(drive=structure.drive[first:])
-        if structure.loads.size:
-            part = part._replace(loads=structure.loads[first:])
-        n_done, status = kernels.march(
-            system._replace(structure=part), last - first, 1, samples[first : last + 1]
+    def _keep(self, first: int, samples, sums) -> None:
+        """Keep the samples of the window, and of earlier cycles those at equal distances; the last one follows later."""
+        is_early = first + len(samples) - 1 <= self.n_steps - self.n_window
+        if is_early and not self.keeps_samples:
+            return
+        stride = max(1, self.run.steps // N_KEPT) if is_early else 1
+        n_kept = sum(map(len, self.numbers))
+        if is_early and n_kept > checkpoint.MAX_EARLY_SAMPLES:
+            return
+        picked = np.arange(0, len(samples) - 1, stride)
+        self.numbers.append(first + picked)
+        self.rows.append(samples[picked])
+        self.sums.append(sums[:, picked])
+
+    def find_largest_state(self) -> np.ndarray:
+        """Return the largest magnitudes (2 n,) of the modal coordinates and velocities in the last part."""
+        n = 2 * self.run.modes.omega.size
+        return np.abs(self.last[1][:, :n]).max(axis=0)
+
+    def repeat(self, count: int) -> None:
+        """Repeat the last part of the march."""
+        first, samples, sums = self.last
+        size = len(samples) - 1
+        n_cycles = size // self.run.steps
+        step = (sums[:, -1] - sums[:, 0])[:, None]
+        for k in range(1, count + 1):
+            self._keep(first + k * size, samples, sums + k * step)
+        self.totals = self.totals + count * step[:, 0]
+        self.extremes += count * self.extremes[-n_cycles:]
+        self.phasors += count * self.phasors[-n_cycles:]
+
+    def make_motion(self) -> Motion:
+        """Return the record of a finished march."""
+        run = self.run
+        _, samples, sums = self.last
+        last = samples[-1:]
+        rows = np.concatenate([*self.rows, last])
+        numbers = np.concatenate([*self.numbers, [run.done]]).astype(int)
+        energies = np.concatenate([*self.sums, sums[:, -1:]], axis=1)
+        in_window = numbers >= run.done - self.n_window
+        response = make_response(run, rows, numbers, energies)
+        n = 2 * run.modes.omega.size
+        window_rows = rows[in_window][:-1]
+        steps = run.steps
+        return Motion(
+            response,
+            response.select(in_window),
+            window_rows[:, n + Sample.PORTS + 2] if run.contact.point_sets else window_rows[:, 0] * 0,
+            float(window_rows[:, n + Sample.WORK].sum()),
+            np.array(self.extremes),
+            np.array(self.phasors),
+            run.find_ledger(last[0]),
+            run.outcome,
+            run.message,
+            run.done / steps,
+            self.snapshots,
+            run,
         )
-        row = samples[first + n_done]
-        ports = row[size + Sample.PORTS :]
-        points = system.points
-        snapshots.append(
-            Snapshot(
-                (done + first + n_done) * structure.numbers[1],
-                float(system.ports.rows[0] @ row[: size // 2]),
-                float(system.ports.rows[0] @ row[size // 2 : size]),
-                ports[0],
-                ports[1],
-                row[size + Sample.HEAVE],
-                row[size + Sample.PITCH],
-                points.memory.copy(),
-                points.values[Point.END_LOAD, : points.port.size].copy(),
-                points.shear[0].copy(),
-                points.values[Point.NODE_FORCE].copy(),
-            )
-        )
-        if status != DONE:
-            return first + n_done, status
-    return count, DONE
-
-
-def _make_motion(modes, drive, contact, system, chunks, snapshots, run) -> Motion:
-    """Return the record of a finished march."""
-    status, done, n_window, steps, step = run
-    extremes = []
-    phasors = []
-    kept = []
-    numbers = []
-    works = []
-    friction = 0.0
-    first_window = done - n_window
-    size = 2 * modes.omega.size
-    stride = max(1, steps // N_KEPT)
-    for first, samples in chunks:
-        extremes.append(find_extremes(samples, modes, step))
-        time = step * (first + np.arange(len(samples)))
-        output = samples[:, : modes.omega.size] @ modes.output
-        wave = np.exp(-2j * np.pi * time / drive.period)
-        phasors.append(2 / drive.period * np.trapezoid(output * wave, dx=step))
-        picked = np.arange(
-            0, len(samples) - 1, 1 if first + len(samples) - 1 > first_window else stride
-        )
-        kept.append(samples[picked])
-        sums = friction + np.append(0.0, np.cumsum(samples[:-1, size + Sample.WORK]))
-        friction = sums[-1]
-        works.append(sums[picked])
-        numbers.append(first + picked)
-    kept.append(chunks[-1][1][-1:])
-    works.append([friction])
-    numbers.append([chunks[-1][0] + len(chunks[-1][1]) - 1])
-    rows = np.concatenate(kept)
-    number = np.concatenate(numbers)
-    in_window = number >= first_window
-    response = make_response(modes, drive, contact, rows, number * step, np.concatenate(works))
-    window = response.select(in_window)
-    outcome, message = _judge(system, status, done)
-    return Motion(
-        response,
-        window,
-        rows[in_window][:-1, size + Sample.PORTS + 2],
-        float(rows[in_window][:-1, size + Sample.WORK].sum()),
-        np.array(extremes),
-        np.array(phasors),
-        _make_ledger(modes, system, rows[-1]),
-        outcome,
-        message,
-        done / steps,
-        snapshots,
-        system,
-    )
-
-
-def _judge(system: System, status: int, done: int) -> tuple[Outcome | None, str]:
-    """Return how a march ended, and the reason."""
-    if status == EXCEEDS_TRAVEL:
-        return Outcome.EXCEEDS_TRAVEL, ""
-    if status == NO_CONTACT_SET:
-        return (
-            Outcome.NOT_CONVERGED,
-            f"at step {done} no set of points in contact was found; raise accuracy.steps_per_cycle",
-        )
-    if status != DONE:
-        return (
-            Outcome.NOT_CONVERGED,
-            f"at step {done} the motion is not a finite number; raise accuracy.steps_per_cycle",
-        )
-    unsolved = int(system.totals[Total.UNSOLVED])
-    if unsolved > MAX_UNSOLVED:
-        return (
-            Outcome.NOT_CONVERGED,
-            f"{unsolved} of {done} time steps did not converge; raise accuracy.steps_per_cycle",
-        )
-    return None, ""
-
-
-def _make_ledger(modes: ModalBasis, system: System, last) -> dict:
-    """Return energies [J] and counters by name."""
-    n = modes.omega.size
-    totals = system.totals
-    z = last[:n]
-    v = last[n : 2 * n]
-    interface = last[2 * n + Sample.ENERGY] + last[2 * n + Sample.CONTACT_ENERGY]
-    friction = float(totals[Total.FRICTION])
-    stored = 0.5 * modes.mass * float(v @ v + (modes.omega * z) @ (modes.omega * z)) + float(
-        interface
-    )
-    lost = friction - float(last[2 * n + Sample.ENERGY])
-    return {
-        "work_in": float(totals[Total.WORK_IN]), "viscous": float(totals[Total.VISCOUS]),
-        "power": float(totals[Total.POWER]), "friction": lost, "peak_stored": float(totals[Total.STORED]),
-        "iterations": float(totals[Total.ITERATIONS]), "worst_iterations": float(totals[Total.WORST]),
-        "stored": stored, "booked": friction, "sampled": friction, "passed": abs(friction),
-    }  # fmt: skip
 
 
 def find_extremes(samples, modes: ModalBasis, step: float) -> tuple[float, float]:
@@ -467,7 +913,8 @@ def find_extremes(samples, modes: ModalBasis, step: float) -> tuple[float, float
     n = modes.omega.size
     q = samples[:, :n] @ modes.output
     v = samples[:, n : 2 * n] @ modes.output
-    turn = np.flatnonzero(v[:-1] * v[1:] < 0)
+    # A change of sign within round-off, as at a stop, is no reversal: the cubic would overshoot there.
+    turn = np.flatnonzero(v[:-1] * v[1:] < -1e-12 * np.max(v**2, initial=0.0))
     if not turn.size:
         return float(q.min()), float(q.max())
     # The velocity is the parabola with the mean of the increment.
@@ -477,51 +924,65 @@ def find_extremes(samples, modes: ModalBasis, step: float) -> tuple[float, float
     square = 3 * (first + last) - 6 * mean
     linear = 6 * mean - 4 * first - 2 * last
     root = np.sqrt(np.maximum(linear**2 - 4 * square * first, 0.0))
-    x = 2 * first / (-linear + np.copysign(root, first - last))
-    x = np.clip(x, 0.0, 1.0)
+    x = np.clip(2 * first / (-linear + np.copysign(root, first - last)), 0.0, 1.0)
     peaks = q[turn] + step * x * (first + x * (linear / 2 + x * square / 3))
     return float(min(q.min(), peaks.min())), float(max(q.max(), peaks.max()))
 
 
-def make_response(modes: ModalBasis, drive, contact: Contact, rows, time, work) -> Response:
-    """Return samples as histories.
+def make_response(run: March, rows, numbers, energies) -> Response:
+    """Return samples (k, w) with their step numbers (k,) and energies (3, k) as histories.
 
-    `work` (k,) is the friction work [J] up to each sample. Slides, slide rates, forces and slips of several interfaces
-    are columns in `extra`, which also has the load, moment, energy, heave and pitch of a contact that moves.
+    `extra` has the energies: friction work, stored, dissipated and created energy [J]; slides, slide rates, forces and
+    slips (k, i) of several interfaces, and forces of springs (k, s); load, moment and energy of the contact, heave and
+    pitch of a contact that moves.
     """
+    modes = run.modes
+    contact = run.contact
+    time = numbers * run.step
     n = modes.omega.size
     z = rows[:, :n]
     rate = rows[:, n : 2 * n]
     first = 2 * n + Sample.PORTS
-    n_ports = len(contact.point_sets)
-    columns = rows[:, first : first + N_PORT_COLUMNS * n_ports].reshape(
-        len(rows), n_ports, N_PORT_COLUMNS
-    )
-    port_rows = np.array([one.row for one in contact.point_sets])
+    sets = contact.point_sets
+    columns = rows[:, first : first + N_PORT_COLUMNS * len(sets)]
+    columns = columns.reshape(len(rows), len(sets), N_PORT_COLUMNS)
+    port_rows = np.array([one.row for one in sets], float).reshape(len(sets), n)
+    push = run.drive.values(time)
+    base = push if run.drive.moving else np.zeros_like(push)
     forces = columns[..., 0]
-    push = drive.values(time)
-    base = push if drive.moving else np.zeros_like(push)
     acceleration = -np.outer(push, modes.base) - rate @ modes.damping_matrix.T - z * modes.omega**2
     acceleration -= forces @ port_rows / modes.mass
-    extra = {}
+    work, dissipated, created = energies
+    extra = {"ledger": np.stack([work, rows[:, 2 * n + Sample.ENERGY], dissipated, created])}
+    press = rows[:, 2 * n + Sample.LOAD : 2 * n + Sample.PITCH + 1]
     if contact.sets is not None or contact.load is not None:
-        names = ("normal_load", "normal_moment", "normal_energy", "heave", "turn")
-        extra = dict(zip(names, rows[:, 2 * n + Sample.LOAD : 2 * n + Sample.PORTS].T))
+        extra |= dict(zip(PRESS_COLUMNS, press.T))
     if contact.sets is not None:
-        press = np.stack(
-            [extra["normal_load"] - contact.sets.load, extra["normal_moment"] - contact.sets.moment]
-        )
         # Less load accelerates the holder towards the contact.
-        acceleration += press.T @ np.array([contact.heave, contact.pitch]) / modes.mass
-    energy = rows[:, 2 * n + Sample.ENERGY]
-    extra["ledger"] = np.stack([work, energy, work - energy, np.zeros_like(work)])
-    is_interface = [not one.is_spring for one in contact.point_sets]
+        change = press[:, :2] - [contact.sets.load, contact.sets.moment]
+        acceleration += change @ np.array([contact.heave, contact.pitch]) / modes.mass
     slides = z @ port_rows.T
     rates = rate @ port_rows.T
-    if len(port_rows) > 1:
+    is_interface = np.array([not one.is_spring for one in sets], bool)
+    if len(sets) > 1:
         parts = {"slides": slides, "slide_rates": rates, "forces": forces, "slips": columns[..., 1]}
-        extra |= {name: part[:, is_interface] for name, part in parts.items()}
+        extra["spring_forces"] = forces[:, ~is_interface]
+        if is_interface.any():
+            extra |= {name: part[:, is_interface] for name, part in parts.items()}
+    grooves = contact.grooves
+    if grooves is not None and grooves.lifted_mass:
+        sliding = acceleration @ modes.slide
+        lift = grooves.slope(slides[:, 0]) * sliding
+        lift = lift + grooves.slope_derivative(slides[:, 0]) * rates[:, 0] ** 2
+        extra["normal_load"] = contact.preload + grooves.lifted_mass * lift
+    if is_interface.any():
+        own = int(np.flatnonzero(is_interface)[0])
+        interface = slides[:, own], rates[:, own], forces[:, own], columns[:, own, 1]
+    else:
+        still = np.zeros(len(rows))
+        interface = z @ modes.slide, rate @ modes.slide, still, z @ modes.slide
+    slide, speed, force, slip = interface
     return Response(
-        time, z, rate, slides[:, 0], rates[:, 0], z @ modes.output, rate @ modes.output,
-        acceleration @ modes.output + base, base, forces[:, 0], columns[:, 0, 1], extra,
+        time, z, rate, slide, speed, z @ modes.output, rate @ modes.output,
+        acceleration @ modes.output + base, base, force, slip, extra,
     )  # fmt: skip

@@ -24,6 +24,7 @@ LUGRE         stiffness, kinetic, static, v_s, sigma_1, sigma_2    stretch [m], 
 BONDS         mu, eps_0 [m], growth (6) (eq. 2.10), m_0            eps, m, z, s2, eps in the middle of the step
 CUBIC         k_3 [N/m3]                                           slide [m]
 INTERLOCK     k [N/m], wavelength [m]                              slide [m]
+LIST          mu, length [m], load of the relative pressure 1 [N]  see `lists_kernels`
 ============= ==================================================== =================================================
 """
 
@@ -68,6 +69,7 @@ class Law(IntEnum):
     BONDS = 6
     CUBIC = 7
     INTERLOCK = 8
+    LIST = 9
 
 
 class Masing(IntEnum):

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..core import Measure, NotConverged, Outcome
-from ..dynamics import checkpoint
+from ..points import checkpoint
 from ..model.model import Model
 from ..model.source import locate_errors
 from . import joint, memory

@@ -488,15 +488,14 @@ def _count_samples(stick_fraction: float) -> int:
     return int(min(SAMPLES_PER_STICK * 2 * np.pi / max(angle, 1e-9), 65536))
 
 
-def make_law(model):
-    """Return the harmonic-balance law that corresponds to a contact model (`march.models.ContactModel`).
+def make_law(element: Element | None):
+    """Return the harmonic-balance law of an Element; None means bonds that are no single element.
 
     Raises
     ------
     PatchfemError
         If harmonic balance cannot treat it; the message says what to do.
     """
-    element = model.element
     form = element.form if element is not None else ""
     if form == "parallel":
         count = int(element.numbers[1])
@@ -506,7 +505,7 @@ def make_law(model):
     # If bonds neither grow nor break gradually, one stretch describes the memory of a bond point.
     if form == "flow" or (form == "points" and element.numbers[3] < 0 and not element.numbers[8]):
         return FlowLaw(element)
-    if model.set_valued:
+    if element is not None and not element.kernels:
         raise PatchfemError(
             'accuracy.method: "harmonic" '
             "cannot treat rigid friction, because the force of rigid friction jumps; use the exact "

@@ -15,7 +15,7 @@ import numpy as np
 
 from ... import cost_model
 from ...core import Missing
-from ...dynamics import checkpoint
+from ...points import checkpoint
 from ...effects import law_has_trait
 from ...model import patch as patch_model
 from ...model.model import Model

@@ -19,7 +19,6 @@ from ...core import (
     SineDrive,
 )
 from ...dynamics.event_list import DRIVE_CHANGE, RELEASE, REVERSAL, STOP, EventLog
-from ...dynamics.grooves import climbing
 from ...dynamics.integrated import find_accelerations
 from ...formatting import format_length
 from ...hybrid import cases, periodic
@@ -218,7 +217,7 @@ class LumpedEvaluator(RunEvaluator):
     def _explain_end(self, motion, travel: float) -> str:
         """Return why a motion ended early, "" if it reached the travel of the scene."""
         if motion.status == Status.LEAVES_GROOVES:
-            return climbing.lift_message(self.model.grooves, motion.time)
+            return self.model.grooves.describe_lift(motion.time)
         if travel >= self.model.rig.springs.travel:
             return ""
         return (
