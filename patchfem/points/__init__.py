@@ -34,7 +34,7 @@ PUBLIC = {
         "with_elements",
     ),
     "laws": ("make_point_law",),
-    "march": ("March", "Motion", "Snapshot", "count_list_bytes", "march"),
+    "march": ("March", "Motion", "Snapshot", "count_list_bytes", "load_kernels", "march"),
     "orbits": ("MAX_CYCLES", "estimate_multipliers", "march_cycle", "march_to_periodic"),
     "slides": ("SlideMotion", "follow"),
 }

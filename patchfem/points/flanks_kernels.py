@@ -9,21 +9,21 @@ does exactly the work of height, lifted mass and law. The normal force at the en
 from math import cos, sin, sqrt
 
 from ..compiled.jit import njit
-from ..friction.flags_kernels import NJIT_KERNEL
+from ..friction.flags_kernels import NJIT_CALL
 from .march_rows import Flank
 
 GAUSS_POINT = sqrt(0.6)  # outer node of the Gauss rule of three points
 MIN_PHASE = 1e-4  # phase [rad] below which a series replaces sin(x)/x
 
 
-@njit(**NJIT_KERNEL)
+@njit(**NJIT_CALL)
 def find_slope(flank, q):
     """Return the slope dz/dq at a slide q [m]."""
     wave = flank[Flank.WAVE_NUMBER]
     return flank[Flank.AMPLITUDE] * wave * sin(wave * q - flank[Flank.PHASE])
 
 
-@njit(**NJIT_KERNEL)
+@njit(**NJIT_CALL)
 def climb(flank, q, dq, dt):
     """Write mean slope, path ratio and vertical force of a trial increment dq [m] from the slide q [m]."""
     wave = flank[Flank.WAVE_NUMBER]
@@ -40,7 +40,7 @@ def climb(flank, q, dq, dt):
     flank[Flank.TRIAL_VERTICAL] = flank[Flank.LOAD] + 2 * flank[Flank.LIFTED_MASS] * rise / dt
 
 
-@njit(**NJIT_KERNEL)
+@njit(**NJIT_CALL)
 def find_stiffness(flank, q, dq, dt):
     """Return the derivative of the mean climbing force V dz/dq by the increment [N/m]."""
     wave = flank[Flank.WAVE_NUMBER]
@@ -50,7 +50,7 @@ def find_stiffness(flank, q, dq, dt):
     return flank[Flank.TRIAL_VERTICAL] * curvature + inertia
 
 
-@njit(**NJIT_KERNEL)
+@njit(**NJIT_CALL)
 def find_normal(flank, q, friction, bound):
     """Return the normal force [N] at a slide q, for a mean friction force of the step; `bound` is mu [1].
 
@@ -63,7 +63,7 @@ def find_normal(flank, q, friction, bound):
     return max(max(flank[Flank.TRIAL_VERTICAL], 0.0) * sqrt(1 + t * t) + after * t, 0.0)
 
 
-@njit(**NJIT_KERNEL)
+@njit(**NJIT_CALL)
 def find_energy(flank, q):
     """Return the energy [J] of the height of the load and of the lifted mass at a slide q."""
     half = sin(0.5 * (flank[Flank.WAVE_NUMBER] * q - flank[Flank.PHASE]))

@@ -9,7 +9,7 @@ from ..compiled.jit import njit
 from ..friction.bonds.list_forms_kernels import FORM_MOMENTS, FORM_POWER
 from ..friction.bonds.list_kernels import list_force, list_mean, list_slope, list_step
 from ..friction.bonds.list_rows_kernels import LAW, STATUS
-from ..friction.flags_kernels import NJIT_NO_REFCOUNT
+from ..friction.flags_kernels import NJIT_CALL
 from .march_rows import BondList, Point
 from .return_maps_kernels import PointState
 
@@ -19,7 +19,7 @@ SLOPE_INCREMENT = 1e-9
 MAX_OWED = 1e-4
 
 
-@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
+@njit(**NJIT_CALL)
 def pick_list(lists, j):
     """Return the list of point j as the record that `friction.bonds.list_kernels` takes."""
     return BondList(
@@ -27,13 +27,13 @@ def pick_list(lists, j):
     )
 
 
-@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
+@njit(**NJIT_CALL)
 def press_list(numbers, lists, j, load):
     """Set the pressure under which bonds of point j form to that of a load [N]."""
     lists.statuses[j, STATUS.pressure] = load / numbers[3, j]
 
 
-@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
+@njit(**NJIT_CALL)
 def write_list_mean(numbers, values, lists, j, dt):
     """Write the mean force of point j over its slide, and the slope of that force."""
     one = pick_list(lists, j)
@@ -72,7 +72,7 @@ def write_list_mean(numbers, values, lists, j, dt):
     values[Point.BY_SLIDE, j] = slope
 
 
-@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
+@njit(**NJIT_CALL)
 def advance_list(numbers, values, lists, j, v0, v1, dt):
     """Advance the list of point j over its slide; return whether its array has room.
 
@@ -102,7 +102,7 @@ def advance_list(numbers, values, lists, j, v0, v1, dt):
     return has_room
 
 
-@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
+@njit(**NJIT_CALL)
 def read_list(numbers, lists, j):
     """Return the `PointState` of point j."""
     status = lists.statuses[j]

@@ -123,6 +123,16 @@ class Motion:
     end: "March"
 
 
+def load_kernels(contact: Contact, say=None):
+    """Return the compiled march with the parts that a contact needs: lists of bonds, contact sets."""
+    parts = {}
+    if contact.bond_sum is None:
+        parts["lists"] = "points.no_lists_kernels"
+    if contact.sets is None:
+        parts["normal"] = "points.no_normal_kernels"
+    return compiled.instantiate("points.march_kernels", parts, say)
+
+
 # ---- arrays of a march
 
 
@@ -256,8 +266,11 @@ def _make_points(contact: Contact, n_nodes: int) -> Points:
     shear = np.zeros((len(Shear), stiffness.size))
     if stiffness.size:
         shear[Shear.SCALE] = 1 / np.sqrt((shapes**2).mean(axis=1))
+        shear[Shear.LARGEST] = np.abs(shapes).max(axis=1)
+    n_moving = 0 if contact.sets is None else 2  # ports of heave and pitch have no points
     return Points(
         np.repeat(np.arange(len(counts)), counts),
+        np.cumsum([0, *counts, *[0] * n_moving]),
         nodes,
         share,
         numbers,
@@ -404,7 +417,7 @@ class March:
         self.work_sums = np.zeros(3)
         n_columns = len(contact.point_sets) + (2 if contact.sets is not None else 0)
         self.width = 2 * modes.omega.size + Sample.PORTS + N_PORT_COLUMNS * n_columns
-        self.kernels = compiled.load("points.march_kernels")
+        self.kernels = load_kernels(contact)
         self.reset_balance()
 
     def fork(self, drive=None) -> "March":
@@ -484,7 +497,7 @@ class March:
                 options=system.options._replace(step=1.0),
             )
             self.kernels.march(still, 1, np.zeros((2, self.width - system.state.shape[1])))
-            system.points.shear[[Shear.LAST, Shear.EARLIER]] = 0.0
+            system.points.shear[[Shear.LAST, Shear.EARLIER, Shear.FIRST]] = 0.0
         if system.flank.size:
             slope = float(self.contact.grooves.slope(end))
             system.flank[Flank.RISE_SPEED] = slope * float(row @ velocity)
@@ -594,7 +607,7 @@ class March:
         motion = float(row @ sample[:n]), float(row @ sample[n : 2 * n])
         ports = rest[Sample.PORTS :]
         place = self.done * self.step, *motion, ports[0], ports[1]
-        return make_snapshot(self.system, (*place, rest[Sample.HEAVE], rest[Sample.PITCH]))
+        return make_snapshot(self.kernels, self.system, (*place, rest[Sample.HEAVE], rest[Sample.PITCH]))
 
     def find_ledger(self, sample) -> dict:
         """Return energies [J] and counters by name at a sample of the present state."""
@@ -666,7 +679,7 @@ def split_losses(samples, n: int, scale: float) -> np.ndarray:
     """
     energy = samples[:, n + Sample.ENERGY]
     losses = samples[:-1, n + Sample.WORK] - np.diff(energy)
-    force = np.maximum(scale, np.abs(samples[:-1, n + Sample.PORTS]))
+    force = np.abs(samples[:-1, n + Sample.PORTS : n + Sample.PORTS + 1]).max(axis=1, initial=scale)
     work = np.abs(samples[:-1, n + Sample.WORK])
     noise = 1e-12 * work + 1e-14 * np.maximum(energy[1:], energy[:-1])
     # The last digit of the motion.
@@ -675,11 +688,11 @@ def split_losses(samples, n: int, scale: float) -> np.ndarray:
     return np.where((losses < 0) & (losses > -noise), 0.0, losses)
 
 
-def make_snapshot(system: System, motion: tuple) -> Snapshot:
+def make_snapshot(kernels, system: System, motion: tuple) -> Snapshot:
     """Return the state of the points of a system; `motion` has the first seven fields of Snapshot."""
     points = system.points
     count = points.port.size
-    read = compiled.load("points.march_kernels").read_points
+    read = kernels.read_points
     forces = np.zeros(count)
     stretch = np.zeros(count)
     read(system, forces, stretch)
@@ -733,7 +746,7 @@ def march(
     Missing
         If lists of bonds become too long.
     """
-    compiled.load("points.march_kernels", say)
+    load_kernels(contact, say)
     if isinstance(start, March):
         run = start.fork(drive)
         run.reset_balance()

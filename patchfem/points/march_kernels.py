@@ -22,13 +22,12 @@ point at rest is released, is halved up to the last level.
 import numpy as np
 
 from ..compiled.jit import njit
-from ..contact.press_kernels import compute_energy, find_set, press_state
-from ..contact.press_path_kernels import path_mean
 from ..contact.set_arrays import REFERENCE_LOAD, REFERENCE_MOMENT
 from ..friction.bonds.point_kernels import MAX_SHORT_PATH
-from ..friction.flags_kernels import NJIT_KERNEL
+from ..friction.flags_kernels import NJIT_CALL, NJIT_INLINE, NJIT_KERNEL
 from . import flanks_kernels as flanks
-from .lists_kernels import advance_list, press_list, read_list, write_list_mean
+from . import lists_kernels as lists
+from . import normal_kernels as normal
 from .march_rows import N_PORT_COLUMNS, Flank, Point, Port, Sample, Shear, Total
 from .return_maps_kernels import (
     Law,
@@ -44,6 +43,8 @@ from .return_maps_kernels import (
 )
 
 MAX_ITERATIONS = 200  # Newton iterations of a step
+STEADY_BONDS = 1e-13  # relative distance of bonds from those of an endless slide that counts as none
+LAST_STEP = 4e-6  # change of a slide in bond lengths, half the square of which is within RESIDUAL
 MAX_CUTS = 40  # trials of a line search
 MAX_OVERSHOOT = 0.5  # slope beyond the minimum of a line search, relative to that at its start
 MAX_STALLS = 4  # iterations that do not halve the smallest residual, after which a step ends
@@ -63,7 +64,7 @@ LEAVES_GROOVES = 5
 LOWER = -2  # node of a point on the pressure of the lower piece
 
 
-@njit(**NJIT_KERNEL)
+@njit(**NJIT_CALL)
 def solve_linear(matrix, vector, n):
     """Solve a dense system in place by Gaussian elimination with partial pivoting; return whether it is regular."""
     for k in range(n):
@@ -91,7 +92,7 @@ def solve_linear(matrix, vector, n):
     return True
 
 
-@njit(**NJIT_KERNEL)
+@njit(**NJIT_INLINE)
 def project(row, state):
     """Return the displacement of a port."""
     total = 0.0
@@ -100,7 +101,7 @@ def project(row, state):
     return total
 
 
-@njit(**NJIT_KERNEL)
+@njit(**NJIT_INLINE)
 def move_freely(system, level, drive, row, fraction):
     """Write the motion at the end of a step without interface forces, and that of the ports.
 
@@ -136,7 +137,7 @@ def move_freely(system, level, drive, row, fraction):
         values[Port.FREE, p] = free
 
 
-@njit(**NJIT_KERNEL)
+@njit(**NJIT_INLINE)
 def prepare_points(system, h):
     """Press the trial memory of the points to the loads in the middle of the step."""
     points = system.points
@@ -154,7 +155,7 @@ def prepare_points(system, h):
             middle = 0.5 * (start + values[Point.END_LOAD, j])
             values[Point.LOAD, j] = middle
             if points.numbers[0, j] == Law.LIST:
-                press_list(points.numbers, system.lists, j, middle)
+                lists.press_list(points.numbers, system.lists, j, middle)
             elif start != middle:
                 press(points.numbers, points.trial, j, start, middle)
         system.totals[Total.IS_DIRTY] = 1.0
@@ -164,7 +165,7 @@ def prepare_points(system, h):
             prepare(points.numbers, points.trial, j, Step(0.0, h, v, v, 0.0))
 
 
-@njit(**NJIT_KERNEL)
+@njit(**NJIT_INLINE)
 def write_forces(system, level, h):
     """Write motion of ports and points under the assumed forces, and the mean forces of the laws with their slopes.
 
@@ -186,36 +187,33 @@ def write_forces(system, level, h):
             v -= compliance[1, p, k] * moves[Port.FORCE, k]
         moves[Port.INCREMENT, p] = dq
         moves[Port.END_VELOCITY, p] = v
-        moves[Port.SUM, p] = moves[Port.BY_SLIDE, p] = moves[Port.BY_VELOCITY, p] = 0.0
     if flank.size:
         flanks.climb(flank, moves[Port.SLIDE, 0], moves[Port.INCREMENT, 0], h)
 
     # Slides of the points.
-    for j in range(count):
-        p = points.port[j]
-        ratio = flank[Flank.RATIO] if flank.size and p == 0 else 1.0
-        values[Point.SLIDE, j] = ratio * moves[Port.INCREMENT, p]
+    for p in range(n_ports):
+        slide = moves[Port.INCREMENT, p]
+        slide *= flank[Flank.RATIO] if flank.size and p == 0 else 1.0
+        for j in range(points.first[p], points.first[p + 1]):
+            values[Point.SLIDE, j] = slide
     for k in range(points.stiffness.size):
         increment = points.shear[Shear.TRIAL, k]
         for j in range(count):
             values[Point.SLIDE, j] -= points.shapes[k, j] * increment
 
-    # Bonds of one law have a loop that vectorises.
-    is_done = system.options.is_plain and write_bond_means(
-        points.numbers,
-        points.trial,
-        values[Point.LOAD, :count],
-        values[Point.SLIDE, :count],
-        values[Point.FORCE, :count],
-        values[Point.BY_SLIDE, :count],
-    )
-    if not is_done:
+    if not (system.options.is_plain and write_bond_forces(system)):
         write_point_forces(system, level, h)
-    for j in range(count):
-        p = points.port[j]
-        moves[Port.SUM, p] += values[Point.FORCE, j]
-        moves[Port.BY_SLIDE, p] += values[Point.BY_SLIDE, j]
-        moves[Port.BY_VELOCITY, p] += values[Point.BY_VELOCITY, j]
+    for p in range(n_ports):
+        force = 0.0
+        by_slide = 0.0
+        by_velocity = 0.0
+        for j in range(points.first[p], points.first[p + 1]):
+            force += values[Point.FORCE, j]
+            by_slide += values[Point.BY_SLIDE, j]
+            by_velocity += values[Point.BY_VELOCITY, j]
+        moves[Port.SUM, p] = force
+        moves[Port.BY_SLIDE, p] = by_slide
+        moves[Port.BY_VELOCITY, p] = by_velocity
     if flank.size:
         flank[Flank.TRIAL_FORCE] = moves[Port.SUM, 0]
         ratio = flank[Flank.RATIO]
@@ -228,7 +226,74 @@ def write_forces(system, level, h):
         moves[Port.FORCE, 0] = moves[Port.SUM, 0]
 
 
-@njit(**NJIT_KERNEL)
+@njit(**NJIT_CALL)
+def keep_sliding(values, count, direction):
+    """Return whether no point moves against a direction."""
+    least = 0.0
+    for j in range(count):
+        least = min(least, direction * values[Point.SLIDE, j])
+    return least == 0.0
+
+
+@njit(**NJIT_INLINE)
+def write_bond_forces(system):
+    """Write the mean forces of bonds that slide steadily, or over short slides in a loop that vectorises; else return False."""
+    points = system.points
+    values = points.values
+    count = points.port.size
+    direction = system.totals[Total.SLIDES]
+    if direction != 0.0 and keep_sliding(values, count, direction):
+        for j in range(count):
+            values[Point.FORCE, j] = direction * points.numbers[1, j] * values[Point.LOAD, j]
+            values[Point.BY_SLIDE, j] = 0.0
+        return True
+    return write_bond_means(
+        points.numbers,
+        points.trial,
+        values[Point.LOAD, :count],
+        values[Point.SLIDE, :count],
+        values[Point.FORCE, :count],
+        values[Point.BY_SLIDE, :count],
+    )
+
+
+@njit(**NJIT_CALL)
+def advance_plain_bonds(system):
+    """Advance bonds of constant length whose slides are short, or that slide steadily; return whether they were."""
+    points = system.points
+    values = points.values
+    trial = points.trial
+    count = points.port.size
+    direction = system.totals[Total.SLIDES]
+    if direction != 0.0 and keep_sliding(values, count, direction):
+        return True
+    system.totals[Total.SLIDES] = 0.0
+    longest = 0.0
+    for j in range(count):
+        longest = max(longest, abs(values[Point.SLIDE, j]) - MAX_SHORT_PATH * trial[4, j])
+    if longest > 0.0:
+        return False
+    advance_bonds(trial, values[Point.LOAD, :count], values[Point.SLIDE, :count])
+    return True
+
+
+@njit(**NJIT_CALL)
+def find_steady_slide(system):
+    """Return the direction in which all bonds of constant length slide steadily, or 0."""
+    points = system.points
+    values = points.values
+    direction = 1.0 if points.trial[2, 0] > 0 else -1.0
+    for j in range(points.port.size):
+        load = values[Point.LOAD, j]
+        length = points.trial[4, j]
+        gap = abs(points.trial[1, j] - load) + abs(direction * points.trial[2, j] / length - load)
+        gap += 0.01 * abs(points.trial[3, j] / (length * length) - 2 * load)
+        if gap > STEADY_BONDS * load:
+            return 0.0
+    return direction
+
+
+@njit(**NJIT_INLINE)
 def write_point_forces(system, level, h):
     """Write the mean forces of the points of any law, and their slopes."""
     ports = system.ports
@@ -236,7 +301,7 @@ def write_point_forces(system, level, h):
     values = points.values
     for j in range(points.port.size):
         if points.numbers[0, j] == Law.LIST:
-            write_list_mean(points.numbers, values, system.lists, j, h)
+            lists.write_list_mean(points.numbers, values, system.lists, j, h)
             continue
         if find_rest_limit(points.numbers, points.trial, j, 1.0) < np.inf:
             values[Point.FORCE, j] = values[Point.BY_SLIDE, j] = values[Point.BY_VELOCITY, j] = 0.0
@@ -255,7 +320,7 @@ def write_point_forces(system, level, h):
         values[Point.BY_VELOCITY, j] = mean.by_velocity
 
 
-@njit(**NJIT_KERNEL)
+@njit(**NJIT_INLINE)
 def write_residual(system, level, h):
     """Write the residuals of port forces and shear coordinates; return the largest one relative to its tolerance."""
     ports = system.ports
@@ -272,7 +337,7 @@ def write_residual(system, level, h):
         pitch = int(ports.contact[1])
         increments = moves[Port.INCREMENT]
         slides = moves[Port.SLIDE]
-        path_mean(
+        normal.path_mean(
             system.sets,
             int(system.totals[Total.SLOT]),
             slides[heave],
@@ -312,7 +377,7 @@ def write_residual(system, level, h):
     return largest
 
 
-@njit(**NJIT_KERNEL)
+@njit(**NJIT_INLINE)
 def write_matrix(system, level):
     """Write the Jacobian of the residuals.
 
@@ -368,7 +433,7 @@ def write_matrix(system, level):
                 matrix[p, k] = -compliance[1, p, k] / compliance[1, p, p]
 
 
-@njit(**NJIT_KERNEL)
+@njit(**NJIT_INLINE)
 def find_descent(system, level):
     """Return the slope of the potential along the present step, which subtracts `ports.step` from the unknowns."""
     ports = system.ports
@@ -386,7 +451,7 @@ def find_descent(system, level):
     return slope
 
 
-@njit(**NJIT_KERNEL)
+@njit(**NJIT_INLINE)
 def find_step(system, level):
     """Write Newton's step; return the slope of the potential along it, which is below 0, or 0 if there is no step.
 
@@ -414,7 +479,54 @@ def find_step(system, level):
     return 0.0
 
 
-@njit(**NJIT_KERNEL)
+@njit(**NJIT_INLINE)
+def is_last_step(system, level):
+    """Return whether the present step changes the slide of every bond by less than LAST_STEP bond lengths."""
+    ports = system.ports
+    points = system.points
+    n_ports = ports.values.shape[1]
+    change = 0.0
+    for k in range(n_ports):
+        change += ports.compliance[level, 0, 0, k] * ports.step[k]
+    change = abs(change)
+    for k in range(points.stiffness.size):
+        change += points.shear[Shear.LARGEST, k] * abs(ports.step[n_ports + k])
+    return change <= LAST_STEP * points.trial[4, 0]
+
+
+@njit(**NJIT_INLINE)
+def finish_step(system, level):
+    """Take a step whose residual is known to be small; the forces of the points follow from their slopes."""
+    ports = system.ports
+    points = system.points
+    values = points.values
+    n_ports = ports.values.shape[1]
+    change = 0.0
+    for k in range(n_ports):
+        change += ports.compliance[level, 0, 0, k] * ports.step[k]
+    for p in range(n_ports):
+        for k in range(n_ports):
+            dq = ports.compliance[level, 0, p, k] * ports.step[k]
+            ports.values[Port.INCREMENT, p] += dq
+            v = ports.compliance[level, 1, p, k] * ports.step[k]
+            ports.values[Port.END_VELOCITY, p] += v
+        ports.values[Port.FORCE, p] -= ports.step[p]
+    count = points.port.size
+    for j in range(count):
+        values[Point.BY_VELOCITY, j] = change
+    for k in range(points.stiffness.size):
+        part = ports.step[n_ports + k]
+        points.shear[Shear.TRIAL, k] -= part
+        for j in range(count):
+            values[Point.BY_VELOCITY, j] += points.shapes[k, j] * part
+    for j in range(count):
+        dq = values[Point.BY_VELOCITY, j]
+        values[Point.SLIDE, j] += dq
+        values[Point.FORCE, j] += values[Point.BY_SLIDE, j] * dq
+        values[Point.BY_VELOCITY, j] = 0.0
+
+
+@njit(**NJIT_INLINE)
 def take_step(system, level, h, fraction):
     """Subtract a fraction of the step from the unknowns at its start; return the relative residual."""
     ports = system.ports
@@ -428,30 +540,35 @@ def take_step(system, level, h, fraction):
     return write_residual(system, level, h)
 
 
-@njit(**NJIT_KERNEL)
+@njit(**NJIT_INLINE)
 def solve_forces(system, level, h):
     """Solve the port forces and shear increments by Newton's method; return whether it converged."""
     ports = system.ports
     moves = ports.values
     shear = system.points.shear
     totals = system.totals
-    write_forces(system, level, h)
-    residual = write_residual(system, level, h)
-    smallest = residual
+    residual = np.inf
+    smallest = np.inf
     n_stalls = 0
     stalled = LISTS_STALLED if system.options.has_lists else STALLED
     for count in range(MAX_ITERATIONS):
-        if residual <= 1.0:
-            return True
         if n_stalls >= MAX_STALLS and residual <= stalled:
             return True
-        totals[Total.ITERATIONS] += 1
-        totals[Total.WORST] = max(totals[Total.WORST], count)
         for p in range(moves.shape[1]):
             moves[Port.BASE, p] = moves[Port.FORCE, p]
         for k in range(system.points.stiffness.size):
             shear[Shear.BASE, k] = shear[Shear.TRIAL, k]
-        descent = -find_step(system, level)
+        # The first pass evaluates the guess, so that the code of the laws appears only once.
+        descent = 0.0
+        if count > 0:
+            totals[Total.ITERATIONS] += 1
+            totals[Total.WORST] = max(totals[Total.WORST], count)
+            descent = -find_step(system, level)
+        else:
+            ports.step[:] = 0.0
+        if count > 0 and system.options.is_plain and is_last_step(system, level):
+            finish_step(system, level)
+            return True
 
         # The line search ends where the potential no longer falls, or rises little.
         low = 0.0
@@ -460,7 +577,9 @@ def solve_forces(system, level, h):
         for _ in range(MAX_CUTS):
             residual = take_step(system, level, h, fraction)
             slope = find_descent(system, level)
-            if residual <= 1.0 or descent <= 0.0 or slope <= MAX_OVERSHOOT * descent:
+            if residual <= 1.0:
+                return True
+            if descent <= 0.0 or slope <= MAX_OVERSHOOT * descent:
                 break
             high = fraction
             fraction = max(0.1, descent / (slope + descent)) * fraction
@@ -479,7 +598,8 @@ def solve_forces(system, level, h):
                 part += ports.compliance[level, 0, p, k] * ports.step[k]
             change = max(change, abs(fraction * part))
         if (
-            system.options.has_lists
+            count > 0
+            and system.options.has_lists
             and high < np.inf
             and size > 0
             and change <= ROUND_OFF * size
@@ -489,7 +609,7 @@ def solve_forces(system, level, h):
     return residual <= stalled
 
 
-@njit(**NJIT_KERNEL)
+@njit(**NJIT_CALL)
 def interpolate_pressure(x, pattern):
     """Return the relative pressure of the lower piece at x [m]; 0 outside its nodes."""
     last = pattern.shape[1] - 1
@@ -507,7 +627,7 @@ def interpolate_pressure(x, pattern):
     return (1 - part) * pattern[1, low] + part * pattern[1, high]
 
 
-@njit(**NJIT_KERNEL)
+@njit(**NJIT_CALL)
 def find_loads(system, row, fraction, is_solved):
     """Write the loads of the points at the end of a step; return their largest change, -1 without a contact set.
 
@@ -527,12 +647,12 @@ def find_loads(system, row, fraction, is_solved):
         pitch = int(ports.contact[1])
         h = moves[Port.SLIDE, heave] + moves[Port.INCREMENT, heave]
         t = moves[Port.SLIDE, pitch] + moves[Port.INCREMENT, pitch]
-        slot = find_set(system.sets, int(totals[Total.SLOT]), -h, t)
+        slot = normal.find_set(system.sets, int(totals[Total.SLOT]), -h, t)
         if slot < 0:
             return -1.0
-        press_state(system.sets, slot, -h, t, values[Point.NODE_FORCE, : system.sets.x.size])
+        normal.press_state(system.sets, slot, -h, t, values[Point.NODE_FORCE, : system.sets.x.size])
         resultant = max(
-            system.sets.reference[REFERENCE_LOAD] - compute_energy(system.sets, slot, h, t)[1], 0.0
+            system.sets.reference[REFERENCE_LOAD] - normal.compute_energy(system.sets, slot, h, t)[1], 0.0
         )
     elif flank.size:
         if is_solved:
@@ -560,7 +680,7 @@ def find_loads(system, row, fraction, is_solved):
     return 0.0 if loads.size and heave < 0 else change / total
 
 
-@njit(**NJIT_KERNEL)
+@njit(**NJIT_INLINE)
 def write_trial(system, level):
     """Write the state at the end of the step under the port forces."""
     response = system.structure.responses[level]
@@ -579,7 +699,7 @@ def write_trial(system, level):
             state[2, i] += response[i, size + 3 + k] * force
 
 
-@njit(**NJIT_KERNEL)
+@njit(**NJIT_CALL)
 def find_holds(system, state, drive):
     """Write the forces of the ports at an instant that hold rigid points at rest."""
     ports = system.ports
@@ -601,7 +721,7 @@ def find_holds(system, state, drive):
         pitch = int(ports.contact[1])
         h = project(ports.rows[heave], state[:n])
         t = project(ports.rows[pitch], state[:n])
-        energy = compute_energy(system.sets, int(system.totals[Total.SLOT]), h, t)
+        energy = normal.compute_energy(system.sets, int(system.totals[Total.SLOT]), h, t)
         values[Port.HOLD, heave] += energy[1]
         values[Port.HOLD, pitch] += energy[2]
 
@@ -627,7 +747,7 @@ def find_holds(system, state, drive):
         values[Port.HOLD, p] = ports.vector[p]
 
 
-@njit(**NJIT_KERNEL)
+@njit(**NJIT_CALL)
 def find_event(system, drive, is_shortest):
     """Return whether the trial step contains an event of a rigid point; at the last level, change its regime instead."""
     ports = system.ports
@@ -665,7 +785,7 @@ def find_event(system, drive, is_shortest):
     return not is_shortest
 
 
-@njit(**NJIT_KERNEL)
+@njit(**NJIT_INLINE)
 def commit(system, h):
     """Advance memories, shear coordinates and loads after an accepted step; bring held ports to rest."""
     ports = system.ports
@@ -674,21 +794,16 @@ def commit(system, h):
     options = system.options
     flank = system.flank
     count = points.port.size
-    is_short = options.is_plain and not options.has_growth
-    if is_short:
-        for j in range(count):
-            is_short = (
-                is_short and abs(values[Point.SLIDE, j]) <= MAX_SHORT_PATH * points.trial[4, j]
-            )
-    if is_short:
-        advance_bonds(points.trial, values[Point.LOAD, :count], values[Point.SLIDE, :count])
+    is_constant = options.is_plain and not options.has_growth
+    is_advanced = is_constant and advance_plain_bonds(system)
     for j in range(count):
+        values[Point.TOTAL, j] += values[Point.SLIDE, j]
+    for j in range(count if options.has_loads or not is_advanced else 0):
         p = points.port[j]
         slide = values[Point.SLIDE, j]
-        values[Point.TOTAL, j] += slide
         if points.numbers[0, j] == Law.LIST:
             commit_list(system, j, h)
-        elif not is_short:
+        elif not is_advanced:
             v0 = ports.values[Port.VELOCITY, p]
             v1 = ports.values[Port.END_VELOCITY, p]
             step = Step(slide, h, v0, v1, 0.0)
@@ -710,13 +825,17 @@ def commit(system, h):
                 # A port that was at rest before stays at its place.
                 was_held = points.memory[0, j] == 0 and points.trial[0, j] == 0
                 ports.values[Port.FREE, p] = ports.values[Port.INCREMENT, p] if was_held else 0.0
-    for k in range(points.memory.shape[0]):
-        for j in range(count):
-            points.memory[k, j] = points.trial[k, j]
+    if system.totals[Total.SLIDES] == 0.0:
+        for k in range(points.memory.shape[0]):
+            for j in range(count):
+                points.memory[k, j] = points.trial[k, j]
+        if is_constant and not options.has_loads:
+            system.totals[Total.SLIDES] = find_steady_slide(system)
     system.totals[Total.IS_DIRTY] = 0.0
     for k in range(points.stiffness.size):
         shear = points.shear
         shear[Shear.VALUE, k] += shear[Shear.TRIAL, k]
+        shear[Shear.FIRST, k] = shear[Shear.EARLIER, k]
         shear[Shear.EARLIER, k] = shear[Shear.LAST, k]
         shear[Shear.LAST, k] = shear[Shear.TRIAL, k] / h
     for i in range(system.state.shape[1]):
@@ -726,7 +845,7 @@ def commit(system, h):
         n = system.state.shape[1] // 2
         up = project(ports.rows[heave], system.state[0, :n])
         turn = project(ports.rows[int(ports.contact[1])], system.state[0, :n])
-        slot = find_set(system.sets, int(system.totals[Total.SLOT]), -up, turn)
+        slot = normal.find_set(system.sets, int(system.totals[Total.SLOT]), -up, turn)
         system.totals[Total.SLOT] = slot
     if flank.size:
         rise = 2 * flank[Flank.SLOPE] * ports.values[Port.INCREMENT, 0] / h
@@ -741,7 +860,7 @@ def commit(system, h):
         rest_ports(system)
 
 
-@njit(**NJIT_KERNEL)
+@njit(**NJIT_INLINE)
 def commit_list(system, j, h):
     """Advance the list of a point; without shear of the pieces it moves at the velocities of its port."""
     points = system.points
@@ -756,16 +875,16 @@ def commit_list(system, j, h):
     else:
         values[Point.SPEED, j] = max(1.5 * speed - 0.5 * values[Point.LAST_SPEED, j], 0.0)
         values[Point.LAST_SPEED, j] = speed
-    if not advance_list(points.numbers, values, system.lists, j, v0, v1, h):
+    if not lists.advance_list(points.numbers, values, system.lists, j, v0, v1, h):
         system.totals[Total.IS_FULL] = 1.0
 
 
-@njit(**NJIT_KERNEL)
+@njit(**NJIT_INLINE)
 def read_point(system, j):
     """Return force, energy and stretch of a point under its load at the end of the last step."""
     points = system.points
     if points.numbers[0, j] == Law.LIST:
-        return read_list(points.numbers, system.lists, j)
+        return lists.read_list(points.numbers, system.lists, j)
     return read(points.numbers, points.memory, j, points.values[Point.END_LOAD, j])
 
 
@@ -778,7 +897,7 @@ def read_points(system, forces, stretch):
         stretch[j] = state.stretch
 
 
-@njit(**NJIT_KERNEL)
+@njit(**NJIT_CALL)
 def rest_ports(system):
     """Bring the ports of rigid points at rest back to their places and to rest, by the smallest change of the modes.
 
@@ -814,7 +933,7 @@ def rest_ports(system):
                 state[first + i] -= change
 
 
-@njit(**NJIT_KERNEL)
+@njit(**NJIT_INLINE)
 def try_step(system, level, row, begin, end, drive):
     """Advance by a step of a level; return False if it contains an event; without a contact set SLOT becomes -1.
 
@@ -830,31 +949,35 @@ def try_step(system, level, row, begin, end, drive):
     h = options.step / (1 << level)
     move_freely(system, level, drive, row, begin)
 
-    # The increments of the pieces are extrapolated from the last steps.
+    # Forces and increments of the pieces are extrapolated from the last steps by parabolas.
+    moves = system.ports.values
     for k in range(points.stiffness.size):
-        shear[Shear.TRIAL, k] = h * (2 * shear[Shear.LAST, k] - shear[Shear.EARLIER, k])
+        rate = 3 * (shear[Shear.LAST, k] - shear[Shear.EARLIER, k]) + shear[Shear.FIRST, k]
+        shear[Shear.TRIAL, k] = h * rate
+    if options.is_plain:
+        for p in range(moves.shape[1]):
+            force = moves[Port.FORCE, p]
+            moves[Port.FORCE, p] = 3 * (force - moves[Port.LAST, p]) + moves[Port.EARLIER, p]
+            moves[Port.EARLIER, p] = moves[Port.LAST, p]
+            moves[Port.LAST, p] = force
     if options.has_lists:
         for j in range(points.port.size):
             values[Point.TRIAL_SLIDE, j] = np.nan
             if points.stiffness.size == 0:
                 values[Point.SPEED, j] = system.ports.values[Port.VELOCITY, points.port[j]]
     is_solved = False
-    if options.has_loads:
-        if find_loads(system, row, end, False) < 0:
-            totals[Total.SLOT] = -1
-            return True
-        for _ in range(MAX_LOADS):
-            prepare_points(system, h)
-            is_solved = solve_forces(system, level, h)
-            change = find_loads(system, row, end, True)
+    for count in range(MAX_LOADS):
+        if options.has_loads:
+            change = find_loads(system, row, end, count > 0)
             if change < 0:
                 totals[Total.SLOT] = -1
                 return True
-            if change <= LOAD_RESIDUAL:
+            if count > 0 and change <= LOAD_RESIDUAL:
                 break
-    else:
         prepare_points(system, h)
         is_solved = solve_forces(system, level, h)
+        if not options.has_loads:
+            break
     write_trial(system, level)
     is_shortest = level == levels - 1
     if options.is_rigid and find_event(
@@ -874,7 +997,7 @@ def try_step(system, level, row, begin, end, drive):
     return True
 
 
-@njit(**NJIT_KERNEL)
+@njit(**NJIT_INLINE)
 def add_energies(system, h, drive):
     """Add the energies of a step from the state before it, in `state[1]`; integrals of velocities by Simpson's rule."""
     structure = system.structure
@@ -908,7 +1031,32 @@ def add_energies(system, h, drive):
     totals[Total.STORED] = max(totals[Total.STORED], 0.5 * mass * stored)
 
 
-@njit(**NJIT_KERNEL)
+@njit(**NJIT_CALL)
+def write_bond_sample(system, sample, first):
+    """Write force and slip of bonds on one port, and the sum of the weights of the points; return their energy."""
+    points = system.points
+    values = points.values
+    force = 0.0
+    energy = 0.0
+    slip = 0.0
+    total = 0.0
+    for j in range(points.port.size):
+        m = points.memory[1, j]
+        z = points.memory[2, j]
+        stiffness = points.numbers[1, j] / points.numbers[2, j]
+        weight = values[Point.END_LOAD, j] * points.numbers[1, j]
+        stretch = z / m if m > 0.0 else 0.0
+        force += stiffness * z
+        energy += 0.5 * stiffness * points.memory[3, j]
+        slip += weight * (values[Point.TOTAL, j] - stretch)
+        total += weight
+    sample[first] = force
+    sample[first + 1] = slip
+    system.ports.vector[0] = total
+    return energy
+
+
+@njit(**NJIT_INLINE)
 def write_sample(system, row, sample):
     """Write a sample of forces and energies at the present state."""
     ports = system.ports
@@ -934,7 +1082,9 @@ def write_sample(system, row, sample):
         ports.vector[p] = 0.0
     for k in range(points.stiffness.size):
         energy += 0.5 * points.stiffness[k] * points.shear[Shear.VALUE, k] ** 2
-    for j in range(points.port.size):
+    if system.options.is_plain:
+        energy += write_bond_sample(system, sample, first)
+    for j in range(0 if system.options.is_plain else points.port.size):
         p = points.port[j]
         load = points.values[Point.END_LOAD, j]
         state = read_point(system, j)
@@ -975,7 +1125,7 @@ def write_sample(system, row, sample):
     if heave >= 0:
         h = ports.values[Port.SLIDE, heave]
         t = ports.values[Port.SLIDE, int(ports.contact[1])]
-        contact = compute_energy(system.sets, int(totals[Total.SLOT]), h, t)
+        contact = normal.compute_energy(system.sets, int(totals[Total.SLOT]), h, t)
         reference = system.sets.reference
         sample[size + Sample.LOAD] = max(reference[REFERENCE_LOAD] - contact[1], 0.0)
         sample[size + Sample.MOMENT] = reference[REFERENCE_MOMENT] - contact[2]
@@ -1055,7 +1205,7 @@ def march(system, steps, samples):
     return steps, DONE
 
 
-@njit(**NJIT_KERNEL)
+@njit(**NJIT_INLINE)
 def add_work(system, sample, first_column, part):
     """Add the mean forces of a part of a step to a sample; return the friction work of this part [J]."""
     ports = system.ports

@@ -45,6 +45,7 @@ class Port(IntEnum):
     - HOLD: force that holds the port at rest [N]
     - SUM, BY_SLIDE, BY_VELOCITY: sums over the points of the port of their forces and of the slopes
     - BASE: force from which a line search starts [N]
+    - LAST, EARLIER: mean forces of the last step and of the step before it [N]
     """
 
     SLIDE = 0
@@ -59,23 +60,28 @@ class Port(IntEnum):
     BY_SLIDE = 9
     BY_VELOCITY = 10
     BASE = 11
+    LAST = 12
+    EARLIER = 13
 
 
 class Shear(IntEnum):
     """Rows of `Points.shear`.
 
     - VALUE: coordinates [m]
-    - LAST, EARLIER: their mean rates in the last step and in the step before it [m/s]
+    - LAST, EARLIER, FIRST: their mean rates in the last three steps [m/s], the last one first
     - TRIAL, BASE: increments of a trial step, and those from which a line search starts [m]
     - SCALE: factor that makes the residuals of the coordinates comparable with forces
+    - LARGEST: largest slide of a point per coordinate
     """
 
     VALUE = 0
     LAST = 1
     EARLIER = 2
-    TRIAL = 3
-    BASE = 4
-    SCALE = 5
+    FIRST = 3
+    TRIAL = 4
+    BASE = 5
+    SCALE = 6
+    LARGEST = 7
 
 
 class Flank(IntEnum):
@@ -116,6 +122,7 @@ class Total(IntEnum):
     - SLOT: slot of the contact set, -1 if none is found
     - IS_FULL: 1 if a list of bonds is full
     - IS_DIRTY: 1 if the trial memory differs from the memory
+    - SLIDES: direction in which all bonds slide steadily, so that their force does not change; 0 if they do not
     """
 
     WORK_IN = 0
@@ -129,6 +136,7 @@ class Total(IntEnum):
     SLOT = 8
     IS_FULL = 9
     IS_DIRTY = 10
+    SLIDES = 11
 
 
 class Sample(IntEnum):
@@ -185,20 +193,21 @@ class BondList(NamedTuple):
 class Points(NamedTuple):
     """Points with laws; m points, r shear coordinates of the pieces.
 
-    - port (m,): port on which the point acts
+    - port (m,), first (P + 1,): port on which the point acts, and first point of each port
     - node (m,): node whose force is the load of the point; -1 for a fraction `share` of the resultant, -2 for `share`
       times the pressure of the lower piece at the place of the point
     - share (m,): fraction of the resultant, factor of the pressure, or the load [N] where it is constant
     - numbers (k, m), memory, trial (l, m): see `return_maps_kernels`
     - values (13, m or number of nodes): see `Point`
     - shapes (r, m), stiffness (r,): slide of the points per coordinate, and stiffness [N/m] of the coordinates
-    - shear (6, r): see `Shear`
+    - shear (8, r): see `Shear`
     - is_spring (m,): whether the point is a spring, whose work is not friction
     - place (m,): position of the point at rest [m]
     - pressure (2, k): positions [m] and relative pressures of the lower piece, or (2, 0)
     """
 
     port: np.ndarray
+    first: np.ndarray
     node: np.ndarray
     share: np.ndarray
     numbers: np.ndarray
@@ -219,7 +228,7 @@ class Ports(NamedTuple):
     - rows (P, n): displacement of the ports per coordinate
     - compliance (levels, 2, P, P): decrease of displacement and velocity per constant force in a step
     - grip (P, P): decrease of the acceleration per force [1/kg]
-    - values (12, P): see `Port`
+    - values (14, P): see `Port`
     - matrix (P + r, P + r), vector, step (P + r,): Newton system and its solution
     - contact (11,): press workspace: numbers of the heave and pitch ports (-1 for none) and the results of `path_mean`
     """
@@ -261,7 +270,7 @@ class Options(NamedTuple):
     - damping: weight of the change of a shear increment
     - is_rigid, has_lists, has_loads, has_growth: whether points are rigid, have lists of bonds, loads that change, or
       bonds that grow
-    - is_plain: whether all points are bonds of constant length on one port
+    - is_plain: whether all points are bonds on one port
     """
 
     mass: float

@@ -43,7 +43,7 @@ from ..friction.bonds.point_kernels import (
     short_bond_mean,
     short_bond_step,
 )
-from ..friction.flags_kernels import NJIT_KERNEL
+from ..friction.flags_kernels import NJIT_CALL, NJIT_KERNEL
 
 SMALL_RATE = 1e-4  # rate times step below which series replace exponentials
 LIMIT_FRACTION = 1e-9  # smallest Stribeck limit relative to the static one, because z divides by it
@@ -129,7 +129,7 @@ class Relaxed(NamedTuple):
     mean: float
 
 
-@njit(**NJIT_KERNEL)
+@njit(**NJIT_CALL)
 def mean_force(numbers, memory, j, load, step):
     """Return the `MeanForce` of point j under a load over a `Step`; a COULOMB point has to slip."""
     law = numbers[0, j]
@@ -196,7 +196,7 @@ def _stretch(start, move, limit):
     return Relaxed(elastic, elastic * (start + end) * 0.5 + (1 - elastic) * end)
 
 
-@njit(**NJIT_KERNEL)
+@njit(**NJIT_CALL)
 def _mean_tanh(limit, speed, step):
     """Return the mean of f(v) = limit tanh(v/speed) over a step.
 
@@ -236,7 +236,7 @@ def _mean_tanh(limit, speed, step):
     return MeanForce(force, 0.0, tangent, limit * first, force - trapezoid)
 
 
-@njit(**NJIT_KERNEL)
+@njit(**NJIT_CALL)
 def _mean_lugre(numbers, stretch, j, load, step):
     """Return the stretch after a step, and the mean force of the LuGre law.
 
@@ -263,7 +263,7 @@ def _mean_lugre(numbers, stretch, j, load, step):
     return Relaxed(z, load * (numbers[1, j] * mean + damping))
 
 
-@njit(**NJIT_KERNEL)
+@njit(**NJIT_CALL)
 def _lugre_force(numbers, j, load, stretch, velocity):
     """Return the force of the LuGre law at a stretch and a velocity."""
     limit = _stribeck_limit(numbers, j, velocity)
@@ -279,7 +279,7 @@ def _stribeck_limit(numbers, j, velocity):
     return max(numbers[2, j] + rise, LIMIT_FRACTION * numbers[3, j])
 
 
-@njit(**NJIT_KERNEL)
+@njit(**NJIT_CALL)
 def _mean_spring(numbers, slide, j, dq):
     """Return the mean force over dq and its slope of a cubic or interlocking spring."""
     end = slide + dq
@@ -296,7 +296,7 @@ def _mean_spring(numbers, slide, j, dq):
     return force, (numbers[1, j] / turn * sin(turn * end) - force) / dq
 
 
-@njit(**NJIT_KERNEL)
+@njit(**NJIT_CALL)
 def _walk_bouc_wen(numbers, z, j, load, dq):
     """Return force and path-mean force of the Bouc-Wen law, whose z is advanced by Runge-Kutta steps.
 
@@ -373,7 +373,7 @@ def _first_loading(numbers, j, x):
     return Relaxed(force, area + numbers[1, j] * max(x - phi, 0.0))
 
 
-@njit(**NJIT_KERNEL)
+@njit(**NJIT_CALL)
 def _walk(numbers, memory, j, dq, commits):
     """Return force and mean force of parallel sliders over dq by Masing's and Madelung's rules.
 
@@ -450,7 +450,7 @@ def _walk(numbers, memory, j, dq, commits):
     return Relaxed(force, direction * area / abs(dq) if dq != 0 else force)
 
 
-@njit(**NJIT_KERNEL)
+@njit(**NJIT_CALL)
 def prepare(numbers, memory, j, step):
     """Set the bond length in the middle of a step from the velocity at its start (Strang splitting)."""
     if numbers[0, j] == Law.BONDS:
@@ -462,7 +462,7 @@ def prepare(numbers, memory, j, step):
         memory[4, j] = grow(memory[0, j], v, v, abs(v) * half, half, numbers[3:9, j])[0]
 
 
-@njit(**NJIT_KERNEL)
+@njit(**NJIT_CALL)
 def advance(numbers, memory, j, load, step):
     """Advance the memory of point j under a load over a `Step`."""
     law = numbers[0, j]
@@ -498,7 +498,7 @@ def advance(numbers, memory, j, load, step):
         memory[0, j] += dq
 
 
-@njit(**NJIT_KERNEL)
+@njit(**NJIT_CALL)
 def read(numbers, memory, j, load):
     """Return the `PointState` of point j under a load; a COULOMB point has the force of its slip."""
     law = numbers[0, j]
@@ -559,7 +559,7 @@ def slip_since_zero(numbers, memory, j, load, velocity):
     return slip if stretch > 0 else -slip
 
 
-@njit(**NJIT_KERNEL)
+@njit(**NJIT_CALL)
 def press(numbers, memory, j, before, after):
     """Change the load of point j at rest: elastic forces are cut at the new limit, new bonds form."""
     law = numbers[0, j]

@@ -5,9 +5,15 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .. import compiled
 from .contacts import Contact
-from .march import copy_system, enlarge_lists, make_snapshot, make_system, split_losses
+from .march import (
+    copy_system,
+    enlarge_lists,
+    load_kernels,
+    make_snapshot,
+    make_system,
+    split_losses,
+)
 from .march_kernels import LISTS_FULL
 from .march_rows import N_PORT_COLUMNS, Sample, Total
 
@@ -54,7 +60,7 @@ def follow(contact: Contact, time, slide, frames=(), say=None, report=None) -> S
     Missing
         If lists of bonds become too long.
     """
-    kernels = compiled.load("points.march_kernels", say)
+    kernels = load_kernels(contact, say)
     time = np.asarray(time, float)
     slide = np.asarray(slide, float)
     last = slide.size - 1
@@ -87,7 +93,7 @@ def follow(contact: Contact, time, slide, frames=(), say=None, report=None) -> S
         if end in frames:
             force, slip = samples[-1, Sample.PORTS : Sample.PORTS + 2]
             motion = (float(time[end]), float(slide[end]), 0.0, force, slip, 0.0, 0.0)
-            snapshots.append(make_snapshot(system, motion))
+            snapshots.append(make_snapshot(kernels, system, motion))
         if report is not None:
             report(end / last)
     return SlideMotion(

@@ -10,11 +10,10 @@ from time import perf_counter
 
 import numpy as np
 
-from ... import compiled
 from ...core import IntegratedMeasures
 from ...effects import law_has_trait
 from ...friction.record import make_law
-from ...points.march import march
+from ...points.march import load_kernels, march
 from ...response.ends import estimate_window_error
 from ...response.inside_steps import add_substep_samples
 from ...response.measures import compute_step_harmonic, peak_sampling_errors
@@ -60,7 +59,7 @@ def march_in_time(model, numerics, patch, frames: int = 0, say=None, progress=No
     begin = perf_counter()
     contact = make_contact(model, numerics, patch)
     reduced = perf_counter() - begin
-    compiled.load("points.march_kernels", say)
+    load_kernels(contact, say)
     prepare = {"reduce": reduced, "compiled_code": perf_counter() - begin - reduced}
     begin = perf_counter()
     # Strips that slide independently have no common shear stress, so no output frames are stored.

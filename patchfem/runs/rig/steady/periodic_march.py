@@ -10,7 +10,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .... import compiled
 from ....core import NotConverged, Outcome
 from ....effects import SINE_WAVEFORM
 from ....model.rig import DriveLevels
@@ -117,7 +116,7 @@ class MarchFinder(TracedCurve):
             SET_VALUED_SAMPLES if exact else START_STEPS
         )
         self.numerics = replace(numerics, cycles=1.0, window=1)
-        compiled.load("points.march_kernels", say)
+        engine.load_kernels(self.contact, say)
 
     def _march_to_periodic(self, drive, guess, steps: int):
         """Integrate until the motion is periodic; return the run and its change per period."""
