@@ -6,6 +6,7 @@ from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 from scipy.linalg import expm
 
 from .. import compiled
@@ -150,7 +151,10 @@ def make_responses(modes: ModalBasis, step: float, levels: int) -> np.ndarray:
     matrix[velocities, 2 * n] = -np.asarray(modes.base)
     matrix[2 * n, 2 * n + 1] = matrix[2 * n + 1, 2 * n + 2] = 1.0
     matrix[velocities, 2 * n + 3 :] = np.eye(n)
-    return np.array([expm(matrix * (step / 2**level))[: 2 * n] for level in range(levels)])
+    parts = [expm(matrix * (step / 2 ** (levels - 1)))]
+    for _ in range(levels - 1):
+        parts.append(parts[-1] @ parts[-1])
+    return np.array(parts[::-1])[:, : 2 * n]
 
 
 def make_system(
@@ -853,13 +857,22 @@ class Record:
         self.snapshots = list(snapshots)
 
         # Extremes and phasor of each cycle; a march that ends early has a part of a cycle.
+        output = samples[:, : n // 2] @ run.modes.output
+        speed = samples[:, n // 2 : n] @ run.modes.output
         steps = run.steps
-        for begin in range(0, max(count, 1), steps):
-            rows = samples[begin : min(begin + steps, count) + 1]
-            self.extremes.append(find_extremes(rows, run.modes, run.step))
-            wave = np.exp(-2j * np.pi * (first + begin + np.arange(len(rows) - 1)) / steps)
-            output = rows[:-1, : n // 2] @ run.modes.output
-            self.phasors.append(2 * (output @ wave) / max(len(rows) - 1, 1))
+        n_whole = count // steps
+        ends = [n_whole * steps] if n_whole else []
+        ends += [count] if count > n_whole * steps or not n_whole else []
+        begin = 0
+        for end in ends:
+            size = steps if end == n_whole * steps and n_whole else end - begin
+            cycles = sliding_window_view(output[begin : end + 1], size + 1)[:: max(size, 1)]
+            speeds = sliding_window_view(speed[begin : end + 1], size + 1)[:: max(size, 1)]
+            self.extremes += find_extremes(cycles, speeds, run.step)
+            angle = 2 * np.pi * ((first + begin + np.arange(size)) % steps) / steps
+            parts = cycles[:, :-1] @ np.stack([np.cos(angle), -np.sin(angle)], axis=1)
+            self.phasors += list(2 / max(size, 1) * (parts[:, 0] + 1j * parts[:, 1]))
+            begin = end
 
     def _keep(self, first: int, samples, sums) -> None:
         """Keep the samples of the window, and of earlier cycles those at equal distances; the last one follows later."""
@@ -921,25 +934,28 @@ class Record:
         )
 
 
-def find_extremes(samples, modes: ModalBasis, step: float) -> tuple[float, float]:
-    """Return the smallest and largest output of samples, those of the cubics between them included."""
-    n = modes.omega.size
-    q = samples[:, :n] @ modes.output
-    v = samples[:, n : 2 * n] @ modes.output
+def find_extremes(q, v, step: float) -> list[tuple[float, float]]:
+    """Return the smallest and largest of samples q (c, k) of each cycle, those of the cubics between them included.
+
+    `v` (c, k) are the velocities, `step` [s] the distance of the samples.
+    """
+    low = q.min(axis=1)
+    high = q.max(axis=1)
     # A change of sign within round-off, as at a stop, is no reversal: the cubic would overshoot there.
-    turn = np.flatnonzero(v[:-1] * v[1:] < -1e-12 * np.max(v**2, initial=0.0))
-    if not turn.size:
-        return float(q.min()), float(q.max())
+    limit = -1e-12 * (v**2).max(axis=1, keepdims=True)
+    row, turn = np.nonzero(v[:, :-1] * v[:, 1:] < limit)
     # The velocity is the parabola with the mean of the increment.
-    first = v[turn]
-    last = v[turn + 1]
-    mean = (q[turn + 1] - q[turn]) / step
+    first = v[row, turn]
+    last = v[row, turn + 1]
+    mean = (q[row, turn + 1] - q[row, turn]) / step
     square = 3 * (first + last) - 6 * mean
     linear = 6 * mean - 4 * first - 2 * last
     root = np.sqrt(np.maximum(linear**2 - 4 * square * first, 0.0))
     x = np.clip(2 * first / (-linear + np.copysign(root, first - last)), 0.0, 1.0)
-    peaks = q[turn] + step * x * (first + x * (linear / 2 + x * square / 3))
-    return float(min(q.min(), peaks.min())), float(max(q.max(), peaks.max()))
+    peaks = q[row, turn] + step * x * (first + x * (linear / 2 + x * square / 3))
+    np.minimum.at(low, row, peaks)
+    np.maximum.at(high, row, peaks)
+    return list(zip(low.tolist(), high.tolist()))
 
 
 def make_response(run: March, rows, numbers, energies) -> Response:

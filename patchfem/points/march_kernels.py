@@ -92,6 +92,47 @@ def solve_linear(matrix, vector, n):
     return True
 
 
+@njit(**NJIT_CALL)
+def subtract_shear(slides, shapes, increments):
+    """Subtract the displacements of the pieces from the slides (m,) of the points, four coordinates in one pass."""
+    r = increments.size
+    whole = r - r % 4
+    for k in range(0, whole, 4):
+        first = increments[k]
+        second = increments[k + 1]
+        third = increments[k + 2]
+        fourth = increments[k + 3]
+        for j in range(slides.size):
+            slides[j] -= (
+                shapes[k, j] * first
+                + shapes[k + 1, j] * second
+                + shapes[k + 2, j] * third
+                + shapes[k + 3, j] * fourth
+            )
+    for k in range(whole, r):
+        part = increments[k]
+        for j in range(slides.size):
+            slides[j] -= shapes[k, j] * part
+
+
+@njit(**NJIT_CALL)
+def sum_products(first, second):
+    """Return the sum of the products of the entries of two arrays."""
+    total = 0.0
+    for j in range(second.size):
+        total += first[j] * second[j]
+    return total
+
+
+@njit(**NJIT_CALL)
+def sum_triples(first, second, third):
+    """Return the sum of the products of the entries of three arrays."""
+    total = 0.0
+    for j in range(third.size):
+        total += first[j] * second[j] * third[j]
+    return total
+
+
 @njit(**NJIT_INLINE)
 def project(row, state):
     """Return the displacement of a port."""
@@ -196,10 +237,8 @@ def write_forces(system, level, h):
         slide *= flank[Flank.RATIO] if flank.size and p == 0 else 1.0
         for j in range(points.first[p], points.first[p + 1]):
             values[Point.SLIDE, j] = slide
-    for k in range(points.stiffness.size):
-        increment = points.shear[Shear.TRIAL, k]
-        for j in range(count):
-            values[Point.SLIDE, j] -= points.shapes[k, j] * increment
+    if points.stiffness.size:
+        subtract_shear(values[Point.SLIDE, :count], points.shapes, points.shear[Shear.TRIAL])
 
     if not (system.options.is_plain and write_bond_forces(system)):
         write_point_forces(system, level, h)
@@ -365,13 +404,13 @@ def write_residual(system, level, h):
     # kappa (b + db/2) = shapes^T f, with a damped change of db.
     shear = points.shear
     damping = system.options.damping
+    forces = points.values[Point.FORCE, : points.port.size]
     for k in range(points.stiffness.size):
         increment = shear[Shear.TRIAL, k]
         change = increment - h * shear[Shear.LAST, k]
         residual = points.stiffness[k] * (shear[Shear.VALUE, k] + 0.5 * increment)
         residual += damping * points.stiffness[k] * change
-        for j in range(points.port.size):
-            residual -= points.shapes[k, j] * points.values[Point.FORCE, j]
+        residual -= sum_products(points.shapes[k], forces)
         vector[n_ports + k] = residual
         largest = max(largest, abs(residual) * shear[Shear.SCALE, k] / tolerance)
     return largest
@@ -407,17 +446,14 @@ def write_matrix(system, level):
                 matrix[p, k] -= change + ports.contact[8 + 2 * i] * compliance[0, pitch, k]
 
     # All points that share shear coordinates act on the port of the first one.
+    slopes = points.values[Point.BY_SLIDE, :n_points]
     for k in range(points.stiffness.size):
         row = n_ports + k
         p = points.port[0]
         ratio = system.flank[Flank.RATIO] if system.flank.size and p == 0 else 1.0
-        slope = 0.0
-        for j in range(n_points):
-            slope += points.shapes[k, j] * points.values[Point.BY_SLIDE, j]
+        slope = sum_products(points.shapes[k], slopes)
         for l in range(k + 1):
-            total = 0.0
-            for j in range(n_points):
-                total += points.shapes[k, j] * points.shapes[l, j] * points.values[Point.BY_SLIDE, j]
+            total = sum_triples(points.shapes[k], points.shapes[l], slopes)
             matrix[row, n_ports + l] = matrix[n_ports + l, row] = total
         matrix[row, row] += points.stiffness[k] * (0.5 + system.options.damping)
         matrix[p, row] = -ratio * slope

@@ -577,7 +577,7 @@ def press(numbers, memory, j, before, after):
         memory[0, j] *= after / before if before > 0 else 0.0
 
 
-@njit(**NJIT_KERNEL)
+@njit(**NJIT_CALL)
 def write_bond_means(numbers, memory, loads, slides, forces, slopes):
     """Write mean forces (m,) and slopes of points with bonds, in a loop that vectorises; return False for long slides."""
     for j in range(slides.size):
@@ -591,7 +591,7 @@ def write_bond_means(numbers, memory, loads, slides, forces, slopes):
     return True
 
 
-@njit(**NJIT_KERNEL)
+@njit(**NJIT_CALL)
 def advance_bonds(memory, loads, slides):
     """Advance points with bonds of constant length after short slides (m,)."""
     for j in range(slides.size):
