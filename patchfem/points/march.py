@@ -6,6 +6,7 @@ from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
+from numpy.polynomial.legendre import leggauss
 from numpy.lib.stride_tricks import sliding_window_view
 from scipy.linalg import expm
 
@@ -45,6 +46,8 @@ from .march_rows import (
 )
 from .return_maps_kernels import Law
 
+MAX_ANGLE = 0.5  # largest phase of the fastest mode in the step of a matrix exponential [rad]
+N_GAUSS = 8  # Gauss points of the integrals over that step
 RIGID_LEVELS = 12  # lengths of the steps with rigid points: whole steps and eleven halvings
 LEVELS = 4  # lengths of other steps, which are halved if they do not converge
 # Weights of the change of a shear increment for points under changing loads, and for lists, whose forces jump
@@ -108,6 +111,7 @@ class Motion:
     - cycles_done: number of cycles
     - snapshots: states at the ends of equal parts of the last cycle
     - end: the march at its end, from which another one can go on
+    - log, events: None and 0, because a march has no list of events
     """
 
     response: Response
@@ -122,6 +126,8 @@ class Motion:
     cycles_done: float
     snapshots: list
     end: "March"
+    log: None = None
+    events: int = 0
 
 
 def load_kernels(contact: Contact, say=None):
@@ -137,8 +143,16 @@ def load_kernels(contact: Contact, say=None):
 # ---- arrays of a march
 
 
-def make_responses(modes: ModalBasis, step: float, levels: int) -> np.ndarray:
-    """Return the motion at the end of steps of several lengths, see `march_rows.Structure`.
+class Responses(NamedTuple):
+    """Motion, viscous loss and work of the drive in steps of several lengths, see `march_rows.Structure`."""
+
+    motion: np.ndarray
+    loss: np.ndarray
+    work: np.ndarray
+
+
+def make_responses(modes: ModalBasis, step: float, levels: int) -> Responses:
+    """Return motion and energies of steps of several lengths.
 
     The matrix exponential is that of the modes with the chain of derivatives of the drive and with constant forces.
     """
@@ -151,10 +165,31 @@ def make_responses(modes: ModalBasis, step: float, levels: int) -> np.ndarray:
     matrix[velocities, 2 * n] = -np.asarray(modes.base)
     matrix[2 * n, 2 * n + 1] = matrix[2 * n + 1, 2 * n + 2] = 1.0
     matrix[velocities, 2 * n + 3 :] = np.eye(n)
-    parts = [expm(matrix * (step / 2 ** (levels - 1)))]
-    for _ in range(levels - 1):
-        parts.append(parts[-1] @ parts[-1])
-    return np.array(parts[::-1])[:, : 2 * n]
+
+    # The short step of the first exponential resolves the fastest mode; a step is doubled by the square of its matrix,
+    # and an integral of x(t)^T form x(t) by that of both halves.
+    fastest = float(modes.omega.max(initial=0.0)) * step
+    n_halvings = max(levels - 1, int(np.ceil(np.log2(max(fastest / MAX_ANGLE, 1e-300)))))
+    short = step / 2**n_halvings
+    nodes, weights = leggauss(N_GAUSS)
+    times = 0.5 * short * (1 + nodes)
+    loss = np.zeros_like(matrix)
+    loss[velocities, velocities] = modes.mass * modes.damping_matrix
+    work = np.zeros_like(matrix)
+    work[2 * n, velocities] = -modes.mass * np.asarray(modes.base)
+    inside = expm(matrix * times[:, None, None])
+    forms = [
+        np.einsum("g,gki,kl,glj->ij", 0.5 * short * weights, inside, form, inside, optimize=True)
+        for form in (loss, work)
+    ]
+    whole = expm(matrix * short)
+    parts = []
+    for k in range(n_halvings + 1):
+        if k > n_halvings - levels:
+            parts.append((whole[: 2 * n], forms[0], forms[1][2 * n : 2 * n + 3]))
+        forms = [form + whole.T @ form @ whole for form in forms]
+        whole = whole @ whole
+    return Responses(*(np.array(part) for part in zip(*parts[::-1])))
 
 
 def make_system(
@@ -180,19 +215,19 @@ def make_system(
     if contact.sets is not None:
         press[:2] = len(rows), len(rows) + 1
         rows += [np.asarray(contact.heave, float), np.asarray(contact.pitch, float)]
-    rows = np.array(rows).reshape(-1, n)
+    rows = np.array(rows, float).reshape(len(rows), n)
     laws = {law.numbers[0] for one in contact.point_sets for law in one.laws}
     levels = RIGID_LEVELS if Law.COULOMB in laws else LEVELS
     mass = 1.0 if modes is None else float(modes.mass)
     if modes is None:
-        responses = np.zeros((levels, 0, 3))
+        responses = Responses(*(np.zeros((levels, k, 3)) for k in (0, 3, 3)))
         shape = np.zeros((3, 0))
         damping = np.zeros((0, 0))
     else:
         responses = make_responses(modes, step, levels)
         shape = np.array([modes.omega**2, modes.base, modes.output], float)
         damping = np.array(modes.damping_matrix, float)
-    by_force = responses[:, :, 2 * n + 3 :]
+    by_force = responses.motion[:, :, 2 * n + 3 :]
     compliance = [[rows @ part[:n] @ rows.T, rows @ part[n:] @ rows.T] for part in by_force]
     points = _make_points(contact, 0 if contact.sets is None else contact.sets.x.size)
     lists = _make_lists(contact, points)
@@ -210,7 +245,10 @@ def make_system(
         np.zeros(size),
         press,
     )
-    structure = Structure(responses, shape, damping, np.zeros((1, 3)), np.zeros(0), np.zeros(0))
+    size = 3 * n + 3
+    structure = Structure(
+        *responses, shape, damping, np.zeros((1, 3)), np.zeros(0), np.zeros(0), np.zeros(size)
+    )
     has_lists = Law.LIST in laws
     damped = LIST_DAMPING if has_lists else LOAD_DAMPING if contact.has_loads else 0.0
     options = Options(
@@ -219,11 +257,11 @@ def make_system(
         float(travel),
         max(float(contact.limit), 1e-300),
         damped,
-        Law.COULOMB in laws,
-        has_lists,
-        contact.has_loads,
-        bool(((points.numbers[0] == Law.BONDS) & (points.numbers[3] >= 0)).any()),
-        laws == {Law.BONDS} and len(contact.point_sets) == 1,
+        int(Law.COULOMB in laws),
+        int(has_lists),
+        int(contact.has_loads),
+        int(((points.numbers[0] == Law.BONDS) & (points.numbers[3] >= 0)).any()),
+        int(laws == {Law.BONDS} and len(contact.point_sets) == 1),
     )
     sets = _make_no_sets() if contact.sets is None else contact.sets.make_arrays()
     flank = _make_flank(contact)
@@ -486,7 +524,10 @@ class March:
             no_modes = system.structure._replace(
                 path=path,
                 drive=np.zeros((2, 3)),
-                responses=system.structure.responses[:, :0],
+                responses=np.zeros((len(system.structure.responses), 0, 3)),
+                loss=np.zeros((len(system.structure.responses), 3, 3)),
+                work=np.zeros((len(system.structure.responses), 3, 3)),
+                inputs=np.zeros(3),
                 modes=np.zeros((3, 0)),
                 damping=np.zeros((0, 0)),
             )
@@ -847,7 +888,9 @@ class Record:
         n = 2 * run.modes.omega.size
         count = len(samples) - 1
         losses = split_losses(samples, n, run.system.options.scale)
-        parts = [samples[:-1, n + Sample.WORK], np.maximum(losses, 0), np.maximum(-losses, 0)]
+        # Rigid friction stores nothing; a loss below 0 takes back what the step before lost too much.
+        created = np.maximum(-losses, 0) * (1 - run.system.options.is_rigid)
+        parts = [samples[:-1, n + Sample.WORK], losses + created, created]
         sums = self.totals[:, None] + np.concatenate(
             [np.zeros((3, 1)), np.cumsum(parts, axis=1)], axis=1
         )

@@ -892,8 +892,11 @@ def commit(system, h):
         flank[Flank.FORCE] = 0.0
         for j in range(count):
             flank[Flank.FORCE] += read_point(system, j).force
+    system.totals[Total.REST] = 0.0
     if options.is_rigid:
+        before = find_modal_energy(system)
         rest_ports(system)
+        system.totals[Total.REST] = find_modal_energy(system) - before
 
 
 @njit(**NJIT_INLINE)
@@ -931,6 +934,17 @@ def read_points(system, forces, stretch):
         state = read_point(system, j)
         forces[j] = state.force
         stretch[j] = state.stretch
+
+
+@njit(**NJIT_CALL)
+def find_modal_energy(system):
+    """Return the energy of the modes [J]."""
+    state = system.state[0]
+    n = state.size // 2
+    energy = 0.0
+    for i in range(n):
+        energy += state[n + i] ** 2 + system.structure.modes[0, i] * state[i] ** 2
+    return 0.5 * system.options.mass * energy
 
 
 @njit(**NJIT_CALL)
@@ -1029,41 +1043,42 @@ def try_step(system, level, row, begin, end, drive):
     for i in range(system.state.shape[1]):
         system.state[1, i] = system.state[0, i]
     commit(system, h)
-    add_energies(system, h, drive)
+    add_energies(system, level, drive)
     return True
 
 
 @njit(**NJIT_INLINE)
-def add_energies(system, h, drive):
-    """Add the energies of a step from the state before it, in `state[1]`; integrals of velocities by Simpson's rule."""
+def add_energies(system, level, drive):
+    """Add the energies of a step from the state before it, in `state[1]`."""
     structure = system.structure
     totals = system.totals
-    before = system.state[1]
+    ports = system.ports
+    inputs = structure.inputs
     after = system.state[0]
-    n = after.size // 2
+    size = after.size
+    n = size // 2
     mass = system.options.mass
-    middle_drive = drive[0] + 0.5 * h * (drive[1] + 0.25 * h * drive[2])
-    end_drive = drive[0] + h * (drive[1] + 0.5 * h * drive[2])
-    work = 0.0
-    loss = 0.0
     stored = 0.0
+    for i in range(size):
+        inputs[i] = system.state[1, i]
     for i in range(n):
-        start = before[n + i]
-        end = after[n + i]
-        middle = 1.5 * (after[i] - before[i]) / h - 0.25 * (start + end)
-        work -= structure.modes[1, i] * (
-            drive[0] * start + 4 * middle_drive * middle + end_drive * end
-        )
-        for k in range(n):
-            if structure.damping[i, k] != 0.0:
-                other = 1.5 * (after[k] - before[k]) / h - 0.25 * (before[n + k] + after[n + k])
-                squares = start * before[n + k] + 4 * middle * other + end * after[n + k]
-                loss += structure.damping[i, k] * squares
-        stored += end * end + structure.modes[0, i] * after[i] * after[i]
-    work *= mass * h / 6
+        stored += after[n + i] * after[n + i] + structure.modes[0, i] * after[i] * after[i]
+        force = 0.0
+        for p in range(ports.rows.shape[0]):
+            force -= ports.rows[p, i] * ports.values[Port.FORCE, p]
+        inputs[size + 3 + i] = force / mass
+    inputs[size] = drive[0]
+    inputs[size + 1] = drive[1]
+    inputs[size + 2] = drive[2]
+    work = 0.0
+    for i in range(3):
+        work += drive[i] * sum_products(structure.work[level, i], inputs)
+    loss = 0.0
+    for i in range(inputs.size):
+        loss += inputs[i] * sum_products(structure.loss[level, i], inputs)
     totals[Total.WORK_IN] += work
     totals[Total.POWER] += abs(work)
-    totals[Total.VISCOUS] += mass * h / 6 * loss
+    totals[Total.VISCOUS] += loss
     totals[Total.STORED] = max(totals[Total.STORED], 0.5 * mass * stored)
 
 
@@ -1246,7 +1261,7 @@ def add_work(system, sample, first_column, part):
     """Add the mean forces of a part of a step to a sample; return the friction work of this part [J]."""
     ports = system.ports
     points = system.points
-    work = 0.0
+    work = -system.totals[Total.REST]
     for j in range(points.port.size):
         if points.is_spring[j]:
             continue
@@ -1255,7 +1270,6 @@ def add_work(system, sample, first_column, part):
         slide = ports.values[Port.INCREMENT, p]
         if points.numbers[0, j] == Law.COULOMB:
             force = ports.values[Port.FORCE, p]
-            slide -= ports.values[Port.FREE, p]
         if system.flank.size and p == 0:
             force *= system.flank[Flank.RATIO]
         work += force * slide

@@ -123,6 +123,7 @@ class Total(IntEnum):
     - IS_FULL: 1 if a list of bonds is full
     - IS_DIRTY: 1 if the trial memory differs from the memory
     - SLIDES: direction in which all bonds slide steadily, so that their force does not change; 0 if they do not
+    - REST: energy that the modes gained as ports at rest were brought back in the last step [J]
     """
 
     WORK_IN = 0
@@ -137,6 +138,7 @@ class Total(IntEnum):
     IS_FULL = 9
     IS_DIRTY = 10
     SLIDES = 11
+    REST = 12
 
 
 class Sample(IntEnum):
@@ -246,20 +248,27 @@ class Ports(NamedTuple):
 class Structure(NamedTuple):
     """Modes in steps of several lengths.
 
-    - responses (levels, 2 n, 3 n + 3): motion at the end of a step per state, parabola of the drive and constant modal force
+    - responses (levels, 2 n, N): motion at the end of a step per state, parabola of the drive and constant modal force over
+      mass, N = 3 n + 3
+    - loss (levels, N, N), work (levels, 3, N): viscous loss [J] as a quadratic form of these inputs, and work of the drive
+      as a bilinear form of the parabola and the inputs
     - modes (3, n): squared frequencies, participations of drive and output
     - damping (n, n): [1/s]
     - drive (s, 3): value, slope and second derivative of the drive at the start of every step
     - loads (s + 1,): prescribed load [N] at the steps, or (0,)
     - path (s + 1,): prescribed displacement [m] of port 0 at the steps, or (0,)
+    - inputs (N,): workspace
     """
 
     responses: np.ndarray
+    loss: np.ndarray
+    work: np.ndarray
     modes: np.ndarray
     damping: np.ndarray
     drive: np.ndarray
     loads: np.ndarray
     path: np.ndarray
+    inputs: np.ndarray
 
 
 class Options(NamedTuple):
@@ -268,9 +277,9 @@ class Options(NamedTuple):
     - mass [kg], step [s], travel [m]: modal mass, duration of a step, largest output
     - scale: force [N] to whose 1e-11 part a step is solved
     - damping: weight of the change of a shear increment
-    - is_rigid, has_lists, has_loads, has_growth: whether points are rigid, have lists of bonds, loads that change, or
+    - is_rigid, has_lists, has_loads, has_growth: 1 if points are rigid, have lists of bonds, loads that change, or
       bonds that grow
-    - is_plain: whether all points are bonds on one port
+    - is_plain: 1 if all points are bonds on one port
     """
 
     mass: float
@@ -278,11 +287,11 @@ class Options(NamedTuple):
     travel: float
     scale: float
     damping: float
-    is_rigid: bool
-    has_lists: bool
-    has_loads: bool
-    has_growth: bool
-    is_plain: bool
+    is_rigid: int
+    has_lists: int
+    has_loads: int
+    has_growth: int
+    is_plain: int
 
 
 class System(NamedTuple):

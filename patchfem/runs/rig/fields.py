@@ -52,7 +52,7 @@ def collect_interface_fields(model, numerics, patch, solution) -> dict:
         return make_interface_frames(patch, window.time[at], tau, slip, window.slide[at])
 
     snapshots = solution.snapshots
-    reduction = solution.contact.reduction
+    reduction = getattr(solution.contact, "reduction", None)
     is_march = isinstance(snapshots[0], Snapshot)
     if not is_march:
         snapshots = [SimpleNamespace(**one) for one in snapshots]

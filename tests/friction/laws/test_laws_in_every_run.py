@@ -11,7 +11,6 @@ from law_runs import (
     run_two_masses_uncompiled,
     shrinking_sine,
 )
-from march_paths import share_one_loop
 from scene_texts import COATED, DRIVE, MODE, get_only_mistake, list_mistakes
 
 from patchfem import load
@@ -73,10 +72,8 @@ def test_exact_released_bonds_agree_in_both_engines(extra_keys):
 @pytest.mark.parametrize(
     "law", [IWAN, BOUC_WEN.format(2.0, 0.7), DAMPED], ids=["iwan", "bouc-wen", "lugre"]
 )
-def test_exact_two_equal_interfaces_move_equally(law, monkeypatch):
+def test_exact_two_equal_interfaces_move_equally(law):
     """Two equal interfaces have the relative displacement of a single interface."""
-    if law == IWAN:
-        share_one_loop(monkeypatch)
     two_masses = run_two_masses(law, 2)
     slides = two_masses.response.extra["slides"]
     single_slide = run_two_masses(law, 1).response.slide

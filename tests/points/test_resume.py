@@ -12,7 +12,6 @@ import pytest
 import xarray as xr
 from command_line import run_cli
 from limits import limit_file_size
-from march_paths import share_one_loop
 from scene_texts import (
     BENCH,
     COATED,
@@ -99,7 +98,6 @@ def assert_same_results(first, second) -> None:
 def test_exact_resumed_run_equals_uninterrupted_run(tmp_path, save_counter, kind, monkeypatch):
     """A run that is interrupted four times and resumed gives the same result file as an
     uninterrupted run, and leaves no state file."""
-    share_one_loop(monkeypatch)
     scene = tmp_path / "scene.toml"
     scene.write_text(RIGS[kind], "utf-8")
     command = ("run", scene, "--no-page", "-o")
