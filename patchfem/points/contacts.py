@@ -262,7 +262,9 @@ def make_pressed_contact(
     if name in ("coulomb", "tanh"):
         kinetic = law.static if law.kinetic is None else law.kinetic
         make = make_coulomb if name == "coulomb" else make_tanh
-        laws = [make(law.static, kinetic if name == "coulomb" else law.reference_speed, loads.sum())]
+        laws = [
+            make(law.static, kinetic if name == "coulomb" else law.reference_speed, loads.sum())
+        ]
         nodes = None
     elif name != "bonds":
         length = law.bond_length or 0.0

@@ -6,8 +6,8 @@ from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
-from numpy.polynomial.legendre import leggauss
 from numpy.lib.stride_tricks import sliding_window_view
+from numpy.polynomial.legendre import leggauss
 from scipy.linalg import expm
 
 from .. import compiled
@@ -19,7 +19,7 @@ from ..friction.bonds.list_rows_kernels import N_ROWS, STATUS
 from ..friction.laws.stretch import growth_numbers
 from ..friction.path_work import sampled_work
 from . import checkpoint
-from .contacts import LOWER, RESULTANT, Contact
+from .contacts import RESULTANT, Contact
 from .laws import N_MEMORY, N_NUMBERS
 from .march_kernels import (
     DONE,
@@ -66,7 +66,9 @@ MAX_STEPS_AT_ONCE = 8000
 SAME_CYCLE = 1e-11
 N_KEPT = 128  # samples per cycle of the histories before the window
 EDGE = 1e-9  # distance of the samples of a drive from the ends of a step, in steps
-RUNAWAY = 10.0  # output relative to the travel of a softening spring beyond which a step has diverged
+RUNAWAY = (
+    10.0  # output relative to the travel of a softening spring beyond which a step has diverged
+)
 # Sums that a repeated cycle continues
 REPEATED = [Total.WORK_IN, Total.POWER, Total.VISCOUS, Total.FRICTION]
 PRESS_COLUMNS = ("normal_load", "normal_moment", "normal_energy", "heave", "turn")
@@ -193,7 +195,11 @@ def make_responses(modes: ModalBasis, step: float, levels: int) -> Responses:
 
 
 def make_system(
-    contact: Contact, step: float, modes: ModalBasis | None = None, travel: float = np.inf, start=None
+    contact: Contact,
+    step: float,
+    modes: ModalBasis | None = None,
+    travel: float = np.inf,
+    start=None,
 ) -> System:
     """Return the arrays of a rig or of a prescribed slide at its start, without the drive.
 
@@ -209,7 +215,9 @@ def make_system(
     start : core.InitialState, optional
     """
     n = 0 if modes is None else modes.omega.size
-    rows = [np.zeros(n) if modes is None else np.asarray(one.row, float) for one in contact.point_sets]
+    rows = [
+        np.zeros(n) if modes is None else np.asarray(one.row, float) for one in contact.point_sets
+    ]
     press = np.zeros(11)
     press[:2] = -1.0
     if contact.sets is not None:
@@ -230,7 +238,7 @@ def make_system(
     by_force = responses.motion[:, :, 2 * n + 3 :]
     compliance = [[rows @ part[:n] @ rows.T, rows @ part[n:] @ rows.T] for part in by_force]
     points = _make_points(contact, 0 if contact.sets is None else contact.sets.x.size)
-    lists = _make_lists(contact, points)
+    lists = _make_lists(contact, points, modes is None)
     state = np.zeros((3, 2 * n))
     if start is not None:
         state[0] = [*start.z, *start.v]
@@ -328,12 +336,14 @@ def _make_points(contact: Contact, n_nodes: int) -> Points:
     )
 
 
-def _make_lists(contact: Contact, points: Points) -> Lists:
+def _make_lists(contact: Contact, points: Points, is_prescribed: bool) -> Lists:
     """Return the arrays of the lists of bonds; empty ones without lists."""
     count = points.port.size
     if contact.bond_sum is None:
         empty = np.zeros(0)
-        return Lists(np.zeros((N_ROWS, 0)), np.zeros((count, 6)), np.zeros((count, 16)), *[empty] * 3)
+        return Lists(
+            np.zeros((N_ROWS, 0)), np.zeros((count, 6)), np.zeros((count, 16)), *[empty] * 3
+        )
     bonds, reach, merge = contact.bond_sum
     capacity = list_numbers.list_capacity(bonds, reach, merge)
     if count > 1:
@@ -344,8 +354,8 @@ def _make_lists(contact: Contact, points: Points) -> Lists:
     start = np.zeros(count)
     start[is_list] = points.values[Point.END_LOAD, :count][is_list] / points.numbers[3, is_list]
     statuses[:, STATUS.pressure] = statuses[:, STATUS.initial_pressure] = start
-    # The initial bonds of a single list have no width, so that it is exact along a prescribed slide.
-    width = FIRST_WIDTH if count > 1 or contact.has_loads else 0.0
+    # The initial bonds of a single list along a prescribed slide have no width, so that it is exact.
+    width = 0.0 if is_prescribed and count == 1 and not points.stiffness.size else FIRST_WIDTH
     return Lists(
         np.zeros((N_ROWS, count * capacity)),
         np.tile(list_numbers.make_path_state(bonds), (count, 1)),
@@ -446,7 +456,9 @@ class March:
       [J]
     """
 
-    def __init__(self, modes, drive, contact: Contact, steps: int, travel: float = np.inf, start=None):
+    def __init__(
+        self, modes, drive, contact: Contact, steps: int, travel: float = np.inf, start=None
+    ):
         self.modes = modes
         self.drive = drive
         self.contact = contact
@@ -609,9 +621,7 @@ class March:
             self.message = self.contact.grooves.describe_lift(self.done * self.step)
         elif status == NO_CONTACT_SET:
             self.outcome = Outcome.NOT_CONVERGED
-            self.message = (
-                f"at step {self.done} the method could not determine which points are in contact; {advice}"
-            )
+            self.message = f"at step {self.done} the method could not determine which points are in contact; {advice}"
         elif status != DONE:
             self.outcome = Outcome.NOT_CONVERGED
             self.message = (
@@ -652,7 +662,9 @@ class March:
         motion = float(row @ sample[:n]), float(row @ sample[n : 2 * n])
         ports = rest[Sample.PORTS :]
         place = self.done * self.step, *motion, ports[0], ports[1]
-        return make_snapshot(self.kernels, self.system, (*place, rest[Sample.HEAVE], rest[Sample.PITCH]))
+        return make_snapshot(
+            self.kernels, self.system, (*place, rest[Sample.HEAVE], rest[Sample.PITCH])
+        )
 
     def find_ledger(self, sample) -> dict:
         """Return energies [J] and counters by name at a sample of the present state."""
@@ -820,7 +832,9 @@ def march(
         record.add(*advance_with_frames(run, size, frames if is_last else 0))
         count = (n_steps - record.n_window - run.done) // size
         state = run.system.state[0]
-        memory = np.concatenate([run.system.points.memory.ravel(), run.system.points.shear[Shear.VALUE]])
+        memory = np.concatenate(
+            [run.system.points.memory.ravel(), run.system.points.shear[Shear.VALUE]]
+        )
         now = np.concatenate([state, memory])
         if can_repeat and count > 0 and before is not None and before.size == now.size:
             scale = np.concatenate([record.find_largest_state(), np.abs(memory)])
@@ -964,7 +978,9 @@ class Record:
         return Motion(
             response,
             response.select(in_window),
-            window_rows[:, n + Sample.PORTS + 2] if run.contact.point_sets else window_rows[:, 0] * 0,
+            window_rows[:, n + Sample.PORTS + 2]
+            if run.contact.point_sets
+            else window_rows[:, 0] * 0,
             float(window_rows[:, n + Sample.WORK].sum()),
             np.array(self.extremes),
             np.array(self.phasors),

@@ -43,7 +43,9 @@ from .return_maps_kernels import (
 )
 
 MAX_ITERATIONS = 200  # Newton iterations of a step
-STEADY_BONDS = 1e-13  # relative distance of bonds from those of an endless slide that counts as none
+STEADY_BONDS = (
+    1e-13  # relative distance of bonds from those of an endless slide that counts as none
+)
 LAST_STEP = 4e-6  # change of a slide in bond lengths, half the square of which is within RESIDUAL
 MAX_CUTS = 40  # trials of a line search
 MAX_OVERSHOOT = 0.5  # slope beyond the minimum of a line search, relative to that at its start
@@ -197,7 +199,7 @@ def prepare_points(system, h):
             values[Point.LOAD, j] = middle
             if points.numbers[0, j] == Law.LIST:
                 lists.press_list(points.numbers, system.lists, j, middle)
-            elif start != middle:
+            elif start != middle and points.node[j] != LOWER:
                 press(points.numbers, points.trial, j, start, middle)
         system.totals[Total.IS_DIRTY] = 1.0
     if options.has_growth:
@@ -688,7 +690,9 @@ def find_loads(system, row, fraction, is_solved):
             return -1.0
         normal.press_state(system.sets, slot, -h, t, values[Point.NODE_FORCE, : system.sets.x.size])
         resultant = max(
-            system.sets.reference[REFERENCE_LOAD] - normal.compute_energy(system.sets, slot, h, t)[1], 0.0
+            system.sets.reference[REFERENCE_LOAD]
+            - normal.compute_energy(system.sets, slot, h, t)[1],
+            0.0,
         )
     elif flank.size:
         if is_solved:
@@ -845,7 +849,11 @@ def commit(system, h):
             step = Step(slide, h, v0, v1, 0.0)
             advance(points.numbers, points.trial, j, values[Point.LOAD, j], step)
         if options.has_loads:
-            if points.numbers[0, j] != Law.LIST:
+            if points.node[j] == LOWER:
+                # Bonds keep the pressure under which they formed until their point leaves the pressed area.
+                if points.numbers[0, j] == Law.BONDS and values[Point.END_LOAD, j] <= 0.0:
+                    points.trial[1, j] = points.trial[2, j] = points.trial[3, j] = 0.0
+            elif points.numbers[0, j] != Law.LIST:
                 press(
                     points.numbers,
                     points.trial,

@@ -17,7 +17,9 @@ MAX_CYCLES = 600  # largest number of cycles
 # doubles.
 MAX_CHANGE_RATIO = 0.1
 PERIODIC_TOL = 1e-8  # largest relative change of the state per cycle of a periodic motion
-REST_RATIO = 1e-9  # largest motion that counts as rest, relative to that of a free mass under the drive
+REST_RATIO = (
+    1e-9  # largest motion that counts as rest, relative to that of a free mass under the drive
+)
 PERTURBATION_RATIO = 1e-6  # perturbation for the multipliers, relative to the largest state
 N_SETTLING_CYCLES = 2  # cycles in which the memory adapts to a perturbation
 N_PERTURBED_CYCLES = 8  # cycles after a perturbation

@@ -66,8 +66,12 @@ def follow(contact: Contact, time, slide, frames=(), say=None, report=None) -> S
     last = slide.size - 1
     system = make_system(contact, 1.0)
     steps = np.diff(time)
-    changes = 1 + np.flatnonzero(np.abs(np.diff(steps)) > SAME_STEP * np.minimum(steps[1:], steps[:-1]))
-    ends = np.unique(np.concatenate([np.arange(0, last, BLOCK), np.asarray(frames, int), changes, [last]]))
+    changes = 1 + np.flatnonzero(
+        np.abs(np.diff(steps)) > SAME_STEP * np.minimum(steps[1:], steps[:-1])
+    )
+    ends = np.unique(
+        np.concatenate([np.arange(0, last, BLOCK), np.asarray(frames, int), changes, [last]])
+    )
     width = Sample.PORTS + N_PORT_COLUMNS * len(contact.point_sets)
     rows = np.zeros((slide.size, width))
     snapshots = []
@@ -77,7 +81,9 @@ def follow(contact: Contact, time, slide, frames=(), say=None, report=None) -> S
             path=slide[begin : end + 1].copy(), drive=np.zeros((size + 1, 3))
         )
         if contact.load is not None:
-            structure = structure._replace(loads=np.asarray(contact.load(time[begin : end + 1]), float))
+            structure = structure._replace(
+                loads=np.asarray(contact.load(time[begin : end + 1]), float)
+            )
         step = float(time[end] - time[begin]) / size
         options = system.options._replace(step=step if step > 0 else 1.0)
         system = system._replace(structure=structure, options=options)

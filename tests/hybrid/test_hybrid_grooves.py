@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from grooves_reference import draw_case, flank_slope, integrate_case, sliding_forces
 from hybrid_cases import make_modes
+from patchfem.dynamics.grooves.climbing import check_lifted_mass
 from scipy.integrate import solve_ivp
 from scipy.special import ellipk
 
 from patchfem.core import PatchfemError
-from patchfem.dynamics.grooves.climbing import check_lifted_mass
 from patchfem.friction import Grooves
 from patchfem.hybrid import cases, drives, runs
 from patchfem.hybrid.laws import grooves as rigid

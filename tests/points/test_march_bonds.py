@@ -17,7 +17,7 @@ from patchfem.core import InitialState, Missing, Outcome, SineDrive
 from patchfem.friction import Bonds, FirstOrderBonds
 from patchfem.friction.bonds.recursion import advance_bonds
 from patchfem.points import march as engine
-from patchfem.points.contacts import BondSum, make_bond_contact
+from patchfem.points.contacts import BondSum, make_bond_contact, make_pressed_contact
 from patchfem.points.march import march
 from patchfem.response import energy_balance
 from patchfem.slip.shear_modes import shear_modes
@@ -37,7 +37,9 @@ def make_lists(law, force, shear=None, reach=25.0, merge=0.02, **options):
 def make_shear(shape, stiffness):
     """Return shear modes of points with given slides (m, r) per coordinate."""
     return SimpleNamespace(
-        shape=np.asarray(shape), stiffness=np.asarray(stiffness, float), points=np.arange(len(shape))
+        shape=np.asarray(shape),
+        stiffness=np.asarray(stiffness, float),
+        points=np.arange(len(shape)),
     )
 
 
@@ -64,7 +66,9 @@ def check_balance(found, path, rel=1e-12) -> None:
 # ---- prescribed paths
 
 
-@pytest.mark.parametrize("growth", [{}, {"ratio": 0.6, "rest_growth": 0.3, "slip_growth": 0.4, "rest_speed": 1e-2}])
+@pytest.mark.parametrize(
+    "growth", [{}, {"ratio": 0.6, "rest_growth": 0.3, "slip_growth": 0.4, "rest_speed": 1e-2}]
+)
 def test_exact_points_on_path_agree_with_recursion(growth):
     """Forces and energies of points along a prescribed path agree with the NumPy recursion within 1e-12."""
     law = Bonds(0.4, 1.0, initial=0.7, **growth)
@@ -301,17 +305,26 @@ def test_order_two_against_integrated_rate_equations(growth):
         q, v, z, eps = y
         grows = 0.0
         if growth:
-            grows = 10.0 / max(abs(v), 1e-3) * (length - eps) + abs(v) / 0.2e-6 * (0.7 * length - eps)
+            grows = 10.0 / max(abs(v), 1e-3) * (length - eps) + abs(v) / 0.2e-6 * (
+                0.7 * length - eps
+            )
         accel = -drive * np.sin(OMEGA * t) - 0.006 * OMEGA * v - OMEGA**2 * q - limit * z / length
         return [v, accel, v - abs(v) * z / eps, grows]
 
     period = 2 * np.pi / OMEGA
     times = np.linspace(0, 2 * period, 101)
     reference = solve_ivp(
-        find_rates, (0, times[-1]), [0, 0, 0, length], "LSODA", times, rtol=1e-11, atol=1e-19
+        find_rates,
+        (0, times[-1]),
+        [0, 0, 0, length],
+        "LSODA",
+        times,
+        rtol=1e-10,
+        atol=[1e-16, 1e-13, 1e-17, 1e-17],
+        max_step=period / 800,
     )
     errors = []
-    for steps in (200, 400, 800, 3200):
+    for steps in (100, 800, 6400):
         result = march(
             make_one_mode(OMEGA, 0.003, 1.0),
             SineDrive(drive, OMEGA),
@@ -322,8 +335,8 @@ def test_order_two_against_integrated_rate_equations(growth):
         )
         errors.append(np.abs(result.window.slide[:: steps // 50] - reference.y[0]).max() / length)
     assert (reference.y[3].min() < 0.701 * length) == bool(growth)
-    assert errors[0] > errors[1] > errors[3] and errors[3] < 1e-4
-    assert np.log2(errors[0] / errors[3]) / 4 == pytest.approx(2, abs=0.2)
+    assert errors[0] > errors[1] > errors[2] and errors[2] < 1e-4
+    assert np.log2(errors[0] / errors[2]) / 6 == pytest.approx(2, abs=0.15)
 
 
 def test_always_unresolved_pressure_waves_are_reported():
@@ -331,9 +344,7 @@ def test_always_unresolved_pressure_waves_are_reported():
     x = np.linspace(-30e-6, 30e-6, 1201)
     sigma = 1e6 * np.maximum(0.0, 0.3 + np.sin(x / 1e-6))
     area = np.full(1201, 1e-4 / 1201)
-    contact = make_bond_contact(
-        Bonds(0.4, 2e-6), area * 1e6, ROW, lower=np.stack([x, sigma / 1e6])
-    )
+    contact = make_bond_contact(Bonds(0.4, 2e-6), area * 1e6, ROW, lower=np.stack([x, sigma / 1e6]))
     drive = SineDrive(1.5 * 0.4 * area @ sigma, OMEGA)
     coarse, fine = (
         march(make_one_mode(OMEGA, 0.01, 1.0), drive, contact, 2, steps, window=2)
@@ -403,7 +414,9 @@ def test_exact_enlarged_list_equals_large_list(name, monkeypatch):
 def test_refuses_list_longer_than_limit(monkeypatch):
     """A list that exceeds the largest number of entries is refused with a message that names the key to change."""
     monkeypatch.setattr(engine, "MAX_STRIPS", 100)
-    with pytest.raises(Missing, match=r"grew beyond 100 entries \(0 MB\) at step \d+; raise accuracy.tail"):
+    with pytest.raises(
+        Missing, match=r"grew beyond 100 entries \(0 MB\) at step \d+; raise accuracy.tail"
+    ):
         march_list(GROWING_LISTS["stretch"], 40, monkeypatch)
 
 
@@ -419,10 +432,7 @@ def test_order_lists_under_prescribed_load(order, grows):
     def find_load(t):
         return np.maximum(60 + 70 * np.cos(2 * np.pi * 90 * np.asarray(t)), 0.0)
 
-    basis = make_modal_basis([OMEGA], 0.02, [1.0], [0.0])
     basis = make_modal_basis([OMEGA], 0.02)
-    from patchfem.points.contacts import make_pressed_contact
-
     slides = []
     for steps in (200, 400, 800, 1600):
         contact = make_pressed_contact(
@@ -435,4 +445,6 @@ def test_order_lists_under_prescribed_load(order, grows):
         assert (result.response.extra["normal_load"] == 0).sum() > 50
         slides.append(result.window.slide[:: steps // 200])
     changes = [np.abs(b - a).max() for a, b in pairwise(slides)]
-    assert changes[2] < changes[0] / 3 and changes[2] < 1e-3 * np.abs(slides[-1]).max()
+    # Bonds of order 0 have no stiffness, like Coulomb's law, so that the order is not two.
+    assert changes[2] < 1e-3 * np.abs(slides[-1]).max()
+    assert order == 0 or changes[2] < changes[0] / 3

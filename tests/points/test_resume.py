@@ -26,9 +26,9 @@ from scene_texts import (
     SECOND,
 )
 
-from patchfem.dynamics import checkpoint
-from patchfem.dynamics.march import run as march_run
 from patchfem.export.folder import is_state
+from patchfem.points import checkpoint
+from patchfem.points import march as march_run
 
 MARCH = '[accuracy]\nmethod = "march"\nsteps_per_cycle = 60\n'
 SHORT_DRIVE = DRIVE.replace("cycles = 30", "cycles = 16.3")
@@ -95,7 +95,7 @@ def assert_same_results(first, second) -> None:
     "kind",
     [pytest.param(kind, marks=[pytest.mark.slow] * (kind == "bonds that grow")) for kind in RIGS],
 )
-def test_exact_resumed_run_equals_uninterrupted_run(tmp_path, save_counter, kind, monkeypatch):
+def test_exact_resumed_run_equals_uninterrupted_run(tmp_path, save_counter, kind):
     """A run that is interrupted four times and resumed gives the same result file as an
     uninterrupted run, and leaves no state file."""
     scene = tmp_path / "scene.toml"
@@ -194,8 +194,8 @@ def test_exact_run_ended_by_signal_can_be_resumed(tmp_path, number):
     out = tmp_path / "out"
     scene.write_text(RIGS["one slide"].replace("cycles = 16.3", "cycles = 4000"), "utf-8")
     code = (
-        "from patchfem.dynamics import checkpoint as c; c.MIN_WRITE_INTERVAL = 0.05; c.MAX_WRITE_FRACTION = 1.0; "
-        "from patchfem.dynamics.march import run; run.PERIODIC_TOL = -1.0; "
+        "from patchfem.points import checkpoint as c; c.MIN_WRITE_INTERVAL = 0.05; c.MAX_WRITE_FRACTION = 1.0; "
+        "from patchfem.points import march; march.SAME_CYCLE = -1.0; "
         "from patchfem.__main__ import main; main()"
     )
     command = [sys.executable, "-c", code, "run", scene, "--no-page", "-q", "-o", out]

@@ -11,10 +11,10 @@ import re
 from itertools import product
 
 import pytest
+from patchfem.dynamics.march import march
 from scene_texts import COATED, DRIVE, MODE, SLIDE, get_only_mistake
 
 from patchfem import SceneError
-from patchfem.dynamics.march import march
 from patchfem.effects import LAWS
 from patchfem.runs.run import run
 from patchfem.scene import loads

@@ -4,12 +4,12 @@ import re
 from dataclasses import replace
 
 import pytest
+from patchfem.dynamics.march import march
 from self_checks import checks
 from self_checks.evidence import Evidence
 
 import patchfem as pf
 from patchfem.core import Outcome
-from patchfem.dynamics.march import march
 from patchfem.model import structure
 from patchfem.response import rows
 from patchfem.runs.bench import bench

@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 from modal_bases import make_modal_basis
+from patchfem.dynamics.march.march import march
 from scene_texts import MODE, PLASTIC, POINT
 from scipy.integrate import quad
 
 from patchfem import SceneError, plan, run
 from patchfem.core import InitialState, Outcome, SineDrive
 from patchfem.dynamics import coulomb_model, jenkins_model
-from patchfem.dynamics.march.march import march
 from patchfem.scene import loads
 from patchfem.structure import make_release
 from patchfem.structure.drives import SweepDrive, make_levels, make_step

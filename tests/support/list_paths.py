@@ -3,8 +3,8 @@
 from typing import NamedTuple
 
 import numpy as np
-
 from patchfem.dynamics.interfaces.arrays import BondList
+
 from patchfem.friction import (
     N_ROWS,
     STATUS,

@@ -177,9 +177,7 @@ def make_single_law(model: Model, numerics: Numerics, patch) -> SingleLaw:
         parts = jenkins_elements.strip_elements(patch, f.static, element.length)
         return SingleLaw(parallel_element(*map(np.concatenate, zip(*parts))))
     elements = jenkins_elements.elements(patch, f.static, element.length)
-    return SingleLaw(
-        parallel_element(elements.stiffness, elements.yield_displacement), elements
-    )
+    return SingleLaw(parallel_element(elements.stiffness, elements.yield_displacement), elements)
 
 
 def _make_bond_contact(model: Model, numerics: Numerics, patch, load: float, row):
@@ -272,7 +270,9 @@ def _make_varying_contact(model: Model, numerics: Numerics, patch, row) -> conta
     measure = force + mean * MIN_PRESSURE_FRACTION
     modes_of_pieces = None
     if model.partial_slip:
-        modes_of_pieces = choose_shear_modes(model, patch, law, force, measure, numerics.shear_modes)
+        modes_of_pieces = choose_shear_modes(
+            model, patch, law, force, measure, numerics.shear_modes
+        )
     still = np.zeros(modes.omega.size)
     return contacts.make_pressed_contact(
         law,

@@ -17,7 +17,6 @@ from ...points.march import load_kernels, march
 from ...response.ends import estimate_window_error
 from ...response.inside_steps import add_substep_samples
 from ...response.measures import compute_step_harmonic, peak_sampling_errors
-from ...response.rows import ROWS_NEEDING_RUN
 from ...response.spectrum import friction_harmonic, motion_harmonic
 from ...structure.drive_sizes import (
     estimate_peak_speed,

@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 from friction_paths import march_tractions, random_walk, triangle_path, upper_pressure
 from march_paths import OMEGA, follow_path, make_one_mode
+from patchfem.dynamics.march.march import march
 from scene_texts import DRIVE, KILOGRAM
 
 from patchfem import build, plan
 from patchfem.core import SineDrive
 from patchfem.dynamics import bond_list_model
-from patchfem.dynamics.march.march import march
 from patchfem.friction import Bonds, Quadrature, choose_engine
 from patchfem.response import energy_balance
 from patchfem.runs import choose_numerics as settings_of

@@ -12,13 +12,13 @@ import numpy as np
 import pytest
 from friction_paths import march_tractions, upper_pressure
 from modal_bases import make_modal_basis
+from patchfem.dynamics.march.march import march
 from scipy.special import gammainc
 from vibration_forms import sliding_amplitude
 
 from patchfem import build
 from patchfem.core import SineDrive
 from patchfem.dynamics import points_model
-from patchfem.dynamics.march.march import march
 from patchfem.friction import Bonds, FirstOrderBonds, Quadrature
 from patchfem.friction.bonds.quadrature import cutoff_age
 from patchfem.friction.bonds.recursion import BondState
