@@ -3,12 +3,12 @@ integrations from rest."""
 
 import numpy as np
 import pytest
-from patchfem.dynamics.march.march import march
 from scene_texts import BLOCK, KEYS
 
 import patchfem as pf
 from patchfem import build
 from patchfem.core import Outcome
+from patchfem.points.march import march
 from patchfem.runs import choose_numerics
 from patchfem.runs.rig import interface
 from patchfem.scene import loads

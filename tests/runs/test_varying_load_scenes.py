@@ -6,8 +6,8 @@ import pytest
 from scene_texts import BENCH, RIG, STRUCTURE, get_only_mistake
 
 from patchfem.contact.unilateral import solve_forces
-from patchfem.dynamics import make_contact_sets
 from patchfem.export.run_data import collect_data
+from patchfem.runs.rig.interface import make_contact_sets
 from patchfem.runs.run import run
 from patchfem.scene import loads
 
