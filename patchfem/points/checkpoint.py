@@ -160,9 +160,11 @@ def save_checkpoint(path: Path, key: str, run, record) -> None:
             arrays[f"{name}.{number}"] = block
     for name in CYCLES:
         arrays[name] = np.array(getattr(record, name))
-    first, samples, sums = record.last
-    arrays |= {"samples": samples, "last": sums, "totals": record.totals, "works": run.work_sums}
-    numbers = {"done": run.done, "first": first, "energy": run.first_energy}
+    for number, (_, samples, sums) in enumerate(record.recent):
+        arrays |= {f"samples.{number}": samples, f"energies.{number}": sums}
+    arrays |= {"totals": record.totals, "works": run.work_sums, "lists": run.first_sums}
+    firsts = [first for first, _, _ in record.recent]
+    numbers = {"done": run.done, "firsts": firsts, "energy": run.first_energy}
     n_bytes = sum(array.nbytes for array in arrays.values())
     with write_atomically(path, n_bytes) as partial, open(partial, "wb") as file:
         np.savez(file, key=np.array(key), march=np.array(json.dumps(numbers)), **arrays)
@@ -205,7 +207,12 @@ def load_checkpoint(path: Path, key: str, run, record) -> None:
                 blocks.append(arrays[f"{name}.{len(blocks)}"])
             setattr(record, name, blocks)
         record.totals = arrays["totals"]
-        record.last = numbers["first"], arrays["samples"], arrays["last"]
+        record.recent = [
+            (first, arrays[f"samples.{number}"], arrays[f"energies.{number}"])
+            for number, first in enumerate(numbers["firsts"])
+        ]
+        record.last = record.recent[-1]
+        run.first_sums = arrays["lists"]
     except PatchfemError:
         raise
     except Exception as error:  # a damaged archive can raise exceptions of many classes

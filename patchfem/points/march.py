@@ -275,6 +275,10 @@ def make_system(
     flank = _make_flank(contact)
     totals = np.zeros(len(Total))
     system = System(structure, ports, points, lists, flank, sets, state, totals, options)
+    # Rigid points slip from the start where their ports move.
+    velocity = np.sign(rows @ state[0, n:])[points.port] * (points.numbers[0] == Law.COULOMB)
+    for memory in (points.memory, points.trial):
+        memory[0] = np.where(velocity != 0, velocity, memory[0])
     if contact.sets is not None:
         _press_first(system, contact)
     if contact.grooves is not None and modes is not None:
@@ -514,6 +518,7 @@ class March:
         self.kernels.march(self.system, 0, sample)
         totals[[Total.WORK_IN, Total.STORED]] = self.find_stored_energy(sample[0])
         self.first_energy = float(sample[0, 2 * self.modes.omega.size + Sample.ENERGY])
+        self.first_sums = self._sum_lists()
 
     def find_stored_energy(self, sample) -> float:
         """Return the energy [J] of modes, interfaces and normal contact at a sample."""
@@ -686,12 +691,15 @@ class March:
             "passed": float(passed),
         }
         if self.system.options.has_lists:
-            statuses = self.system.lists.statuses
-            ledger["created"] = float(statuses[:, STATUS.created].sum())
-            ledger["dissipated"] = float(statuses[:, STATUS.dissipated].sum())
-            ledger["substeps"] = float(statuses[:, STATUS.n_extra].sum())
-            ledger["strips"] = float(statuses[:, STATUS.max_strips].max())
+            names = ("created", "dissipated", "substeps", "strips")
+            ledger |= dict(zip(names, map(float, self._sum_lists() - self.first_sums)))
         return ledger
+
+    def _sum_lists(self) -> np.ndarray:
+        """Return created and dissipated energy [J], extra strips and length of the longest of the lists of bonds."""
+        statuses = self.system.lists.statuses
+        sums = statuses[:, [STATUS.created, STATUS.dissipated, STATUS.n_extra]].sum(axis=0)
+        return np.append(sums, statuses[:, STATUS.max_strips].max(initial=0.0))
 
 
 def enlarge_lists(system: System, place: str) -> System:
@@ -879,7 +887,9 @@ class Record:
     - extremes, phasors: of the output in each cycle
     - totals (3,): friction work, dissipated and created energy up to the last sample [J]
     - snapshots: of the last cycle
-    - last: number of the first step, samples and energies of the last part
+    - last, recent: number of the first step, samples and energies of the last part, and of the last parts, which contain
+      the window
+    - stride: distance of the samples of earlier cycles
     """
 
     def __init__(self, run: March, n_steps: int, n_window: int, keeps_samples: bool):
@@ -895,6 +905,10 @@ class Record:
         self.totals = np.zeros(3)
         self.snapshots = []
         self.last = None
+        self.recent = []
+        # The distance of early samples divides a cycle, so that each one begins with a sample.
+        longest = max(1, run.steps // N_KEPT)
+        self.stride = max(k for k in range(1, longest + 1) if run.steps % k == 0)
 
     def add(self, first: int, samples, snapshots=()) -> None:
         """Add the samples (k + 1, w) from the step `first` on."""
@@ -909,7 +923,7 @@ class Record:
             [np.zeros((3, 1)), np.cumsum(parts, axis=1)], axis=1
         )
         self.last = first, samples, sums
-        self._keep(first, samples, sums)
+        self._keep(self.last)
         self.totals = sums[:, -1].copy()
         self.snapshots = list(snapshots)
 
@@ -931,19 +945,17 @@ class Record:
             self.phasors += list(2 / max(size, 1) * (parts[:, 0] + 1j * parts[:, 1]))
             begin = end
 
-    def _keep(self, first: int, samples, sums) -> None:
-        """Keep the samples of the window, and of earlier cycles those at equal distances; the last one follows later."""
-        is_early = first + len(samples) - 1 <= self.n_steps - self.n_window
-        if is_early and not self.keeps_samples:
-            return
-        stride = max(1, self.run.steps // N_KEPT) if is_early else 1
-        n_kept = sum(map(len, self.numbers))
-        if is_early and n_kept > checkpoint.MAX_EARLY_SAMPLES:
-            return
-        picked = np.arange(0, len(samples) - 1, stride)
-        self.numbers.append(first + picked)
-        self.rows.append(samples[picked])
-        self.sums.append(sums[:, picked])
+    def _keep(self, part: tuple) -> None:
+        """Keep all samples of the parts within a window of the last one, and of older parts those at equal distances."""
+        self.recent.append(part)
+        last = part[0] + len(part[1]) - 1
+        while len(self.recent) > 1 and self.recent[1][0] <= last - self.n_window:
+            first, samples, sums = self.recent.pop(0)
+            if self.keeps_samples and sum(map(len, self.numbers)) <= checkpoint.MAX_EARLY_SAMPLES:
+                picked = np.arange(0, len(samples) - 1, self.stride)
+                self.numbers.append(first + picked)
+                self.rows.append(samples[picked])
+                self.sums.append(sums[:, picked])
 
     def find_largest_state(self) -> np.ndarray:
         """Return the largest magnitudes (2 n,) of the modal coordinates and velocities in the last part."""
@@ -957,7 +969,7 @@ class Record:
         n_cycles = size // self.run.steps
         step = (sums[:, -1] - sums[:, 0])[:, None]
         for k in range(1, count + 1):
-            self._keep(first + k * size, samples, sums + k * step)
+            self._keep((first + k * size, samples, sums + k * step))
         self.totals = self.totals + count * step[:, 0]
         self.extremes += count * self.extremes[-n_cycles:]
         self.phasors += count * self.phasors[-n_cycles:]
@@ -967,9 +979,19 @@ class Record:
         run = self.run
         _, samples, sums = self.last
         last = samples[-1:]
-        rows = np.concatenate([*self.rows, last])
-        numbers = np.concatenate([*self.numbers, [run.done]]).astype(int)
-        energies = np.concatenate([*self.sums, sums[:, -1:]], axis=1)
+        parts = [
+            (first + np.arange(len(one) - 1), one[:-1], energies[:, :-1])
+            for first, one, energies in self.recent
+        ]
+        recent_numbers, recent_rows, recent_sums = zip(*parts)
+        rows = np.concatenate([*self.rows, *recent_rows, last])
+        numbers = np.concatenate([*self.numbers, *recent_numbers, [run.done]]).astype(int)
+        energies = np.concatenate([*self.sums, *recent_sums, sums[:, -1:]], axis=1)
+        if not self.keeps_samples:
+            is_kept = numbers >= run.done - self.n_window
+            rows = rows[is_kept]
+            numbers = numbers[is_kept]
+            energies = energies[:, is_kept]
         in_window = numbers >= run.done - self.n_window
         response = make_response(run, rows, numbers, energies)
         n = 2 * run.modes.omega.size

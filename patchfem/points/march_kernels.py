@@ -869,6 +869,7 @@ def commit(system, h):
                 # A port that was at rest before stays at its place.
                 was_held = points.memory[0, j] == 0 and points.trial[0, j] == 0
                 ports.values[Port.FREE, p] = ports.values[Port.INCREMENT, p] if was_held else 0.0
+                values[Point.TOTAL, j] -= ports.values[Port.FREE, p]
     if system.totals[Total.SLIDES] == 0.0:
         for k in range(points.memory.shape[0]):
             for j in range(count):
