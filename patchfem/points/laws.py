@@ -12,6 +12,7 @@ from .return_maps_kernels import Law, Masing
 N_NUMBERS = 10  # rows of numbers of a point
 N_MEMORY = 6  # rows of memory of a point, without a stack of reversals
 REVERSALS = 48  # reversals that parallel sliders remember
+MIN_LENGTH = 1e-30  # length [m] in place of no length, by which a stiffness is divided
 MIN_LOAD = 1e-12  # load [N] in place of no load, to which a stiffness refers
 
 
@@ -44,7 +45,7 @@ def _pack(law: Law, numbers, memory=(), load=1.0, n_memory: int = N_MEMORY) -> P
 
 def make_jenkins(static: float, length: float, load: float = 1.0) -> PointLaw:
     """Return an elastic-plastic point (eq. 3.12) of friction coefficient `static` and length [m]."""
-    return _pack(Law.JENKINS, (static, length), (0.0, load), load)
+    return _pack(Law.JENKINS, (static, np.maximum(length, MIN_LENGTH)), (0.0, load), load)
 
 
 def make_coulomb(static: float, kinetic: float, load: float = 1.0) -> PointLaw:

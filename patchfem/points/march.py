@@ -168,8 +168,7 @@ def make_responses(modes: ModalBasis, step: float, levels: int) -> Responses:
     matrix[2 * n, 2 * n + 1] = matrix[2 * n + 1, 2 * n + 2] = 1.0
     matrix[velocities, 2 * n + 3 :] = np.eye(n)
 
-    # The short step of the first exponential resolves the fastest mode; a step is doubled by the square of its matrix,
-    # and an integral of x(t)^T form x(t) by that of both halves.
+    # The first step resolves the fastest mode. As steps double, an integral of x(t)^T form x(t) is the sum of both halves.
     fastest = float(modes.omega.max(initial=0.0)) * step
     n_halvings = max(levels - 1, int(np.ceil(np.log2(max(fastest / MAX_ANGLE, 1e-300)))))
     short = step / 2**n_halvings
@@ -184,13 +183,13 @@ def make_responses(modes: ModalBasis, step: float, levels: int) -> Responses:
         np.einsum("g,gki,kl,glj->ij", 0.5 * short * weights, inside, form, inside, optimize=True)
         for form in (loss, work)
     ]
-    whole = expm(matrix * short)
     parts = []
     for k in range(n_halvings + 1):
+        # The square of the last matrix would double its round-off.
+        whole = expm(matrix * (short * 2**k))
         if k > n_halvings - levels:
             parts.append((whole[: 2 * n], forms[0], forms[1][2 * n : 2 * n + 3]))
         forms = [form + whole.T @ form @ whole for form in forms]
-        whole = whole @ whole
     return Responses(*(np.array(part) for part in zip(*parts[::-1])))
 
 
@@ -275,7 +274,12 @@ def make_system(
     flank = _make_flank(contact)
     totals = np.zeros(len(Total))
     system = System(structure, ports, points, lists, flank, sets, state, totals, options)
-    # Rigid points slip from the start where their ports move.
+    # Springs and slips refer to the displacement at rest; rigid points slip from the start where their ports move.
+    slides = (rows @ state[0, :n])[points.port]
+    points.values[Point.TOTAL, : slides.size] = slides
+    is_spring = points.is_spring.astype(bool)
+    for memory in (points.memory, points.trial):
+        memory[0, is_spring] = slides[is_spring]
     velocity = np.sign(rows @ state[0, n:])[points.port] * (points.numbers[0] == Law.COULOMB)
     for memory in (points.memory, points.trial):
         memory[0] = np.where(velocity != 0, velocity, memory[0])
@@ -754,7 +758,7 @@ def split_losses(samples, n: int, scale: float) -> np.ndarray:
 
 
 def make_snapshot(kernels, system: System, motion: tuple) -> Snapshot:
-    """Return the state of the points of a system; `motion` has the first seven fields of Snapshot."""
+    """Return the state of the points on the first port; `motion` has the first seven fields of Snapshot."""
     points = system.points
     count = points.port.size
     read = kernels.read_points
@@ -762,13 +766,17 @@ def make_snapshot(kernels, system: System, motion: tuple) -> Snapshot:
     stretch = np.zeros(count)
     read(system, forces, stretch)
     values = points.values
+    n_own = int(points.first[1])
+    # The pieces at rest under the present forces; the march brings only their means over a step into equilibrium.
+    shapes = points.shapes[:, :n_own]
+    bend = (shapes @ forces[:n_own] / points.stiffness) @ shapes
     has_nodes = system.ports.contact[0] >= 0
     return Snapshot(
         *motion,
-        forces,
-        stretch,
-        points.shear[Shear.VALUE] @ points.shapes,
-        values[Point.END_LOAD, :count].copy(),
+        forces[:n_own],
+        stretch[:n_own],
+        bend,
+        values[Point.END_LOAD, :n_own].copy(),
         values[Point.NODE_FORCE, : system.sets.x.size].copy() if has_nodes else np.zeros(0),
         float(system.flank[Flank.VERTICAL]) if system.flank.size else 0.0,
     )

@@ -46,6 +46,8 @@ MAX_ITERATIONS = 200  # Newton iterations of a step
 STEADY_BONDS = (
     1e-13  # relative distance of bonds from those of an endless slide that counts as none
 )
+# Compliance of a port at rest, relative to its own, which determines the forces of more ports than modes
+REDUNDANT = 1e-10
 LAST_STEP = 4e-6  # change of a slide in bond lengths, half the square of which is within RESIDUAL
 MAX_CUTS = 40  # trials of a line search
 MAX_OVERSHOOT = 0.5  # slope beyond the minimum of a line search, relative to that at its start
@@ -395,6 +397,7 @@ def write_residual(system, level, h):
             if find_rest_limit(points.numbers, points.trial, j, 1.0) < np.inf:
                 p = points.port[j]
                 vector[p] = moves[Port.END_VELOCITY, p] / ports.compliance[level, 1, p, p]
+                vector[p] -= REDUNDANT * moves[Port.FORCE, p]
     largest = 0.0
     tolerance = RESIDUAL * size
     for p in range(n_ports):
@@ -469,6 +472,7 @@ def write_matrix(system, level):
             matrix[p, :] = 0.0
             for k in range(n_ports):
                 matrix[p, k] = -compliance[1, p, k] / compliance[1, p, p]
+            matrix[p, p] -= REDUNDANT
 
 
 @njit(**NJIT_INLINE)
@@ -782,6 +786,7 @@ def find_holds(system, state, drive):
         ports.vector[p] = total
         for k in range(n_ports):
             ports.matrix[p, k] = ports.grip[p, k]
+        ports.matrix[p, p] *= 1 + REDUNDANT
     solve_linear(ports.matrix, ports.vector, n_ports)
     for p in range(n_ports):
         values[Port.HOLD, p] = ports.vector[p]
@@ -985,6 +990,7 @@ def rest_ports(system):
                     ports.vector[p] = project(ports.rows[p], state[n:])
                 for k in range(n_ports):
                     ports.matrix[p, k] = ports.grip[p, k]
+                ports.matrix[p, p] *= 1 + REDUNDANT
         solve_linear(ports.matrix, ports.vector, n_ports)
         for p in range(n_ports):
             for i in range(n):

@@ -10,10 +10,10 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parent))
 sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
 import problems
-
-from patchfem.core import InitialState, ModalBasis
 from patchfem.dynamics.march import march as marching
 from patchfem.dynamics.march import models
+
+from patchfem.core import InitialState, ModalBasis
 from patchfem.model import build
 from patchfem.runs import choose_numerics, solve_with_coarser
 from patchfem.runs.rig.interface import make_single_contact

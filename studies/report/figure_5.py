@@ -25,11 +25,11 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
 from drawing import BLUE, GREY, ORANGE, drawing
+from patchfem.dynamics.cycles import find_hermite_extremes
 from report_methods import solve_euler
 from study_text import read_answer
 
 import patchfem as pf
-from patchfem.dynamics.cycles import find_hermite_extremes
 from patchfem.model import build
 from patchfem.scene import load as load_scene
 

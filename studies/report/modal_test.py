@@ -7,12 +7,12 @@ sinc^2(f/RATE): what H1 differs from 1 is divided by it.
 from typing import NamedTuple
 
 import numpy as np
+from patchfem.dynamics.march.march import march
 from scipy import signal
 from scipy.optimize import least_squares
 
 import patchfem as pf
 from patchfem.dynamics import warm_up
-from patchfem.dynamics.march.march import march
 from patchfem.runs import choose_numerics, solve_with_coarser
 from patchfem.runs.rig.interface import make_contact
 from patchfem.structure.drives import RecordedDrive

@@ -1,11 +1,9 @@
-"""Record of a march: cycles that repeat are not computed again, early samples may be left out, copies go on by themselves."""
+"""Record of a march: cycles that repeat are not computed again, early samples may be left out, copies go on."""
 
 import numpy as np
 import pytest
 from march_paths import OMEGA, make_one_mode
 from modal_bases import make_modal_basis
-from test_march_bonds import make_compliance
-from test_march_loads import reduce_to_shear_modes
 from varying_load_cases import LAWS, MIXED, crowned_contact, make_modes
 
 from patchfem.core import Outcome, SineDrive
@@ -20,6 +18,9 @@ from patchfem.points.contacts import (
 from patchfem.points.march import March, march
 from patchfem.slip.shear_modes import shear_modes
 
+from .test_march_bonds import make_compliance
+from .test_march_loads import reduce_to_shear_modes
+
 DRIVE = SineDrive(49.0, OMEGA)
 BASIS = make_one_mode(OMEGA, 0.05, 1.0)
 ROW = np.ones(1)
@@ -28,9 +29,9 @@ CYCLES = 400
 STEPS = 80
 
 
-def make_tanh_contact():
+def make_tanh_contact(rows=ROW[None]):
     """Return the contact of 20 N tanh(v/(5 mm/s))."""
-    return make_contact([TanhLaw(20.0, 5e-3).element(1.0)], ROW[None])
+    return make_contact([TanhLaw(20.0, 5e-3).element(1.0)], rows)
 
 
 def make_compliant_contact():
@@ -109,7 +110,7 @@ def test_exact_beats_and_slow_growth_are_not_repeated(monkeypatch):
     beating = make_modal_basis(OMEGA * np.array([1.0, 1.37]), [0.05, 0.0], [1.0, 0.0], ones, ones)
     growing = Bonds(0.4, 1e-6, ratio=2.0, rest_growth=1e-12, slip_growth=1e3)
     steps = count_steps(monkeypatch)
-    march(beating, DRIVE, make_tanh_contact(), CYCLES, STEPS, window=5)
+    march(beating, DRIVE, make_tanh_contact(beating.interfaces), CYCLES, STEPS, window=5)
     march(BASIS, DRIVE, make_bond_contact(growing, 50.0, ROW), CYCLES, STEPS, window=5)
     assert sum(steps) == 2 * CYCLES * STEPS
 
