@@ -93,8 +93,8 @@ MODULES_OF_SCENES = {  # run from Python -> text of the scene, modules that are 
         COULOMB_RIG,
         "hybrid.runs structure.modes",
         "structure.matrices structure.masses structure.arrays structure.universal structure.modal_fit structure.drives "
-        "dynamics.harmonic.harmonic dynamics.harmonic.continuation dynamics.harmonic.balance dynamics.propagator "
-        "dynamics.march runs.rig.steady " + " ".join(RIG_KEYS),
+        "dynamics.harmonic.harmonic dynamics.harmonic.continuation dynamics.harmonic.balance "
+        "points.march runs.rig.steady " + " ".join(RIG_KEYS),
     ),
     **{
         name: (COULOMB_RIG + lines, module, " ".join(RIG_KEYS - {module}))
