@@ -444,7 +444,8 @@ def sample_drive(drive, step: float, first: int, count: int) -> np.ndarray:
     The ends are taken inside of the step, because the drive may jump there.
     """
     starts = first + np.arange(count)[:, None]
-    values = drive.values((step * (starts + [EDGE, 0.5, 1 - EDGE])).ravel()).reshape(count, 3)
+    times = step * (starts + np.array([EDGE, 0.5, 1 - EDGE]))
+    values = drive.values(times.ravel()).reshape(count, 3)
     start, middle, end = values.T
     slope = (4 * middle - 3 * start - end) / step
     return np.stack([start, slope, 4 * (start - 2 * middle + end) / step**2], axis=1)

@@ -280,7 +280,7 @@ def keep_sliding(values, count, direction):
 
 @njit(**NJIT_INLINE)
 def write_bond_forces(system):
-    """Write the mean forces of bonds that slide steadily, or over short slides in a loop that vectorises; else return False."""
+    """Write the mean forces of bonds that slide steadily or a short way, in loops that vectorise; else return False."""
     points = system.points
     values = points.values
     count = points.port.size
@@ -1222,7 +1222,6 @@ def march(system, steps, samples):
     """
     structure = system.structure
     ports = system.ports
-    points = system.points
     size = system.state.shape[1]
     ticks = 1 << (structure.responses.shape[0] - 1)
     h = system.options.step

@@ -19,9 +19,9 @@ class LawGroup:
     """Friction laws and springs that act on the interface rows of a modal basis.
 
     `parts` is a law, a pair (row, law) or a list of them. A row is the number of an interface of
-    `modes` or participations (n,); a law alone acts on
-    interface 0; an Element is converted to its law, None means bonds that are no single element. rows: (i, n); laws: a tuple of laws for every row;
-    modes: the modal basis.
+    `modes` or participations (n,); a law alone acts on interface 0. An Element is converted to its
+    law; None means bonds that are no single element.
+    rows: (i, n); laws: a tuple of laws for every row; modes: the modal basis.
     A call with the harmonics (i, H + 1) of the slides and omega returns a
     `harmonic.ContactResponse`.
     """

@@ -9,7 +9,7 @@ number of steps.
 """
 
 from functools import lru_cache
-from math import ceil, inf, log2, pi, sqrt
+from math import ceil, inf, pi, sqrt
 from time import thread_time
 from typing import NamedTuple
 
@@ -25,7 +25,6 @@ from ...model.model import Model
 from ...structure.drive_sizes import (
     find_drive_omega,
     find_max_acceleration,
-    find_max_frequency_ratio,
 )
 from ..bench import engine as bench_engine
 from .numerics import Numerics
@@ -46,9 +45,6 @@ MAX_STRIPS_PER_STEP = 0.1
 # Largest number of strips, at about one per step, at which steps are halved again; each halving
 # makes the run four times as expensive.
 MIN_LONG_LIST = 500
-# Smallest slip, in bond lengths, at which the motion of a block does not count as elastic.
-MIN_SLIP_LENGTHS = 1e-3
-MAX_HALVINGS = 2  # Largest number of halvings of the step (0 to 3 were needed).
 # Ratio of the cost of a patch with shear compliance to that of a single list, due to its many lists
 # and the additional Newton iterations.
 SHEAR_COST_FACTOR = 256.0
@@ -117,29 +113,6 @@ def _estimate_held_displacement(model: Model, min_ratio: float = MIN_STUCK_RATIO
     holding_force = compute_holding_force(rig)
     limit = f.static * model.nominal_load
     return holding_force / limit if limit >= min_ratio * holding_force else inf
-
-
-def count_step_halvings(model: Model) -> int:
-    """Return how many times the automatic time step is halved for a block that sticks on its bonds.
-
-    A stuck block vibrates on its bonds faster than its modes and its drive. Up to MAX_HALVINGS
-    halvings give a period of this vibration as many steps as the fastest mode or the drive has. No
-    halving is needed if the slip, half the square of the stretch, is below MIN_SLIP_LENGTHS bond
-    lengths.
-    """
-    rig = model.rig
-    f = model.friction
-    if f is None or not law_has_trait(f.law, "bonds") or model.accuracy.steps_per_cycle is not None:
-        return 0
-    stretch = _estimate_held_displacement(model)
-    if stretch == inf or stretch**2 / 2 < MIN_SLIP_LENGTHS:
-        return 0
-    max_frequency = max(
-        find_max_frequency_ratio(rig.drive.signal) / rig.drive.signal.period,
-        float(rig.structure.frequencies.max()),
-    )
-    doublings = ceil(log2(_find_bond_frequency(model) / (2 * pi * max_frequency)))
-    return min(max(0, doublings), MAX_HALVINGS)
 
 
 def _find_bond_frequency(model: Model) -> float:
