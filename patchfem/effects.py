@@ -26,7 +26,7 @@ Traits of laws:
 - `cells`: a continuous distribution of elements is discretised into cells;
 - `overshoots`: after a reversal, the force exceeds that of steady sliding for less than one time step.
 
-`runs.rig.varying_load` and `points.laws` have their own lists of supported laws.
+`runs.rig.interface` and `points.laws` have their own lists of supported laws.
 
 A gap shape has a table in `scene.keys.contact` and a function in `contact.gaps`. A waveform has a function in the table
 `DRIVE_BUILDERS` of its module; the class `Waveform` describes its traits.

@@ -60,6 +60,7 @@ TUPLE_MODULES = (
     "contact/set_arrays.py",
     "hybrid/records.py",
     "points/case_rows.py",
+    "points/law_rows.py",
     "points/march_rows.py",
 )
 # State of the environment variable that makes numba run all kernels as Python.

@@ -9,6 +9,7 @@ from ..contact.contact_sets import ContactSets
 from ..friction.bonds.parameters import Bonds
 from ..friction.grooves import Grooves
 from ..friction.protocol import Element
+from .law_rows import Law
 from .laws import (
     N_MEMORY,
     N_NUMBERS,
@@ -21,10 +22,8 @@ from .laws import (
     make_list,
     make_tanh,
 )
-from .return_maps_kernels import Law
+from .march_rows import LOWER
 
-RESULTANT = -1  # node of a point whose load is a fraction of the resultant
-LOWER = -2  # node of a point whose load is the pressure of the lower piece at its place
 # Law of the elements of a single number of memory, by the module of their kernels
 FLOW_LAWS = {
     "friction.laws.tanh_kernels": Law.TANH,

@@ -7,7 +7,7 @@ import numpy as np
 from ..friction.bonds.parameters import Bonds
 from ..friction.laws.iwan import max_yield_displacement
 from ..friction.laws.stretch import growth_numbers
-from .return_maps_kernels import Law, Masing
+from .law_rows import Law, Masing
 
 N_NUMBERS = 10  # rows of numbers of a point
 N_MEMORY = 6  # rows of memory of a point, without a stack of reversals

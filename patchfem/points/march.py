@@ -19,18 +19,18 @@ from ..friction.bonds.list_rows_kernels import N_ROWS, STATUS
 from ..friction.laws.stretch import growth_numbers
 from ..friction.path_work import sampled_work
 from . import checkpoint
-from .contacts import RESULTANT, Contact
+from .contacts import Contact
+from .law_rows import Law
 from .laws import N_MEMORY, N_NUMBERS
-from .march_kernels import (
+from .march_rows import (
     DONE,
     EXCEEDS_TRAVEL,
     LEAVES_GROOVES,
     LISTS_FULL,
+    N_PORT_COLUMNS,
     NO_CONTACT_SET,
     RESIDUAL,
-)
-from .march_rows import (
-    N_PORT_COLUMNS,
+    RESULTANT,
     Flank,
     Lists,
     Options,
@@ -44,15 +44,13 @@ from .march_rows import (
     System,
     Total,
 )
-from .return_maps_kernels import Law
 
 MAX_ANGLE = 0.5  # largest phase of the fastest mode in the step of a matrix exponential [rad]
 N_GAUSS = 8  # Gauss points of the integrals over that step
-RIGID_LEVELS = 12  # lengths of the steps with rigid points: whole steps and eleven halvings
+RIGID_LEVELS = 16  # lengths of the steps with rigid points: whole steps and fifteen halvings
 LEVELS = 4  # lengths of other steps, which are halved if they do not converge
-# Weights of the change of a shear increment for points under changing loads, and for lists, whose forces jump
-LOAD_DAMPING = 0.25
-LIST_DAMPING = 1 / 16
+LIST_DAMPING = 1 / 16  # weight of the change of a shear increment for lists, whose forces jump
+REDUNDANT = 1e-10  # relative compliance of ports at rest that outnumber the modes
 FIRST_WIDTH = 1e-6  # width in bond lengths over which the initial bonds of several lists lie
 FIRST_STRIPS = 256  # first strips of each of several lists, in addition to those of one step
 MAX_STRIPS = 2_000_000  # largest number of strips of all lists, which limits the memory
@@ -257,13 +255,13 @@ def make_system(
         *responses, shape, damping, np.zeros((1, 3)), np.zeros(0), np.zeros(0), np.zeros(size)
     )
     has_lists = Law.LIST in laws
-    damped = LIST_DAMPING if has_lists else LOAD_DAMPING if contact.has_loads else 0.0
     options = Options(
         mass,
         float(step),
         float(travel),
         max(float(contact.limit), 1e-300),
-        damped,
+        LIST_DAMPING if has_lists else 0.0,
+        REDUNDANT if len(rows) > n else 0.0,
         int(Law.COULOMB in laws),
         int(has_lists),
         int(contact.has_loads),
@@ -925,8 +923,8 @@ class Record:
         n = 2 * run.modes.omega.size
         count = len(samples) - 1
         losses = split_losses(samples, n, run.system.options.scale)
-        # Rigid friction stores nothing; a loss below 0 takes back what the step before lost too much.
-        created = np.maximum(-losses, 0) * (1 - run.system.options.is_rigid)
+        # Only lists of bonds can create energy; of other laws a loss below 0 is an error of the step.
+        created = np.maximum(-losses, 0) * run.system.options.has_lists
         parts = [samples[:-1, n + Sample.WORK], losses + created, created]
         sums = self.totals[:, None] + np.concatenate(
             [np.zeros((3, 1)), np.cumsum(parts, axis=1)], axis=1

@@ -11,9 +11,9 @@ for the shear coordinates b of the pieces. These are the conditions of the minim
 
 which Newton's method with a line search finds; it is convex unless the force of a point falls with its slide. Normal
 contact acts on the ports of heave and pitch with the path mean of its piecewise linear forces. A changing load acts
-half before and half after the slide; it then changes the pieces as well, and a weight of the change of db damps the
-oscillation that a mean over the step would leave. A port may climb flanks (`flanks_kernels`), and its displacement may
-be prescribed.
+half before and half after the slide, and then the pieces relax while the ports rest: a mean over the step would leave
+them out of equilibrium, and reverse that in every step. Lists of bonds, whose forces jump, have a weight on the change
+of db instead. A port may climb flanks (`flanks_kernels`), and its displacement may be prescribed.
 
 A rigid point slips under a given force, or its port is held at rest. A step in which a slipping port would reverse, or a
 point at rest is released, is halved up to the last level.
@@ -28,9 +28,25 @@ from ..friction.flags_kernels import NJIT_CALL, NJIT_INLINE, NJIT_KERNEL
 from . import flanks_kernels as flanks
 from . import lists_kernels as lists
 from . import normal_kernels as normal
-from .march_rows import N_PORT_COLUMNS, Flank, Point, Port, Sample, Shear, Total
+from .law_rows import Law
+from .march_rows import (
+    DONE,
+    EXCEEDS_TRAVEL,
+    LEAVES_GROOVES,
+    LISTS_FULL,
+    LOWER,
+    N_PORT_COLUMNS,
+    NO_CONTACT_SET,
+    NOT_FINITE,
+    RESIDUAL,
+    Flank,
+    Point,
+    Port,
+    Sample,
+    Shear,
+    Total,
+)
 from .return_maps_kernels import (
-    Law,
     Step,
     advance,
     advance_bonds,
@@ -46,26 +62,17 @@ MAX_ITERATIONS = 200  # Newton iterations of a step
 STEADY_BONDS = (
     1e-13  # relative distance of bonds from those of an endless slide that counts as none
 )
-# Compliance of a port at rest, relative to its own, which determines the forces of more ports than modes
-REDUNDANT = 1e-10
 LAST_STEP = 4e-6  # change of a slide in bond lengths, half the square of which is within RESIDUAL
 MAX_CUTS = 40  # trials of a line search
 MAX_OVERSHOOT = 0.5  # slope beyond the minimum of a line search, relative to that at its start
 MAX_STALLS = 4  # iterations that do not halve the smallest residual, after which a step ends
 # Largest residual of such a step relative to RESIDUAL, and that of lists, because sums over bonds jump by up to 1e-8
-STALLED = 1e2
-LISTS_STALLED = 1e4
+STALLED = 1e3
+LISTS_STALLED = 1e5
+MAX_RELAXATIONS = 40  # Newton iterations of the pieces after a step
 MAX_LOADS = 60  # repetitions of a step for the loads that follow from its motion
-RESIDUAL = 1e-11  # residual of forces relative to the scale or the largest one
 ROUND_OFF = 4e-16  # round-off error of an increment relative to its size
 LOAD_RESIDUAL = 1e-11  # change of the loads relative to the resultant
-DONE = 0
-EXCEEDS_TRAVEL = 1
-NOT_FINITE = 2
-NO_CONTACT_SET = 3
-LISTS_FULL = 4
-LEAVES_GROOVES = 5
-LOWER = -2  # node of a point on the pressure of the lower piece
 
 
 @njit(**NJIT_CALL)
@@ -397,7 +404,7 @@ def write_residual(system, level, h):
             if find_rest_limit(points.numbers, points.trial, j, 1.0) < np.inf:
                 p = points.port[j]
                 vector[p] = moves[Port.END_VELOCITY, p] / ports.compliance[level, 1, p, p]
-                vector[p] -= REDUNDANT * moves[Port.FORCE, p]
+                vector[p] -= system.options.redundant * moves[Port.FORCE, p]
     largest = 0.0
     tolerance = RESIDUAL * size
     for p in range(n_ports):
@@ -472,7 +479,7 @@ def write_matrix(system, level):
             matrix[p, :] = 0.0
             for k in range(n_ports):
                 matrix[p, k] = -compliance[1, p, k] / compliance[1, p, p]
-            matrix[p, p] -= REDUNDANT
+            matrix[p, p] -= system.options.redundant
 
 
 @njit(**NJIT_INLINE)
@@ -786,7 +793,7 @@ def find_holds(system, state, drive):
         ports.vector[p] = total
         for k in range(n_ports):
             ports.matrix[p, k] = ports.grip[p, k]
-        ports.matrix[p, p] *= 1 + REDUNDANT
+        ports.matrix[p, p] *= 1 + system.options.redundant
     solve_linear(ports.matrix, ports.vector, n_ports)
     for p in range(n_ports):
         values[Port.HOLD, p] = ports.vector[p]
@@ -882,12 +889,14 @@ def commit(system, h):
         if is_constant and not options.has_loads:
             system.totals[Total.SLIDES] = find_steady_slide(system)
     system.totals[Total.IS_DIRTY] = 0.0
+    shear = points.shear
     for k in range(points.stiffness.size):
-        shear = points.shear
         shear[Shear.VALUE, k] += shear[Shear.TRIAL, k]
         shear[Shear.FIRST, k] = shear[Shear.EARLIER, k]
         shear[Shear.EARLIER, k] = shear[Shear.LAST, k]
         shear[Shear.LAST, k] = shear[Shear.TRIAL, k] / h
+    if options.has_loads and not options.has_lists and points.stiffness.size:
+        relax_pieces(system)
     for i in range(system.state.shape[1]):
         system.state[0, i] = system.state[2, i]
     heave = int(ports.contact[0])
@@ -911,6 +920,61 @@ def commit(system, h):
         before = find_modal_energy(system)
         rest_ports(system)
         system.totals[Total.REST] = find_modal_energy(system) - before
+
+
+@njit(**NJIT_CALL)
+def relax_pieces(system):
+    """Bring the pieces into equilibrium with the points while the ports rest; the points slide back and lose energy.
+
+    The increments db solve kappa (b + db) = shapes^T f with the forces f after the slides -shapes^T db, by Newton's
+    method. The force after a slide dq is d(dq mean)/d(dq) = mean + dq slope, and changes by about twice the slope.
+    """
+    points = system.points
+    ports = system.ports
+    values = points.values
+    shear = points.shear
+    r = points.stiffness.size
+    count = points.port.size
+    tolerance = RESIDUAL * system.options.scale
+    for j in range(count):
+        values[Point.LOAD, j] = values[Point.END_LOAD, j]
+        points.trial[4, j] = points.memory[0, j]
+    for k in range(r):
+        shear[Shear.TRIAL, k] = 0.0
+    for _ in range(MAX_RELAXATIONS):
+        for j in range(count):
+            values[Point.SLIDE, j] = 0.0
+        subtract_shear(values[Point.SLIDE, :count], points.shapes, shear[Shear.TRIAL])
+        largest = 0.0
+        for j in range(count):
+            step = Step(values[Point.SLIDE, j], 1.0, 0.0, 0.0, 0.0)
+            mean = mean_force(points.numbers, points.trial, j, values[Point.LOAD, j], step)
+            values[Point.FORCE, j] = mean.end
+            values[Point.BY_SLIDE, j] = 2 * mean.by_increment
+        for k in range(r):
+            residual = points.stiffness[k] * (shear[Shear.VALUE, k] + shear[Shear.TRIAL, k])
+            residual -= sum_products(points.shapes[k], values[Point.FORCE, :count])
+            ports.vector[k] = residual
+            largest = max(largest, abs(residual) * shear[Shear.SCALE, k])
+            for l in range(r):
+                ports.matrix[k, l] = sum_triples(
+                    points.shapes[k], points.shapes[l], values[Point.BY_SLIDE, :count]
+                )
+            ports.matrix[k, k] += points.stiffness[k]
+        if largest <= tolerance or not solve_linear(ports.matrix, ports.vector, r):
+            break
+        for k in range(r):
+            shear[Shear.TRIAL, k] -= ports.vector[k]
+    for j in range(count):
+        slide = values[Point.SLIDE, j]
+        values[Point.TOTAL, j] += slide
+        step = Step(slide, 0.0, 0.0, 0.0, 0.0)
+        advance(points.numbers, points.trial, j, values[Point.LOAD, j], step)
+    for k in range(points.memory.shape[0]):
+        for j in range(count):
+            points.memory[k, j] = points.trial[k, j]
+    for k in range(r):
+        shear[Shear.VALUE, k] += shear[Shear.TRIAL, k]
 
 
 @njit(**NJIT_INLINE)
@@ -990,7 +1054,7 @@ def rest_ports(system):
                     ports.vector[p] = project(ports.rows[p], state[n:])
                 for k in range(n_ports):
                     ports.matrix[p, k] = ports.grip[p, k]
-                ports.matrix[p, p] *= 1 + REDUNDANT
+                ports.matrix[p, p] *= 1 + system.options.redundant
         solve_linear(ports.matrix, ports.vector, n_ports)
         for p in range(n_ports):
             for i in range(n):

@@ -7,6 +7,17 @@ import numpy as np
 
 from ..contact.set_arrays import SetArrays
 
+# Statuses of a march
+DONE = 0
+EXCEEDS_TRAVEL = 1
+NOT_FINITE = 2
+NO_CONTACT_SET = 3
+LISTS_FULL = 4
+LEAVES_GROOVES = 5
+RESULTANT = -1  # node of a point whose load is a fraction of the resultant
+LOWER = -2  # node of a point whose load is the pressure of the lower piece at its place
+RESIDUAL = 1e-12  # residual of forces relative to the scale or the largest one
+
 
 class Point(IntEnum):
     """Rows of `Points.values`.
@@ -277,6 +288,7 @@ class Options(NamedTuple):
     - mass [kg], step [s], travel [m]: modal mass, duration of a step, largest output
     - scale: force [N] to whose 1e-11 part a step is solved
     - damping: weight of the change of a shear increment
+    - redundant: compliance of a port at rest relative to its own, which determines the forces of more ports than modes
     - is_rigid, has_lists, has_loads, has_growth: 1 if points are rigid, have lists of bonds, loads that change, or
       bonds that grow
     - is_plain: 1 if all points are bonds on one port
@@ -287,6 +299,7 @@ class Options(NamedTuple):
     travel: float
     scale: float
     damping: float
+    redundant: float
     is_rigid: int
     has_lists: int
     has_loads: int

@@ -28,7 +28,6 @@ LIST          mu, length [m], load of the relative pressure 1 [N]  see `lists_ke
 ============= ==================================================== =================================================
 """
 
-from enum import IntEnum
 from math import exp, inf, log1p, sin, sqrt, tanh
 from typing import NamedTuple
 
@@ -44,49 +43,18 @@ from ..friction.bonds.point_kernels import (
     short_bond_step,
 )
 from ..friction.flags_kernels import NJIT_CALL, NJIT_KERNEL
+from .law_rows import Law, Masing
 
 SMALL_RATE = 1e-4  # rate times step below which series replace exponentials
 LIMIT_FRACTION = 1e-9  # smallest Stribeck limit relative to the static one, because z divides by it
 PIECE = (
-    0.25  # longest piece of a path in relaxation lengths that the Bouc-Wen law integrates at once
+    0.125  # longest piece of a path in relaxation lengths that the Bouc-Wen law integrates at once
 )
 NEARLY_SATURATED = (
     1e-3  # distance of z from 1 below which any exponent of the Bouc-Wen law has a closed form
 )
 SATURATED = 1e-14  # distance of |z| from 1 that is round-off
 DIFFERENCE = 1e-6  # relative increment of the numerical tangent of the LuGre law
-
-
-class Law(IntEnum):
-    """Number of a friction law or spring in row 0 of `numbers`."""
-
-    COULOMB = 0
-    TANH = 1
-    JENKINS = 2
-    MASING = 3
-    BOUC_WEN = 4
-    LUGRE = 5
-    BONDS = 6
-    CUBIC = 7
-    INTERLOCK = 8
-    LIST = 9
-
-
-class Masing(IntEnum):
-    """Rows of the memory of parallel sliders, which follow Masing's rules.
-
-    Displacement [m], force [N], direction, number of reversals on the stack, 1 until the sliders have slipped as a
-    whole and -1 then, stored energy [J], mean stretch [m], then displacement and force of each reversal.
-    """
-
-    SLIDE = 0
-    FORCE = 1
-    DIRECTION = 2
-    COUNT = 3
-    VIRGIN = 4
-    ENERGY = 5
-    STRETCH = 6
-    STACK = 7
 
 
 class Step(NamedTuple):

@@ -14,8 +14,7 @@ from .march import (
     make_system,
     split_losses,
 )
-from .march_kernels import LISTS_FULL
-from .march_rows import N_PORT_COLUMNS, Sample, Total
+from .march_rows import LISTS_FULL, N_PORT_COLUMNS, Sample, Total
 
 BLOCK = 4096  # samples between two reports of the progress
 SAME_STEP = 1e-6  # relative change of the duration of a step below which steps are equal

@@ -15,7 +15,7 @@ from scene_texts import COATED, DRIVE, MODE, SLIDE, get_only_mistake
 
 from patchfem import SceneError
 from patchfem.effects import LAWS
-from patchfem.runs.rig import march
+from patchfem.points import march
 from patchfem.runs.run import run
 from patchfem.scene import loads
 
@@ -119,7 +119,7 @@ class TimeLoopReached(Exception):
     """Exception of a march that is ready to start its time loop."""
 
 
-def raise_time_loop_reached(*_):
+def raise_time_loop_reached(*_, **__):
     """Raise TimeLoopReached in place of the preparation of a time loop."""
     raise TimeLoopReached
 

@@ -30,7 +30,8 @@ class LawGroup:
         rows = {}
         laws = {}
         for part in parts if isinstance(parts, list) else [parts]:
-            row, law = part if isinstance(part, tuple) else (0, part)
+            is_pair = isinstance(part, tuple) and not isinstance(part, Element)
+            row, law = part if is_pair else (0, part)
             law = make_law(law) if law is None or isinstance(law, Element) else law
             faces = modes.interfaces
             if np.ndim(row) == 0 and not 0 <= row < len(faces):

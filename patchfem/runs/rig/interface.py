@@ -7,10 +7,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...contact.contact_sets import ContactSets
+from ...contact import contact_sets
 from ...core import PatchfemError
 from ...effects import describe_unsupported, law_has_trait, needs_bond_list
-from ...friction.laws.coulomb import Coulomb
+from ...friction.laws import coulomb
 from ...friction.laws.elastic_plastic import parallel_element
 from ...friction.laws.stretch import points_element
 from ...friction.protocol import Element
@@ -169,7 +169,7 @@ def make_single_law(model: Model, numerics: Numerics, patch) -> SingleLaw:
         return SingleLaw(None)
     if law_has_trait(f.law, "averaged"):
         limit = f.static * load * averaged_law.slip_force_ratio(model, patch)
-        return SingleLaw(Coulomb(limit, limit).element(1.0))
+        return SingleLaw(coulomb.Coulomb(limit, limit).element(1.0))
     element = make_law(f, load).element(load)
     if not model.partial_slip:
         return SingleLaw(element)
@@ -287,7 +287,7 @@ def _make_varying_contact(model: Model, numerics: Numerics, patch, row) -> conta
     )
 
 
-def make_contact_sets(patch, spring: float = 0.0) -> ContactSets:
+def make_contact_sets(patch, spring: float = 0.0) -> "contact_sets.ContactSets":
     """Return the contact sets of a patch in the vicinity of its solved contact state.
 
     The rotational spring of the holder is in series with the pitch, as a compliance x_i x_j/K in addition to that of the
@@ -318,7 +318,9 @@ def make_contact_sets(patch, spring: float = 0.0) -> ContactSets:
     compliance = patch.pieces.normal
     if spring > 0:
         compliance = compliance + np.outer(patch.x, patch.x) / spring
-    return ContactSets(compliance, patch.x, patch.pressure.gap - compliance @ force, force > 0)
+    return contact_sets.ContactSets(
+        compliance, patch.x, patch.pressure.gap - compliance @ force, force > 0
+    )
 
 
 def choose_shear_modes(model: Model, patch, law, force, measure, count: int | None):

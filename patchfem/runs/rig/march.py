@@ -13,7 +13,7 @@ import numpy as np
 from ...core import IntegratedMeasures
 from ...effects import law_has_trait
 from ...friction.record import make_law
-from ...points.march import load_kernels, march
+from ...points import march as engine
 from ...response.ends import estimate_window_error
 from ...response.inside_steps import add_substep_samples
 from ...response.measures import compute_step_harmonic, peak_sampling_errors
@@ -58,7 +58,7 @@ def march_in_time(model, numerics, patch, frames: int = 0, say=None, progress=No
     begin = perf_counter()
     contact = make_contact(model, numerics, patch)
     reduced = perf_counter() - begin
-    load_kernels(contact, say)
+    engine.load_kernels(contact, say)
     prepare = {"reduce": reduced, "compiled_code": perf_counter() - begin - reduced}
     begin = perf_counter()
     # Strips that slide independently have no common shear stress, so no output frames are stored.
@@ -69,7 +69,7 @@ def march_in_time(model, numerics, patch, frames: int = 0, say=None, progress=No
 
     def integrate(drive, before, watch, is_last, cycles=numerics.cycles):
         """Integrate under a drive from the end of another run, None for the start of the rig."""
-        run = march(
+        run = engine.march(
             rig.modes,
             drive,
             contact,
