@@ -4,16 +4,16 @@ The bonds have any order p and either form of eq. 2.17 (`friction.reading`).
 
 Every point has its own path, damage and, where bonds grow, bond length, at its own
 velocity. Its weight is its friction limit [N]. The tests compare with
-`friction.bonds.quadrature.Quadrature`, point by point.
+`friction.bonds.points.ListedBonds`, point by point.
 """
 
 import numpy as np
 
 from ...compiled.jit import njit
-from ...friction.bonds.list_rows_kernels import PATH, STATUS
+from ...friction.bonds.list_kernels import mean_with_slope
+from ...friction.bonds.list_rows_kernels import PATH, STATUS, BondList
 from ...friction.flags_kernels import NJIT_NO_REFCOUNT
 from .arrays import ListPointRow, PointRow
-from .list_kernels import find_mean_and_slope
 
 # Largest accepted residual relative to the tolerance, if it no longer decreases; sums
 # over bonds jump by up to 1e-8.
@@ -25,21 +25,16 @@ STEP_DAMPING = 1 / 16
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def load_list(j, contact):
-    """Copy the time state and status of the list of point j to `now` and `status`."""
-    for i in range(contact.now.size):
-        contact.now[i] = contact.nows[j, i]
-    for i in range(contact.status.size):
-        contact.status[i] = contact.statuses[j, i]
-
-
-@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def store_list(j, contact):
-    """Copy `now` and `status` back to the list of bonds of point j."""
-    for i in range(contact.now.size):
-        contact.nows[j, i] = contact.now[i]
-    for i in range(contact.status.size):
-        contact.statuses[j, i] = contact.status[i]
+def point_list(j, contact):
+    """Return the arrays of the list of bonds of point j as views."""
+    return BondList(
+        contact.bondlist,
+        contact.nows[j],
+        contact.statuses[j],
+        contact.law,
+        contact.table,
+        contact.growth,
+    )
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
@@ -134,8 +129,7 @@ def write_forces(kind, ending, contact):
         if is_empty and is_unpressed:
             points[PointRow.FORCE, j] = points[PointRow.SLOPE, j] = 0.0
             continue
-        load_list(j, contact)
-        f, s = find_mean_and_slope(xi, contact, points[ListPointRow.GROWTH_SPEED, j], dt)
+        f, s = mean_with_slope(xi, point_list(j, contact), points[ListPointRow.GROWTH_SPEED, j], dt)
         # Where many bonds have the same stretch, the mean force is steeper than the
         # slope s, so the secant is used.
         if xi != points[ListPointRow.TRIAL_SLIDE, j]:

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from friction_paths import march_tractions, random_walk, triangle_path, upper_pressure
+from friction_paths import march_path, random_walk, triangle_path, upper_pressure
 from march_paths import OMEGA, follow_path, make_one_mode
 from scene_texts import DRIVE, KILOGRAM
 
@@ -10,7 +10,7 @@ from patchfem import build, plan
 from patchfem.core import SineDrive
 from patchfem.dynamics import bond_list_model
 from patchfem.dynamics.march.march import march
-from patchfem.friction import Bonds, Quadrature, choose_engine
+from patchfem.friction import STATUS, Bonds, ListedBonds, choose_engine
 from patchfem.response import energy_balance
 from patchfem.runs import choose_numerics as settings_of
 from patchfem.runs.rig.bond_lists import choose_bond_summation
@@ -72,7 +72,7 @@ def test_exact_printed_law_creates_energy_per_cycle():
         )
         work = forces[:-1, 1] @ np.diff(path)
         assert n_failures == 0 and work / (4 * 0.01 * 20) == pytest.approx(expected, rel=1e-3)
-        created, dissipated = contact.status[6:8]
+        created, dissipated = contact.status[[STATUS.created, STATUS.dissipated]]
         assert work == pytest.approx(dissipated - created + energies[-1, 1], abs=1e-15)
         assert (created > 1e-4) == (reading == "report") and (created == 0) == (
             reading == "stretch"
@@ -97,7 +97,8 @@ def test_always_stretch_law_creates_negligible_energy(order, initial, size):
     _, _, n_failures, contact = follow_path(
         bond_list_model(Bonds(1.0, 1.0, order, initial=initial), 1.0, np.inf, 0.0), path, 1.0
     )
-    assert n_failures == 0 and contact.status[6] <= 1e-7 * contact.status[7]
+    created, dissipated = contact.status[[STATUS.created, STATUS.dissipated]]
+    assert n_failures == 0 and created <= 1e-7 * dissipated
 
 
 # ---- marches
@@ -116,8 +117,8 @@ def test_exact_marched_list_agrees_with_numpy_sum(reading, order):
         100,
         window=2,
     )
-    replay = march_tractions(
-        Quadrature(law, tail=0.0), marched.window.slide, upper_pressure([98.0665]), 1 / 14300
+    replay = march_path(
+        ListedBonds(law, tail=0.0), marched.window.slide, upper_pressure([98.0665]), 1 / 14300
     )
     ledger = marched.ledger
     assert marched.outcome is None and np.ptp(marched.window.slide) > 5e-6
