@@ -14,11 +14,10 @@ PUBLIC = {
         "choose_engine",
     ),
     "bonds.list_kernels": (
-        "advance",
         "break_bonds",
-        "mean_force",
-        "mean_with_slope",
-        "sum_list",
+        "list_mean",
+        "list_mean_and_slope",
+        "list_step",
     ),
     "bonds.list_numbers": (
         "MAX_DAMAGE",
@@ -62,6 +61,7 @@ PUBLIC = {
         "FirstOrderBonds",
         "ListedBonds",
     ),
+    "bonds.points_kernels": ("point_list",),
     "bonds.spread": ("carried_fraction",),
     "bonds.temperature": ("surface_temperature_rise",),
     "flags_kernels": (

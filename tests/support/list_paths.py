@@ -19,10 +19,10 @@ from patchfem.friction import (
 from patchfem.friction.bonds import list_kernels
 
 for kernel in (
-    list_kernels.mean_force,
+    list_kernels.list_mean,
     list_kernels.sum_list,
     list_kernels.total,
-    list_kernels.advance,
+    list_kernels.list_step,
 ):
     if hasattr(kernel, "enable_caching"):  # Without compilation there is no cache to enable.
         # Only tests call these kernels from Python, so only here is their compiled code cached.
@@ -60,9 +60,9 @@ def march_list(law, path, times=1.0, merge=0.0, tail=0.0, capacity=60_000):
     status = bond_list.status
     for dq, dt in zip(np.diff(path), np.broadcast_to(np.asarray(times, float), len(path) - 1)):
         v = dq / dt if dt > 0 else 0.0
-        mean = list_kernels.mean_force(dq, bond_list, v, dt)
+        mean = list_kernels.list_mean(dq, bond_list, v, dt)
         list_kernels.sum_list(1.0, dq, bond_list, v, dt)
         ahead = list_kernels.total(STRIP.force, 0, bond_list)
-        assert list_kernels.advance(dq, bond_list, v, v, dt)
+        assert list_kernels.list_step(dq, bond_list, v, v, dt)
         rows.append((mean, status[STATUS.force], ahead, status[STATUS.energy]))
     return ListHistory(*np.array(rows).T, status)

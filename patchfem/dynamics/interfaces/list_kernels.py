@@ -6,7 +6,7 @@ The arrays are `arrays.BondList`. `march.loop_kernels` calls the functions of ev
 import numpy as np
 
 from ...compiled.jit import njit
-from ...friction.bonds.list_kernels import advance, mean_force
+from ...friction.bonds.list_kernels import list_mean, list_step
 from ...friction.bonds.list_rows_kernels import FORM_STRETCH, LAW, STATUS
 from ...friction.flags_kernels import NJIT_NO_REFCOUNT
 from ...friction.protocol_kernels import Reading
@@ -39,7 +39,7 @@ def find_mean_force(dq, contact, v0, dt):
     -------
     float
     """
-    return contact.force[0] * mean_force(dq, contact, v0, dt)
+    return contact.force[0] * list_mean(dq, contact, v0, dt)
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
@@ -114,7 +114,7 @@ def commit_step(dq, force, start, end_velocity, contact):
     contact.last[1] = contact.last[0]
     contact.last[0] = dq
     before = contact.status[STATUS.energy]
-    ok = advance(dq, contact, start.velocity, end_velocity, start.dt)
+    ok = list_step(dq, contact, start.velocity, end_velocity, start.dt)
     return add_list_energies(force * dq, before, contact.force[0], contact.law, contact.status), ok
 
 

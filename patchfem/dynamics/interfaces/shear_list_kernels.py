@@ -7,8 +7,9 @@ every contact.
 """
 
 from ...compiled.jit import njit
-from ...friction.bonds.list_kernels import advance, break_bonds
+from ...friction.bonds.list_kernels import break_bonds, list_step
 from ...friction.bonds.list_rows_kernels import LAW, PATH, STATUS
+from ...friction.bonds.points_kernels import point_list
 from ...friction.flags_kernels import NJIT_NO_REFCOUNT
 from ...friction.protocol_kernels import Reading
 from . import shear_solve_kernels as solver
@@ -17,7 +18,6 @@ from .list_kernels import add_list_energies
 from .shear_lists_kernels import (
     find_pressure,
     has_changing_pressure,
-    point_list,
     start_step,
 )
 
@@ -84,11 +84,11 @@ def commit_step(dq, force, start, end_velocity, contact):
     changes = has_changing_pressure(contact)
     contact.slip_state[SlipStateIndex.TOTAL_SLIDE] += dq
     for j in range(int(contact.count[0])):
-        bonds = point_list(j, contact)
+        bonds = point_list(contact, j)
         xi = points[PointRow.SLIDE, j]
         energy = bonds.status[STATUS.energy]
         speed = abs(xi) / start.dt
-        has_room = advance(xi, bonds, speed, speed, start.dt) and has_room
+        has_room = list_step(xi, bonds, speed, speed, start.dt) and has_room
         if changes and find_pressure(j, contact) <= 0.0:
             break_bonds(0, bonds)
         work = points[PointRow.FORCE, j] * xi

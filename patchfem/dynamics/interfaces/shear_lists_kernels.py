@@ -10,8 +10,9 @@ velocity. Its weight is its friction limit [N]. The tests compare with
 import numpy as np
 
 from ...compiled.jit import njit
-from ...friction.bonds.list_kernels import mean_with_slope
-from ...friction.bonds.list_rows_kernels import PATH, STATUS, BondList
+from ...friction.bonds.list_kernels import list_mean_and_slope
+from ...friction.bonds.list_rows_kernels import PATH, STATUS
+from ...friction.bonds.points_kernels import point_list
 from ...friction.flags_kernels import NJIT_NO_REFCOUNT
 from .arrays import ListPointRow, PointRow
 
@@ -22,19 +23,6 @@ GOAL_SLACK = 1e4
 FORCE_MAY_FALL = True
 # Damping of a step relative to the stiffness of the shear modes, needed because the forces jump.
 STEP_DAMPING = 1 / 16
-
-
-@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def point_list(j, contact):
-    """Return the arrays of the list of bonds of point j as views."""
-    return BondList(
-        contact.bondlist,
-        contact.nows[j],
-        contact.statuses[j],
-        contact.law,
-        contact.table,
-        contact.growth,
-    )
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
@@ -129,7 +117,9 @@ def write_forces(kind, ending, contact):
         if is_empty and is_unpressed:
             points[PointRow.FORCE, j] = points[PointRow.SLOPE, j] = 0.0
             continue
-        f, s = mean_with_slope(xi, point_list(j, contact), points[ListPointRow.GROWTH_SPEED, j], dt)
+        f, s = list_mean_and_slope(
+            xi, point_list(contact, j), points[ListPointRow.GROWTH_SPEED, j], dt
+        )
         # Where many bonds have the same stretch, the mean force is steeper than the
         # slope s, so the secant is used.
         if xi != points[ListPointRow.TRIAL_SLIDE, j]:

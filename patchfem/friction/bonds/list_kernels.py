@@ -269,7 +269,7 @@ def _find_end(piece, division):
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def mean_with_slope(increment, bonds, v0, dt):
+def list_mean_and_slope(increment, bonds, v0, dt):
     """Return the path-mean force of a bond list over an increment, and its derivative by the increment.
 
     The slope assumes that the force depends on the displacement alone; it may be negative.
@@ -283,7 +283,7 @@ def mean_with_slope(increment, bonds, v0, dt):
     -------
     MeanForce
     """
-    mean = mean_force(increment, bonds, v0, dt)
+    mean = list_mean(increment, bonds, v0, dt)
     small = SLOPE_INCREMENT_RATIO * bonds.law[LAW.length]
     if abs(increment) > small:
         sum_list(1.0, increment, bonds, v0, dt)
@@ -295,7 +295,7 @@ def mean_with_slope(increment, bonds, v0, dt):
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def mean_force(increment, bonds, v0, dt):
+def list_mean(increment, bonds, v0, dt):
     """Return the force [1] of a bond list, averaged over the path of an increment.
 
     For reading="stretch" it comes from the energy balance, so that no step creates energy: damage dissipates the
@@ -438,7 +438,7 @@ def _suits_simpson(increment, bonds):
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def advance(increment, bonds, v0, v1, dt):
+def list_step(increment, bonds, v0, v1, dt):
     """Advance a list of bond strips by an increment: append new strips, drop the oldest and join others.
 
     Force and energy after the step are written into the status.
@@ -680,30 +680,23 @@ def _join_strips(bonds, i, k):
     if form == FORM_GROWING and not _have_similar_lengths(bonds, i, k):
         return False
 
+    # Two values with the sum and the first moment of the four; positions are measured from the end of k. The values of
+    # growing bonds are lengths, not weights, and count with the length of their strip.
     covered = strips[STRIP.covered, i] + strips[STRIP.covered, k]
     part = strips[STRIP.covered, k] / covered
-    value_1 = 0.0
-    value_2 = 0.0
-    if form == FORM_GROWING:
-        value_1 = _joint_start_length(GAUSS_POINT_1, bonds, i, k)
-        value_2 = _joint_start_length(GAUSS_POINT_2, bonds, i, k)
-    elif form == FORM_STRETCH:
-        # Two weights with the sum and the first moment of the four; positions are measured from the end of k
-        total_i = strips[STRIP.value_1, i] + strips[STRIP.value_2, i]
-        total_k = strips[STRIP.value_1, k] + strips[STRIP.value_2, k]
-        moment = GAUSS_POINT_1 * (
-            width_i * strips[STRIP.value_1, i] + width_k * strips[STRIP.value_1, k]
-        )
-        moment += GAUSS_POINT_2 * (
-            width_i * strips[STRIP.value_2, i] + width_k * strips[STRIP.value_2, k]
-        )
-        moment = (moment + total_i * width_k) / (width_i + width_k)
-        weight = total_i + total_k
-        value_2 = (moment - GAUSS_POINT_1 * weight) / (GAUSS_POINT_2 - GAUSS_POINT_1)
-        value_1 = weight - value_2
-        if value_1 <= 0 or value_2 <= 0:
-            return False
-        part = total_k / weight
+    scale_i = 1 - part if form == FORM_GROWING else 1.0
+    scale_k = part if form == FORM_GROWING else 1.0
+    i_1, i_2 = scale_i * strips[STRIP.value_1, i], scale_i * strips[STRIP.value_2, i]
+    k_1, k_2 = scale_k * strips[STRIP.value_1, k], scale_k * strips[STRIP.value_2, k]
+    moment = (1 - part) * (GAUSS_POINT_1 * i_1 + GAUSS_POINT_2 * i_2) + part * (i_1 + i_2)
+    moment += part * (GAUSS_POINT_1 * k_1 + GAUSS_POINT_2 * k_2)
+    weight = i_1 + i_2 + k_1 + k_2
+    value_2 = (moment - GAUSS_POINT_1 * weight) / (GAUSS_POINT_2 - GAUSS_POINT_1)
+    value_1 = weight - value_2
+    if value_1 < 0 or value_2 < 0:
+        return False
+    if form == FORM_STRETCH:
+        part = (k_1 + k_2) / weight
 
     # The joint pressure conserves the sum of the weights of every point
     strips[STRIP.density, i] += part * (strips[STRIP.density, k] - strips[STRIP.density, i])
@@ -719,43 +712,18 @@ def _join_strips(bonds, i, k):
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def _value_at(fraction, bonds, k):
-    """Return the interpolated value of strip k at a position, a fraction of its length from its end."""
-    strips = bonds.bondlist
-    return interpolate_value(fraction, strips[STRIP.value_1, k], strips[STRIP.value_2, k])
-
-
-@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def _is_fully_grown(bonds, k):
-    """Return whether the starting lengths of the bonds of a strip no longer matter."""
-    scale = exp(bonds.now[PATH.reference] - bonds.now[PATH.growth])
-    return scale * _value_at(0.0, bonds, k) <= MAX_START_LENGTH_RATIO * bonds.now[PATH.length]
-
-
-@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def _have_similar_lengths(bonds, i, k):
     """Return whether the growing bonds of two strips have similar lengths or are fully grown."""
-    if _is_fully_grown(bonds, k):
-        return True
-    young = _value_at(0.0, bonds, k)
-    old = _value_at(1.0, bonds, i)
+    strips = bonds.bondlist
+    mature = bonds.now[PATH.length]
     scale = exp(bonds.now[PATH.reference] - bonds.now[PATH.growth])
-    young_length = bonds.now[PATH.length] - scale * young
-    old_length = bonds.now[PATH.length] - scale * old
-    return young <= exp(MAX_GROWTH_SPAN) * old and young_length >= (1 - MAX_SHORTENING) * old_length
-
-
-@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def _joint_start_length(gauss, bonds, i, k):
-    """Return the scaled starting length at a Gauss point of the joint strips i and k."""
-    if _is_fully_grown(bonds, k):
-        return 0.0
-    width_i = bonds.bondlist[STRIP.covered, i]
-    width_k = bonds.bondlist[STRIP.covered, k]
-    position = gauss * (width_i + width_k)
-    if position <= width_k:
-        return _value_at(position / width_k, bonds, k)
-    return _value_at((position - width_k) / width_i, bonds, i)
+    young = scale * interpolate_value(0.0, strips[STRIP.value_1, k], strips[STRIP.value_2, k])
+    old = scale * interpolate_value(1.0, strips[STRIP.value_1, i], strips[STRIP.value_2, i])
+    if young <= MAX_START_LENGTH_RATIO * mature:
+        return True
+    return young <= exp(MAX_GROWTH_SPAN) * old and mature - young >= (1 - MAX_SHORTENING) * (
+        mature - old
+    )
 
 
 # ---- change of load at rest

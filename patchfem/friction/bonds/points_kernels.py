@@ -45,7 +45,9 @@ def mean_force(lists, j, load, step):
     """Return the path-mean force of point j per mu_s, and its slope, if bonds form under a load [N]."""
     bonds = point_list(lists, j)
     bonds.status[STATUS.pressure] = load
-    return list_kernels.mean_with_slope(step.increment, bonds, step.start_velocity, step.duration)
+    return list_kernels.list_mean_and_slope(
+        step.increment, bonds, step.start_velocity, step.duration
+    )
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
@@ -53,7 +55,7 @@ def advance(lists, j, load, step):
     """Advance the bonds of point j over a step under a load [N]; return False if its list is full."""
     bonds = point_list(lists, j)
     bonds.status[STATUS.pressure] = load
-    return list_kernels.advance(
+    return list_kernels.list_step(
         step.increment, bonds, step.start_velocity, step.end_velocity, step.duration
     )
 
@@ -109,10 +111,10 @@ def advance_list(bonds, increment, before, after, dt, out):
         strips[STRIP.pressure + j, new] = 0.5 * (before[j] + after[j])
         status[STATUS.pressure] = max(status[STATUS.pressure], strips[STRIP.pressure + j, new])
         out[1, j] = list_kernels.total(STRIP.present_energy, j, bonds)
-    list_kernels.mean_force(increment, bonds, speed, dt)
+    list_kernels.list_mean(increment, bonds, speed, dt)
     for j in range(before.size):
         out[0, j] = list_kernels.total(STRIP.mean, j, bonds)
-    if not list_kernels.advance(increment, bonds, speed, speed, dt):
+    if not list_kernels.list_step(increment, bonds, speed, speed, dt):
         return False
     for j in range(before.size):
         if after[j] <= 0:

@@ -15,20 +15,12 @@ from ...compiled.jit import njit
 from ..bonds.point_kernels import bond_mean, bond_step, grow
 from ..flags_kernels import FASTMATH_FLAGS, NJIT_NO_REFCOUNT
 from ..protocol_kernels import (
-    HAS_SPEED_LAYER,
-    HAS_ZERO_KINK,
-    IS_SET_VALUED,
-    IntegratedStretch,
     Rates,
     Reading,
     RelaxedStretch,
     solve_step,
 )
-from .exponential_kernels import exp_minus
 
-NUMBER_UNITS = "N/m m"  # units of `numbers`, for batches that scale time and force
-# Whether the stretch depends on the path alone, as it does for a constant bond length
-IS_RATE_INDEPENDENT = True
 # Index in `numbers` of the first growth parameter: a_s, l_k, v_h, eps_0, eps_k
 GROWTH_INDEX = 3
 FIRST_POINT_INDEX = 8  # index of the first number of the points
@@ -100,32 +92,13 @@ def relax_stretch(numbers, stretch, increment, dt):
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def rate_equation(numbers, stretch, velocity, direction):
-    """Return the force of mature bonds of constant length at a stretch, and dz/dx = 1 - z/eps.
-
-    x increases along the slip.
+    """Return the force of mature bonds of constant length at a stretch.
 
     Returns
     -------
     Rates
     """
-    return Rates(numbers[1] * stretch, 1 - direction * stretch / numbers[2], numbers[1], 0.0)
-
-
-@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def integrate_stretch(numbers, stretch, mean_square, increment, direction):
-    """Return stretch, mean square stretch and work of mature bonds after an increment.
-
-    Returns
-    -------
-    IntegratedStretch
-    """
-    end = direction * numbers[2]
-    x = direction * increment / numbers[2]
-    deviation = stretch - end
-    decay = exp_minus(x)
-    square = mean_square * decay + 2 * end * (end * (1 - decay) + deviation * x * decay)
-    work = numbers[1] * end * (increment + deviation * (1 - decay))
-    return IntegratedStretch(end + deviation * decay, square, work)
+    return Rates(numbers[1] * stretch, numbers[1], 0.0)
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
