@@ -61,7 +61,12 @@ PUBLIC = {
         "FirstOrderBonds",
         "ListedBonds",
     ),
-    "bonds.points_kernels": ("point_list",),
+    "bonds.points_kernels": (
+        "ListStep",
+        "advance",
+        "mean_force",
+        "point_list",
+    ),
     "bonds.spread": ("carried_fraction",),
     "bonds.temperature": ("surface_temperature_rise",),
     "flags_kernels": (

@@ -7,9 +7,9 @@ every contact.
 """
 
 from ...compiled.jit import njit
-from ...friction.bonds.list_kernels import break_bonds, list_step
+from ...friction.bonds.list_kernels import break_bonds
 from ...friction.bonds.list_rows_kernels import LAW, PATH, STATUS
-from ...friction.bonds.points_kernels import point_list
+from ...friction.bonds.points_kernels import ListStep, advance, point_list
 from ...friction.flags_kernels import NJIT_NO_REFCOUNT
 from ...friction.protocol_kernels import Reading
 from . import shear_solve_kernels as solver
@@ -88,7 +88,8 @@ def commit_step(dq, force, start, end_velocity, contact):
         xi = points[PointRow.SLIDE, j]
         energy = bonds.status[STATUS.energy]
         speed = abs(xi) / start.dt
-        has_room = list_step(xi, bonds, speed, speed, start.dt) and has_room
+        step = ListStep(xi, start.dt, speed, speed)
+        has_room = advance(contact, j, bonds.status[STATUS.pressure], step) and has_room
         if changes and find_pressure(j, contact) <= 0.0:
             break_bonds(0, bonds)
         work = points[PointRow.FORCE, j] * xi

@@ -10,9 +10,8 @@ velocity. Its weight is its friction limit [N]. The tests compare with
 import numpy as np
 
 from ...compiled.jit import njit
-from ...friction.bonds.list_kernels import list_mean_and_slope
 from ...friction.bonds.list_rows_kernels import PATH, STATUS
-from ...friction.bonds.points_kernels import point_list
+from ...friction.bonds.points_kernels import ListStep, mean_force
 from ...friction.flags_kernels import NJIT_NO_REFCOUNT
 from .arrays import ListPointRow, PointRow
 
@@ -117,9 +116,9 @@ def write_forces(kind, ending, contact):
         if is_empty and is_unpressed:
             points[PointRow.FORCE, j] = points[PointRow.SLOPE, j] = 0.0
             continue
-        f, s = list_mean_and_slope(
-            xi, point_list(contact, j), points[ListPointRow.GROWTH_SPEED, j], dt
-        )
+        speed = points[ListPointRow.GROWTH_SPEED, j]
+        step = ListStep(xi, dt, speed, speed)
+        f, s = mean_force(contact, j, status[STATUS.pressure], step)
         # Where many bonds have the same stretch, the mean force is steeper than the
         # slope s, so the secant is used.
         if xi != points[ListPointRow.TRIAL_SLIDE, j]:

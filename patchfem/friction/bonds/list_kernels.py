@@ -65,7 +65,7 @@ MIN_ENERGY_STEP = 1e-3
 MIN_ENERGY_STEP_SPREAD = 1e-6
 # Largest increment in bond lengths for which Simpson's rule is accurate enough
 MAX_SIMPSON_STEP = 0.1
-MAX_SIMPSON_STEP_FRACTIONAL = 0.03  # the same limit for an order below 1
+MAX_SIMPSON_STEP_STEEP = 0.03  # the same limit for an order below 1
 MAX_PANEL_LENGTH = 0.5  # largest length of the first panel of five Gauss points, in bond lengths
 # Largest exponent of the scaled values before they are rescaled; exp(709) is the largest
 # floating-point number
@@ -332,18 +332,18 @@ def list_mean(increment, bonds, v0, dt):
     strips[STRIP.mean, first] = 0.0
     for k in range(int(bonds.status[STATUS.head]), int(bonds.status[STATUS.end]) + 1):
         strips[STRIP.mean, k] = 0.0
-    if _suits_simpson(increment, bonds):
-        _add_to_mean(loss / 6 - gain, present_row, bonds)
+    share = _find_simpson_share(increment, bonds)
+    if share > 0:
+        _add_to_mean(share * loss / 6, present_row, bonds)
         sum_list(0.5, increment, bonds, v0, dt)
-        _add_to_mean(4 * loss / 6, row, bonds)
+        _add_to_mean(4 * share * loss / 6, row, bonds)
+    if share < 1:
+        _integrate_panels((1 - share) * loss, row, increment, bonds, v0, dt)
+    _add_to_mean(-gain, present_row, bonds)
+    end_weight = gain + share * loss / 6
+    if end_weight != 0:
         sum_list(1.0, increment, bonds, v0, dt)
-        _add_to_mean(loss / 6 + gain, row, bonds)
-    else:
-        _integrate_panels(loss, row, increment, bonds, v0, dt)
-        if has_balance:
-            _add_to_mean(-gain, present_row, bonds)
-            sum_list(1.0, increment, bonds, v0, dt)
-            _add_to_mean(gain, row, bonds)
+        _add_to_mean(end_weight, row, bonds)
 
     # Where it has a closed form, it replaces the rule
     if not is_stretch:
@@ -368,20 +368,19 @@ def _add_to_mean(weight, row, bonds):
 def _integrate_panels(weight, row, increment, bonds, v0, dt):
     """Add a row, averaged over an increment by panels of five Gauss points, to the row of the mean force.
 
-    Each panel is twice as long as the one before; the last two become one, so that no panel is much shorter than the
-    others.
+    Each panel is twice as long as the one before. The last one may be short, so that the mean force depends continuously
+    on the increment.
     """
     path = abs(increment) / bonds.now[PATH.length]
     low = 0.0
     high = min(MAX_PANEL_LENGTH / path, 1.0)
     while low < 1:
-        high = 1.0 if high > 0.75 else high
         for point, point_weight in GAUSS_RULE_5:
             fraction = low + (high - low) * (1 + point) / 2
             sum_list(fraction, increment, bonds, v0, dt)
             _add_to_mean(weight * (high - low) * point_weight / 2, row, bonds)
         low = high
-        high = 2 * high
+        high = min(2 * high, 1.0)
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
@@ -415,23 +414,21 @@ def _needs_energy_balance(increment, bonds):
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def _suits_simpson(increment, bonds):
-    """Return whether Simpson's rule is accurate enough for an increment: a short one with a smooth force.
+def _find_simpson_share(increment, bonds):
+    """Return the share of Simpson's rule in the mean of an increment; the remainder is that of panels of Gauss points.
 
-    For distributed initial bonds the choice must not depend on their position.
+    It is 1 for increments of up to half a limit with a smooth force and falls to 0 at the limit, so that the mean depends
+    continuously on the increment. For distributed initial bonds it must not depend on their position.
     """
     law = bonds.law
     p = law[LAW.order]
     is_stretch = law[LAW.form] == FORM_STRETCH
     has_steep_range = law[LAW.half_width] > 0 and p < 1
-    limit = MAX_SIMPSON_STEP if p >= 1 else MAX_SIMPSON_STEP_FRACTIONAL
-    return (
-        bonds.status[STATUS.end] > bonds.status[STATUS.head]
-        and abs(increment) / bonds.now[PATH.length] <= limit
-        and p >= 0
-        and not has_steep_range
-        and not (is_stretch and _passes_kink(increment, bonds))
-    )
+    is_empty = bonds.status[STATUS.end] == bonds.status[STATUS.head]
+    if is_empty or has_steep_range or p < 0 or (is_stretch and _passes_kink(increment, bonds)):
+        return 0.0
+    limit = MAX_SIMPSON_STEP if p >= 1 else MAX_SIMPSON_STEP_STEEP
+    return min(max(2 - 2 * abs(increment) / (limit * bonds.now[PATH.length]), 0.0), 1.0)
 
 
 # ---- increment of the list

@@ -239,7 +239,7 @@ def test_order_points_under_moving_pressure_agree_with_numpy_law(reading, order)
     stored = [0.0]
     for start, end in pairwise(path):
         pressure = np.interp(x + end, x, sigma, left=0.0, right=0.0)
-        state = numpy_law.advance(state, end - start, previous, pressure, 1e-3)
+        state = numpy_law.step(state, end - start, previous, pressure, 1e-3).state
         previous = pressure
         expected.append(weight * numpy_law.traction(state).sum())
         stored.append(weight * numpy_law.stored_energy(state).sum())
@@ -292,7 +292,7 @@ def test_order_two_under_prescribed_load(order, grows):
         state = numpy_law.initial_state(loads[:1])
         expected = [0.0]
         for k, dq in enumerate(np.diff(response.slide)):
-            state = numpy_law.advance(state, dq, loads[k : k + 1], loads[k + 1 : k + 2], dt)
+            state = numpy_law.step(state, dq, loads[k : k + 1], loads[k + 1 : k + 2], dt).state
             expected.append(numpy_law.traction(state)[0])
         differences.append(np.abs(response.force - expected).mean() / 39)
         energies = result.ledger
