@@ -13,12 +13,7 @@ PUBLIC = {
         "RequestedEngine",
         "choose_engine",
     ),
-    "bonds.list_kernels": (
-        "break_bonds",
-        "list_mean",
-        "list_mean_and_slope",
-        "list_step",
-    ),
+    "bonds.list_kernels": ("list_mean",),
     "bonds.list_numbers": (
         "MAX_DAMAGE",
         "MAX_STRIPS_PER_LENGTH",
@@ -40,6 +35,10 @@ PUBLIC = {
         "N_ROWS",
         "STATUS",
         "STRIP",
+    ),
+    "bonds.list_step_kernels": (
+        "break_bonds",
+        "list_step",
     ),
     "bonds.parameters": (
         "Bonds",

@@ -13,7 +13,6 @@ from patchfem.friction import MAX_LIST_SECONDS, steady_loop
 from patchfem.runs import BenchOptions, solve_with_coarser
 from patchfem.runs.bench import bench
 from patchfem.runs.bench.averaged_law import distribute_slip_force
-from patchfem.runs.bench.engine import BenchEngine, Method
 from patchfem.runs.bench.ledger import N_BLOCK_SAMPLES, SlideTask
 from patchfem.runs.bench.step_by_step import slide_step_by_step
 from patchfem.runs.run import run
@@ -68,7 +67,7 @@ def run_both_ways(model, steps, patch=None, frames=0):
     choice = compiled.engine.choice
     if choice is not None:
         choice = replace(choice, tail=0.0, merge=0.0)
-    engine = BenchEngine(Method.STEPPED, choice)
+    engine = replace(compiled.engine, choice=choice)
     stepped = slide_step_by_step(SlideTask(model, patch, time, slide, frames, engine))
     return compiled, stepped
 

@@ -16,13 +16,13 @@ from patchfem.friction import (
     make_path_state,
     make_status,
 )
-from patchfem.friction.bonds import list_kernels
+from patchfem.friction.bonds import list_kernels, list_step_kernels
 
 for kernel in (
     list_kernels.list_mean,
     list_kernels.sum_list,
     list_kernels.total,
-    list_kernels.list_step,
+    list_step_kernels.list_step,
 ):
     if hasattr(kernel, "enable_caching"):  # Without compilation there is no cache to enable.
         # Only tests call these kernels from Python, so only here is their compiled code cached.
@@ -63,6 +63,6 @@ def march_list(law, path, times=1.0, merge=0.0, tail=0.0, capacity=60_000):
         mean = list_kernels.list_mean(dq, bond_list, v, dt)
         list_kernels.sum_list(1.0, dq, bond_list, v, dt)
         ahead = list_kernels.total(STRIP.force, 0, bond_list)
-        assert list_kernels.list_step(dq, bond_list, v, v, dt)
+        assert list_step_kernels.list_step(dq, bond_list, v, v, dt)
         rows.append((mean, status[STATUS.force], ahead, status[STATUS.energy]))
     return ListHistory(*np.array(rows).T, status)

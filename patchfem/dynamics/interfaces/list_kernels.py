@@ -6,8 +6,9 @@ The arrays are `arrays.BondList`. `march.loop_kernels` calls the functions of ev
 import numpy as np
 
 from ...compiled.jit import njit
-from ...friction.bonds.list_kernels import list_mean, list_step
+from ...friction.bonds.list_kernels import list_mean
 from ...friction.bonds.list_rows_kernels import FORM_STRETCH, LAW, STATUS
+from ...friction.bonds.list_step_kernels import list_step
 from ...friction.flags_kernels import NJIT_NO_REFCOUNT
 from ...friction.protocol_kernels import Reading
 from ..modal_kernels import Bracket, narrow_bracket

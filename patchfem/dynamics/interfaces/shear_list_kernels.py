@@ -7,8 +7,8 @@ every contact.
 """
 
 from ...compiled.jit import njit
-from ...friction.bonds.list_kernels import break_bonds
 from ...friction.bonds.list_rows_kernels import LAW, PATH, STATUS
+from ...friction.bonds.list_step_kernels import break_bonds
 from ...friction.bonds.points_kernels import ListStep, advance, point_list
 from ...friction.flags_kernels import NJIT_NO_REFCOUNT
 from ...friction.protocol_kernels import Reading

@@ -34,7 +34,7 @@ from .list_rows_kernels import (
 UNSTRESSED_TOL = 1e-14
 # Smallest length of a growing bond relative to that of mature bonds; it keeps R/length finite
 MIN_LENGTH_RATIO = 1e-9
-ROUND_OFF = 1e-15  # largest difference of two equal paths, relative to the whole path
+PATH_ROUND_OFF = 1e-15  # largest difference of two equal paths, relative to the whole path
 MIN_POSITIVE = 1e-300  # smallest path [m] or value whose logarithm is taken
 # Distance of u = 0 from the middle of a strip, in half lengths of the strip, from which two Gauss points suffice
 KINK_REACH = 1.0  # for whole orders: the strip does not contain u = 0
@@ -49,6 +49,13 @@ MAX_PIECE_DAMAGE = 0.03
 MAX_PIECES = 8
 # Ratio of u to the length of a piece from which two Gauss points are more exact than a difference of powers
 FAR_RATIO = 30.0
+GAUSS_RULE_5 = (  # five Gauss points in (-1, 1), each with its weight
+    (-0.906179845938664, 0.23692688505618908),
+    (-0.5384693101056831, 0.47862867049936647),
+    (0.0, 0.5688888888888889),
+    (0.5384693101056831, 0.47862867049936647),
+    (0.906179845938664, 0.23692688505618908),
+)
 
 
 class BondSum(NamedTuple):
@@ -251,7 +258,8 @@ def _integrate_growing_piece(after, scale, bonds, k, low, high):
 
     # The density without R^steep_power at both Gauss points, and the same times |u|
     width = high - low
-    force_1, force_2, energy_1, energy_2 = 0.0, 0.0, 0.0, 0.0
+    force_1 = force_2 = 0.0
+    energy_1 = energy_2 = 0.0
     sign = 1.0
     for point in range(2):
         fraction = low + (GAUSS_POINT_1 if point == 0 else GAUSS_POINT_2) * width
@@ -343,7 +351,7 @@ def _sum_report(after, bonds):
         path = after.path - strips[STRIP.path, k]
         zero = min(max(direction * (end - after.displacement), 0.0), abs(step))
 
-        is_known = abs(path - known_path) <= ROUND_OFF * after.path
+        is_known = abs(path - known_path) <= PATH_ROUND_OFF * after.path
         younger = older if is_known else _sum_youngest(path / eps0, bonds)
         known_path = path + abs(step)
         older = _sum_youngest(known_path / eps0, bonds)

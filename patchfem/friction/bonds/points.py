@@ -45,9 +45,23 @@ class FirstOrderBonds:
         return moments
 
     def step(self, state: np.ndarray, dq: float, s0, s1, dt: float) -> Step:
-        """Advance the bonds by an increment dq [m] in dt [s] under pressures (m,) [Pa] from s0 to s1.
+        """Advance the bonds by an increment under a pressure that changes along it.
 
         New bonds form at the mean pressure. All bonds are lost where the step ends without pressure.
+
+        Parameters
+        ----------
+        state : (4, m) array
+        dq : float
+            Increment [m].
+        s0, s1 : (m,) array
+            Pressures at the ends [Pa].
+        dt : float
+            Duration [s].
+
+        Returns
+        -------
+        Step
         """
         after = state.copy()
         out = np.zeros((2, state.shape[1]))
@@ -58,7 +72,19 @@ class FirstOrderBonds:
         return Step(*(self._stiffness * out), after)
 
     def press(self, state: np.ndarray, s0, s1) -> Step:
-        """Change the pressure (m,) [Pa] from s0 to s1 at rest; energy that is no longer stored is lost."""
+        """Change the pressure at rest; energy that is no longer stored is lost.
+
+        Parameters
+        ----------
+        state : (4, m) array
+        s0, s1 : (m,) array
+            Pressures before and after [Pa].
+
+        Returns
+        -------
+        Step
+            Its mean is the traction after the change.
+        """
         after = state.copy()
         out = np.zeros((2, state.shape[1]))
         compiled.load("friction.bonds.points_kernels").press_moments(
@@ -115,15 +141,41 @@ class ListedBonds:
         )
 
     def step(self, state: BondList, dq: float, s0, s1, dt: float) -> Step:
-        """Advance the bonds by an increment dq [m] in dt [s] under pressures (m,) [Pa] from s0 to s1.
+        """Advance the bonds by an increment under a pressure that changes along it.
 
         New bonds form at the mean pressure. All bonds are lost where the step ends without pressure.
+
+        Parameters
+        ----------
+        state : BondList
+        dq : float
+            Increment [m].
+        s0, s1 : (m,) array
+            Pressures at the ends [Pa].
+        dt : float
+            Duration [s].
+
+        Returns
+        -------
+        Step
         """
         advance = compiled.load("friction.bonds.points_kernels").advance_list
         return self._change(state, advance, float(dq), _as_array(s0), _as_array(s1), float(dt))
 
     def press(self, state: BondList, s0, s1) -> Step:
-        """Change the pressure (m,) [Pa] from s0 to s1 at rest (`list_kernels.press`)."""
+        """Change the pressure at rest (`list_step_kernels.release`).
+
+        Parameters
+        ----------
+        state : BondList
+        s0, s1 : (m,) array
+            Pressures before and after [Pa].
+
+        Returns
+        -------
+        Step
+            Its mean is the traction after the change.
+        """
         press = compiled.load("friction.bonds.points_kernels").press_list
         return self._change(state, press, _as_array(s0), _as_array(s1))
 

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 from ...compiled.jit import njit
 from ..flags_kernels import NJIT_NO_REFCOUNT
-from . import list_kernels
+from . import list_kernels, list_step_kernels
 from .list_rows_kernels import LAW, STATUS, STRIP, BondList
 from .point_kernels import bond_mean, bond_step, grow, press_point
 
@@ -42,7 +42,22 @@ def point_list(lists, j):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def mean_force(lists, j, load, step):
-    """Return the path-mean force of point j per mu_s, and its slope, if bonds form under a load [N]."""
+    """Return the path-mean force of point j over a step, and its slope.
+
+    Parameters
+    ----------
+    lists : BondLists
+    j : int
+        Number of the point.
+    load : float
+        Load under which bonds form [N].
+    step : ListStep
+
+    Returns
+    -------
+    list_kernels.MeanForce
+        Per mu_s [N], [N/m].
+    """
     bonds = point_list(lists, j)
     bonds.status[STATUS.pressure] = load
     return list_kernels.list_mean_and_slope(
@@ -52,17 +67,45 @@ def mean_force(lists, j, load, step):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def advance(lists, j, load, step):
-    """Advance the bonds of point j over a step under a load [N]; return False if its list is full."""
+    """Advance the bonds of point j over a step.
+
+    Parameters
+    ----------
+    lists : BondLists
+    j : int
+        Number of the point.
+    load : float
+        Load under which bonds form [N].
+    step : ListStep
+
+    Returns
+    -------
+    bool
+        False if the list of the point is full.
+    """
     bonds = point_list(lists, j)
     bonds.status[STATUS.pressure] = load
-    return list_kernels.list_step(
+    return list_step_kernels.list_step(
         step.increment, bonds, step.start_velocity, step.end_velocity, step.duration
     )
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def read(lists, j, load):
-    """Return the `PointReading` of point j under a load [N]."""
+    """Return force, energy and stretch of point j.
+
+    Parameters
+    ----------
+    lists : BondLists
+    j : int
+        Number of the point.
+    load : float
+        Present load [N].
+
+    Returns
+    -------
+    PointReading
+    """
     force = lists.statuses[j, STATUS.force]
     energy = lists.statuses[j, STATUS.energy] - lists.statuses[j, STATUS.owed]
     stretch = force * lists.law[LAW.length] / load if load > 0 else 0.0
@@ -71,8 +114,22 @@ def read(lists, j, load):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def press(lists, j, before, after):
-    """Change the load of point j [N] at rest; return False if its list is full."""
-    return list_kernels.press(before, after, point_list(lists, j))
+    """Change the load of point j at rest.
+
+    Parameters
+    ----------
+    lists : BondLists
+    j : int
+        Number of the point.
+    before, after : float
+        Loads [N].
+
+    Returns
+    -------
+    bool
+        False if the list of the point is full.
+    """
+    return list_step_kernels.press(before, after, point_list(lists, j))
 
 
 # ---- all points move alike
@@ -114,11 +171,11 @@ def advance_list(bonds, increment, before, after, dt, out):
     list_kernels.list_mean(increment, bonds, speed, dt)
     for j in range(before.size):
         out[0, j] = list_kernels.total(STRIP.mean, j, bonds)
-    if not list_kernels.list_step(increment, bonds, speed, speed, dt):
+    if not list_step_kernels.list_step(increment, bonds, speed, speed, dt):
         return False
     for j in range(before.size):
         if after[j] <= 0:
-            list_kernels.break_bonds(j, bonds)
+            list_step_kernels.break_bonds(j, bonds)
         if increment == 0:
             out[0, j] = list_kernels.total(STRIP.present_force, j, bonds)
         out[1, j] += out[0, j] * increment - list_kernels.total(STRIP.present_energy, j, bonds)
@@ -147,14 +204,14 @@ def press_list(bonds, before, after, out):
     formed = 0.0
     for j in range(before.size):
         out[1, j] = list_kernels.total(STRIP.present_energy, j, bonds)
-        out[0, j] = list_kernels.release(before[j], after[j], j, bonds)
+        out[0, j] = list_step_kernels.release(before[j], after[j], j, bonds)
         formed = max(formed, out[0, j])
     if formed > 0:
-        if not list_kernels.append_unstretched(bonds):
+        if not list_step_kernels.append_unstretched(bonds):
             return False
         for j in range(before.size):
             strips[STRIP.pressure + j, int(bonds.status[STATUS.end]) - 1] = out[0, j]
-    list_kernels.update_sums(bonds)
+    list_step_kernels.update_sums(bonds)
     for j in range(before.size):
         out[0, j] = list_kernels.total(STRIP.present_force, j, bonds)
         out[1, j] -= list_kernels.total(STRIP.present_energy, j, bonds)
@@ -184,13 +241,18 @@ def advance_moments(moments, increment, before, after, dt, growth, out):
     path = abs(increment)
     speed = path / dt if dt > 0 else 0.0
     for j in range(before.size):
-        m, z, s2, eps = moments[0, j], moments[1, j], moments[2, j], moments[3, j]
+        m = moments[0, j]
+        z = moments[1, j]
+        s2 = moments[2, j]
+        eps = moments[3, j]
         sigma = 0.5 * (before[j] + after[j])
         middle = grow(eps, speed, speed, path / 2, dt / 2, growth)[0]
         out[0, j] = bond_mean(m, z, increment, sigma, middle)[0]
         moved = bond_step(m, z, s2, increment, sigma, middle)
         out[1, j] = 0.5 * moved.damage_integral
-        moments[0, j], moments[1, j], moments[2, j] = moved.m, moved.z, moved.s2
+        moments[0, j] = moved.m
+        moments[1, j] = moved.z
+        moments[2, j] = moved.s2
         if after[j] <= 0:
             out[1, j] += 0.5 * moved.s2
             moments[0, j] = moments[1, j] = moments[2, j] = 0.0
@@ -217,4 +279,6 @@ def press_moments(moments, before, after, initial, length, out):
         m, z, s2 = press_point(bonds, before[j], after[j], initial, length)
         out[0, j] = z
         out[1, j] = 0.5 * (moments[2, j] - s2)
-        moments[0, j], moments[1, j], moments[2, j] = m, z, s2
+        moments[0, j] = m
+        moments[1, j] = z
+        moments[2, j] = s2
