@@ -60,19 +60,23 @@ def fast_log(x):
 
 
 @njit(error_model="numpy", fastmath={"contract"}, forceinline=True, **NJIT_NO_REFCOUNT)
+def whole_power(x, p):
+    """Return x^p for p = 0, 1 or 2 without a branch."""
+    first = min(p, 1.0)
+    second = max(p - 1.0, 0.0)
+    return (1.0 - first + first * x) * (1.0 - second + second * x)
+
+
+@njit(error_model="numpy", fastmath={"contract"}, forceinline=True, **NJIT_NO_REFCOUNT)
 def power(x, p):
     """Return x^p of x >= 0; fast for the orders 0, 1 and 2."""
-    if p == 0.0:
-        return 1.0
-    if p == 1.0:
-        return x
-    if p == 2.0:
-        return x * x
+    if p == 0.0 or p == 1.0 or p == 2.0:
+        return whole_power(x, p)
     return fast_exp(p * fast_log(x))
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def bond_gammainc(p, x, inverse_gamma, table):
+def bond_gammainc(p, x, density, inverse_gamma, table):
     """Return P(p + 1, x), the fraction of the limit that bonds of the last x bond lengths carry.
 
     It has a closed form for p = 0, 1 and 2. Else it is a power series for x < 1, and above it a cubic between two
@@ -82,8 +86,8 @@ def bond_gammainc(p, x, inverse_gamma, table):
     ----------
     p, x : float
         Order and argument.
-    inverse_gamma : float
-        1/Gamma(p + 1).
+    density, inverse_gamma : float
+        x^(p + 1) exp(-x)/Gamma(p + 1), 1/Gamma(p + 1).
     table : (k,) array
         P(p + 1, x) at multiples of 1/N_TABLE_STEPS (`list_numbers.gamma_table`).
 
@@ -91,13 +95,11 @@ def bond_gammainc(p, x, inverse_gamma, table):
     -------
     float
     """
-    if x <= 0:
-        return 0.0
     if p == 0.0 or p == 1.0 or p == 2.0:
         return 1 - (1 + min(p, 1.0) * x * (1 + max(p - 1, 0.0) * 0.5 * x)) * fast_exp(-x)
     if x < 1:
         # P(a, x) = x^a exp(-x)/Gamma(a + 1) (1 + x/(a + 1) + x^2/((a + 1)(a + 2)) + ...), a = p + 1
-        term = inverse_gamma / (p + 1) * fast_exp((p + 1) * fast_log(x) - x)
+        term = density / (p + 1)
         total = term
         for n in range(1, N_SERIES_TERMS):
             term *= x / (p + 1 + n)

@@ -18,7 +18,7 @@ from numba import uint64
 
 from ...compiled.jit import njit
 from ..flags_kernels import FASTMATH_FLAGS, NJIT_NO_REFCOUNT
-from .list_math_kernels import bond_gammainc, fast_exp, fast_log, power
+from .list_math_kernels import bond_gammainc, fast_exp, fast_log, power, whole_power
 from .list_rows_kernels import (
     FORM_REPORT,
     FORM_STRETCH,
@@ -100,7 +100,10 @@ def sum_strips(after, bonds):
     if form == FORM_STRETCH:
         force_factor *= scale
         energy_factor = force_factor / (p + 1)
-    _sum_gauss(after, scale, force_factor, energy_factor, bonds)
+    if form == FORM_STRETCH:
+        _sum_gauss_stretch(after, force_factor, energy_factor, bonds)
+    else:
+        _sum_gauss_growing(after, scale, force_factor, bonds)
     for k in range(int(bonds.status[STATUS.head]), int(bonds.status[STATUS.end])):
         if not _suits_gauss(after, bonds, k, p, form):
             exact = _integrate_strip(after, scale, bonds, k)
@@ -135,32 +138,57 @@ def _suits_gauss(after, bonds, k, p, form):
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def _sum_gauss(after, scale, force_factor, energy_factor, bonds):
-    """Write force and energy of all strips by two Gauss points each."""
+def _sum_gauss_stretch(after, force_factor, energy_factor, bonds):
+    """Write force and energy of all strips for reading="stretch" by two Gauss points each."""
     strips = bonds.bondlist
     p = bonds.law[LAW.order]
-    is_stretch = bonds.law[LAW.form] == FORM_STRETCH
+    is_whole = p == 0.0 or p == 1.0 or p == 2.0
+    for k in range(uint64(bonds.status[STATUS.head]), uint64(bonds.status[STATUS.end])):
+        end = strips[STRIP.end, k]
+        step = end - strips[STRIP.start, k]
+        u_1 = after.displacement - end + GAUSS_POINT_1 * step
+        u_2 = after.displacement - end + GAUSS_POINT_2 * step
+        if is_whole:
+            power_1 = whole_power(abs(u_1), p)
+            power_2 = whole_power(abs(u_2), p)
+        else:
+            power_1 = fast_exp(p * fast_log(abs(u_1)))
+            power_2 = fast_exp(p * fast_log(abs(u_2)))
+        force_1 = strips[STRIP.value_1, k] * power_1
+        force_2 = strips[STRIP.value_2, k] * power_2
+        force = np.copysign(force_1, u_1) + np.copysign(force_2, u_2)
+        strips[STRIP.force, k] = force_factor * force
+        strips[STRIP.energy, k] = energy_factor * (force_1 * abs(u_1) + force_2 * abs(u_2))
+
+
+@njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
+def _sum_gauss_growing(after, scale, factor, bonds):
+    """Write force and energy of all strips of growing bonds by two Gauss points each."""
+    strips = bonds.bondlist
+    p = bonds.law[LAW.order]
+    is_whole = p == 0.0 or p == 1.0 or p == 2.0
     min_length = MIN_LENGTH_RATIO * after.length
     for k in range(uint64(bonds.status[STATUS.head]), uint64(bonds.status[STATUS.end])):
         end = strips[STRIP.end, k]
         step = end - strips[STRIP.start, k]
         u_1 = after.displacement - end + GAUSS_POINT_1 * step
         u_2 = after.displacement - end + GAUSS_POINT_2 * step
-        if is_stretch:
-            force_1 = strips[STRIP.value_1, k] * power(abs(u_1), p)
-            force_2 = strips[STRIP.value_2, k] * power(abs(u_2), p)
+        covered = strips[STRIP.covered, k]
+        path = after.path - strips[STRIP.path, k]
+        length_1 = max(after.length - scale * strips[STRIP.value_1, k], min_length)
+        length_2 = max(after.length - scale * strips[STRIP.value_2, k], min_length)
+        x_1 = max(path + GAUSS_POINT_1 * covered, MIN_POSITIVE) / length_1
+        x_2 = max(path + GAUSS_POINT_2 * covered, MIN_POSITIVE) / length_2
+        if is_whole:
+            force_1 = whole_power(x_1, p) * fast_exp(-x_1)
+            force_2 = whole_power(x_2, p) * fast_exp(-x_2)
         else:
-            covered = strips[STRIP.covered, k]
-            path = after.path - strips[STRIP.path, k]
-            length_1 = max(after.length - scale * strips[STRIP.value_1, k], min_length)
-            length_2 = max(after.length - scale * strips[STRIP.value_2, k], min_length)
-            x_1 = max(path + GAUSS_POINT_1 * covered, MIN_POSITIVE) / length_1
-            x_2 = max(path + GAUSS_POINT_2 * covered, MIN_POSITIVE) / length_2
-            force_1 = 0.5 * covered * power(x_1, p) * fast_exp(-x_1)
-            force_2 = 0.5 * covered * power(x_2, p) * fast_exp(-x_2)
+            force_1 = fast_exp(p * fast_log(x_1) - x_1)
+            force_2 = fast_exp(p * fast_log(x_2) - x_2)
         force = np.copysign(force_1, u_1) + np.copysign(force_2, u_2)
-        strips[STRIP.force, k] = force_factor * force
-        strips[STRIP.energy, k] = energy_factor * (force_1 * abs(u_1) + force_2 * abs(u_2))
+        weight = 0.5 * factor * covered
+        strips[STRIP.force, k] = weight * force
+        strips[STRIP.energy, k] = weight * (force_1 * abs(u_1) + force_2 * abs(u_2))
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
@@ -375,8 +403,9 @@ def _sum_youngest(x, bonds):
         return BondSum(0.0, 0.0)
     p = bonds.law[LAW.order]
     inverse_gamma = bonds.law[LAW.inverse_gamma]
-    total = bond_gammainc(p, x, inverse_gamma, bonds.table)
-    return BondSum(total, (p + 1) * total - inverse_gamma * x * power(x, p) * fast_exp(-x))
+    density = inverse_gamma * x * power(x, p) * fast_exp(-x)
+    total = bond_gammainc(p, x, density, inverse_gamma, bonds.table)
+    return BondSum(total, (p + 1) * total - density)
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
@@ -403,7 +432,9 @@ def sum_initial(after, bonds):
     displacement = after.displacement
     weight = law[LAW.initial] * law[LAW.inverse_gamma]
     is_at_place = half_width == 0 and abs(displacement) <= UNSTRESSED_TOL * after.path
-    if weight == 0 or after.path == 0 or is_at_place:
+    age = PATH.damage if law[LAW.form] == FORM_STRETCH else PATH.path
+    is_old = bonds.now[age] > law[LAW.cutoff]
+    if weight == 0 or after.path == 0 or is_at_place or is_old:
         return BondSum(0.0, 0.0)
 
     stretch_power = 0.0
@@ -441,7 +472,7 @@ def average_initial(increment, bonds):
     law = bonds.law
     eps0 = law[LAW.length]
     half_width = law[LAW.half_width]
-    if law[LAW.initial] == 0:
+    if law[LAW.initial] == 0 or bonds.now[PATH.path] > law[LAW.cutoff]:
         return 0.0
     size = abs(increment)
     path = bonds.now[PATH.path]
@@ -452,8 +483,12 @@ def average_initial(increment, bonds):
     to_entry = min(max(-along - half_width, 0.0), size)
     to_exit = min(max(-along + half_width, 0.0), size)
     at_start = _sum_youngest(path / eps0, bonds).force
-    at_entry = _sum_youngest((path + to_entry) / eps0, bonds).force
-    at_exit = _sum_youngest((path + to_exit) / eps0, bonds).force
+    at_entry = at_start
+    if to_entry > 0:
+        at_entry = _sum_youngest((path + to_entry) / eps0, bonds).force
+    at_exit = at_entry
+    if to_exit > to_entry:
+        at_exit = _sum_youngest((path + to_exit) / eps0, bonds).force
     total = _sum_youngest((path + size) / eps0, bonds).force - at_exit - (at_entry - at_start)
     if to_exit > to_entry:
         middle = along + 0.5 * (to_entry + to_exit)
