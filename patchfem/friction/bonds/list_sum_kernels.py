@@ -44,9 +44,9 @@ STEEP_REACH = 3.0
 # Ratio of the last to the first bond length of a strip above which its bonds grew at rest, not along the strip
 MIN_RESTING_RATIO = 0.05
 # Largest damage along a piece, and largest number of pieces; with them the linear density of a piece changes the force
-# by less than 1e-6 of the friction limit
-MAX_PIECE_DAMAGE = 0.03
-MAX_PIECES = 8
+# by less than 2e-6 of the friction limit
+MAX_PIECE_DAMAGE = 0.07
+MAX_PIECES = 4
 # Ratio of u to the length of a piece from which two Gauss points are more exact than a difference of powers
 FAR_RATIO = 30.0
 GAUSS_RULE_5 = (  # five Gauss points in (-1, 1), each with its weight
@@ -256,8 +256,11 @@ def _integrate_stretch_piece(after, bonds, k, low, high):
     value_1 = strips[STRIP.value_1, k]
     value_2 = strips[STRIP.value_2, k]
     width = high - low
-    weight_1 = width * interpolate_value(low + GAUSS_POINT_1 * width, value_1, value_2)
-    weight_2 = width * interpolate_value(low + GAUSS_POINT_2 * width, value_1, value_2)
+    weight_1 = value_1
+    weight_2 = value_2
+    if width < 1:
+        weight_1 = width * interpolate_value(low + GAUSS_POINT_1 * width, value_1, value_2)
+        weight_2 = width * interpolate_value(low + GAUSS_POINT_2 * width, value_1, value_2)
     step = strips[STRIP.end, k] - strips[STRIP.start, k]
     u_low = after.displacement - strips[STRIP.end, k] + low * step
     u_high = after.displacement - strips[STRIP.end, k] + high * step
