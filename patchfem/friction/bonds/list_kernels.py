@@ -358,12 +358,13 @@ def list_mean(increment, bonds, v0, dt):
         sum_list(1.0, increment, bonds, v0, dt)
         _add_to_mean(end_weight, row, bonds)
 
-    # Where it has a closed form, it replaces the rule
-    if not is_stretch:
+    # A closed form replaces the rule, but not for the new bonds of reading="report": their steep force at the start of
+    # the increment cancels that of the strip before
+    if is_stretch:
+        new = int(bonds.status[STATUS.end])
+        strips[STRIP.mean, new] = average_formed(increment, after.middle_length, bonds)
+    else:
         strips[STRIP.mean, first] = average_initial(increment, bonds)
-    if bonds.law[LAW.form] != FORM_GROWING:
-        eps = after.middle_length if is_stretch else bonds.law[LAW.length]
-        strips[STRIP.mean, int(bonds.status[STATUS.end])] = average_formed(increment, eps, bonds)
     return total(STRIP.mean, 0, bonds)
 
 
