@@ -136,7 +136,7 @@ def convert_element(element: Element) -> list[PointLaw]:
     if element.form == "points":
         # Points of equal slide and a density of 1 per load are one point.
         limit = numbers[1] * numbers[2]
-        rows[:10] = (Law.BONDS, limit, numbers[2], *numbers[3:9], element.memory[1])
+        rows[:9] = (Law.BONDS, limit, numbers[2], *numbers[3:8], element.memory[1])
         memory[:4] = element.memory[:4]
         return [PointLaw(rows, memory, 1.0)]
     if element.kernels in FLOW_LAWS:
@@ -226,14 +226,14 @@ def make_bond_contact(
     if bond_sum is None:
         laws = [make_bonds(bonds, load) for load in now]
     else:
-        laws = [make_list(bonds, load, measure) for load, measure in zip(now, loads)]
+        laws = [make_list(bonds, load) for load in now]
     points = PointSet(laws, row, nodes, shear, shares=shares, places=places)
     limit = bonds.static * float(now.sum())
     return Contact([points], limit, bonds.length, bond_sum=bond_sum, pressure=pressure)
 
 
 def make_pressed_contact(
-    law, force, row, shear=None, bond_sum: BondSum | None = None, measure=None, **load
+    law, force, row, shear=None, bond_sum: BondSum | None = None, **load
 ) -> Contact:
     """Return the points of an interface under a load that changes.
 
@@ -249,8 +249,6 @@ def make_pressed_contact(
         Shear of the pieces at all nodes.
     bond_sum : BondSum, optional
         Sum over lists of bonds.
-    measure : (m,) array, optional
-        Loads of the relative pressure 1 of lists [N]; default: `force`.
     **load
         Fields of Contact that describe the load.
     """
@@ -273,8 +271,7 @@ def make_pressed_contact(
         laws = [make_bonds(law, load) for load in loads]
     else:
         length = law.length
-        measure = loads if measure is None else measure
-        laws = [make_list(law, load, unit) for load, unit in zip(loads, measure)]
+        laws = [make_list(law, load) for load in loads]
     points = PointSet(laws, row, nodes, shear)
     limit = (law.static or 1.0) * max(float(loads.sum()), 1e-9)
     return Contact([points], limit, length, bond_sum=bond_sum, preload=float(loads.sum()), **load)

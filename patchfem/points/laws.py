@@ -4,9 +4,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..friction.bonds.parameters import Bonds
+from ..friction.bonds.parameters import Bonds, growth_numbers
 from ..friction.laws.iwan import max_yield_displacement
-from ..friction.laws.stretch import growth_numbers
 from .law_rows import Law, Masing
 
 N_NUMBERS = 10  # rows of numbers of a point
@@ -64,9 +63,9 @@ def make_bonds(bonds: Bonds, load: float = 1.0) -> PointLaw:
     return _pack(Law.BONDS, numbers, (bonds.length, bonds.initial * load), load)
 
 
-def make_list(bonds: Bonds, load: float, unit: float) -> PointLaw:
-    """Return a point whose bonds are summed over a list, under a load [N]; at the load `unit` the relative pressure is 1."""
-    return _pack(Law.LIST, (bonds.static, bonds.length, unit), load=load)
+def make_list(bonds: Bonds, load: float) -> PointLaw:
+    """Return a point whose bonds are summed over a list, under a load [N]."""
+    return _pack(Law.LIST, (bonds.static, bonds.length), load=load)
 
 
 def make_cubic(stiffness: float) -> PointLaw:

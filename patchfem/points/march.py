@@ -15,8 +15,8 @@ from ..contact.set_arrays import hash_set, make_set_arrays
 from ..core import Missing, ModalBasis, Outcome, Response, SineDrive
 from ..formatting import format_length
 from ..friction.bonds import list_numbers
-from ..friction.bonds.list_rows_kernels import N_ROWS, STATUS
-from ..friction.laws.stretch import growth_numbers
+from ..friction.bonds.list_rows_kernels import N_ROWS, STATUS, BondLists
+from ..friction.bonds.parameters import growth_numbers
 from ..friction.path_work import sampled_work
 from . import checkpoint
 from .contacts import Contact
@@ -32,7 +32,6 @@ from .march_rows import (
     RESIDUAL,
     RESULTANT,
     Flank,
-    Lists,
     Options,
     Point,
     Points,
@@ -342,13 +341,13 @@ def _make_points(contact: Contact, n_nodes: int) -> Points:
     )
 
 
-def _make_lists(contact: Contact, points: Points, is_prescribed: bool) -> Lists:
+def _make_lists(contact: Contact, points: Points, is_prescribed: bool) -> BondLists:
     """Return the arrays of the lists of bonds; empty ones without lists."""
     count = points.port.size
     if contact.bond_sum is None:
         empty = np.zeros(0)
-        return Lists(
-            np.zeros((N_ROWS, 0)), np.zeros((count, 6)), np.zeros((count, 16)), *[empty] * 3
+        return BondLists(
+            np.zeros((N_ROWS, 0)), np.zeros((count, 6)), np.zeros((count, 14)), *[empty] * 3
         )
     bonds, reach, merge = contact.bond_sum
     capacity = list_numbers.list_capacity(bonds, reach, merge)
@@ -356,19 +355,17 @@ def _make_lists(contact: Contact, points: Points, is_prescribed: bool) -> Lists:
         step = list_numbers.MAX_STRIPS_PER_LENGTH * int(min(reach, list_numbers.MAX_DAMAGE))
         capacity = min(capacity, FIRST_STRIPS + step)
     statuses = list_numbers.make_status(capacity, count)
-    is_list = points.numbers[0] == Law.LIST
-    start = np.zeros(count)
-    start[is_list] = points.values[Point.END_LOAD, :count][is_list] / points.numbers[3, is_list]
-    statuses[:, STATUS.pressure] = statuses[:, STATUS.initial_pressure] = start
+    loads = np.where(points.numbers[0] == Law.LIST, points.values[Point.END_LOAD, :count], 0.0)
+    statuses[:, STATUS.pressure] = statuses[:, STATUS.initial_pressure] = loads
     # The initial bonds of a single list along a prescribed slide have no width, so that it is exact.
     width = 0.0 if is_prescribed and count == 1 and not points.stiffness.size else FIRST_WIDTH
-    return Lists(
+    return BondLists(
         np.zeros((N_ROWS, count * capacity)),
         np.tile(list_numbers.make_path_state(bonds), (count, 1)),
         statuses,
         list_numbers.law_numbers(bonds, reach, merge, width),
-        growth_numbers(bonds),
         list_numbers.gamma_table(bonds),
+        growth_numbers(bonds),
     )
 
 
@@ -721,17 +718,9 @@ def enlarge_lists(system: System, place: str) -> System:
             f"{LONG_LIST_ADVICE}",
             "",
         )
-    count = len(lists.statuses)
-    capacity = min(2 * room, MAX_STRIPS) // count
-    bondlist = np.zeros((N_ROWS, capacity * count))
     statuses = lists.statuses.copy()
-    for j, status in enumerate(statuses):
-        head, end = status[[STATUS.head, STATUS.end]].astype(int)
-        first = j * capacity
-        bondlist[:, first : first + end - head] = lists.bondlist[:, head:end]
-        status[[STATUS.room_start, STATUS.head]] = first
-        status[STATUS.room_end] = first + capacity
-        status[STATUS.end] = first + end - head
+    capacity = min(2 * room, MAX_STRIPS) // len(statuses)
+    bondlist = list_numbers.enlarge_lists(lists.bondlist, statuses, capacity)
     return system._replace(lists=lists._replace(bondlist=bondlist, statuses=statuses))
 
 

@@ -207,7 +207,7 @@ def prepare_points(system, h):
             middle = 0.5 * (start + values[Point.END_LOAD, j])
             values[Point.LOAD, j] = middle
             if points.numbers[0, j] == Law.LIST:
-                lists.press_list(points.numbers, system.lists, j, middle)
+                lists.press_list(system.lists, j, middle)
             elif start != middle and points.node[j] != LOWER:
                 press(points.numbers, points.trial, j, start, middle)
         system.totals[Total.IS_DIRTY] = 1.0
@@ -1000,9 +1000,10 @@ def commit_list(system, j, h):
 def read_point(system, j):
     """Return force, energy and stretch of a point under its load at the end of the last step."""
     points = system.points
+    load = points.values[Point.END_LOAD, j]
     if points.numbers[0, j] == Law.LIST:
-        return lists.read_list(points.numbers, system.lists, j)
-    return read(points.numbers, points.memory, j, points.values[Point.END_LOAD, j])
+        return lists.read_list(points.numbers, system.lists, j, load)
+    return read(points.numbers, points.memory, j, load)
 
 
 @njit(cache=True, **NJIT_KERNEL)

@@ -6,6 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..contact.set_arrays import SetArrays
+from ..friction.bonds.list_rows_kernels import BondLists
 
 # Statuses of a march
 DONE = 0
@@ -176,33 +177,6 @@ class Sample(IntEnum):
 N_PORT_COLUMNS = 3  # force, slip and mean force of the following step
 
 
-class Lists(NamedTuple):
-    """Lists of bonds of all points, see `friction.bonds.list_kernels`.
-
-    - bondlist (9, k): strips of all lists
-    - nows (m, 6), statuses (m, 16): path state and status of each list
-    - law (24,), growth (6,), table (t,): numbers of the law
-    """
-
-    bondlist: np.ndarray
-    nows: np.ndarray
-    statuses: np.ndarray
-    law: np.ndarray
-    growth: np.ndarray
-    table: np.ndarray
-
-
-class BondList(NamedTuple):
-    """One list of `Lists`."""
-
-    bondlist: np.ndarray
-    now: np.ndarray
-    status: np.ndarray
-    law: np.ndarray
-    growth: np.ndarray
-    table: np.ndarray
-
-
 class Points(NamedTuple):
     """Points with laws; m points, r shear coordinates of the pieces.
 
@@ -313,7 +287,7 @@ class System(NamedTuple):
     structure: Structure
     ports: Ports
     points: Points
-    lists: Lists
+    lists: BondLists
     flank: np.ndarray
     sets: SetArrays
     state: np.ndarray

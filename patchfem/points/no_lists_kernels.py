@@ -6,7 +6,7 @@ from .return_maps_kernels import PointState
 
 
 @njit(**NJIT_CALL)
-def press_list(numbers, lists, j, load):
+def press_list(lists, j, load):
     """Press nothing."""
 
 
@@ -22,6 +22,6 @@ def advance_list(numbers, values, lists, j, v0, v1, dt):
 
 
 @njit(**NJIT_CALL)
-def read_list(numbers, lists, j):
+def read_list(numbers, lists, j, load):
     """Return a state at rest."""
     return PointState(0.0, 0.0, 0.0)

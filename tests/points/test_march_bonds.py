@@ -5,6 +5,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from bond_moments import advance_bonds
 from friction_paths import march_path, random_walk, upper_pressure
 from march_paths import OMEGA, follow_path, make_one_mode
 from modal_bases import make_modal_basis
@@ -15,7 +16,6 @@ from scipy.special import gammainc
 
 from patchfem.core import InitialState, Missing, Outcome, SineDrive
 from patchfem.friction import Bonds, FirstOrderBonds
-from patchfem.friction.bonds.recursion import advance_bonds
 from patchfem.points import march as engine
 from patchfem.points.contacts import BondSum, make_bond_contact, make_pressed_contact
 from patchfem.points.march import march

@@ -3,6 +3,7 @@ balances."""
 
 import numpy as np
 import pytest
+from bond_moments import advance_bonds
 from harmonic_cases import (
     jenkins_forces,
     make_bond_law,
@@ -32,7 +33,6 @@ from patchfem.dynamics import (
 from patchfem.dynamics.harmonic.harmonic import HarmonicBalance, solve_newton, unpack_harmonics
 from patchfem.dynamics.harmonic.laws import Jenkins, SampledSlide
 from patchfem.friction import Bonds, Coulomb, points_element
-from patchfem.friction.bonds.recursion import advance_bonds
 from patchfem.friction.laws.elastic_plastic import parallel_element
 
 DRIVE = SineDrive(1.0, 1.0)
