@@ -300,7 +300,10 @@ def _make_points(contact: Contact, n_nodes: int) -> Points:
         values[[Point.START_LOAD, Point.LOAD, Point.END_LOAD], j] = law.load
         if law.numbers[0] == Law.BONDS:
             memory[4, j] = law.memory[0]  # bond length in the middle of a step
-    share = np.array([law.load / contact.preload for law in laws], float)
+    resultant = contact.preload
+    if contact.grooves is not None:
+        resultant *= float(np.hypot(1.0, contact.grooves.slope(0.0)))
+    share = np.array([law.load / resultant for law in laws], float)
     nodes = np.full(len(laws), RESULTANT, np.int64)
     place = np.zeros(len(laws))
     shapes = np.zeros((0, len(laws)))

@@ -17,7 +17,7 @@ LISTS_FULL = 4
 LEAVES_GROOVES = 5
 RESULTANT = -1  # node of a point whose load is a fraction of the resultant
 LOWER = -2  # node of a point whose load is the pressure of the lower piece at its place
-RESIDUAL = 1e-12  # residual of forces relative to the scale or the largest one
+RESIDUAL = 1e-12
 
 
 class Point(IntEnum):

@@ -47,9 +47,8 @@ from .law_rows import Law, Masing
 
 SMALL_RATE = 1e-4  # rate times step below which series replace exponentials
 LIMIT_FRACTION = 1e-9  # smallest Stribeck limit relative to the static one, because z divides by it
-PIECE = (
-    0.125  # longest piece of a path in relaxation lengths that the Bouc-Wen law integrates at once
-)
+# Longest piece of a path in relaxation lengths that the Bouc-Wen law integrates at once.
+PIECE = 0.03125
 NEARLY_SATURATED = (
     1e-3  # distance of z from 1 below which any exponent of the Bouc-Wen law has a closed form
 )

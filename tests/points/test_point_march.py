@@ -54,9 +54,9 @@ def test_exact_release_of_a_coulomb_block():
 
 
 def test_exact_stick_under_static_friction():
-    """Below static friction a block at rest does not move at all."""
+    """Below static friction a block at rest moves by no more than round-off."""
     motion = run(laws.make_coulomb(1.3, 1.0, LIMIT), 100, cycles=20)
-    assert not motion.extremes.any()
+    assert np.abs(motion.extremes).max() < 1e-15 * DRIVE.acceleration / OMEGA**2
 
 
 def test_order_two():
