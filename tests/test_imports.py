@@ -94,7 +94,7 @@ MODULES_OF_SCENES = {  # run from Python -> text of the scene, modules that are 
         "hybrid.runs structure.modes",
         "structure.matrices structure.masses structure.arrays structure.universal structure.modal_fit structure.drives "
         "dynamics.harmonic.harmonic dynamics.harmonic.continuation dynamics.harmonic.balance "
-        "points.march runs.rig.steady " + " ".join(RIG_KEYS),
+        "points.time_march runs.rig.steady " + " ".join(RIG_KEYS),
     ),
     **{
         name: (COULOMB_RIG + lines, module, " ".join(RIG_KEYS - {module}))

@@ -49,10 +49,8 @@ PUBLIC = {
     ),
     "press_path_kernels": ("path_mean",),
     "set_arrays": (
-        "N_BUILT",
         "REFERENCE_LOAD",
         "REFERENCE_MOMENT",
-        "REFERENCE_STIFFNESS",
         "SetArrays",
         "make_set_arrays",
         "hash_set",

@@ -2,7 +2,7 @@
 
 In: increments of relative displacement and pressure. Out: path-mean traction, dissipated energy, and the state after
 the step (`protocol`). `laws/` has one law per file, `bonds/` the sum over bonds of eq. 2.17 and its engines. Files named
-*kernels are compiled and have their NumPy form beside them. `grooves` has matched grooves, whose flanks the load climbs.
+*kernels are compiled: those of `laws/` are for the harmonic balance. `grooves` has matched grooves, whose flanks the load climbs.
 `path_work` computes the friction work of samples. Read `protocol` first, then `laws/elastic_plastic`.
 """
 
@@ -13,11 +13,9 @@ PUBLIC = {
         "RequestedEngine",
         "choose_engine",
     ),
-    "bonds.list_kernels": ("list_mean",),
     "bonds.list_numbers": (
         "MAX_DAMAGE",
         "MAX_STRIPS_PER_LENGTH",
-        "cutoff_age",
         "enlarge_lists",
         "gamma_table",
         "law_numbers",
@@ -27,14 +25,11 @@ PUBLIC = {
         "sum_form",
     ),
     "bonds.list_rows_kernels": (
-        "BondList",
         "FORM_GROWING",
         "FORM_STRETCH",
-        "PATH",
         "LAW",
         "N_ROWS",
         "STATUS",
-        "STRIP",
     ),
     "bonds.list_step_kernels": (
         "break_bonds",
@@ -48,7 +43,6 @@ PUBLIC = {
     ),
     "bonds.point_kernels": (
         "MAX_SHORT_PATH",
-        "bond_end_stretch",
         "bond_mean",
         "bond_step",
         "grow",
@@ -60,12 +54,7 @@ PUBLIC = {
         "FirstOrderBonds",
         "ListedBonds",
     ),
-    "bonds.points_kernels": (
-        "ListStep",
-        "advance",
-        "mean_force",
-        "point_list",
-    ),
+    "bonds.points_kernels": ("point_list",),
     "bonds.spread": ("carried_fraction",),
     "bonds.temperature": ("surface_temperature_rise",),
     "flags_kernels": (
@@ -74,34 +63,18 @@ PUBLIC = {
     ),
     "grooves": ("Grooves",),
     "laws.coulomb": ("Coulomb",),
-    "laws.coulomb_kernels": ("solve_coulomb_step",),
     "laws.elastic_plastic": (
         "masing_loop",
         "parallel_element",
     ),
-    "laws.elastic_plastic_kernels": (
-        "press_springs",
-        "spring_end",
-        "spring_mean",
-        "spring_step",
-        "update_memory",
-    ),
     "laws.iwan": ("max_yield_displacement",),
     "laws.lugre": ("LuGre",),
-    "laws.stretch": (
-        "points_element",
-        "unpack_bonds",
-    ),
+    "laws.stretch": ("points_element",),
     "laws.stretch_kernels": ("relax_stretch",),
-    "laws.tanh": ("TanhLaw",),
     "path_work": ("sampled_work",),
     "protocol": (
         "Element",
         "Step",
-    ),
-    "protocol_kernels": (
-        "Reading",
-        "step_bond_length",
     ),
     "record": (
         "make_law",

@@ -8,7 +8,7 @@ nodes in partial slip, laws that are much faster than the drive; and, with one p
 3. `case_rows`, `case_kernels`, `cases`  many cases of one mode and one point with their measures
 4. `contacts`             points of a rig or a bench: elements, bonds, patches, varying loads, grooves
 5. `march_rows`, `lists_kernels`, `flanks_kernels`, `march_kernels`  steps of modes with many points
-6. `checkpoint`, `march`  march over the cycles of a drive, with its record; its state on disk
+6. `checkpoint`, `time_march`  march over the cycles of a drive, with its record; its state on disk
 7. `slides`               points along a prescribed slide
 8. `orbits`               periodic motions by marching, and their multipliers
 
@@ -34,7 +34,7 @@ PUBLIC = {
         "with_elements",
     ),
     "laws": ("make_point_law",),
-    "march": ("March", "Motion", "Snapshot", "count_list_bytes", "load_kernels", "march"),
+    "time_march": ("March", "Motion", "Snapshot", "count_list_bytes", "load_kernels", "march"),
     "orbits": ("MAX_CYCLES", "estimate_multipliers", "march_cycle", "march_to_periodic"),
     "slides": ("SlideMotion", "follow"),
 }

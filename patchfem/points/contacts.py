@@ -125,7 +125,7 @@ def convert_element(element: Element) -> list[PointLaw]:
     Parallel elements become one point each, bonds at points of equal slide a single point.
     """
     numbers = element.numbers
-    if not element.kernels:
+    if element.form == "rigid":
         return [make_coulomb(numbers[1], numbers[2])]
     if element.form == "parallel":
         count = int(numbers[1])

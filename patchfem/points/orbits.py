@@ -8,7 +8,7 @@ themselves; after an extrapolation that did not reduce the change per cycle, the
 
 import numpy as np
 
-from .march import March, Motion, Record, advance_with_frames
+from .time_march import March, Motion, Record, advance_with_frames
 
 N_FIRST_CYCLES = 6  # cycles before the first extrapolation
 N_MEMORY_CYCLES = 2  # cycles after an extrapolation in which the memory adapts to the new state

@@ -6,7 +6,8 @@ from typing import NamedTuple
 import numpy as np
 
 from .contacts import Contact
-from .march import (
+from .march_rows import LISTS_FULL, N_PORT_COLUMNS, Sample, Total
+from .time_march import (
     copy_system,
     enlarge_lists,
     load_kernels,
@@ -14,7 +15,6 @@ from .march import (
     make_system,
     split_losses,
 )
-from .march_rows import LISTS_FULL, N_PORT_COLUMNS, Sample, Total
 
 BLOCK = 4096  # samples between two reports of the progress
 SAME_STEP = 1e-6  # relative change of the duration of a step below which steps are equal

@@ -53,7 +53,7 @@ def point_fields(patch, shear, snapshots) -> ShearFields:
         The pressed patch.
     shear : ShearModes or None
         Shear of the pieces; None if every node is a point.
-    snapshots : sequence of points.march.Snapshot
+    snapshots : sequence of points.time_march.Snapshot
 
     Returns
     -------

@@ -12,7 +12,8 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parent))
 import today
 
-from patchfem.friction import Bonds, cutoff_age
+from patchfem.friction import Bonds
+from patchfem.friction.bonds.list_numbers import cutoff_age
 from patchfem.points.contacts import BondSum, Contact, PointSet, make_bond_contact
 from patchfem.points.laws import make_jenkins
 from patchfem.points.slides import follow

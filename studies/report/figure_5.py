@@ -30,7 +30,7 @@ from study_text import read_answer
 
 import patchfem as pf
 from patchfem.model import build
-from patchfem.points.march import find_extremes
+from patchfem.points.time_march import find_extremes
 from patchfem.scene import load as load_scene
 
 FOLDER = Path(__file__).parent

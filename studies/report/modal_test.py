@@ -11,7 +11,7 @@ from scipy import signal
 from scipy.optimize import least_squares
 
 import patchfem as pf
-from patchfem.points.march import march
+from patchfem.points.time_march import march
 from patchfem.runs import choose_numerics, solve_with_coarser
 from patchfem.runs.rig.interface import make_contact
 from patchfem.structure.drives import RecordedDrive

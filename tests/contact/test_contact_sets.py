@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 from pieces import LOAD, draw_gap, make_coated_pair
 
 from patchfem.compiled import load
-from patchfem.contact import N_BUILT, ContactSets, hash_set, press
-from patchfem.contact.set_arrays import N_STORED
+from patchfem.contact import ContactSets, hash_set, press
+from patchfem.contact.set_arrays import N_BUILT, N_STORED
 from patchfem.contact.unilateral import solve_forces
 
 PRESS = load("contact.press_kernels")

@@ -16,9 +16,9 @@ from scipy.special import gammainc
 
 from patchfem.core import InitialState, Missing, Outcome, SineDrive
 from patchfem.friction import Bonds, FirstOrderBonds
-from patchfem.points import march as engine
+from patchfem.points import time_march as engine
 from patchfem.points.contacts import BondSum, make_bond_contact, make_pressed_contact
-from patchfem.points.march import march
+from patchfem.points.time_march import march
 from patchfem.response import energy_balance
 from patchfem.slip.shear_modes import shear_modes
 from patchfem.structure import drives

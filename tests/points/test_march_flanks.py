@@ -20,7 +20,7 @@ from patchfem.points.contacts import (
     make_flank_contact,
     make_parallel_contact,
 )
-from patchfem.points.march import march
+from patchfem.points.time_march import march
 from patchfem.response import energy_balance
 from patchfem.runs.bench import shear
 from patchfem.scene.keys.tables import Friction

@@ -9,8 +9,9 @@ from modal_bases import make_modal_basis
 from scipy.special import ellipk
 
 from patchfem.core import InitialState, ModalBasis, SineDrive
-from patchfem.friction import Bonds, Coulomb, TanhLaw, points_element
+from patchfem.friction import Bonds, Coulomb, points_element
 from patchfem.friction.laws.elastic_plastic import ElasticPlastic
+from patchfem.friction.laws.tanh import TanhLaw
 from patchfem.hybrid.laws.masing import from_elements
 from patchfem.points.contacts import (
     BondSum,
@@ -20,7 +21,7 @@ from patchfem.points.contacts import (
     make_cubic_spring,
     make_interlocking_spring,
 )
-from patchfem.points.march import march
+from patchfem.points.time_march import march
 from patchfem.response import energy_balance
 from patchfem.structure import make_release
 

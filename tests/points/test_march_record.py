@@ -7,15 +7,16 @@ from modal_bases import make_modal_basis
 from varying_load_cases import LAWS, MIXED, crowned_contact, make_modes
 
 from patchfem.core import Outcome, SineDrive
-from patchfem.friction import Bonds, Coulomb, TanhLaw
-from patchfem.points import march as engine
+from patchfem.friction import Bonds, Coulomb
+from patchfem.friction.laws.tanh import TanhLaw
+from patchfem.points import time_march as engine
 from patchfem.points.contacts import (
     make_bond_contact,
     make_contact,
     make_parallel_contact,
     make_pressed_contact,
 )
-from patchfem.points.march import March, march
+from patchfem.points.time_march import March, march
 from patchfem.slip.shear_modes import shear_modes
 
 from .test_march_bonds import make_compliance

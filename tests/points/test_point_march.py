@@ -6,7 +6,7 @@ import pytest
 from patchfem.core import InitialState, ModalBasis, SineDrive
 from patchfem.points import laws
 from patchfem.points.contacts import Contact, PointSet
-from patchfem.points.march import march
+from patchfem.points.time_march import march
 
 OMEGA = 2 * np.pi * 143.0
 LIMIT = 40.0

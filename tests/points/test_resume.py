@@ -27,8 +27,7 @@ from scene_texts import (
 )
 
 from patchfem.export.folder import is_state
-from patchfem.points import checkpoint
-from patchfem.points import march as march_run
+from patchfem.points import checkpoint, time_march
 
 MARCH = '[accuracy]\nmethod = "march"\nsteps_per_cycle = 60\n'
 SHORT_DRIVE = DRIVE.replace("cycles = 30", "cycles = 16.3")
@@ -63,7 +62,7 @@ RIGS = {
 @pytest.fixture
 def save_counter(monkeypatch):
     """Counter of saved states; marches save their state after every second cycle."""
-    monkeypatch.setattr(march_run, "MAX_CYCLES_AT_ONCE", 2)
+    monkeypatch.setattr(time_march, "MAX_CYCLES_AT_ONCE", 2)
     saved = []
     save = checkpoint.save_checkpoint
 
@@ -195,7 +194,7 @@ def test_exact_run_ended_by_signal_can_be_resumed(tmp_path, number):
     scene.write_text(RIGS["one slide"].replace("cycles = 16.3", "cycles = 4000"), "utf-8")
     code = (
         "from patchfem.points import checkpoint as c; c.MIN_WRITE_INTERVAL = 0.05; c.MAX_WRITE_FRACTION = 1.0; "
-        "from patchfem.points import march; march.SAME_CYCLE = -1.0; "
+        "from patchfem.points import time_march; time_march.SAME_CYCLE = -1.0; "
         "from patchfem.__main__ import main; main()"
     )
     command = [sys.executable, "-c", code, "run", scene, "--no-page", "-q", "-o", out]

@@ -8,7 +8,7 @@ from scene_texts import BLOCK, KEYS
 import patchfem as pf
 from patchfem import build
 from patchfem.core import Outcome
-from patchfem.points.march import march
+from patchfem.points.time_march import march
 from patchfem.runs import choose_numerics
 from patchfem.runs.rig import interface
 from patchfem.scene import loads

@@ -306,8 +306,8 @@ def test_refuses_too_long_run_and_unwritable_folder(write_scene, tmp_path):
 
 def test_exact_unconverged_run_is_written_and_marked(write_scene, tmp_path, monkeypatch):
     """A run with a step that did not converge is written with the outcome not_converged and without errors."""
-    from patchfem.points.march import March
     from patchfem.points.march_rows import Total
+    from patchfem.points.time_march import March
 
     out = tmp_path / "out"
     advance = March.advance

@@ -9,7 +9,7 @@ from scipy.integrate import quad
 from patchfem import SceneError, plan, run
 from patchfem.core import InitialState, Outcome, SineDrive
 from patchfem.points.contacts import make_contact, make_parallel_contact
-from patchfem.points.march import march
+from patchfem.points.time_march import march
 from patchfem.scene import loads
 from patchfem.structure import make_release
 from patchfem.structure.drives import SweepDrive, make_levels, make_step

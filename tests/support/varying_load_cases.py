@@ -12,7 +12,7 @@ from patchfem.contact.unilateral import solve_forces
 from patchfem.core import InitialState, ModalBasis, SineDrive
 from patchfem.friction import Bonds
 from patchfem.points.contacts import make_pressed_contact
-from patchfem.points.march import march
+from patchfem.points.time_march import march
 from patchfem.response import energy_balance
 
 MASS, LOAD, STILL = 0.884, 116.0, SineDrive(0.0, 2 * np.pi * 143)

@@ -505,7 +505,7 @@ def make_law(element: Element | None):
     # If bonds do not grow, one stretch describes the memory of a bond point.
     if form == "flow" or (form == "points" and element.numbers[3] < 0):
         return FlowLaw(element)
-    if element is not None and not element.kernels:
+    if form == "rigid":
         raise PatchfemError(
             'accuracy.method: "harmonic" '
             "cannot treat rigid friction, because the force of rigid friction jumps; use the exact "

@@ -336,30 +336,6 @@ def _have_similar_lengths(bonds, i, k):
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def press(before, after, bonds):
-    """Change the relative pressure of a point with a list of its own at rest (`release`).
-
-    Parameters
-    ----------
-    before, after : float
-        Relative pressure before and after.
-    bonds : BondList
-        Changed in place.
-
-    Returns
-    -------
-    bool
-        False if the array of strips is full.
-    """
-    formed = release(before, after, 0, bonds)
-    has_room = formed == 0 or append_unstretched(bonds)
-    if has_room and formed > 0:
-        bonds.bondlist[STRIP.pressure, int(bonds.status[STATUS.end]) - 1] = formed
-    update_sums(bonds)
-    return has_room
-
-
-@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def release(before, after, point, bonds):
     """Change the pressures of the bonds of a point as its relative pressure changes at rest.
 

@@ -272,29 +272,6 @@ def _integrate_slowness(v, min_speed):
     return (1 + log(abs(v) / min_speed)) * (1.0 if v > 0 else -1.0)
 
 
-@njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def bond_end_stretch(m, z, increment, sigma, eps):
-    """Return the stretch of the bonds of a point at the end of an increment.
-
-    Parameters
-    ----------
-    m, z, increment, sigma, eps : float
-        As in `bond_mean`.
-
-    Returns
-    -------
-    z, slope : float
-        Stretch [Pa m] and its derivative over the increment [Pa].
-    """
-    direction = 1.0 if increment > 0 else -1.0
-    x = abs(increment) / eps
-    shapes = shape_functions(x)
-    density_deficit = sigma - m
-    fresh = direction * eps * (sigma * x * shapes.f1 - density_deficit * x * shapes.decay)
-    end = z * shapes.decay + fresh
-    return end, sigma - density_deficit * shapes.decay - direction * end / eps
-
-
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def press_point(bonds, s0, s1, initial, length):
     """Change the normal load on the bonds of a contact point at rest; the stored energy never increases.

@@ -1,9 +1,8 @@
 """Bonds of many points (compiled): lists of strips, or moments for p = 1.
 
-`mean_force`, `advance`, `read` and `press` are the functions of a law for point j, as an engine calls them that couples
-points with different slides. `lists` is a `BondLists`; loads [N] are those under which bonds form, and the forces follow
-per unit of mu_s. `advance_list`, `press_list`, `advance_moments` and `press_moments` move all points alike; they are
-called from Python (`points`). Points with one list share its path and its strips.
+`point_list` and `read` serve an engine that couples points with different slides. `advance_list`, `press_list`,
+`advance_moments` and `press_moments` move all points alike; they are called from Python (`points`). Points with one list
+share its path and its strips.
 """
 
 from typing import NamedTuple
@@ -13,15 +12,6 @@ from ..flags_kernels import NJIT_NO_REFCOUNT
 from . import list_kernels, list_step_kernels
 from .list_rows_kernels import LAW, STATUS, STRIP, BondList
 from .point_kernels import bond_mean, bond_step, grow, press_point
-
-
-class ListStep(NamedTuple):
-    """Increment [m] and duration [s] of a step, and velocities [m/s] at its ends."""
-
-    increment: float
-    duration: float
-    start_velocity: float
-    end_velocity: float
 
 
 class PointReading(NamedTuple):
@@ -34,59 +24,9 @@ class PointReading(NamedTuple):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def point_list(lists, j):
-    """Return the arrays of the list of point j as views."""
+    """Return the arrays of the list of point j of a `BondLists` as views."""
     return BondList(
         lists.bondlist, lists.nows[j], lists.statuses[j], lists.law, lists.table, lists.growth
-    )
-
-
-@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def mean_force(lists, j, load, step):
-    """Return the path-mean force of point j over a step, and its slope.
-
-    Parameters
-    ----------
-    lists : BondLists
-    j : int
-        Number of the point.
-    load : float
-        Load under which bonds form [N].
-    step : ListStep
-
-    Returns
-    -------
-    list_kernels.MeanForce
-        Per mu_s [N], [N/m].
-    """
-    bonds = point_list(lists, j)
-    bonds.status[STATUS.pressure] = load
-    return list_kernels.list_mean_and_slope(
-        step.increment, bonds, step.start_velocity, step.duration
-    )
-
-
-@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def advance(lists, j, load, step):
-    """Advance the bonds of point j over a step.
-
-    Parameters
-    ----------
-    lists : BondLists
-    j : int
-        Number of the point.
-    load : float
-        Load under which bonds form [N].
-    step : ListStep
-
-    Returns
-    -------
-    bool
-        False if the list of the point is full.
-    """
-    bonds = point_list(lists, j)
-    bonds.status[STATUS.pressure] = load
-    return list_step_kernels.list_step(
-        step.increment, bonds, step.start_velocity, step.end_velocity, step.duration
     )
 
 
@@ -110,29 +50,6 @@ def read(lists, j, load):
     energy = lists.statuses[j, STATUS.energy] - lists.statuses[j, STATUS.owed]
     stretch = force * lists.law[LAW.length] / load if load > 0 else 0.0
     return PointReading(force, energy, stretch)
-
-
-@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def press(lists, j, before, after):
-    """Change the load of point j at rest.
-
-    Parameters
-    ----------
-    lists : BondLists
-    j : int
-        Number of the point.
-    before, after : float
-        Loads [N].
-
-    Returns
-    -------
-    bool
-        False if the list of the point is full.
-    """
-    return list_step_kernels.press(before, after, point_list(lists, j))
-
-
-# ---- all points move alike
 
 
 @njit(error_model="numpy", cache=True, **NJIT_NO_REFCOUNT)

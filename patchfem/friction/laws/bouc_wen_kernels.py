@@ -6,19 +6,13 @@ loading, the variable w = -ln(1 - y) removes the knee: dw/dx = (1 - y^n)/(1 - y)
 integral over w on loading and over |y| on unloading, by a Gauss rule on short pieces. Newton's method inverts it.
 """
 
-from math import exp, expm1, inf, log, log1p, nan
+from math import exp, expm1, log, log1p
 
 import numpy as np
 
 from ...compiled.jit import njit
 from ..flags_kernels import FASTMATH_FLAGS, NJIT_NO_REFCOUNT
-from ..protocol_kernels import (
-    Rates,
-    Reading,
-    RelaxedStretch,
-    solve_step,
-    step_bond_length,
-)
+from ..protocol_kernels import Rates, RelaxedStretch
 
 GAUSS_POINTS = np.polynomial.legendre.leggauss(8)[0]  # Gauss points of a piece in (-1, 1)
 GAUSS_WEIGHTS = np.polynomial.legendre.leggauss(8)[1]  # weights of these points
@@ -179,56 +173,6 @@ def rate_equation(numbers, stretch, velocity, direction):
     """
     stiffness = numbers[1] / numbers[2]
     return Rates(stiffness * stretch, stiffness, 0.0)
-
-
-@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def mean_force(numbers, memory, rel_disp, increment, bond_length, dt):
-    """Return the path-mean force over an increment.
-
-    Returns
-    -------
-    force, slope : float
-        Path-mean force [N] and its derivative over the increment [N/m].
-    """
-    limit = numbers[1]
-    length = numbers[2]
-    z = memory[0]
-    direction = 1.0 if increment > 0 else -1.0
-    x = abs(increment) / length
-    rise = _z_slope(direction * z, numbers[3], numbers[4])
-    if x < 1e-7:  # the series replaces a quotient of two numbers close to zero
-        return limit * (z + 0.5 * direction * x * rise), 0.5 * limit / length * rise
-    end, area = _follow_path(direction * z, x, numbers[3], numbers[4])
-    return direction * limit * area / x, limit / length * (end - area / x) / x
-
-
-@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def update_memory(numbers, memory, increment, force, v0, v1, dt, bond_length):
-    """Advance z by an increment; work that is not stored is dissipated.
-
-    Returns
-    -------
-    float
-        Dissipated energy [J].
-    """
-    z = memory[0]
-    direction = 1.0 if increment > 0 else -1.0
-    end, area = _follow_path(direction * z, abs(increment) / numbers[2], numbers[3], numbers[4])
-    memory[0] = direction * end
-    return numbers[1] * numbers[2] * (area - 0.5 * (end * end - z * z))
-
-
-@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def read_memory(numbers, memory, rel_disp, velocity):
-    """Return the force mu N z, the energy of the spring and the slip q - eps z.
-
-    Returns
-    -------
-    Reading
-    """
-    z = memory[0]
-    energy = 0.5 * numbers[1] * numbers[2] * z * z
-    return Reading(numbers[1] * z, energy, rel_disp - numbers[2] * z)
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)

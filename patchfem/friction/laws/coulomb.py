@@ -25,12 +25,11 @@ class Coulomb(LastTraction):
         return self.kinetic if self.static is None else self.static
 
     def element(self, load: float) -> Element:
-        """Return the Element under a constant load [N], with the static and kinetic friction force.
-
-        It has no kernels, because a set-valued law has no slope.
-        """
+        """Return the Element under a constant load [N], with the static and kinetic friction force."""
         limit = self._static_coefficient * load
-        return Element("", np.array([0.0, limit, self.kinetic * load]), np.zeros(1), limit)
+        return Element(
+            "", np.array([0.0, limit, self.kinetic * load]), np.zeros(1), limit, form="rigid"
+        )
 
     def limit_fraction(self, dq, dt):
         """Return the ratio of the friction force to its limit for increments dq [m]; 0 at rest."""

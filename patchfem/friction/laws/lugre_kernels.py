@@ -5,19 +5,13 @@ numbers: stiffness [N/m], kinetic and static force [N], Stribeck velocity v_s [m
 path.
 """
 
-from math import exp, inf, nan
+from math import exp
 from typing import NamedTuple
 
 from ...compiled.jit import njit
 from ..bonds.point_kernels import shape_functions
 from ..flags_kernels import FASTMATH_FLAGS, NJIT_NO_REFCOUNT
-from ..protocol_kernels import (
-    Rates,
-    Reading,
-    RelaxedStretch,
-    solve_step,
-    step_bond_length,
-)
+from ..protocol_kernels import Rates, RelaxedStretch
 
 # Smallest friction limit relative to the static force; z relaxes over limit/stiffness, which must
 # not be 0
@@ -102,51 +96,6 @@ def _relax(numbers, stretch, increment, dt):
         shapes.decay,
         by_time,
     )
-
-
-@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def mean_force(numbers, memory, rel_disp, increment, bond_length, dt):
-    """Return the path-mean force over an increment; for dt = 0 it excludes the damping forces.
-
-    Returns
-    -------
-    force, slope : float
-        Path-mean force [N] and its derivative over the increment [N/m].
-    """
-    relaxed = _relax(numbers, memory[0], increment, dt)
-    force = numbers[1] * relaxed.mean
-    slope = numbers[1] * relaxed.mean_by_increment
-    if dt > 0:
-        force += (numbers[5] * (relaxed.end - memory[0]) + numbers[6] * increment) / dt
-        slope += (numbers[5] * relaxed.end_by_increment + numbers[6]) / dt
-    return force, slope
-
-
-@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def update_memory(numbers, memory, increment, force, v0, v1, dt, bond_length):
-    """Advance z by an increment; work that is not stored is dissipated.
-
-    Returns
-    -------
-    float
-        Dissipated energy [J].
-    """
-    before = memory[0]
-    memory[0] = _relax(numbers, before, increment, dt).end
-    return force * increment - 0.5 * numbers[1] * (memory[0] * memory[0] - before * before)
-
-
-@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def read_memory(numbers, memory, rel_disp, velocity):
-    """Return the force at a velocity, the energy of the bristles and the slip q - z.
-
-    Returns
-    -------
-    Reading
-    """
-    z = memory[0]
-    force = rate_equation(numbers, z, velocity, 1.0 if velocity > 0 else -1.0).force
-    return Reading(force, 0.5 * numbers[1] * z * z, rel_disp - z)
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)

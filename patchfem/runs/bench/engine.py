@@ -15,7 +15,7 @@ from ...core import Missing
 from ...effects import law_has_trait, needs_bond_list
 from ...friction.bonds import engines as bond_engines
 from ...friction.bonds import parameters
-from ...points import march
+from ...points import time_march
 from ..sizes import COMPILED_CODE, MemoryPart, RunSizes
 
 MAX_GROOVE_STEPS = 200_000  # Largest number of steps per cycle over grooves.
@@ -253,7 +253,7 @@ def count_bench_sizes(model, n_points: int) -> RunSizes:
     if engine.choice is not None and engine.choice.strips:
         unknowns["bond_list_about"] = strips = int(engine.choice.strips)
         parts.append(
-            MemoryPart(march.count_list_bytes(strips), "the list of bonds", "accuracy.tail")
+            MemoryPart(time_march.count_list_bytes(strips), "the list of bonds", "accuracy.tail")
         )
     return RunSizes(unknowns, tuple(parts), engine=engine.name)
 

@@ -139,7 +139,7 @@ def compute_groove_fields(patch, contact, snapshots) -> tuple:
     ----------
     patch : Patch
     contact : points.contacts.Contact
-    snapshots : sequence of points.march.Snapshot
+    snapshots : sequence of points.time_march.Snapshot
     """
     index = contact.reduction.points
     weight = patch.pieces.interface.weight[index]

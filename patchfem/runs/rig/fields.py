@@ -10,7 +10,7 @@ import numpy as np
 
 from ...effects import law_has_trait, needs_bond_list
 from ...friction import record
-from ...points import march as marching
+from ...points.time_march import Snapshot
 from ...slip import fields
 from ..bench import averaged_law
 from ..bench import shear as bench_shear
@@ -53,7 +53,7 @@ def collect_interface_fields(model, numerics, patch, solution) -> dict:
 
     snapshots = solution.snapshots
     reduction = getattr(solution.contact, "reduction", None)
-    is_march = isinstance(snapshots[0], marching.Snapshot)
+    is_march = isinstance(snapshots[0], Snapshot)
     if not is_march:
         snapshots = [SimpleNamespace(**one) for one in snapshots]
     rule = SlipRule()

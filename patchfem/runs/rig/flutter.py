@@ -116,7 +116,7 @@ def _find_limit_cycles(model, numerics, patch) -> LimitCycles:
         return LimitCycles([], f"limit cycles cannot be computed {reason}")
     element = make_single_law(model, numerics, patch).element
     try:
-        if element is not None and not element.kernels:
+        if element is not None and element.form == "rigid":
             if rig.springs.is_nonlinear:
                 return LimitCycles([], f"{RIGID_LAW_REASON} a nonlinear spring")
             if not modes.omega.all():

@@ -13,7 +13,7 @@ import numpy as np
 from ...core import IntegratedMeasures
 from ...effects import law_has_trait
 from ...friction.record import make_law
-from ...points import march as engine
+from ...points import time_march as engine
 from ...response.ends import estimate_window_error
 from ...response.inside_steps import add_substep_samples
 from ...response.measures import compute_step_harmonic, peak_sampling_errors

@@ -10,7 +10,7 @@ from patchfem import build, plan
 from patchfem.core import SineDrive
 from patchfem.friction import Bonds, choose_engine
 from patchfem.points.contacts import BondSum, make_bond_contact
-from patchfem.points.march import march
+from patchfem.points.time_march import march
 from patchfem.response import energy_balance
 from patchfem.runs import choose_numerics as settings_of
 from patchfem.runs.rig.bond_lists import choose_bond_summation

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from march_paths import follow_path
 
-from patchfem.friction import Bonds, cutoff_age
+from patchfem.friction import Bonds
+from patchfem.friction.bonds.list_numbers import cutoff_age
 from patchfem.points.contacts import BondSum, make_bond_contact
 
 ENGINES = {"direct": (0.0, 0.0), "truncated": (1e-6, 0.0), "merged": (1e-6, 0.02)}  # tail, merge

@@ -17,9 +17,10 @@ from vibration_forms import sliding_amplitude
 
 from patchfem import build
 from patchfem.core import SineDrive
-from patchfem.friction import Bonds, FirstOrderBonds, ListedBonds, cutoff_age
+from patchfem.friction import Bonds, FirstOrderBonds, ListedBonds
+from patchfem.friction.bonds.list_numbers import cutoff_age
 from patchfem.points.contacts import make_bond_contact
-from patchfem.points.march import march
+from patchfem.points.time_march import march
 from patchfem.response import energy_balance
 from patchfem.runs.bench import bench as law_bench
 from patchfem.scene import scene

@@ -43,7 +43,7 @@ SIZES = {  # Constant -> description of the quantity that it bounds.
     "surface.files.table.MAX_LENGTH": "length of a trace [m]",
     "model.slide.MAX_STEPS_PER_CYCLE": "steps per cycle of a prescribed slide",
     "runs.rig.costs.MAX_MARCH_STEPS": "steps per cycle of a time integration, if the tolerance determines the steps",
-    "points.march.MAX_STRIPS": "number of entries in a list of bonds",
+    "points.time_march.MAX_STRIPS": "number of entries in a list of bonds",
     "friction.bonds.parameters.MAX_LIST_SECONDS": "estimated computing time of a run with a list of bonds [s]",
     "runs.rig.costs.MAX_EXACT_SECONDS": "estimated time to compute a whole motion from event to event, with "
     "method `exact` or by engine `hybrid` [s]",

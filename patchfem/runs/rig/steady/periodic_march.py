@@ -13,8 +13,8 @@ import numpy as np
 from ....core import NotConverged, Outcome
 from ....effects import SINE_WAVEFORM
 from ....model.rig import DriveLevels
-from ....points import march as engine
 from ....points import orbits
+from ....points import time_march as engine
 from ....response.measures import peak_sampling_errors
 from ..interface import make_contact
 from ..march import MarchEvaluator
@@ -90,7 +90,7 @@ class CycleEvaluation(NamedTuple):
     """Measures and histories of one cycle of a periodic motion over grooves.
 
     - values: measures by name.
-    - motion: points.march.Motion of the cycle.
+    - motion: points.time_march.Motion of the cycle.
     - is_stuck: whether the interface sticks.
     """
 
