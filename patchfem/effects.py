@@ -13,6 +13,7 @@ interface under a constant load. Optional features are:
 - `exact`: steady motions of the whole interface as one rigid element;
 - `pieces`: elements that stick or slip, for patches that slip part by part;
 - `harmonic`: harmonic balance;
+- `march`: time steps with return maps (`points.return_maps_kernels`);
 - `grooves`: grooves whose flanks the surfaces climb;
 
 Traits of laws:
@@ -202,21 +203,21 @@ EFFECTS = {
         "laws.coulomb",
         "|F| <= mu_s N stuck, F = mu_k N sgn(v) sliding (2.1)",
         ("", "kinetic"),
-        "shear joints varying-load exact pieces grooves",
+        "shear joints varying-load exact pieces grooves march",
         "set-valued timeless memoryless",
     ),
     "friction.law=tanh": _make_law(
         "laws.tanh",
         "F = mu N tanh(v/v_0) (2.4)",
         ("reference_speed", ""),
-        "joints varying-load harmonic grooves",
+        "joints varying-load harmonic grooves march",
         "memoryless creeps",
     ),
     "friction.law=elastic-plastic": _make_law(
         "laws.elastic_plastic",
         "F' = k v, |F| <= mu N (3.12, corrected for reversals), k = stiffness or mu N/bond_length",
         ("bond_length|stiffness", ""),
-        "shear joints varying-load harmonic pieces grooves",
+        "shear joints varying-load harmonic pieces grooves march",
         "timeless",
     ),
     "friction.law=nonlocal": _make_law(
@@ -227,28 +228,28 @@ EFFECTS = {
             "kinetic reading order rest_growth slip_growth rest_speed "
             "initial_bonds spread temperature",
         ),
-        "shear joints varying-load harmonic grooves",
+        "shear joints varying-load harmonic grooves march",
         "bonds",
     ),
     "friction.law=convolution": _make_law(
         "laws.convolution",
         "tau = mu_s sgn(v) int phi(s/eps)/eps sigma_n(x - s sgn v) ds (Oden, Pires)",
         ("bond_length", "order spread"),
-        "exact",
+        "exact march",
         "averaged set-valued timeless memoryless",
     ),
     "friction.law=iwan": _make_law(
         "laws.iwan",
         "F = int rho(phi) (u - x_phi) dphi, rho = R phi^chi + S delta(phi - phi_max) (Segalman)",
         ("stiffness chi beta", ""),
-        "joints harmonic pieces",
+        "joints harmonic pieces march",
         "timeless cells",
     ),
     "friction.law=bouc-wen": _make_law(
         "laws.bouc_wen",
         "F = mu N z, z' = v/eps (1 - |z|^n (s sgn(v z) + 1 - s)) (Wen)",
         ("stiffness", "exponent shape"),
-        "joints harmonic",
+        "joints harmonic march",
         "timeless",
     ),
     "friction.law=lugre": _make_law(
@@ -256,7 +257,7 @@ EFFECTS = {
         "F = k z + s_1 z' + s_2 v, z' = v - k |v| z/g(v), g = mu_k N + "
         "(mu_s - mu_k) N exp(-(v/v_s)^2) (Canudas de Wit; Dahl: mu_k = mu_s, no damping)",
         ("stiffness stribeck_speed", "kinetic micro_damping viscous"),
-        "joints harmonic",
+        "joints harmonic march",
         "overshoots",
     ),
     "friction.reading=stretch": Effect(
@@ -460,6 +461,11 @@ def needs_bond_list(friction) -> bool:
     return law_has_trait(friction.law, "bonds") and (
         friction.reading == "report" or friction.order not in (1, None)
     )
+
+
+def has_return_map(friction) -> bool:
+    """Return whether time steps can integrate the law of a [friction] table."""
+    return "march" in LAWS[friction.law].supports.split()
 
 
 def law_supports(friction, feature: str) -> bool:

@@ -1,11 +1,10 @@
 """Contact points of a rig or a bench with their laws: elements, bonds, patches under changing loads, flanks of grooves."""
 
 from dataclasses import dataclass, replace
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from ..contact.contact_sets import ContactSets
 from ..friction.bonds.parameters import Bonds
 from ..friction.grooves import Grooves
 from ..friction.protocol import Element
@@ -23,6 +22,9 @@ from .laws import (
     make_tanh,
 )
 from .march_rows import LOWER
+
+if TYPE_CHECKING:
+    from ..contact.contact_sets import ContactSets
 
 # Law of the elements of a single number of memory, by the module of their kernels
 FLOW_LAWS = {
@@ -87,7 +89,7 @@ class Contact:
     point_sets: list[PointSet]
     limit: float = 0.0
     length: float = 0.0
-    sets: ContactSets | None = None
+    sets: "ContactSets | None" = None
     heave: np.ndarray | None = None
     pitch: np.ndarray | None = None
     load: object = None

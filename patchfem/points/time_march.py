@@ -8,7 +8,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.polynomial.legendre import leggauss
-from scipy.linalg import expm
 
 from .. import compiled
 from ..contact.set_arrays import hash_set, make_set_arrays
@@ -61,6 +60,7 @@ MAX_CYCLES_AT_ONCE = 8
 MAX_STEPS_AT_ONCE = 8000
 # Change of the state between two parts of a march, relative to its size, below which they repeat
 SAME_CYCLE = 1e-11
+TAYLOR_DEGREE = 18  # degree whose remainder is below round-off for matrices of norm 1
 N_KEPT = 128  # samples per cycle of the histories before the window
 EDGE = 1e-9  # distance of the samples of a drive from the ends of a step, in steps
 RUNAWAY = (
@@ -170,12 +170,12 @@ def make_responses(modes: ModalBasis, step: float, levels: int) -> Responses:
     n_halvings = max(levels - 1, int(np.ceil(np.log2(max(fastest / MAX_ANGLE, 1e-300)))))
     short = step / 2**n_halvings
     nodes, weights = leggauss(N_GAUSS)
-    times = 0.5 * short * (1 + nodes)
+    powers = np.concatenate([np.zeros(n), np.ones(n), [2, 3, 4], np.full(n, 2.0)])
     loss = np.zeros_like(matrix)
     loss[velocities, velocities] = modes.mass * modes.damping_matrix
     work = np.zeros_like(matrix)
     work[2 * n, velocities] = -modes.mass * np.asarray(modes.base)
-    inside = expm(matrix * times[:, None, None])
+    inside = np.array([exponential(matrix, 0.5 * short * (1 + node), powers) for node in nodes])
     forms = [
         np.einsum("g,gki,kl,glj->ij", 0.5 * short * weights, inside, form, inside, optimize=True)
         for form in (loss, work)
@@ -183,11 +183,31 @@ def make_responses(modes: ModalBasis, step: float, levels: int) -> Responses:
     parts = []
     for k in range(n_halvings + 1):
         # The square of the last matrix would double its round-off.
-        whole = expm(matrix * (short * 2**k))
+        whole = exponential(matrix, short * 2**k, powers)
         if k > n_halvings - levels:
             parts.append((whole[: 2 * n], forms[0], forms[1][2 * n : 2 * n + 3]))
         forms = [form + whole.T @ form @ whole for form in forms]
     return Responses(*(np.array(part) for part in zip(*parts[::-1])))
+
+
+def exponential(matrix, time: float, powers) -> np.ndarray:
+    """Return exp(time matrix) (k, k) for a state (k,) of units [s^-powers].
+
+    It is the Taylor polynomial of a fraction 2^-s of the exponent, squared s times.
+    """
+    # In units of the time the entries of the exponent are of order 1.
+    units = time**-powers
+    ratio = units[:, None] / units
+    exponent = time * matrix / ratio
+    n_squares = max(int(np.ceil(np.log2(np.abs(exponent).sum(axis=1).max()))), 0)
+    exponent = exponent / 2**n_squares
+    identity = np.eye(powers.size)
+    result = identity
+    for order in range(TAYLOR_DEGREE, 0, -1):
+        result = identity + exponent @ result / order
+    for _ in range(n_squares):
+        result = result @ result
+    return result * ratio
 
 
 def make_system(

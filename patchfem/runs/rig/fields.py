@@ -10,7 +10,7 @@ import numpy as np
 
 from ...effects import law_has_trait, needs_bond_list
 from ...friction import record
-from ...points.time_march import Snapshot
+from ...points import time_march
 from ...slip import fields
 from ..bench import averaged_law
 from ..bench import shear as bench_shear
@@ -53,7 +53,7 @@ def collect_interface_fields(model, numerics, patch, solution) -> dict:
 
     snapshots = solution.snapshots
     reduction = getattr(solution.contact, "reduction", None)
-    is_march = isinstance(snapshots[0], Snapshot)
+    is_march = isinstance(snapshots[0], time_march.Snapshot)
     if not is_march:
         snapshots = [SimpleNamespace(**one) for one in snapshots]
     rule = SlipRule()
