@@ -45,7 +45,7 @@ from .march_rows import (
 
 MAX_ANGLE = 0.5  # largest phase of the fastest mode in the step of a matrix exponential [rad]
 N_GAUSS = 8  # Gauss points of the integrals over that step
-RIGID_LEVELS = 16  # lengths of the steps with rigid points: whole steps and fifteen halvings
+RIGID_LEVELS = 20  # lengths of the steps with rigid points: whole steps and fifteen halvings
 LEVELS = 4  # lengths of other steps, which are halved if they do not converge
 LIST_DAMPING = 1 / 16  # weight of the change of a shear increment for lists, whose forces jump
 REDUNDANT = 1e-10  # relative compliance of ports at rest that outnumber the modes

@@ -15,7 +15,7 @@ from patchfem.core import InitialState, ModalBasis
 from patchfem.friction import Coulomb
 from patchfem.model import build
 from patchfem.points import contacts
-from patchfem.points import march as marching
+from patchfem.points import time_march
 from patchfem.runs import choose_numerics, solve_with_coarser
 from patchfem.runs.rig.interface import make_single_law
 from patchfem.scene import scene
@@ -167,7 +167,7 @@ def march(one: Problem, steps: int) -> np.ndarray:
         contact = contacts.make_contact([element], one.modes.interfaces)
     else:
         contact = contacts.make_parallel_contact(*one.elements, one.modes.slide)
-    found = marching.march(
+    found = time_march.march(
         one.modes, one.drive, contact, one.cycles, steps, window=one.last, start=one.start
     )
     return found.window.slide[:: steps // POINTS][1:]

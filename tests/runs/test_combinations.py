@@ -15,7 +15,7 @@ from scene_texts import COATED, DRIVE, MODE, SLIDE, get_only_mistake
 
 from patchfem import SceneError
 from patchfem.effects import LAWS
-from patchfem.points import march
+from patchfem.points import time_march
 from patchfem.runs.run import run
 from patchfem.scene import loads
 
@@ -185,7 +185,7 @@ def assert_combinations_run(name: str, law: str, every: int) -> None:
 @pytest.fixture
 def stop_at_time_loop(monkeypatch):
     """Stop a march where its time loop would begin."""
-    monkeypatch.setattr(march, "march", raise_time_loop_reached)
+    monkeypatch.setattr(time_march, "march", raise_time_loop_reached)
 
 
 @pytest.mark.usefixtures("stop_at_time_loop")

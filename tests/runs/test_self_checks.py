@@ -10,7 +10,7 @@ from self_checks.evidence import Evidence
 import patchfem as pf
 from patchfem.core import Outcome
 from patchfem.model import structure
-from patchfem.points import march
+from patchfem.points import time_march
 from patchfem.response import rows
 from patchfem.runs.bench import bench
 
@@ -152,7 +152,7 @@ def test_always_wrong_numbers_are_detected(monkeypatch, owner, name, fault, scen
     ("owner", "name", "fault", "scene", "warning"),
     [
         (  # the warning names no key, because no setting is a remedy
-            march.March,
+            time_march.March,
             "find_ledger",
             lambda balance: balance | {"friction": (1 + 1e-6) * balance["friction"]},
             SCENES["march"].replace("8 g", "8.1 g"),

@@ -280,7 +280,6 @@ def _make_varying_contact(model: Model, numerics: Numerics, patch, row) -> conta
         row,
         modes_of_pieces,
         bond_sum,
-        force + MIN_PRESSURE_FRACTION * force.mean(),
         sets=sets,
         heave=still if modes.normal is None else np.asarray(modes.normal, float),
         pitch=still if modes.pitch is None else np.asarray(modes.pitch, float),
