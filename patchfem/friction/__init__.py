@@ -40,6 +40,7 @@ PUBLIC = {
         "MAX_LIST_SECONDS",
         "growth_numbers",
         "growth_path_ratio",
+        "list_growth",
     ),
     "bonds.point_kernels": (
         "MAX_SHORT_PATH",

@@ -61,6 +61,7 @@ MAX_STEPS_AT_ONCE = 8000
 # Change of the state between two parts of a march, relative to its size, below which they repeat
 SAME_CYCLE = 1e-11
 TAYLOR_DEGREE = 18  # degree whose remainder is below round-off for matrices of norm 1
+SAME_PLACE = 1e-12  # change of a slide relative to the largest displacement that counts as rest
 N_KEPT = 128  # samples per cycle of the histories before the window
 EDGE = 1e-9  # distance of the samples of a drive from the ends of a step, in steps
 RUNAWAY = (
@@ -671,7 +672,9 @@ class March:
         n = 2 * self.modes.omega.size
         works = samples[:-1, n + Sample.WORK]
         created = -np.minimum(split_losses(samples, n, self.system.options.scale), 0.0)
-        sampled = 0.0
+        sampled = np.zeros(works.size)
+        rests = np.ones(works.size, bool)
+        still = SAME_PLACE * np.abs(samples[:, : n // 2]).max(initial=0.0)
         for k, one in enumerate(self.contact.point_sets):
             if one.is_spring:
                 continue
@@ -679,8 +682,12 @@ class March:
             is_rigid = one.laws[0].numbers[0] == Law.COULOMB
             mean = columns[:-1, 2] if is_rigid else None
             slide = samples[:, : n // 2] @ np.asarray(one.row, float)
-            sampled += float(sampled_work(slide, columns[:, 0], mean).sum())
-        self.work_sums += sampled, float(np.abs(works).sum()), float(created.sum())
+            sampled += sampled_work(slide, columns[:, 0], mean)
+            rests &= is_rigid & (np.abs(np.diff(slide)) <= still)
+        # What a port at rest does within a step and takes back is no work of the friction.
+        sampled[rests] = works[rests]
+        passed = np.abs(works[~rests]).sum()
+        self.work_sums += float(sampled.sum()), float(passed), float(created.sum())
 
     def take_snapshot(self, sample) -> Snapshot:
         """Return the state of the interface at the end of the last step, whose sample is given."""

@@ -14,8 +14,7 @@ import problems
 from patchfem.core import InitialState, ModalBasis
 from patchfem.friction import Coulomb
 from patchfem.model import build
-from patchfem.points import contacts
-from patchfem.points import time_march
+from patchfem.points import contacts, time_march
 from patchfem.runs import choose_numerics, solve_with_coarser
 from patchfem.runs.rig.interface import make_single_law
 from patchfem.scene import scene
