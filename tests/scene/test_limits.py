@@ -6,7 +6,17 @@ from itertools import islice, product
 from pathlib import Path
 
 import pytest
-from scene_texts import BENCH, FORCED, LINEAR, PAIR, PATCH, RIG, find_line, get_only_mistake, list_mistakes
+from scene_texts import (
+    BENCH,
+    FORCED,
+    LINEAR,
+    PAIR,
+    PATCH,
+    RIG,
+    find_line,
+    get_only_mistake,
+    list_mistakes,
+)
 
 from patchfem.scene import load, loads
 from patchfem.scene.scene import SceneError
