@@ -197,8 +197,6 @@ def _make_bond_sum_engine(
     law = model.bonds
     if choice.engine == "recursion":
         return BenchEngine(Method.RECURSION, choice)
-    if law.breakaway and n_lists == 1:  # A bond list cannot represent an elastic range.
-        return BenchEngine(Method.STEPPED)
     size = slide.size
     max_move = float(np.abs(np.diff(slide)).max())
     strips = min(choice.strips, size * max(1.0, 4 * max_move / law.length))
