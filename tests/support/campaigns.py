@@ -35,6 +35,8 @@ KINDS = {  # Name on the command line -> module and function.
     "shear-chains": ("shear_scenes", "compare_chain"),
     "static": ("static_scenes", "compare_coarse_patch"),
     "static-fine": ("static_scenes", "compare_fine_patch"),
+    "patches": ("random_patches", "compare_coarse_patch"),
+    "patches-fine": ("random_patches", "compare_fine_patch"),
     "traces": ("random_traces", "compare_trace"),
     "wear": ("wear_scenes", "compare_bench"),
     "predicted-wear": ("predicted_pairs", "compare_pair"),
