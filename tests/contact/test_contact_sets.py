@@ -7,9 +7,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from pieces import LOAD, draw_gap, make_coated_pair
+from pressed import press
 
 from patchfem.compiled import load
-from patchfem.contact import N_BUILT, ContactSets, hash_set, press
+from patchfem.contact import N_BUILT, ContactSets, hash_set
 from patchfem.contact.set_arrays import N_STORED
 from patchfem.contact.unilateral import solve_forces
 

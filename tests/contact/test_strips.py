@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from pieces import LENGTH, LOAD, WIDTH, draw_gap, make_coated_pair
-from skins import press_layer, press_strips
+from skins import layer_stiffness, press_layer, press_strips
 
 from patchfem.closed_forms.contact import (
     wedge_on_asperities,
@@ -23,9 +23,8 @@ from patchfem.contact import (
     StripCompliance,
     split_into_strips,
     strip_offsets,
-    strips_stiffness,
 )
-from patchfem.contact.strips import STRIP_RESIDUAL_TOL
+from patchfem.contact.press import STRIP_RESIDUAL_TOL
 from patchfem.contact.unilateral import solve_forces
 from patchfem.core import PatchfemError
 
@@ -175,7 +174,6 @@ def test_exact_centre_of_pressure_of_rigid_wedge_in_full_contact(
     )
     _, centre, _, _ = wedge_on_linear_foundation(roll, LOAD, WIDTH, LENGTH, 1e13)
     assert state.centre_y == pytest.approx(centre * (1 - 1 / n_strips**2), rel=1e-12) and centre < 0
-    assert state.yaw_moment(0.4) == pytest.approx(0.4 * state.load * state.centre_y, rel=1e-14)
 
 
 def test_order_two_centre_of_partly_open_rigid_pad():
@@ -303,6 +301,13 @@ def test_always_random_strips_satisfy_contact_conditions(
 
 
 # ---- stiffnesses
+def strips_stiffness(c, weight, state) -> float:
+    """Return the stiffness [N/m] of all strips together for a common approach."""
+    if state.stiffness is not None:
+        return sum(layer_stiffness(c, weight, row) for row in state.stiffness if row.any())
+    return sum(np.linalg.inv(c[np.ix_(row > 0, row > 0)]).sum() for row in state.force)
+
+
 @each_layer
 def test_order_two_stiffness_equals_load_difference(layer):
     """The normal stiffness of the strips equals the central difference of the load."""
@@ -324,7 +329,7 @@ def test_order_two_stiffness_equals_load_difference(layer):
 
 # ---- refusals
 def test_refuses_invalid_strip_controls():
-    """Inconsistent controls, invalid loads, a load line that tips the piece over and zero strips are refused."""
+    """Inconsistent controls, invalid loads, and a load line that tips the piece over are refused."""
     c, x, weight, y = pair_strips(4, 30)
     flat = np.zeros(x.size)
     for controls in (
@@ -342,8 +347,6 @@ def test_refuses_invalid_strip_controls():
         press_strips(c, x, weight, y, flat, load=1.0, moment=0.51 * LENGTH)
     with_spring = press_strips(c, x, weight, y, flat, load=1.0, moment=0.51 * LENGTH, spring=1e3)
     assert with_spring.moment == pytest.approx(0.51 * LENGTH + 1e3 * with_spring.theta, rel=1e-9)
-    with pytest.raises(PatchfemError, match=r"contact\.strips\.count"):
-        strip_offsets(WIDTH, 0)
 
 
 # ---- free roll

@@ -15,8 +15,8 @@ from pieces import (
     make_coated_pair,
     make_compliance,
 )
+from pressed import press
 
-from patchfem.contact import press
 from patchfem.contact.gaps import tilt
 from patchfem.contact.unilateral import solve_forces
 from patchfem.mesh import graded_grid

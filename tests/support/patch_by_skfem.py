@@ -25,8 +25,9 @@ from skfem.helpers import ddot, eye, sym_grad, trace
 # search, and of the two levels that are compared
 SEARCH = (1 / 40, 0.7, 15, 12, 1.0)
 LEVELS = ((1 / 120, 0.5, 24, 16, 0.5), (1 / 600, 0.35, 48, 32, 0.1))
-N_PASSES = 3  # largest number of meshes on a level, each graded to the edges on the previous one
+N_PASSES = 2  # largest number of meshes on a level, each graded to the edges on the previous one
 N_SEARCHES = 8
+MAX_POINTS = 900  # largest number of columns of all strips together
 MIN_LAYER_PRESSURE = (
     1e-13  # pressure over the peak at which a node of a rough layer counts as loaded
 )
@@ -395,6 +396,8 @@ def press(scene: Scene, parts: list, level: tuple) -> Pressed:
     is_wavy = "CubicSpline" in repr(scene.gap.__closure__)
     largest = half / 100 if is_wavy else half / n_columns
     x = grade(-half, half, [*scene.marks, *edges], sizes, growth, largest, bands)
+    if x.size * scene.strips[0] > MAX_POINTS:
+        raise ArithmeticError(f"{x.size} columns are too many for this program")
     h = np.diff(x)
     weight = (np.append(h, 0) + np.append(0, h)) / 2
     total = 0

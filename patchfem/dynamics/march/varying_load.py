@@ -163,7 +163,7 @@ def make_contact_sets(patch, spring: float = 0.0) -> ContactSets:
     `spring` is the rotational stiffness of the holder [N m/rad], 0 for a rigid one. PatchfemError for a nonlinear asperity
     layer, for strips and for a patch that carries no load.
     """
-    if patch.skin is not None:
+    if patch.has_smooth_skin:
         raise PatchfemError(
             describe_unsupported(
                 "contact.asperities.law: a nonlinear law under a normal load that changes", "linear"

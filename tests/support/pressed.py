@@ -1,0 +1,50 @@
+"""Single patches pressed by a holder, as records of nodal stresses."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from patchfem.contact import Holder, StripCompliance, StripLayout, StripModel, press_strips
+from patchfem.core import Compliance, Outcome
+
+
+class PressedPatch(NamedTuple):
+    """Pressed patch: pressures (m,) [Pa], gap (m,) [m], motion and loads of the holder, and the check of the solution."""
+
+    sigma_n: np.ndarray
+    gap: np.ndarray
+    approach: float
+    rotation: float
+    load: float
+    moment: float
+    outcome: Outcome
+    iterations: int
+    residuals: dict
+
+
+def press_by_holder(pieces: Compliance, gap, holder: Holder) -> PressedPatch:
+    """Press two bare pieces by a holder."""
+    layout = StripLayout(pieces.interface.x, pieces.interface.weight, np.zeros(1))
+    state = press_strips(StripModel(StripCompliance(pieces.normal), layout), gap, holder)
+    return PressedPatch(
+        state.pressure[0],
+        state.gap[0],
+        state.delta,
+        state.theta,
+        state.load,
+        state.moment,
+        state.outcome,
+        state.iterations,
+        state.residuals,
+    )
+
+
+def press(pieces, gap, load, moment=None, rotation=0.0, spring=0.0) -> PressedPatch:
+    """Press two bare pieces under a load, and a moment about a free rotation."""
+    holder = Holder(load, moment=moment, rotation=rotation, spring=spring)
+    return press_by_holder(pieces, gap, holder)
+
+
+def press_to_approach(pieces, gap, approach, rotation=0.0) -> PressedPatch:
+    """Press two bare pieces to a prescribed approach."""
+    return press_by_holder(pieces, gap, Holder(approach=approach, rotation=rotation))
