@@ -22,7 +22,6 @@ from .active_set import (
     SetSolution,
     find_rest_motion,
     guess_contact_set,
-    patch_problem,
     relative_violation,
     solve_primal,
     solve_primal_dual,
@@ -64,14 +63,6 @@ class ContactSolution(NamedTuple):
     def theta(self) -> float:
         """Rotation [rad] about y in addition to the one that the gap of a patch contains."""
         return -float(self.motion[1]) if self.motion.size > 1 else 0.0
-
-
-class PlainSolution(NamedTuple):
-    """Contact solution of a patch as NumPy arrays, with the number of iterations."""
-
-    force: np.ndarray
-    motion: np.ndarray
-    n_iterations: int
 
 
 def _solve_by_fallbacks(compliance, problem: ContactProblem, max_iterations: int) -> tuple:
@@ -187,33 +178,6 @@ def solve(
     return ContactSolution(
         solution.force, solution.motion + rest_motion, solution.stiffness, n_iterations
     )
-
-
-def solve_forces(c, x, gap, target, start=None, spring: float = 0.0) -> PlainSolution:
-    """Solve the contact problem of a patch that is given as NumPy arrays.
-
-    Parameters
-    ----------
-    c : (m, m) ndarray
-        Compliance [m/N].
-    x, gap : (m,) ndarray
-        Positions [m] and gap [m].
-    target : (0,), (1,) or (2,) ndarray
-        Nothing with the approach contained in the gap, load [N], or load and moment [N m].
-    start : (m,) bool ndarray, optional
-        Contact set of a similar problem.
-    spring : float
-        Stiffness of the holder [N m/rad].
-
-    Returns
-    -------
-    PlainSolution
-    """
-    touch_approach = gap.min() if target.size else 0.0
-    problem = patch_problem(x, gap - touch_approach, *map(float, target), spring=spring)
-    solution = solve(StripCompliance(c), problem, start)
-    solution.motion[:1] += touch_approach
-    return PlainSolution(solution.force, solution.motion, solution.n_iterations)
 
 
 def compute_residuals(

@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from pieces import LENGTH, LOAD, WIDTH, draw_gap, make_coated_pair
+from pressed import solve_forces
 from skins import layer_stiffness, press_layer, press_strips
 
 from patchfem.closed_forms.contact import (
@@ -25,7 +26,6 @@ from patchfem.contact import (
     strip_offsets,
 )
 from patchfem.contact.press import STRIP_RESIDUAL_TOL
-from patchfem.contact.unilateral import solve_forces
 from patchfem.core import PatchfemError
 
 AREA = LENGTH * WIDTH

@@ -5,6 +5,8 @@ from typing import NamedTuple
 import numpy as np
 
 from patchfem.contact import Holder, StripCompliance, StripLayout, StripModel, press_strips
+from patchfem.contact.active_set import patch_problem
+from patchfem.contact.unilateral import solve
 from patchfem.core import Compliance, Outcome
 
 
@@ -48,3 +50,38 @@ def press(pieces, gap, load, moment=None, rotation=0.0, spring=0.0) -> PressedPa
 def press_to_approach(pieces, gap, approach, rotation=0.0) -> PressedPatch:
     """Press two bare pieces to a prescribed approach."""
     return press_by_holder(pieces, gap, Holder(approach=approach, rotation=rotation))
+
+
+class PlainSolution(NamedTuple):
+    """Contact solution of a patch as NumPy arrays, with the number of iterations."""
+
+    force: np.ndarray
+    motion: np.ndarray
+    n_iterations: int
+
+
+def solve_forces(c, x, gap, target, start=None, spring: float = 0.0) -> PlainSolution:
+    """Solve the contact problem of a patch that is given as NumPy arrays.
+
+    Parameters
+    ----------
+    c : (m, m) ndarray
+        Compliance [m/N].
+    x, gap : (m,) ndarray
+        Positions [m] and gap [m].
+    target : (0,), (1,) or (2,) ndarray
+        Nothing with the approach contained in the gap, load [N], or load and moment [N m].
+    start : (m,) bool ndarray, optional
+        Contact set of a similar problem.
+    spring : float
+        Stiffness of the holder [N m/rad].
+
+    Returns
+    -------
+    PlainSolution
+    """
+    touch_approach = gap.min() if target.size else 0.0
+    problem = patch_problem(x, gap - touch_approach, *map(float, target), spring=spring)
+    solution = solve(StripCompliance(c), problem, start)
+    solution.motion[:1] += touch_approach
+    return PlainSolution(solution.force, solution.motion, solution.n_iterations)

@@ -448,7 +448,7 @@ class VaryingLoadRun(Run):
         nodal_forces = np.full(x.size, model.preload)
         if model.load is None:
             heave, pitch = model.rows[1:] @ self.state[0]
-            name = hash_set(self.sets, model.sets.reference.in_contact)
+            name = hash_set(self.sets, model.sets.in_contact)
             slot = press.find_set(self.sets, press.build_first_set(self.sets, name), -heave, pitch)
             press.press_state(self.sets, slot, -heave, pitch, nodal_forces)
         if model.has_point_loads:
