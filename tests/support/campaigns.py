@@ -37,6 +37,7 @@ KINDS = {  # Name on the command line -> module and function.
     "static-fine": ("static_scenes", "compare_fine_patch"),
     "patches": ("random_patches", "compare_coarse_patch"),
     "patches-fine": ("random_patches", "compare_fine_patch"),
+    "boundary-traces": ("boundary_traces", "compare_trace"),
     "traces": ("random_traces", "compare_trace"),
     "wear": ("wear_scenes", "compare_bench"),
     "predicted-wear": ("predicted_pairs", "compare_pair"),
