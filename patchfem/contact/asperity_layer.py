@@ -362,8 +362,6 @@ def press_with_asperities(strips, problem: ContactProblem) -> tuple:
     Returns
     -------
     solution : AsperitySolution
-    separation : (n,) ndarray
-        [m]
     residuals : dict of float
 
     Raises
@@ -387,8 +385,8 @@ def press_with_asperities(strips, problem: ContactProblem) -> tuple:
         solution = solve_asperity_layer(AsperityProblem(asperities, compliance, area, scaled))
         solution = solution._replace(motion=solution.motion * scale)
 
-    # The check takes the separations of the geometry, the state those of the law.
+    # The check takes the separations of the geometry, the solution has those of the law.
     opening = problem.gap - problem.motions @ solution.motion + compliance.product(solution.force)
     geometric = solution._replace(separation=opening)
     residuals = compute_law_residuals(asperities, area, problem, geometric)
-    return solution, solution.separation, residuals
+    return solution, residuals

@@ -150,14 +150,14 @@ def find_edges(
     compliance = normal.compliance
     force_rate = normal.solve(np.ones((x.size, 1)))[:, 0]
 
-    def find_offset(node: int, inner: float, outer: float, fraction: float) -> float:
+    def _find_offset(node: int, inner: float, outer: float, fraction: float) -> float:
         """Return the inward offset [m] of an edge beyond a node, between cells of given lengths [m]."""
         offset = edge_offset(inner, outer, fraction, row_height, is_quadratic=is_quadratic)
         return (
             offset if softness is None else offset * (1 - softness[node] / compliance[node, node])
         )
 
-    return place_edges(x, force, gap, force_rate, 1 - compliance @ force_rate, find_offset)
+    return place_edges(x, force, gap, force_rate, 1 - compliance @ force_rate, _find_offset)
 
 
 def place_edges(x, force, gap, force_rate, gap_rate, find_offset) -> list:

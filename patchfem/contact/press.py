@@ -89,6 +89,14 @@ class Holder(NamedTuple):
     roll: float = 0.0
 
 
+class HolderPosition(NamedTuple):
+    """Approach delta [m] and rotations theta about y and roll about x [rad] of the holder."""
+
+    delta: float
+    theta: float
+    roll: float
+
+
 class StripModel(NamedTuple):
     """Model of equal strips that are pressed by one rigid holder.
 
@@ -116,8 +124,7 @@ class StripsState:
       the layer is compressed.
     - stiffness (s, m): Stiffness of the asperity layer [Pa/m], None without asperities.
     - layout: Nodes of the strips.
-    - delta: Approach of the holder [m].
-    - theta, roll: Rotations of the holder about y and x [rad].
+    - position: Approach and rotations of the holder.
     - residuals: Relative residuals of the independent check.
     - iterations: Number of contact sets or Newton steps.
     """
@@ -126,9 +133,7 @@ class StripsState:
     gap: np.ndarray
     stiffness: np.ndarray | None
     layout: StripLayout
-    delta: float
-    theta: float
-    roll: float
+    position: HolderPosition
     residuals: MappingProxyType
     iterations: int
 
@@ -242,7 +247,8 @@ def press_strips(strips: StripModel, gap, holder: Holder) -> StripsState:
         if strips.is_smooth:
             from .asperity_layer import press_with_asperities
 
-            solution, opening, residuals = press_with_asperities(strips, problem)
+            solution, residuals = press_with_asperities(strips, problem)
+            opening = solution.separation
         else:
             if asperities is not None:
                 compliance = compliance.add_to_diagonal(1 / (asperities.k * layout.weight))
@@ -401,9 +407,7 @@ def _make_state(
         gap=frozen_array(opening),
         stiffness=stiffness,
         layout=layout._replace(offsets=frozen_array(layout.offsets)),
-        delta=float(motion[0]),
-        theta=holder.rotation + theta,
-        roll=holder.roll + roll,
+        position=HolderPosition(float(motion[0]), holder.rotation + theta, holder.roll + roll),
         residuals=MappingProxyType(dict(residuals)),
         iterations=n_iterations,
     )

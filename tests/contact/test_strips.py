@@ -155,8 +155,8 @@ def test_exact_strips_equal_block_diagonal_problem(layer, has_diagonals):
             spring=spring,
         )
         assert np.abs(state.force.ravel() - force).max() <= 1e-10 * load
-        assert state.delta == pytest.approx(motion[0], rel=1e-10)
-        assert state.theta == pytest.approx(
+        assert state.position.delta == pytest.approx(motion[0], rel=1e-10)
+        assert state.position.theta == pytest.approx(
             -motion[1] if moment is not None else 0.0, rel=1e-8, abs=1e-16
         )
 
@@ -228,7 +228,7 @@ def check_strips_state(
     state, layer, c, x, weight, gap, roll, load, moment=None, spring=0.0, rotation=None
 ):
     """Check forces, balance and gap of a state from the definitions."""
-    rotation = state.theta if rotation is None else rotation
+    rotation = state.position.theta if rotation is None else rotation
     force = state.force
     y = state.offsets
     assert max(state.residuals.values()) <= STRIP_RESIDUAL_TOL
@@ -238,7 +238,7 @@ def check_strips_state(
             load * LENGTH + abs(spring * rotation)
         )
     displacement = np.array([c @ row for row in force])
-    opening = gap + roll * y[:, None] + rotation * x - state.delta + displacement
+    opening = gap + roll * y[:, None] + rotation * x - state.position.delta + displacement
     scale = np.ptp(gap) + displacement.max() + abs(rotation) * LENGTH
     if layer is None:
         assert opening.min() >= -1e-9 * scale and force.min() >= 0
@@ -318,7 +318,7 @@ def test_order_two_stiffness_equals_load_difference(layer):
     step = 1e-5 * LOAD / strips_stiffness(c, weight, state)
     upper_load, lower_load = (
         press_strips(
-            c, x, weight, y, 2e-5 * x, 3e-5, approach=state.delta + h, asperities=layer
+            c, x, weight, y, 2e-5 * x, 3e-5, approach=state.position.delta + h, asperities=layer
         ).load
         for h in (step, -step)
     )
@@ -346,7 +346,9 @@ def test_refuses_invalid_strip_controls():
     with pytest.raises(PatchfemError, match=r"contact\.load_line: .* tips over"):
         press_strips(c, x, weight, y, flat, load=1.0, moment=0.51 * LENGTH)
     with_spring = press_strips(c, x, weight, y, flat, load=1.0, moment=0.51 * LENGTH, spring=1e3)
-    assert with_spring.moment == pytest.approx(0.51 * LENGTH + 1e3 * with_spring.theta, rel=1e-9)
+    assert with_spring.moment == pytest.approx(
+        0.51 * LENGTH + 1e3 * with_spring.position.theta, rel=1e-9
+    )
 
 
 # ---- free roll
@@ -372,7 +374,7 @@ def test_exact_free_roll_reproduces_prescribed_roll(layer, control):
             **control,
         )
         assert (
-            free.roll == pytest.approx(roll, rel=1e-8)
+            free.position.roll == pytest.approx(roll, rel=1e-8)
             and max(free.residuals.values()) <= STRIP_RESIDUAL_TOL
         )
         assert np.abs(free.force - prescribed.force).max() <= 1e-9 * LOAD
@@ -388,7 +390,7 @@ def test_exact_free_roll_reproduces_prescribed_roll(layer, control):
             roll_moment=prescribed.roll_moment,
             **control,
         )
-        assert restarted.roll == pytest.approx(roll, rel=1e-8)
+        assert restarted.position.roll == pytest.approx(roll, rel=1e-8)
 
 
 def test_exact_rolling_strips_equal_rotating_nodes():
@@ -408,5 +410,5 @@ def test_exact_rolling_strips_equal_rotating_nodes():
             asperities=layer,
             roll_moment=1e-3 * LOAD,
         )
-        assert rolled.roll == pytest.approx(rotated.theta, rel=1e-10)
+        assert rolled.position.roll == pytest.approx(rotated.position.theta, rel=1e-10)
         assert rolled.force[:, 0] == pytest.approx(rotated.force[0], rel=1e-9, abs=1e-12 * LOAD)

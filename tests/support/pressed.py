@@ -31,8 +31,8 @@ def press_by_holder(pieces: Compliance, gap, holder: Holder) -> PressedPatch:
     return PressedPatch(
         state.pressure[0],
         state.gap[0],
-        state.delta,
-        state.theta,
+        state.position.delta,
+        state.position.theta,
         state.load,
         state.moment,
         state.outcome,

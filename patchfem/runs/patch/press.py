@@ -429,8 +429,8 @@ def solve_contact(
     mean_state = ContactState(
         frozen_array(pressure.mean(axis=0)),
         frozen_array(state.gap.min(axis=0)),
-        state.delta,
-        state.theta,
+        state.position.delta,
+        state.position.theta,
         state.load,
         state.moment,
         state.outcome,

@@ -163,7 +163,7 @@ def _compute_static_values(patch: Patch) -> dict:
         out |= {
             "pressure_centre_lateral": state.centre_y,
             "roll_moment": state.roll_moment,
-            "roll": state.roll,
+            "roll": state.position.roll,
         }
     return {name: float(value) for name, value in out.items()}
 
