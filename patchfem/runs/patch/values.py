@@ -10,6 +10,7 @@ import numpy as np
 
 from ...closed_forms import contact
 from ...contact import edges, stiffness
+from ...contact.press import split_into_strips
 from ...elasticity.lapack import use_one_blas_thread
 from ...mesh.grid import TensorGrid
 from .edge_values import EdgeValues
@@ -175,12 +176,16 @@ def _compute_edge_values(patch: Patch) -> EdgeValues:
     motions = np.stack([np.ones(patch.x.size), patch.x], axis=1)
     stiffnesses = np.zeros(3)
     intervals = []
+    strip_pieces = split_into_strips(patch.pair.compliance, count)
+    coupling = patch.pair.closing
+    if count > 1:
+        coupling = coupling * count
     for strip, active in enumerate(loaded_nodes(patch)):
         if not active.any():
             continue
         # The layer of each strip is in series with its fraction of the pieces.
-        normal = patch.pair.compliance.normal * count
-        tangential = patch.pair.compliance.tangential * count
+        normal = strip_pieces.normal
+        tangential = strip_pieces.tangential
         if skin is not None:
             layer = patch.layer_compliance[strip]
             normal = normal + np.diag(layer)
@@ -190,7 +195,6 @@ def _compute_edge_values(patch: Patch) -> EdgeValues:
         ends = _find_ends(patch, strip, pressed)
         intervals.append(edges.contact_intervals(patch.x, active, ends))
         stiffnesses[:2] += edges.set_stiffness(pressed, motions, ends)
-        coupling = patch.pair.closing * count
         stiffnesses[2] += _full_stick_stiffness(normal, tangential, coupling, active, ends)
     normal_stiffness, rotational_stiffness, tangential_stiffness = stiffnesses.tolist()
     return EdgeValues(
