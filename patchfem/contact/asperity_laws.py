@@ -20,7 +20,6 @@ class LinearAsperities:
     -s > 0 is the compression of the layer; at s >= 0 it carries nothing.
     """
 
-    is_smooth: ClassVar[bool] = False
     k: float
 
     def pressure(self, s: np.ndarray) -> np.ndarray:

@@ -112,7 +112,7 @@ class StripModel(NamedTuple):
     @property
     def is_smooth(self) -> bool:
         """Whether an asperity layer carries pressure at every separation."""
-        return self.asperities is not None and self.asperities.is_smooth
+        return getattr(self.asperities, "is_smooth", False)
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -234,8 +234,8 @@ def press_strips(strips: StripModel, gap, holder: Holder) -> StripsState:
     gap = np.broadcast_to(gap, (offsets.size, layout.x.size)) + holder.roll * offsets[:, None]
     _refuse_unsolvable(strips, gap, holder)
     if holder.load == 0:
-        closed = np.array([gap.min()])
-        return _make_state(strips, np.zeros(gap.shape), gap - gap.min(), closed, holder)
+        closed = gap.min(keepdims=True).ravel()
+        return _make_state(strips, np.zeros(gap.shape), gap - closed, closed, holder)
 
     if strips.is_smooth and asperities.needs_load:
         mean_pressure = holder.load / (layout.weight.sum() * offsets.size)
@@ -323,7 +323,7 @@ def _refuse_unsolvable(strips: StripModel, gap, holder: Holder) -> None:
     approach = holder.approach
     if (load is None) == (approach is None) or (holder.moment is not None and load is None):
         raise PatchfemError("contact: give a load, a load and a moment, or an approach")
-    numbers = [value for value in holder if value is not None]
+    numbers = [value or 0.0 for value in holder]
     if not (np.isfinite(gap).all() and np.isfinite(numbers).all() and holder.spring >= 0):
         raise PatchfemError(
             "contact.load: load, moment, approach, spring of the holder and gap must be finite, the spring >= 0"
