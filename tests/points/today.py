@@ -72,9 +72,7 @@ def convert_single(model, row) -> PointSet:
 def convert_varying(model) -> Contact:
     """Return the contact of a VaryingLoadModel."""
     law = model.law
-    force = (
-        np.array([model.preload]) if model.sets is None else model.sets.reference.forces(0.0, 0.0)
-    )
+    force = np.array([model.preload]) if model.sets is None else model.sets.force
     nodes = None if model.sets is None else np.arange(force.size)
     if law.kind == LawKind.COULOMB:
         points, nodes = [laws.make_coulomb(law.static, law.force[1], model.preload)], None

@@ -4,10 +4,10 @@ from functools import cache
 
 import numpy as np
 import pytest
+from pressed import solve_forces
 from scipy.optimize import brentq
 
 from patchfem.contact import ContactSets
-from patchfem.contact.unilateral import solve_forces
 from patchfem.core import InitialState, ModalBasis, SineDrive
 from patchfem.dynamics.march import varying_load
 from patchfem.friction import Bonds

@@ -163,7 +163,7 @@ def make_contact_sets(patch, spring: float = 0.0) -> ContactSets:
     `spring` is the rotational stiffness of the holder [N m/rad], 0 for a rigid one. PatchfemError for a nonlinear asperity
     layer, for strips and for a patch that carries no load.
     """
-    if patch.skin is not None:
+    if patch.has_smooth_skin:
         raise PatchfemError(
             describe_unsupported(
                 "contact.asperities.law: a nonlinear law under a normal load that changes", "linear"
@@ -448,7 +448,7 @@ class VaryingLoadRun(Run):
         nodal_forces = np.full(x.size, model.preload)
         if model.load is None:
             heave, pitch = model.rows[1:] @ self.state[0]
-            name = hash_set(self.sets, model.sets.reference.in_contact)
+            name = hash_set(self.sets, model.sets.in_contact)
             slot = press.find_set(self.sets, press.build_first_set(self.sets, name), -heave, pitch)
             press.press_state(self.sets, slot, -heave, pitch, nodal_forces)
         if model.has_point_loads:

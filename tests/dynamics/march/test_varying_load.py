@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from pressed import solve_forces
 from varying_load_cases import (
     LAWS,
     LOAD,
@@ -21,7 +22,6 @@ from varying_load_cases import (
     total_energy,
 )
 
-from patchfem.contact.unilateral import solve_forces
 from patchfem.core import InitialState, PatchfemError, SineDrive
 from patchfem.dynamics.march import varying_load
 from patchfem.friction import Bonds

@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from pressed import solve_forces
 from scipy.optimize import root
 from varying_load_cases import (
     LAWS,
@@ -19,7 +20,6 @@ from varying_load_cases import (
     march_with_lift_off,
 )
 
-from patchfem.contact.unilateral import solve_forces
 from patchfem.core import InitialState, PatchfemError, SineDrive
 from patchfem.dynamics.march import march as plain
 from patchfem.dynamics.march import varying_load
@@ -39,7 +39,7 @@ def exponential_compliance(x, depth: float = 3e-8) -> np.ndarray:
 
 def reduce_to_shear_modes(sets, law, count=None, depth: float = 3e-8, tolerance: float = 1e-3):
     """Return shear modes of the nodes of contact sets; with `count` None as many modes as nodes."""
-    force = sets.reference.forces(0.0, 0.0)
+    force = sets.force
     count = sets.x.size if count is None else count
     return varying_load.choose_shear_modes(
         exponential_compliance(sets.x, depth),
@@ -217,7 +217,7 @@ def test_refuses_shear_modes_with_unsuitable_laws():
             )
     few_modes = shear_modes(
         exponential_compliance(crowned_contact().x),
-        0.3 * crowned_contact().reference.forces(0.0, 0.0),
+        0.3 * crowned_contact().force,
         1e-6,
         4,
     )
