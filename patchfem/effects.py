@@ -220,7 +220,7 @@ EFFECTS = {
         "timeless",
     ),
     "friction.law=nonlocal": _make_law(
-        "bonds.quadrature",
+        "bonds.points",
         "tau = mu_s int phi(R/eps) sigma_n u/|u| dL1/eps_0 (2.17)",
         (
             "bond_length",
@@ -260,10 +260,10 @@ EFFECTS = {
         "overshoots",
     ),
     "friction.reading=stretch": Effect(
-        "patchfem.friction.bonds.recursion", "phi: (|u|/eps)^p exp(-int dR/eps)/Gamma(p+1)"
+        "patchfem.friction.bonds.point_kernels", "phi: (|u|/eps)^p exp(-int dR/eps)/Gamma(p+1)"
     ),
     "friction.reading=report": Effect(
-        "patchfem.friction.bonds.quadrature", "phi: (R/eps)^p exp(-R/eps)/Gamma(p+1) (2.14)"
+        "patchfem.friction.bonds.list_kernels", "phi: (R/eps)^p exp(-R/eps)/Gamma(p+1) (2.14)"
     ),
     "friction.temperature": Effect(
         "patchfem.friction.bonds.temperature",

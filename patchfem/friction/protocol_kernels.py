@@ -7,13 +7,6 @@ from typing import NamedTuple
 
 from ..compiled.jit import NJIT_NO_REFCOUNT, njit
 
-IS_SET_VALUED = False  # whether the law sticks without any elastic stretch, as Coulomb's law does
-HAS_ZERO_KINK = False  # whether the rate equation has a kink at zero stretch
-# Whether the stretch depends on the path alone and is given by `integrate_stretch`
-IS_RATE_INDEPENDENT = False
-# Whether the force changes steeply over a narrow range of velocities around 0
-HAS_SPEED_LAYER = False
-
 
 class Reading(NamedTuple):
     """State of a friction law: force [N], stored energy [J], irreversible displacement [m]."""
@@ -41,20 +34,11 @@ class RelaxedStretch(NamedTuple):
 
 
 class Rates(NamedTuple):
-    """Rate equation of a friction law: force [N], stretch rate [1] and force derivatives."""
+    """Force of a friction law [N], and its derivatives by the stretch [N/m] and the velocity [N s/m]."""
 
     force: float
-    stretch_rate: float
     force_by_stretch: float
     force_by_velocity: float
-
-
-class IntegratedStretch(NamedTuple):
-    """Stretch after a path [m], mean square stretch [m2] and work of the friction force [J]."""
-
-    stretch: float
-    mean_square: float
-    work: float
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
@@ -92,23 +76,3 @@ def solve_step(numbers, memory, free, compliance):
     StepSolution
     """
     return StepSolution(0.0, 0.0, False)
-
-
-@njit(error_model="numpy", forceinline=True, **NJIT_NO_REFCOUNT)
-def integrate_stretch(numbers, stretch, mean_square, increment, direction):
-    """Return the stretch unchanged, because the law is given by its rate equation alone.
-
-    Parameters
-    ----------
-    numbers : sequence of float
-        Parameters of the law.
-    stretch, mean_square : float
-        Stretch [m] and mean square of the stretches [m2] before.
-    increment, direction : float
-        Increment [m] and its sign.
-
-    Returns
-    -------
-    IntegratedStretch
-    """
-    return IntegratedStretch(stretch, mean_square, 0.0)

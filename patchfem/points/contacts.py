@@ -71,11 +71,11 @@ def convert_element(element: Element) -> list[PointLaw]:
     if element.form == "points":
         rows = np.zeros(N_NUMBERS)
         # Points of equal slide and a density of 1 per load are one point.
-        rows[:10] = (
+        rows[:9] = (
             Law.BONDS,
             numbers[1] * numbers[2],
             numbers[2],
-            *numbers[3:9],
+            *numbers[3:8],
             element.memory[1],
         )
         memory = np.zeros(N_MEMORY)

@@ -21,7 +21,7 @@ JENKINS       mu, length [m]                                       force/mu, spr
 MASING        F_S, phi_max [m], chi + 1, beta                      see `Masing`
 BOUC_WEN      mu, length [m], exponent n, shape s                  z
 LUGRE         stiffness, kinetic, static, v_s, sigma_1, sigma_2    stretch [m], force
-BONDS         mu, eps_0 [m], growth (6) (eq. 2.10), m_0            eps, m, z, s2, eps in the middle of the step
+BONDS         mu, eps_0 [m], growth (5) (eq. 2.10), m_0            eps, m, z, s2, eps in the middle of the step
 CUBIC         k_3 [N/m3]                                           slide [m]
 INTERLOCK     k [N/m], wavelength [m]                              slide [m]
 ============= ==================================================== =================================================
@@ -457,7 +457,7 @@ def prepare(numbers, memory, j, step):
             return
         half = 0.5 * step.duration
         v = step.start_velocity
-        memory[4, j] = grow(memory[0, j], v, v, abs(v) * half, half, numbers[3:9, j])[0]
+        memory[4, j] = grow(memory[0, j], v, v, abs(v) * half, half, numbers[3:8, j])[0]
 
 
 @njit(**NJIT_KERNEL)
@@ -482,7 +482,7 @@ def advance(numbers, memory, j, load, step):
         if numbers[3, j] >= 0:
             v0 = step.start_velocity
             v1 = step.end_velocity
-            memory[0, j] = grow(memory[0, j], v0, v1, abs(dq), step.duration, numbers[3:9, j])[0]
+            memory[0, j] = grow(memory[0, j], v0, v1, abs(dq), step.duration, numbers[3:8, j])[0]
     elif law == Law.TANH:
         memory[0, j] = numbers[1, j] * load * tanh(step.end_velocity / numbers[2, j])
     elif law == Law.LUGRE:
@@ -569,7 +569,7 @@ def press(numbers, memory, j, before, after):
     elif law == Law.BONDS:
         bonds = memory[1, j], memory[2, j], memory[3, j]
         memory[1, j], memory[2, j], memory[3, j] = press_point(
-            bonds, before, after, numbers[9, j], numbers[2, j]
+            bonds, before, after, numbers[8, j], numbers[2, j]
         )
     elif law == Law.TANH:
         memory[0, j] *= after / before if before > 0 else 0.0

@@ -13,8 +13,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 import today
 
 from patchfem.dynamics import bond_list_model, jenkins_model, load_instances, points_model
-from patchfem.friction import Bonds, list_mean, list_step
-from patchfem.friction.bonds.quadrature import cutoff_age
+from patchfem.friction import Bonds, cutoff_age, list_mean, list_step
 
 loop_kernels = load_instances()
 

@@ -160,7 +160,7 @@ ITEMS = (
         "the path of a point, and the distance that the point has covered since a bond formed",
         LOOP,
         "",
-        "tests/friction/bonds/test_quadrature.py",
+        "tests/friction/bonds/test_list_sums.py",
         "works",
     ),
     Item(
@@ -208,7 +208,7 @@ ITEMS = (
         "at constant speed the nonlocal law becomes a local law",
         LOOP,
         "studies/bench/stribeck.py",
-        "tests/friction/bonds/test_quadrature.py",
+        "tests/friction/bonds/test_list_sums.py",
         "works",
     ),
     Item(

@@ -503,8 +503,8 @@ def make_law(model):
         return Jenkins(element.numbers[2 : 2 + count], element.numbers[2 + count :])
     if form == "speed":
         return SpeedLaw(element)
-    # If bonds neither grow nor break gradually, one stretch describes the memory of a bond point.
-    if form == "flow" or (form == "points" and element.numbers[3] < 0 and not element.numbers[8]):
+    # If bonds do not grow, one stretch describes the memory of a bond point.
+    if form == "flow" or (form == "points" and element.numbers[3] < 0):
         return FlowLaw(element)
     if model.set_valued:
         raise PatchfemError(

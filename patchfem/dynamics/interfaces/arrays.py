@@ -96,7 +96,7 @@ class PointRow(IntEnum):
 
     - DENSITY, STRETCH, SQUARED_STRETCH: moments of the bonds; for an elastic-plastic law DENSITY is the traction over mu and
       STRETCH the density of the springs
-    - PLAY: play of bonds with an elastic range [m]
+    - UNUSED: not used by bonds known by their moments
     - LOAD: load, or friction limit of a list of bonds
     - SLIDE, FORCE, SLOPE: slide [m], force [N] and slope [N/m] in the step
     """
@@ -104,7 +104,7 @@ class PointRow(IntEnum):
     DENSITY = 0
     STRETCH = 1
     SQUARED_STRETCH = 2
-    PLAY = 3
+    UNUSED = 3
     LOAD = 4
     SLIDE = 5
     FORCE = 6
@@ -200,7 +200,7 @@ class ShearedPoints(NamedTuple):
     - weight: (m,) force per traction of the law: mu_s area/eps_0 for bonds under a load
       in Pa
     - eps: (2,) bond length at the start and at the middle of the step [m]
-    - growth: (6,) parameters of eq. 2.10 and of the breakaway fraction
+    - growth: (5,) parameters of eq. 2.10
     - psi, kappa, b: shear modes (r, m), their stiffness [N/m] and coordinates [m] (r,)
     - points: (8, m), see `PointRow`
     - count: (1,) number of columns of points and psi that are under load
@@ -242,7 +242,7 @@ def make_sheared_fields(
     length : float
         Bond length [m].
     growth : array_like
-        (6,) parameters of the growth of bonds.
+        (5,) parameters of the growth of bonds.
     psi, kappa : ndarray
         (m, r) and (r,) shear modes and their stiffnesses; empty for pieces that are rigid in shear.
     lanes : int, optional
@@ -326,7 +326,7 @@ class BondList(NamedTuple):
 
     - force: (1,) friction limit mu_s N [N]
     - bondlist, now, status, law, table: see `friction.bonds.list_rows_kernels`
-    - growth: (6,) parameters of eq. 2.10
+    - growth: (5,) parameters of eq. 2.10
     - last: (2,) increments of the last two steps [m]
     - bound: (1,) largest force [N]
     """
@@ -365,8 +365,8 @@ class ShearedLists(
 
     The functions are those of `shear_list_kernels`.
 
-    - bondlist: (9, m capacity) lists of all points, one after the other
-    - nows, statuses: (m, 6), (m, 16) time state and status of each list; now, status: those of the present list
+    - bondlist: (8, m capacity) lists of all points, one after the other
+    - nows, statuses: (m, 6), (m, 14) time state and status of each list; now, status: those of the present list
     - law, table: see `BondList`
     - time: (1,) duration of the step [s]
     - pressed: (2, m) nodal forces at both ends of the step [N], relative to the row LOAD of points; (2,
@@ -444,7 +444,7 @@ def split_memory(contact, element=None) -> list | None:
 def split_element_memory(element, memory) -> list:
     """Return the memory (l,) of a friction element as rows of numbers of comparable magnitude."""
     head = {"parallel": 3, "points": 1, "places": 1}.get(element.form, memory.size)
-    kinds = 5 if element.form in ("points", "places") else 1
+    kinds = 4 if element.form in ("points", "places") else 1
     return [*memory[:head, None], *memory[head:].reshape(kinds, -1)]
 
 

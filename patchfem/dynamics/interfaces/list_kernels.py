@@ -6,58 +6,20 @@ The arrays are `arrays.BondList`. `march.loop_kernels` calls the functions of ev
 import numpy as np
 
 from ...compiled.jit import njit
-from ...friction.bonds.list_forms_kernels import FORM_MOMENTS, FORM_POWER
-from ...friction.bonds.list_kernels import list_force, list_mean, list_slope, list_step
-from ...friction.bonds.list_rows_kernels import LAW, STATUS
+from ...friction.bonds.list_kernels import list_mean
+from ...friction.bonds.list_rows_kernels import FORM_STRETCH, LAW, STATUS
+from ...friction.bonds.list_step_kernels import list_step
 from ...friction.flags_kernels import NJIT_NO_REFCOUNT
 from ...friction.protocol_kernels import Reading
 from ..modal_kernels import Bracket, narrow_bracket
 from .arrays import SolvedStep
 
-# Largest increment [bond lengths] for which the slope of the force is the mean of
-# the slopes in both directions.
-SLOPE_INCREMENT_RATIO = 1e-9
 # Largest energy that a list may gain in short steps and subtract from its next dissipation (see
 # `commit_step`), relative to the work of one bond length at the friction limit.
 MAX_CARRIED_RATIO = 1e-4
 MAX_ITERATIONS = 300
 N_SECANT_STEPS = 8  # number of secant iterations before bisection steps are inserted
 ROUND_OFF = 4e-16  # round-off error of a sum, relative to its largest term
-
-
-@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def find_mean_and_slope(dq, contact, v0, dt):
-    """Return the path-mean force of a bond list relative to its limit, and the slope.
-
-    For a form other than FORM_MOMENTS the slope assumes that the force depends on the displacement
-    alone; it may be negative.
-
-    Parameters
-    ----------
-    dq : float
-        Increment of the relative displacement [m].
-    contact : arrays.BondList
-    v0 : float
-        Velocity at the start of the step [m/s].
-    dt : float
-        Duration of the step [s].
-
-    Returns
-    -------
-    mean : float
-    slope : float
-        [1/m].
-    """
-    if contact.law[LAW.form] == FORM_MOMENTS:
-        mean, slope = list_slope(dq, contact, v0, dt)
-        return mean, slope
-    mean = list_mean(dq, contact, v0, dt)
-    increment = SLOPE_INCREMENT_RATIO * contact.law[LAW.length]
-    if abs(dq) > increment:
-        return mean, (list_force(dq, contact, v0, dt) - mean) / dq
-    return mean, (
-        list_force(increment, contact, v0, dt) - list_force(-increment, contact, v0, dt)
-    ) / (4 * increment)
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
@@ -78,8 +40,6 @@ def find_mean_force(dq, contact, v0, dt):
     -------
     float
     """
-    if contact.law[LAW.form] == FORM_MOMENTS:
-        return contact.force[0] * list_slope(dq, contact, v0, dt)[0]
     return contact.force[0] * list_mean(dq, contact, v0, dt)
 
 
@@ -156,11 +116,11 @@ def commit_step(dq, force, start, end_velocity, contact):
     contact.last[0] = dq
     before = contact.status[STATUS.energy]
     ok = list_step(dq, contact, start.velocity, end_velocity, start.dt)
-    return add_list_energies(force * dq, before, contact.force[0], contact), ok
+    return add_list_energies(force * dq, before, contact.force[0], contact.law, contact.status), ok
 
 
 @njit(error_model="numpy", forceinline=True, **NJIT_NO_REFCOUNT)
-def add_list_energies(work, before, limit, contact):
+def add_list_energies(work, before, limit, law, status):
     """Return the dissipated energy [J] of a step, and add it to the energy sums of the list.
 
     The loss is the work of the step minus the increase of the stored energy; a negative loss is
@@ -174,19 +134,18 @@ def add_list_energies(work, before, limit, contact):
         Stored energy in the status before the step.
     limit : float
         Friction limit mu_s N [N].
-    contact : arrays.BondList
+    law, status : (8,), (14,) array
+        Parameters and status of the list, see `friction.bonds.list_rows_kernels`.
     """
-    net = work - limit * (contact.status[STATUS.energy] - before)
-    if contact.law[LAW.form] <= FORM_POWER and limit > 0:
-        carried_gain = contact.status[STATUS.owed] - net / limit
-        contact.status[STATUS.owed] = min(
-            max(carried_gain, 0.0), MAX_CARRIED_RATIO * contact.law[LAW.length]
-        )
-        net = limit * (contact.status[STATUS.owed] - carried_gain)
+    net = work - limit * (status[STATUS.energy] - before)
+    if law[LAW.form] == FORM_STRETCH and limit > 0:
+        carried_gain = status[STATUS.owed] - net / limit
+        status[STATUS.owed] = min(max(carried_gain, 0.0), MAX_CARRIED_RATIO * law[LAW.length])
+        net = limit * (status[STATUS.owed] - carried_gain)
     if net < 0:
-        contact.status[STATUS.created] -= net
+        status[STATUS.created] -= net
     else:
-        contact.status[STATUS.dissipated] += net
+        status[STATUS.dissipated] += net
     return net
 
 

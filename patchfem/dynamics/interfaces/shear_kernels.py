@@ -10,7 +10,7 @@ every contact.
 """
 
 from ...compiled.jit import njit
-from ...friction.bonds.point_kernels import bond_step, elastic_bond_step, grow, short_bond_step
+from ...friction.bonds.point_kernels import bond_step, grow, short_bond_step
 from ...friction.flags_kernels import FASTMATH_FLAGS, NJIT_NO_REFCOUNT
 from ...friction.protocol_kernels import Reading
 from .arrays import BondSums, FullSlipRow, PointRow, SlipStateIndex, SolvedStep, StepProblem
@@ -159,16 +159,15 @@ def commit_step(dq, force, start, end_velocity, contact):
             )
         accept_step(contact)
         return dissipated, True
-    loose = contact.growth[5] * length
-    if loose == 0.0 and are_slides_short(contact, length):
+    if are_slides_short(contact, length):
         dissipated = update_points_short(contact, length)
     else:
-        dissipated = update_points(contact, loose, length)
+        dissipated = update_points(contact, length)
     accept_step(contact)
     contact.eps[0] = grow(
         contact.eps[0], start.velocity, end_velocity, abs(dq), start.dt, contact.growth
     )[0]
-    if contact.growth[0] < 0.0 and loose == 0.0:
+    if contact.growth[0] < 0.0:
         contact.slip_state[SlipStateIndex.FULL_SLIP_DIRECTION] = find_full_slip_direction(
             1.0 if dq > 0.0 else -1.0, contact
         )
@@ -221,14 +220,12 @@ def update_points_short(contact, length):
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def update_points(contact, loose, length):
+def update_points(contact, length):
     """Update all points for slides of any size.
 
     Parameters
     ----------
     contact : arrays.ShearedPoints
-    loose : float
-        Half the elastic range of the bonds [m].
     length : float
         Bond length [m].
 
@@ -244,12 +241,7 @@ def update_points(contact, loose, length):
         z = points[PointRow.STRETCH, j]
         s2 = points[PointRow.SQUARED_STRETCH, j]
         xi = points[PointRow.SLIDE, j]
-        if loose > 0.0:
-            (m, z, s2, part), points[PointRow.PLAY, j] = elastic_bond_step(
-                m, z, s2, points[PointRow.PLAY, j], loose, xi, points[PointRow.LOAD, j], length
-            )
-        else:
-            m, z, s2, part = bond_step(m, z, s2, xi, points[PointRow.LOAD, j], length)
+        m, z, s2, part = bond_step(m, z, s2, xi, points[PointRow.LOAD, j], length)
         points[PointRow.DENSITY, j] = m
         points[PointRow.STRETCH, j] = z
         points[PointRow.SQUARED_STRETCH, j] = s2

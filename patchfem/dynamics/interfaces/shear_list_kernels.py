@@ -7,8 +7,9 @@ every contact.
 """
 
 from ...compiled.jit import njit
-from ...friction.bonds.list_kernels import list_step
 from ...friction.bonds.list_rows_kernels import LAW, PATH, STATUS
+from ...friction.bonds.list_step_kernels import break_bonds
+from ...friction.bonds.points_kernels import ListStep, advance, point_list
 from ...friction.flags_kernels import NJIT_NO_REFCOUNT
 from ...friction.protocol_kernels import Reading
 from . import shear_solve_kernels as solver
@@ -17,9 +18,7 @@ from .list_kernels import add_list_energies
 from .shear_lists_kernels import (
     find_pressure,
     has_changing_pressure,
-    load_list,
     start_step,
-    store_list,
 )
 
 
@@ -85,17 +84,16 @@ def commit_step(dq, force, start, end_velocity, contact):
     changes = has_changing_pressure(contact)
     contact.slip_state[SlipStateIndex.TOTAL_SLIDE] += dq
     for j in range(int(contact.count[0])):
-        load_list(j, contact)
+        bonds = point_list(contact, j)
         xi = points[PointRow.SLIDE, j]
-        energy = contact.status[STATUS.energy]
+        energy = bonds.status[STATUS.energy]
         speed = abs(xi) / start.dt
-        has_room = list_step(xi, contact, speed, speed, start.dt) and has_room
-        if changes:
-            contact.nows[j, PATH.displacement] = contact.now[PATH.displacement]
-            if find_pressure(j, contact) <= 0.0:
-                break_bonds(contact.status)
-        add_list_energies(points[PointRow.FORCE, j] * xi, energy, contact.weight[j], contact)
-        store_list(j, contact)
+        step = ListStep(xi, start.dt, speed, speed)
+        has_room = advance(contact, j, bonds.status[STATUS.pressure], step) and has_room
+        if changes and find_pressure(j, contact) <= 0.0:
+            break_bonds(0, bonds)
+        work = points[PointRow.FORCE, j] * xi
+        add_list_energies(work, energy, contact.weight[j], contact.law, bonds.status)
         points[ListPointRow.GROWTH_SPEED, j] = max(
             1.5 * speed - 0.5 * points[ListPointRow.LAST_SPEED, j], 0.0
         )
@@ -103,14 +101,6 @@ def commit_step(dq, force, start, end_velocity, contact):
     solver.accept_step(contact)
     contact.slip_state[SlipStateIndex.IS_FULL] = 0.0 if has_room else 1.0
     return force * dq - (stored_energy(contact) - before), has_room
-
-
-@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def break_bonds(status):
-    """Break all bonds of a list, as when its point lifts off."""
-    status[STATUS.head] = status[STATUS.end] = status[STATUS.room_start]
-    status[STATUS.n_spread] = status[STATUS.n_after_merge] = 0.0
-    status[STATUS.energy] = status[STATUS.force] = status[STATUS.initial_pressure] = 0.0
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)

@@ -4,16 +4,16 @@ The bonds have any order p and either form of eq. 2.17 (`friction.reading`).
 
 Every point has its own path, damage and, where bonds grow, bond length, at its own
 velocity. Its weight is its friction limit [N]. The tests compare with
-`friction.bonds.quadrature.Quadrature`, point by point.
+`friction.bonds.points.ListedBonds`, point by point.
 """
 
 import numpy as np
 
 from ...compiled.jit import njit
 from ...friction.bonds.list_rows_kernels import PATH, STATUS
+from ...friction.bonds.points_kernels import ListStep, mean_force
 from ...friction.flags_kernels import NJIT_NO_REFCOUNT
 from .arrays import ListPointRow, PointRow
-from .list_kernels import find_mean_and_slope
 
 # Largest accepted residual relative to the tolerance, if it no longer decreases; sums
 # over bonds jump by up to 1e-8.
@@ -22,24 +22,6 @@ GOAL_SLACK = 1e4
 FORCE_MAY_FALL = True
 # Damping of a step relative to the stiffness of the shear modes, needed because the forces jump.
 STEP_DAMPING = 1 / 16
-
-
-@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def load_list(j, contact):
-    """Copy the time state and status of the list of point j to `now` and `status`."""
-    for i in range(contact.now.size):
-        contact.now[i] = contact.nows[j, i]
-    for i in range(contact.status.size):
-        contact.status[i] = contact.statuses[j, i]
-
-
-@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def store_list(j, contact):
-    """Copy `now` and `status` back to the list of bonds of point j."""
-    for i in range(contact.now.size):
-        contact.nows[j, i] = contact.now[i]
-    for i in range(contact.status.size):
-        contact.statuses[j, i] = contact.status[i]
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
@@ -134,8 +116,9 @@ def write_forces(kind, ending, contact):
         if is_empty and is_unpressed:
             points[PointRow.FORCE, j] = points[PointRow.SLOPE, j] = 0.0
             continue
-        load_list(j, contact)
-        f, s = find_mean_and_slope(xi, contact, points[ListPointRow.GROWTH_SPEED, j], dt)
+        speed = points[ListPointRow.GROWTH_SPEED, j]
+        step = ListStep(xi, dt, speed, speed)
+        f, s = mean_force(contact, j, status[STATUS.pressure], step)
         # Where many bonds have the same stretch, the mean force is steeper than the
         # slope s, so the secant is used.
         if xi != points[ListPointRow.TRIAL_SLIDE, j]:

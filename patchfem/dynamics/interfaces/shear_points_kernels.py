@@ -10,7 +10,6 @@ from ...friction.bonds.point_kernels import (
     MAX_SHORT_PATH,
     bond_end_stretch,
     bond_mean,
-    elastic_bond_mean,
     short_bond_mean,
 )
 from ...friction.flags_kernels import FASTMATH_FLAGS, NJIT_NO_REFCOUNT
@@ -58,12 +57,7 @@ def write_forces(kind, ending, contact):
     weight = contact.weight
     length = contact.eps[0 if ending else 1]
     force = 0.0
-    if (
-        kind == POINTS
-        and not ending
-        and contact.growth[5] == 0.0
-        and are_slides_short(contact, length)
-    ):
+    if kind == POINTS and not ending and are_slides_short(contact, length):
         for j in range(int(contact.count[0])):
             f, s = short_bond_mean(
                 points[PointRow.DENSITY, j],
@@ -100,7 +94,6 @@ def write_general_forces(kind, ending, contact, length):
     """
     points = contact.points
     weight = contact.weight
-    loose = contact.growth[5] * length
     force = 0.0
     for j in range(int(contact.count[0])):
         m = points[PointRow.DENSITY, j]
@@ -115,8 +108,6 @@ def write_general_forces(kind, ending, contact, length):
             )
         elif ending:
             f, s = bond_end_stretch(m, z, xi, load, length)
-        elif loose > 0.0:
-            f, s = elastic_bond_mean(m, z, points[PointRow.PLAY, j], loose, xi, load, length)
         else:
             f, s = bond_mean(m, z, xi, load, length)
         f *= weight[j]

@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...core import Missing
+from ...friction.bonds.list_numbers import enlarge_lists
 from ...friction.bonds.list_rows_kernels import N_ROWS, STATUS
 from ..interfaces.arrays import SlipStateIndex
 
@@ -23,12 +24,12 @@ LONG_LIST_ADVICE = (
 class SavedState(NamedTuple):
     """Copies of the arrays of a run, from which a section of the march can be repeated.
 
-    - `entries`: used entries of every list of bonds.
+    - `strips`: used entries of all lists of bonds, which follow each other.
     - `fields`: other arrays of the contact by name.
     - `others`: further arrays of the run.
     """
 
-    entries: list
+    strips: np.ndarray
     fields: dict
     others: tuple
 
@@ -41,16 +42,10 @@ def copy_state(contact, *others) -> SavedState | None:
     if not hasattr(contact, "bondlist"):
         return None
     fields = {name: array.copy() for name, array in contact._asdict().items() if name != "bondlist"}
-    entries = [
-        contact.bondlist[:, head:end].copy()
-        for head, end in _get_statuses(contact)[:, [STATUS.head, STATUS.end]].astype(int)
-    ]
-    return SavedState(entries, fields, tuple(array.copy() for array in others))
-
-
-def _get_statuses(contact) -> np.ndarray:
-    """Return the status rows (m, 16) of the bond lists of a contact."""
-    return contact.statuses if hasattr(contact, "statuses") else contact.status[None]
+    statuses = fields["statuses"] if "statuses" in fields else fields["status"][None]
+    used = 2 + int((statuses[:, STATUS.end] - statuses[:, STATUS.head]).max())
+    strips = enlarge_lists(contact.bondlist, statuses, used)
+    return SavedState(strips, fields, tuple(array.copy() for array in others))
 
 
 def is_full(contact) -> bool:
@@ -78,7 +73,7 @@ def enlarge_list(contact, saved_state: SavedState, location: str, *others):
     *others : ndarray
         Arrays that are restored in place, in the order of `saved_state.others`.
     """
-    rows, old_capacity = contact.bondlist.shape
+    old_capacity = contact.bondlist.shape[1]
     if old_capacity >= MAX_ENTRIES:
         raise Missing(
             f"the bond list grew beyond {old_capacity} entries ({old_capacity * ENTRY_BYTES / 1e6:.0f} MB) {location}; "
@@ -90,15 +85,9 @@ def enlarge_list(contact, saved_state: SavedState, location: str, *others):
     restored = contact._replace(
         **{name: array.copy() for name, array in saved_state.fields.items()}
     )
-    statuses = _get_statuses(restored)
+    statuses = restored.statuses if hasattr(restored, "statuses") else restored.status[None]
     capacity = min(2 * old_capacity, MAX_ENTRIES) // len(statuses)
-    enlarged = np.zeros((rows, capacity * len(statuses)))
-    for j, (status, entries) in enumerate(zip(statuses, saved_state.entries)):
-        status[STATUS.room_start] = status[STATUS.head] = j * capacity
-        status[STATUS.room_end] = (j + 1) * capacity
-        status[STATUS.end] = j * capacity + entries.shape[1]
-        enlarged[:, j * capacity : j * capacity + entries.shape[1]] = entries
-    return restored._replace(bondlist=enlarged)
+    return restored._replace(bondlist=enlarge_lists(saved_state.strips, statuses, capacity))
 
 
 def list_bytes(n_entries: float) -> float:

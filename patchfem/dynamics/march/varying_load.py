@@ -105,11 +105,11 @@ def make_bonds_law(law) -> VaryingLoadLaw:
 
     Raises PatchfemError for other bonds.
     """
-    if law.reading != "stretch" or law.order != 1 or law.breakaway:
+    if law.reading != "stretch" or law.order != 1:
         raise PatchfemError(
             describe_unsupported(
-                "friction: a changing normal load together with reading = 'report', an order other "
-                "than 1 or a breakaway above 0",
+                "friction: a changing normal load together with reading = 'report' or an order other "
+                "than 1",
                 "recursion",
             )
         )

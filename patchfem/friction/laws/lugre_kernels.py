@@ -5,28 +5,20 @@ numbers: stiffness [N/m], kinetic and static force [N], Stribeck velocity v_s [m
 path.
 """
 
-from math import inf, nan
+from math import exp, inf, nan
 from typing import NamedTuple
 
 from ...compiled.jit import njit
 from ..bonds.point_kernels import shape_functions
 from ..flags_kernels import FASTMATH_FLAGS, NJIT_NO_REFCOUNT
 from ..protocol_kernels import (
-    HAS_SPEED_LAYER,
-    HAS_ZERO_KINK,
-    IS_RATE_INDEPENDENT,
-    IS_SET_VALUED,
     Rates,
     Reading,
     RelaxedStretch,
-    integrate_stretch,
     solve_step,
     step_bond_length,
 )
-from .exponential_kernels import exp_minus
 
-# Units of `numbers`, for batches that scale time and force
-NUMBER_UNITS = "N/m N N m/s N_s/m N_s/m"
 # Smallest friction limit relative to the static force; z relaxes over limit/stiffness, which must
 # not be 0
 MIN_LIMIT_RATIO = 1e-9
@@ -47,7 +39,7 @@ class _Relaxation(NamedTuple):
 def _relaxation_length(numbers, velocity):
     """Return the length g/stiffness [m] over which z relaxes, and its velocity derivative [s]."""
     ratio = velocity / numbers[4]
-    rise = (numbers[3] - numbers[2]) * exp_minus(ratio * ratio)
+    rise = (numbers[3] - numbers[2]) * exp(-ratio * ratio)
     limit = max(numbers[2] + rise, MIN_LIMIT_RATIO * numbers[3])
     return limit / numbers[1], -2 * ratio / numbers[4] * rise / numbers[1]
 
@@ -67,7 +59,6 @@ def rate_equation(numbers, stretch, velocity, direction):
     length_term = direction * stretch * velocity * length_derivative / (length * length)
     return Rates(
         numbers[1] * stretch + (numbers[5] * stretch_rate + numbers[6]) * velocity,
-        stretch_rate,
         numbers[1] - numbers[5] * direction * velocity / length,
         numbers[5] * (stretch_rate + length_term) + numbers[6],
     )

@@ -1,25 +1,11 @@
-"""Elements for points with the bond law `bonds.recursion` (eq. 2.17, reading="stretch", p = 1)."""
+"""Elements for points with the bond law of `bonds.point_kernels` (eq. 2.17, reading="stretch", p = 1)."""
 
 import numpy as np
 
-from ..bonds.parameters import Bonds
+from ..bonds.parameters import Bonds, growth_numbers
 from ..protocol import Element
 
-N_HEADER_NUMBERS = 9  # number of entries of an element that precede those of its points
-CONSTANT_LENGTH_FLAG = -1.0  # value in place of a_s that marks a constant bond length
-
-
-def growth_numbers(law: Bonds) -> np.ndarray:
-    """Return the parameters (6,) or (6, c) of bond growth and breakaway as an array for compiled code.
-
-    They are a_s [m s-2], or -1 for a constant bond length, l_k [m], v_h [m/s], eps_0 [m], eps_k [m] and the fraction of
-    the bond length that stretches without damage.
-    """
-    growth = (CONSTANT_LENGTH_FLAG, 1.0, 1.0, law.length, law.length, law.breakaway)
-    if law.has_growth:
-        rates = law.rest_growth, law.slip_growth, law.rest_speed
-        growth = (*rates, law.length, law.ratio * law.length, law.breakaway)
-    return np.array(np.broadcast_arrays(*growth))
+N_HEADER_NUMBERS = 8  # number of entries of an element that precede those of its points
 
 
 def points_element(law: Bonds, area, sigma, pattern=None) -> Element:
@@ -47,7 +33,7 @@ def points_element(law: Bonds, area, sigma, pattern=None) -> Element:
         return Element(
             kernels="friction.laws.stretch_kernels",
             numbers=np.concatenate([head, growth_numbers(law), sigma]),
-            memory=np.array([law.length, law.initial, 0.0, 0.0, 0.0, 0.0]),
+            memory=np.array([law.length, law.initial, 0.0, 0.0, 0.0]),
             limit=limit,
             length=law.length,
             is_bounded=False,
@@ -60,7 +46,7 @@ def points_element(law: Bonds, area, sigma, pattern=None) -> Element:
     return Element(
         kernels="friction.laws.stretch_lower_kernels",
         numbers=np.concatenate([head, growth_numbers(law), *points]),
-        memory=np.concatenate([[law.length], law.initial * sigma, np.zeros(4 * area.size)]),
+        memory=np.concatenate([[law.length], law.initial * sigma, np.zeros(3 * area.size)]),
         limit=limit,
         length=law.length,
         is_bounded=False,
@@ -78,11 +64,11 @@ def unpack_bonds(element: Element, memory) -> np.ndarray:
 
     Returns
     -------
-    (5, m) array
-        m [Pa], z [Pa m], s2 [Pa m2], local displacement [m] and play [1] of every point.
+    (4, m) array
+        m [Pa], z [Pa m], s2 [Pa m2] and local displacement [m] of every point.
     """
-    bonds = np.asarray(memory)[1:].reshape(5, -1)
+    bonds = np.asarray(memory)[1:].reshape(4, -1)
     if element.form == "places":
         return bonds
     sigma = element.numbers[N_HEADER_NUMBERS:]
-    return bonds * np.stack([sigma, sigma, sigma, np.ones_like(sigma), np.ones_like(sigma)])
+    return bonds * np.stack([sigma, sigma, sigma, np.ones_like(sigma)])

@@ -1,9 +1,9 @@
 """Bonds as in `stretch_kernels` under a pressure that stays on the lower piece, compiled.
 
-numbers: number m of points, eps_0 [m], the growth (6,), mu_s area/eps_0 (m,) [m] of the points, workspace for their
+numbers: number m of points, eps_0 [m], the growth (5,), mu_s area/eps_0 (m,) [m] of the points, workspace for their
 pressures (m,), number p of nodes of the lower piece, positions of the points (m,) [m], workspace (m,), positions (p,)
-[m] and pressures (p,) [Pa] of the nodes; memory: bond length [m], then m, z, s2, local displacement and play of every
-point, (5, m). Bonds that form under a point in a step have the mean of the pressures at the ends of its path. Where no
+[m] and pressures (p,) [Pa] of the nodes; memory: bond length [m], then m, z, s2 and local displacement of every point,
+(4, m). Bonds that form under a point in a step have the mean of the pressures at the ends of its path. Where no
 pressure is left, the bonds are lost.
 """
 
@@ -16,14 +16,11 @@ from ..bonds.point_kernels import (
     BondStep,
     bond_mean,
     bond_step,
-    elastic_bond_mean,
-    elastic_bond_step,
     grow,
 )
 from ..flags_kernels import FASTMATH_FLAGS, NJIT_NO_REFCOUNT
 from ..protocol_kernels import Reading
 from .stretch_kernels import (
-    BREAKAWAY_INDEX,
     FIRST_POINT_INDEX,
     GROWTH_INDEX,
     solve_step,
@@ -40,7 +37,6 @@ class _Points(NamedTuple):
     z: np.ndarray
     s2: np.ndarray
     displacement: np.ndarray
-    play: np.ndarray
 
 
 class _Pattern(NamedTuple):
@@ -63,7 +59,6 @@ def _view_points(numbers, memory):
         memory[1 + m : 1 + 2 * m],
         memory[1 + 2 * m : 1 + 3 * m],
         memory[1 + 3 * m : 1 + 4 * m],
-        memory[1 + 4 * m : 1 + 5 * m],
     )
 
 
@@ -107,7 +102,6 @@ def mean_force(numbers, memory, rel_disp, increment, bond_length, dt):
     """
     points = _view_points(numbers, memory)
     pattern = _view_pattern(numbers)
-    half = numbers[BREAKAWAY_INDEX] * bond_length
     force = 0.0
     slope = 0.0
     for j in range(points.weight.size):
@@ -117,12 +111,7 @@ def mean_force(numbers, memory, rel_disp, increment, bond_length, dt):
         points.source[j] = source
         m = points.m[j]
         z = points.z[j]
-        if half > 0:
-            mean, bond_slope = elastic_bond_mean(
-                m, z, points.play[j], half, increment, source, bond_length
-            )
-        else:
-            mean, bond_slope = bond_mean(m, z, increment, source, bond_length)
+        mean, bond_slope = bond_mean(m, z, increment, source, bond_length)
         force += points.weight[j] * mean
         slope += points.weight[j] * bond_slope
     return force, slope
@@ -141,19 +130,13 @@ def update_memory(numbers, memory, increment, force, v0, v1, dt, bond_length):
     """
     points = _view_points(numbers, memory)
     end = _view_pattern(numbers).end
-    half = numbers[BREAKAWAY_INDEX] * bond_length
     dissipated = 0.0
     for j in range(points.weight.size):
         m = points.m[j]
         z = points.z[j]
         s2 = points.s2[j]
         source = points.source[j]
-        if half > 0:
-            bond_increment, points.play[j] = elastic_bond_step(
-                m, z, s2, points.play[j], half, increment, source, bond_length
-            )
-        else:
-            bond_increment = bond_step(m, z, s2, increment, source, bond_length)
+        bond_increment = bond_step(m, z, s2, increment, source, bond_length)
         dissipated += points.weight[j] * bond_increment.damage_integral / 2
         points.displacement[j] += increment
         if end[j] <= 0:

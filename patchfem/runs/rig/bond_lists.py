@@ -18,8 +18,8 @@ import numpy as np
 from ...core import Missing
 from ...effects import law_has_trait, needs_bond_list
 from ...friction.bonds import engines
-from ...friction.bonds.list_forms_kernels import FORM_REPORT_GROWING
 from ...friction.bonds.list_numbers import sum_form
+from ...friction.bonds.list_rows_kernels import FORM_GROWING
 from ...friction.bonds.parameters import MAX_LIST_SECONDS
 from ...model.model import Model
 from ...structure.drive_sizes import (
@@ -170,7 +170,7 @@ def find_holding_ratio(model: Model, acceleration: float | None = None) -> float
     if not is_printed_law and (is_released or model.bonds.order != 0):
         return 0.0
     if is_released:
-        if rig.start is None or sum_form(model.bonds) != FORM_REPORT_GROWING:
+        if rig.start is None or sum_form(model.bonds) != FORM_GROWING:
             return 0.0
         slides = rig.modes.interfaces @ rig.start.z
         holding_force = _compute_constraint_force(rig, 0.0, np.zeros(rig.modes.omega.size), slides)
@@ -185,9 +185,7 @@ def find_min_list_growth_ratio(model: Model) -> float:
     It is 1 for a driven block if each step leaves a permanent strip, i.e. if the bonds grow or have
     order 0. Otherwise it is MIN_STUCK_RATIO.
     """
-    leaves_strips = (
-        sum_form(model.bonds) == FORM_REPORT_GROWING or model.friction.reading != "report"
-    )
+    leaves_strips = sum_form(model.bonds) == FORM_GROWING or model.friction.reading != "report"
     return 1.0 if leaves_strips and model.rig.drive.kind != "free" else MIN_STUCK_RATIO
 
 
@@ -302,7 +300,7 @@ def is_bond_list_too_long(model: Model, numerics: Numerics, counters: dict) -> b
     strips = counters.get("strips", 0.0)
     if strips <= MIN_LONG_LIST or model.bonds.reading != "report":
         return False
-    if sum_form(model.bonds) == FORM_REPORT_GROWING:
+    if sum_form(model.bonds) == FORM_GROWING:
         return is_bond_list_growing(model)
     return strips > MAX_STRIPS_PER_STEP * numerics.cycles * numerics.steps
 

@@ -3,6 +3,7 @@ balances."""
 
 import numpy as np
 import pytest
+from bond_moments import advance_bonds
 from harmonic_cases import (
     jenkins_forces,
     make_bond_law,
@@ -35,7 +36,6 @@ from patchfem.dynamics import (
 from patchfem.dynamics.harmonic.harmonic import HarmonicBalance, solve_newton, unpack_harmonics
 from patchfem.dynamics.harmonic.laws import Jenkins, SampledSlide
 from patchfem.friction import Bonds
-from patchfem.friction.bonds.recursion import advance_bonds
 
 DRIVE = SineDrive(1.0, 1.0)
 # peaks by stiffness, for friction limit 0.8 and damping ratio 0.003; DOP853 at 1e-12
@@ -354,10 +354,9 @@ def test_refuses_laws_that_cannot_be_balanced():
     modes = make_sdof()
     with pytest.raises(PatchfemError, match="rigid friction"):
         find_steady_motion(modes, DRIVE, coulomb_model(1.0, 1.0))
+    growing = Bonds(0.3, 1e-6, rest_growth=1.0, slip_growth=1e-6)
     with pytest.raises(PatchfemError, match="a constant bond length"):
-        find_steady_motion(
-            modes, DRIVE, points_model(Bonds(0.3, 1e-6, breakaway=0.1), [1.0], [1.0])
-        )
+        find_steady_motion(modes, DRIVE, points_model(growing, [1.0], [1.0]))
     with pytest.raises(PatchfemError, match="interface 2"):
         LawGroup(modes, (2, Spring(1.0)))
     with pytest.raises(PatchfemError, match="on at least one interface"):

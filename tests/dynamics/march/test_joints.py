@@ -89,9 +89,7 @@ def single_mode(omega=OMEGA, zeta=0.003):
     return make_modal_basis(omega, zeta)
 
 
-LAW = Bonds(
-    0.4, 2e-6, ratio=0.6, rest_growth=0.3, slip_growth=0.4e-6, rest_speed=1e-5, breakaway=0.1
-)
+LAW = Bonds(0.4, 2e-6, ratio=0.6, rest_growth=0.3, slip_growth=0.4e-6, rest_speed=1e-5)
 PAIRS = {
     "coulomb": (coulomb_model(39.0, 30.0), lambda: coulomb_joint(0, 39.0, 30.0)),
     "elastic-plastic": (

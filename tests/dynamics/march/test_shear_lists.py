@@ -21,7 +21,7 @@ from patchfem.dynamics import (
     point_lists_model,
 )
 from patchfem.dynamics.march import varying_load
-from patchfem.friction import Bonds, Quadrature
+from patchfem.friction import Bonds, ListedBonds
 
 LIMIT = np.array([0.7, 1.3, 2.0, 0.4])
 RIGID = SimpleNamespace(shape=np.zeros((4, 0)), stiffness=np.zeros(0), points=np.arange(4))
@@ -231,7 +231,7 @@ def test_order_points_under_moving_pressure_agree_with_numpy_law(reading, order)
         lower_pressure_fields(x, sigma, 1.0),
     )
     forces, energies, failed, contact = follow_path(model, path)
-    numpy_law = Quadrature(law, 0.0)
+    numpy_law = ListedBonds(law, 0.0)
     weight = LIMIT[0]
     state = numpy_law.initial_state(sigma)
     previous = sigma
@@ -239,7 +239,7 @@ def test_order_points_under_moving_pressure_agree_with_numpy_law(reading, order)
     stored = [0.0]
     for start, end in pairwise(path):
         pressure = np.interp(x + end, x, sigma, left=0.0, right=0.0)
-        state = numpy_law.advance(state, end - start, previous, pressure, 1e-3)
+        state = numpy_law.step(state, end - start, previous, pressure, 1e-3).state
         previous = pressure
         expected.append(weight * numpy_law.traction(state).sum())
         stored.append(weight * numpy_law.stored_energy(state).sum())
@@ -286,13 +286,13 @@ def test_order_two_under_prescribed_load(order, grows):
         )
         response = result.response
         dt = 1 / 143 / steps
-        numpy_law = Quadrature(law, 0.0)
+        numpy_law = ListedBonds(law, 0.0)
         loads = load(dt * np.arange(2 * steps + 1))
         assert response.extra["normal_load"] == pytest.approx(loads, abs=1e-9)
         state = numpy_law.initial_state(loads[:1])
         expected = [0.0]
         for k, dq in enumerate(np.diff(response.slide)):
-            state = numpy_law.advance(state, dq, loads[k : k + 1], loads[k + 1 : k + 2], dt)
+            state = numpy_law.step(state, dq, loads[k : k + 1], loads[k + 1 : k + 2], dt).state
             expected.append(numpy_law.traction(state)[0])
         differences.append(np.abs(response.force - expected).mean() / 39)
         energies = result.ledger

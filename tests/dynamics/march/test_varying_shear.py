@@ -3,6 +3,7 @@ energy."""
 
 import numpy as np
 import pytest
+from bond_moments import advance_bonds
 from hypothesis import given
 from hypothesis import strategies as st
 from pressed import solve_forces
@@ -25,7 +26,6 @@ from patchfem.dynamics.march import march as plain
 from patchfem.dynamics.march import varying_load
 from patchfem.dynamics.propagator import make_propagator
 from patchfem.friction import Bonds, FirstOrderBonds
-from patchfem.friction.bonds.recursion import advance_bonds
 from patchfem.friction.laws.elastic_plastic import ElasticPlastic
 from patchfem.slip.shear_modes import shear_modes
 
@@ -80,9 +80,9 @@ def march_all_nodes(basis, drive, law, sets, response, steps: int) -> tuple:
         if not bonds:
             step = law.step(state, xi, load, load, propagator.dt)
             return step.mean, step.state
-        out, mean, _, _ = advance_bonds(state.bonds, xi, load, 1e-6)
-        kept = np.where(load > 0, out, state.bonds)
-        return 0.3 / 1e-6 * np.where(load > 0, mean, 0.0), state._replace(bonds=kept)
+        out, mean, _, _ = advance_bonds(state[:3], xi, load, 1e-6)
+        kept = np.where(load > 0, out, state[:3])
+        return 0.3 / 1e-6 * np.where(load > 0, mean, 0.0), np.vstack([kept, state[3]])
 
     for i in range(len(loads) - 1):
         mean_load = (loads[i] + loads[i + 1]) / 2

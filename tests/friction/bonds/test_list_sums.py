@@ -1,20 +1,16 @@
 """The sum over bonds for every order and both forms of the law, compared with closed forms and a sum by hand."""
 
-from dataclasses import fields
-
 import numpy as np
 import pytest
 from friction_paths import (
     lower_pressure,
     march_path,
-    march_tractions,
     reference_traction,
     triangle_path,
     upper_pressure,
 )
 
-from patchfem.friction import Bonds, Quadrature
-from patchfem.friction.bonds.strips import Strips
+from patchfem.friction import STATUS, Bonds, ListedBonds
 
 TWO_PRESSURES = upper_pressure([1.0, 0.25])
 GROWTH = {"ratio": 0.6, "rest_growth": 0.3, "slip_growth": 0.4, "rest_speed": 1e-2}
@@ -39,7 +35,7 @@ def test_exact_printed_law_agrees_with_hand_sum(order, initial):
     """
     law = Bonds(1.0, 1.0, order, "report", initial=initial)
     path = random_displacements(4, 40)
-    run = march_tractions(Quadrature(law, tail=0.0), path, TWO_PRESSURES)
+    run = march_path(ListedBonds(law, tail=0.0), path, TWO_PRESSURES)
     tolerance = {-0.5: 0.05, 0.5: 1e-4}.get(order, 1e-8 if order == 3.7 else 1e-12)
     assert run.traction[-1] == pytest.approx(
         reference_traction(law, path, TWO_PRESSURES), abs=tolerance
@@ -51,11 +47,15 @@ def test_exact_printed_law_agrees_with_hand_sum(order, initial):
 )
 @pytest.mark.parametrize("reading, order", [("report", 0.0), ("report", 2.0), ("stretch", 1.0)])
 def test_exact_pressure_on_upper_or_lower_piece(reading, order, pressure):
-    """The traction agrees with a sum by hand for a pressure fixed to the upper or to the lower piece."""
+    """The traction agrees with a sum by hand for a pressure fixed to the upper or to the lower piece.
+
+    For reading="stretch" the error is that of two Gauss points per strip.
+    """
     law = Bonds(1.0, 1.0, order, reading, initial=0.5)
     path = random_displacements(5, 40)
-    run = march_tractions(Quadrature(law, tail=0.0), path, pressure)
-    assert run.traction[-1] == pytest.approx(reference_traction(law, path, pressure), abs=1e-12)
+    run = march_path(ListedBonds(law, tail=0.0), path, pressure)
+    tolerance = 3e-8 if reading == "stretch" else 1e-12
+    assert run.traction[-1] == pytest.approx(reference_traction(law, path, pressure), abs=tolerance)
 
 
 # ---- Gauss strips
@@ -63,13 +63,11 @@ def test_exact_pressure_on_upper_or_lower_piece(reading, order, pressure):
 
 @pytest.mark.parametrize("order", [2.0, 3.0])
 def test_exact_gauss_strips_with_smooth_orders(order):
-    """The traction of the stretch law of order 2 and 3 agrees with a sum by hand within 1e-11."""
+    """The traction of the stretch law of order 2 and 3 agrees with a sum by hand within 2e-8."""
     path = np.concatenate([np.linspace(0, 3, 13), np.linspace(3, 1, 9)[1:]])
     law = Bonds(1.0, 1.0, order, "stretch", initial=0.3)
-    run = march_tractions(Quadrature(law, tail=0.0), path, TWO_PRESSURES)
-    assert run.traction[-1] == pytest.approx(
-        reference_traction(law, path, TWO_PRESSURES), abs=1e-11
-    )
+    run = march_path(ListedBonds(law, tail=0.0), path, TWO_PRESSURES)
+    assert run.traction[-1] == pytest.approx(reference_traction(law, path, TWO_PRESSURES), abs=2e-8)
 
 
 @pytest.mark.parametrize("order", [-0.5, 1.0])
@@ -78,47 +76,10 @@ def test_exact_growing_printed_law_is_independent_of_step(order):
     law = Bonds(1.0, 1.0, order, "report", initial=0.0, **GROWTH)
     for n_parts in (1, 2, 4):
         path = triangle_path(1.0, 1, 8 * n_parts)[: 20 * n_parts + 1]
-        run = march_tractions(Quadrature(law, tail=0.0), path, TWO_PRESSURES, dt=0.4 / n_parts)
+        run = march_path(ListedBonds(law, tail=0.0), path, TWO_PRESSURES, dt=0.4 / n_parts)
         force = run.traction[-1, 0]
         expected = reference_traction(law, path, TWO_PRESSURES, 0.4 / n_parts)[0]
         assert force == pytest.approx(expected, abs=2e-6 if order > -0.5 else 1e-4)
-
-
-def flatten_columns(part) -> list:
-    """Return the arrays of a field of the bonds, which may be nested named tuples."""
-    if not isinstance(part, tuple):
-        return [part]
-    return [column for inner in part for column in flatten_columns(inner)]
-
-
-@pytest.mark.share(4, 7)
-@pytest.mark.parametrize(
-    "reading, order, growth",
-    [
-        ("report", 0.0, {}),
-        ("report", 1.0, GROWTH),
-        ("stretch", 0.5, {}),
-        ("stretch", 1.0, GROWTH),
-        ("stretch", 2.0, GROWTH),
-    ],
-)
-@pytest.mark.parametrize("tail", [0.0, 1e-2])
-def test_exact_advance_without_forces_equals_full_step(reading, order, growth, tail):
-    """Strips that are advanced without computing forces equal the strips of full steps."""
-    law = Quadrature(Bonds(0.4, 1.0, order, reading, **growth), tail)
-    pressure = lower_pressure(np.zeros(3), 5.0, 0.5)
-    path = np.concatenate([random_displacements(6, 12, 0.4), [0.0, 0.0, 30.0]])
-    stepped = march_path(law, path, pressure, 0.3)
-    carried = march_tractions(law, path, pressure, 0.3)
-    assert np.array_equal(stepped.traction, carried.traction)
-    for field in fields(Strips):
-        stepped_columns, carried_columns = (
-            flatten_columns(getattr(run.state, field.name)) for run in (stepped, carried)
-        )
-        assert len(stepped_columns) == len(carried_columns)
-        assert all(np.array_equal(a, b) for a, b in zip(stepped_columns, carried_columns)), (
-            field.name
-        )
 
 
 # ---- cut-off
@@ -145,12 +106,14 @@ def test_always_cut_off_error_is_below_bound(reading, order, growth):
             random_displacements(6, 151, 0.4)[-1] + np.linspace(0.2, 20, 100),
         ]
     )
-    full = march_tractions(Quadrature(law, 0.0), path, TWO_PRESSURES, 0.3)
+    full = march_path(ListedBonds(law, 0.0), path, TWO_PRESSURES, 0.3)
     for tail in (1e-2, 1e-5):
-        truncated = march_tractions(Quadrature(law, tail), path, TWO_PRESSURES, 0.3)
-        assert truncated.state.n_dropped > 0 and len(truncated.state.pressure) < len(
-            full.state.pressure
-        )
+        truncated = march_path(ListedBonds(law, tail), path, TWO_PRESSURES, 0.3)
+        lengths = [
+            run.state.status[STATUS.end] - run.state.status[STATUS.head]
+            for run in (truncated, full)
+        ]
+        assert lengths[0] < lengths[1]
         error = np.abs(truncated.traction - full.traction).max()
         assert error <= tail * 0.4 * 1.0
         if reading == "report" and not growth:
@@ -170,7 +133,7 @@ def test_exact_rests_and_long_steps_are_handled(reading, order, growth):
     """Rests and a step of a thousand bond lengths give finite tractions, and without growth the friction limit."""
     law = Bonds(1.0, 1.0, order, reading, **growth)
     path = np.array([0.0, 0.0, 0.3, 0.3, 1e3, 1e3])
-    run = march_path(Quadrature(law), path, TWO_PRESSURES, 1.0)
+    run = march_path(ListedBonds(law), path, TWO_PRESSURES, 1.0)
     assert np.isfinite(np.concatenate([run.mean, run.traction])).all()
     assert not run.traction[0].any()
     # in the printed law, loaded bonds heal at rest and the force changes without motion
@@ -197,7 +160,7 @@ def test_exact_dwell_does_not_grow_next_strip():
     )
     path = np.concatenate([np.linspace(0, 2, 41), [2.0, 2.05]])
     times = np.append(np.full(40, 0.5), [1.0, 0.5])
-    force = march_tractions(Quadrature(law, tail=0.0), path, upper_pressure([1.0]), times).traction[
+    force = march_path(ListedBonds(law, tail=0.0), path, upper_pressure([1.0]), times).traction[
         -1, 0
     ]
     assert force == pytest.approx(
