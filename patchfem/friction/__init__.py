@@ -17,7 +17,6 @@ PUBLIC = {
     "bonds.list_numbers": (
         "MAX_DAMAGE",
         "MAX_STRIPS_PER_LENGTH",
-        "cutoff_age",
         "enlarge_lists",
         "gamma_table",
         "law_numbers",
@@ -34,7 +33,6 @@ PUBLIC = {
         "LAW",
         "N_ROWS",
         "STATUS",
-        "STRIP",
     ),
     "bonds.list_step_kernels": (
         "break_bonds",

@@ -7,9 +7,7 @@ import numpy as np
 from patchfem.friction import (
     N_ROWS,
     STATUS,
-    STRIP,
     BondList,
-    cutoff_age,
     gamma_table,
     growth_numbers,
     law_numbers,
@@ -17,6 +15,8 @@ from patchfem.friction import (
     make_status,
 )
 from patchfem.friction.bonds import list_kernels, list_step_kernels
+from patchfem.friction.bonds.list_numbers import cutoff_age
+from patchfem.friction.bonds.list_rows_kernels import STRIP
 
 for kernel in (
     list_kernels.list_mean,

@@ -9,7 +9,8 @@ import pytest
 from march_paths import follow_path
 
 from patchfem.dynamics import bond_list_model
-from patchfem.friction import Bonds, cutoff_age
+from patchfem.friction import Bonds
+from patchfem.friction.bonds.list_numbers import cutoff_age
 
 ENGINES = {"direct": (0.0, 0.0), "truncated": (1e-6, 0.0), "merged": (1e-6, 0.02)}  # tail, merge
 LAWS = [

@@ -19,7 +19,8 @@ from patchfem import build
 from patchfem.core import SineDrive
 from patchfem.dynamics import points_model
 from patchfem.dynamics.march.march import march
-from patchfem.friction import Bonds, FirstOrderBonds, ListedBonds, cutoff_age
+from patchfem.friction import Bonds, FirstOrderBonds, ListedBonds
+from patchfem.friction.bonds.list_numbers import cutoff_age
 from patchfem.response import energy_balance
 from patchfem.runs.bench import bench as law_bench
 from patchfem.scene import scene
