@@ -192,7 +192,7 @@ EFFECTS = {
         "g += z(x); z is levelled and averaged over the elements at each node",
     ),
     "contact.strips": Effect(
-        "patchfem.contact.strips",
+        "patchfem.contact.press",
         "C f_j >= R_j q - g - roll y_j for each strip j; q is the motion of the common holder",
     ),
     "contact.shear": Effect("patchfem.slip.shear_modes", "slide_i = q - sum_j C_ij f_j"),

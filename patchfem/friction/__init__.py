@@ -40,7 +40,6 @@ PUBLIC = {
         "MAX_LIST_SECONDS",
         "growth_numbers",
         "growth_path_ratio",
-        "list_growth",
     ),
     "bonds.point_kernels": (
         "MAX_SHORT_PATH",

@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..friction.bonds.parameters import Bonds, list_growth
+from ..friction.bonds.parameters import Bonds, growth_numbers
 from ..friction.laws.iwan import max_yield_displacement
 from .law_rows import Law, Masing
 
@@ -59,7 +59,7 @@ def make_tanh(static: float, speed: float, load: float = 1.0) -> PointLaw:
 
 def make_bonds(bonds: Bonds, load: float = 1.0) -> PointLaw:
     """Return a point with bonds of order 1 and reading = "stretch"."""
-    numbers = (bonds.static, bonds.length, *list_growth(bonds), bonds.initial)
+    numbers = (bonds.static, bonds.length, *growth_numbers(bonds), bonds.initial)
     return _pack(Law.BONDS, numbers, (bonds.length, bonds.initial * load), load)
 
 

@@ -420,7 +420,7 @@ def _make_no_sets():
 def _press_first(system: System, contact: Contact) -> None:
     """Find the contact set at the start, and press the points to it."""
     press = compiled.load("contact.press_kernels")
-    name = hash_set(system.sets, contact.sets.reference.in_contact)
+    name = hash_set(system.sets, contact.sets.in_contact)
     n = system.state.shape[1] // 2
     heave, pitch = (
         float(np.dot(row, system.state[0, :n])) for row in (contact.heave, contact.pitch)

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from pressed import solve_forces
 from varying_load_cases import (
     LAWS,
     LOAD,
@@ -23,7 +24,6 @@ from varying_load_cases import (
     total_energy,
 )
 
-from patchfem.contact.unilateral import solve_forces
 from patchfem.core import InitialState, SineDrive
 from patchfem.model.structure import compute_strip_slides
 from patchfem.slip.shear_modes import find_sufficient_modes, shear_modes
@@ -235,7 +235,7 @@ def reduce_to_shear_modes(sets, count=None, depth: float = 3e-8):
     """Return shear modes of the nodes of contact sets, as many as nodes by default."""
     x = sets.x
     compliance = depth * (0.5 * np.exp(-np.abs(x[:, None] - x) / 2e-3) + 0.3 * np.eye(x.size))
-    force = sets.reference.forces(0.0, 0.0)
+    force = sets.force
     limit = 0.3 * (force + force.sum() / x.size)
     if count == 0:
         return find_sufficient_modes(compliance, limit, 1e-6, 4, 1e-4)

@@ -48,7 +48,7 @@ def make_pitching_contact(basis):
     sets = crowned_contact()
     return make_pressed_contact(
         LAWS["plastic"],
-        sets.reference.forces(0.0, 0.0),
+        sets.force,
         basis.slide,
         reduce_to_shear_modes(sets, 4),
         sets=sets,

@@ -3,9 +3,9 @@ load."""
 
 import numpy as np
 import pytest
+from pressed import solve_forces
 from scene_texts import BENCH, RIG, STRUCTURE, get_only_mistake
 
-from patchfem.contact.unilateral import solve_forces
 from patchfem.export.run_data import collect_data
 from patchfem.runs.rig.interface import make_contact_sets
 from patchfem.runs.run import run

@@ -5,10 +5,10 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from pressed import solve_forces
 from scipy.optimize import brentq
 
 from patchfem.contact import ContactSets
-from patchfem.contact.unilateral import solve_forces
 from patchfem.core import InitialState, ModalBasis, SineDrive
 from patchfem.friction import Bonds
 from patchfem.points.contacts import make_pressed_contact
@@ -61,7 +61,7 @@ def march_pressed(basis, drive, sets, name: str, cycles, steps, start=None, shea
     """March a basis under the load of contact sets with a law of LAWS."""
     contact = make_pressed_contact(
         LAWS[name],
-        sets.reference.forces(0.0, 0.0),
+        sets.force,
         basis.slide,
         shear,
         sets=sets,

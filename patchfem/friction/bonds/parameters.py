@@ -39,19 +39,17 @@ class Bonds:
         return self.rest_growth is not None
 
 
-def list_growth(law: Bonds) -> tuple:
-    """Return the five parameters of bond growth: a_s [m s-2], l_k [m], v_h [m/s], eps_0 [m] and eps_k [m].
-
-    For a constant bond length a_s is -1. Each is a float, or an array of values of several points.
-    """
-    if not law.has_growth:
-        return (CONSTANT_LENGTH_FLAG, 1.0, 1.0, law.length, law.length)
-    return (law.rest_growth, law.slip_growth, law.rest_speed, law.length, law.ratio * law.length)
-
-
 def growth_numbers(law: Bonds) -> np.ndarray:
-    """Return the parameters (5,) of bond growth as an array for compiled code."""
-    return np.array(list_growth(law), float)
+    """Return the parameters (5,) or (5, c) of bond growth as an array for compiled code.
+
+    They are a_s [m s-2], or -1 for a constant bond length, l_k [m], v_h [m/s], eps_0 [m] and eps_k [m]. Fields of the law
+    may be arrays (c,) of the values of c points.
+    """
+    growth = (CONSTANT_LENGTH_FLAG, 1.0, 1.0, law.length, law.length)
+    if law.has_growth:
+        rates = (law.rest_growth, law.slip_growth, law.rest_speed)
+        growth = (*rates, law.length, law.ratio * law.length)
+    return np.array(np.broadcast_arrays(*growth))
 
 
 def growth_path_ratio(law: Bonds, speed: float) -> float:

@@ -303,7 +303,7 @@ def make_contact_sets(patch, spring: float = 0.0) -> "contact_sets.ContactSets":
     PatchfemError
         For a nonlinear asperity layer, for strips and for a patch that carries no load.
     """
-    if patch.skin is not None:
+    if patch.has_smooth_skin:
         raise PatchfemError(
             describe_unsupported(
                 "contact.asperities.law: a nonlinear law under a normal load that changes", "linear"
