@@ -324,6 +324,10 @@ SUPPORT = (
         "harmonics, harmonic, grooves",
         "leave `harmonics` out: the motion is integrated until it repeats",
     ),
+    (
+        "harmonics, harmonic, others",
+        "leave `harmonics` out: the steady motion of all interfaces is found without it",
+    ),
     ("holder, grooves", "out"),
     ("grooves, strips, yaw", "either"),
     ("grooves, strips, compliance", "either"),

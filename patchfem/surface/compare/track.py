@@ -161,7 +161,7 @@ def _fit_flanks(x, depths, places, correlation: float) -> np.ndarray:
         fitted = base @ np.linalg.solve(normal, right)
         residual = depths.T - fitted
         deviance[:, form] = np.minimum(residual**2, MAX_SQUARE).sum(axis=1).T
-    # DepthMap whose scatter exceeds the noise carry less information.
+    # Depths whose scatter exceeds the noise carry less information.
     return deviance / max(correlation, float(deviance[0].min()) / x.size)
 
 
