@@ -129,7 +129,11 @@ def _join(columns: list[Column], units: list[Column] | None) -> list[Column]:
 
 
 def parse_column(cell: str) -> Column:
-    """Parse the heading of a column with its unit, such as `x [um]`, `height (nm)` or `x in mm`, or a unit alone."""
+    """Parse the heading of a column with its unit, such as `x [um]`, `height (nm)` or `x in mm`, or a unit alone.
+
+    Words behind two blanks are a remark.
+    """
+    cell = cell.partition("  ")[0]
     if cell in NO_UNIT or parse_length_unit(cell):
         return Column("", None if cell in NO_UNIT else cell, cell)
     match = _COLUMN.fullmatch(cell) if len(cell) <= MAX_NAME else None
