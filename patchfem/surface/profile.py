@@ -70,38 +70,50 @@ def resample_evenly(profile: Profile) -> Profile:
     Missing heights are bridged by straight lines. An uneven trace is resampled at the 10th
     percentile of its steps, so that nothing between its samples is lost. The notes state both.
     """
-    known = ~profile.missing
+    profile, _ = _bridge(profile, ~profile.missing)
     steps = np.diff(profile.x)
-    is_whole = bool(known.all())
-    is_even = bool(np.ptp(steps) <= EVEN_TOL * steps.mean())
-    if is_whole and is_even:
+    if np.ptp(steps) <= EVEN_TOL * steps.mean():
         return profile
-    places = profile.x[known]
-    if places.size < 2:
-        raise PatchfemError(f"{profile.source}: {places.size} heights; a trace needs at least two")
-    x = profile.x[(profile.x >= places[0]) & (profile.x <= places[-1])]
-    notes = profile.notes
-    if not is_whole:
-        notes += (_describe_missing(profile, float(np.diff(places).max())),)
-    if not is_even:
-        step = max(float(np.percentile(steps, 10)), float(x[-1] - x[0]) / MAX_SAMPLES)
-        count = int(np.ceil((x[-1] - x[0]) / step * (1 - 1e-9))) + 1
-        x = np.linspace(x[0], x[-1], count)
-        notes += (
-            f"{profile.source}: samples lie {format_length(float(steps.min()))} to {format_length(float(steps.max()))} "
-            f"apart; the trace is resampled at every {format_length(float(x[1] - x[0]))} by linear "
-            "interpolation",
-        )
-    z = np.interp(x, places, profile.z[known])
-    return replace(profile, x=frozen_array(x), z=frozen_array(z), notes=notes)
-
-
-def _describe_missing(profile: Profile, longest: float) -> str:
-    count = profile.missing.sum()
-    return (
-        f"{profile.source}: {count} of {profile.z.size} heights are missing; the gaps are bridged "
-        f"by straight lines, of which the longest spans {format_length(longest)}"
+    length = profile.length
+    step = max(float(np.percentile(steps, 10)), length / MAX_SAMPLES)
+    x = np.linspace(profile.x[0], profile.x[-1], int(np.ceil(length / step * (1 - 1e-9))) + 1)
+    note = (
+        f"{profile.source}: samples lie {format_length(float(steps.min()))} to {format_length(float(steps.max()))} "
+        f"apart; the trace is resampled at every {format_length(float(x[1] - x[0]))} by linear "
+        "interpolation"
     )
+    z = np.interp(x, profile.x, profile.z)
+    return replace(profile, x=frozen_array(x), z=frozen_array(z), notes=(*profile.notes, note))
+
+
+def _bridge(profile: Profile, usable) -> tuple[Profile, tuple[float, float]]:
+    """Replace all but the usable heights by straight lines, and cut off such ends; a note counts missing heights.
+
+    Returns
+    -------
+    Profile
+    (float, float)
+        First and last place [m] of the longest line.
+    """
+    places = profile.x[usable]
+    if places.size < 2:
+        raise PatchfemError(
+            f"{profile.source}: {places.size} usable heights; a trace needs at least two"
+        )
+    gaps = np.where(np.diff(np.flatnonzero(usable)) > 1, np.diff(places), 0.0)
+    longest = int(np.argmax(gaps))
+    ends = (float(places[longest]), float(places[longest]) + float(gaps[longest]))
+    if usable.all():
+        return profile, ends
+    notes = profile.notes
+    if profile.missing.any():
+        notes += (
+            f"{profile.source}: {profile.missing.sum()} of {profile.z.size} heights are missing; the gaps are bridged "
+            f"by straight lines, of which the longest spans {format_length(float(gaps[longest]))}",
+        )
+    x = profile.x[(profile.x >= places[0]) & (profile.x <= places[-1])]
+    z = np.interp(x, places, profile.z[usable])
+    return replace(profile, x=frozen_array(x), z=frozen_array(z), notes=notes), ends
 
 
 def clean(profile: Profile, max_gap: float) -> Profile:
@@ -111,22 +123,6 @@ def clean(profile: Profile, max_gap: float) -> Profile:
     counts. Raises PatchfemError for a longer gap, and for fewer than two good heights.
     """
     is_spike = find_spikes(profile)
-    usable = np.flatnonzero(~(profile.missing | is_spike))
-    if usable.size < 2:
-        raise PatchfemError(
-            f"{profile.source}: {usable.size} usable heights; a trace needs at least two"
-        )
-    if usable.size == profile.z.size:
-        return profile
-    x = profile.x[usable]
-    gaps = np.where(np.diff(usable) > 1, np.diff(x), 0.0)
-    longest = int(np.argmax(gaps))
-    if gaps[longest] > max_gap * (1 + 1e-9):
-        raise PatchfemError(
-            f"{profile.source}: no usable height between x = {format_length(x[longest])} and "
-            f"{format_length(x[longest + 1])}, and a straight line may bridge at most {format_length(max_gap)}; "
-            "measure this part of the trace anew or use a larger contact.element_size"
-        )
     notes = profile.notes
     if is_spike.any():
         notes += (
@@ -135,11 +131,15 @@ def clean(profile: Profile, max_gap: float) -> Profile:
             f"{SPIKE_DEVIATIONS:g} robust standard deviations from the median of {WINDOW} samples; "
             "straight lines replace these heights",
         )
-    if profile.missing.any():
-        notes += (_describe_missing(profile, float(gaps[longest])),)
-    places = profile.x[usable[0] : usable[-1] + 1]
-    z = np.interp(places, x, profile.z[usable])
-    return replace(profile, x=frozen_array(places), z=frozen_array(z), notes=notes)
+        profile = replace(profile, notes=notes)
+    bridged, (first, last) = _bridge(profile, ~(profile.missing | is_spike))
+    if last - first > max_gap * (1 + 1e-9):
+        raise PatchfemError(
+            f"{profile.source}: no usable height between x = {format_length(first)} and "
+            f"{format_length(last)}, and a straight line may bridge at most {format_length(max_gap)}; "
+            "measure this part of the trace anew or use a larger contact.element_size"
+        )
+    return bridged
 
 
 class RunningMedian(NamedTuple):

@@ -190,8 +190,8 @@ def test_exact_half_width_spans_outermost_contacts(tmp_path):
         result.measures[name].value for name in ("contact_half_width", "contact_fraction")
     )
     assert half == pytest.approx(3e-3 + fraction * LENGTH / 4, rel=1e-3) and 0 < fraction < 0.1
-    assert any("is as long as the patch" in text for text in result.extra["notes"])
-    assert not any("as long as the patch" in text for text in result.warnings)
+    assert any("is centred on the patch" in text for text in result.extra["notes"])
+    assert not any("centred on the patch" in text for text in result.warnings)
 
 
 def test_exact_surface_trace_agrees_with_inverted_gap(tmp_path):

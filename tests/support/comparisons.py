@@ -24,12 +24,9 @@ TRACK_NAMES = {
     "width": (1000 * UM, 6 * UM),
     "depth_mean": (2.4 * UM, 0.03 * UM),
     "depth_floor": (3.0 * UM, 0.02 * UM),
-    "step": (2.9 * UM, 0.02 * UM),
     "area_gross": (2400 * UM**2, 9 * UM**2),
     "area_net": (2390 * UM**2, 9 * UM**2),
     "pile_up": (10 * UM**2, 2 * UM**2),
-    "pile_up_left": (4 * UM**2, 1 * UM**2),
-    "pile_up_right": (6 * UM**2, 1 * UM**2),
 }
 TRACE_VALUES = {
     "shift": (-50 * UM, 0.3 * UM),
@@ -77,7 +74,6 @@ VERDICTS = {
     "identical": {},
 }
 FINDINGS = {
-    "identical_files": {},
     "mirrored": {},
     "turned": {},
     "sure_place": {"significance": 57.3, "sure": 12.0},
@@ -88,7 +84,6 @@ FINDINGS = {
     "other_gain": {"gain": 0.97},
     "hidden_even_wear": {"limit": 3e-7},
     "deposits": {"area": 5e-11},
-    "exchanged": {},
     "other_step": {"before": 5e-7, "after": 1e-6},
     "drift": {"height": 2e-8},
     "other_tracks": {"count": 2},

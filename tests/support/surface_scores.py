@@ -15,6 +15,11 @@ of trace_scores.py (as of 79f8da06^) with the same seed: 300 pairs. Version 1.5 
 A second score, of the version in which a much better parabola counts beside deposits: seed 9873005, 100 pairs of
 `draw_bench` and 80 of `draw_field`, beside version 1.5.
 Verdicts that state two possible causes are counted as doubt: they are not false, and are missed where there is wear.
+
+Scores of the first recipe (this version | 1.5), of 300 pairs: false 4 | 8, refused 5 | 3, intervals that hold: mean and area
+189 of 193 | 178 and 179 of 198, largest 190 | 195, from 110 of 112 | 113 of 115, to 108 of 112 | 112 of 113, width 111 of
+112 | 112 of 115. Of the second one, of 180 pairs: false 1, refused 1, mean and area 114 of 121, largest 118 of 121, from 70
+of 74, to 71 of 73, width 70 of 74.
 """
 
 import sys

@@ -58,19 +58,14 @@ def test_exact_node_averages_agree_with_quadrature(grid, seed):
 
 
 def test_exact_covering_trace_keeps_its_coordinate():
-    """A trace that covers the patch keeps its own coordinate, or is centred on request."""
+    """A trace that covers the patch keeps its own coordinate."""
     x = np.linspace(-8e-3, 20e-3, 5000)
-    for placing in ("auto", "own"):
-        profile = place_over_patch(make_trace(x, x), NODES, placing)
-        assert average_at_nodes(profile, NODES) == pytest.approx(NODES, abs=2e-15)
-        assert profile.notes == ()
-        assert (
-            profile.x[0] <= -HALF_LENGTH < profile.x[1]
-            and profile.x[-2] < HALF_LENGTH <= profile.x[-1]
-        )
-    centred = place_over_patch(make_trace(x, x), NODES, "centred")
-    assert average_at_nodes(centred, NODES) == pytest.approx(NODES + 6e-3, abs=2e-15)
-    assert centred.notes == ()
+    profile = place_over_patch(make_trace(x, x), NODES)
+    assert average_at_nodes(profile, NODES) == pytest.approx(NODES, abs=2e-15)
+    assert profile.notes == ()
+    assert (
+        profile.x[0] <= -HALF_LENGTH < profile.x[1] and profile.x[-2] < HALF_LENGTH <= profile.x[-1]
+    )
     assert np.array_equal(place_over_patch(profile, NODES).x, profile.x)
 
 
@@ -102,18 +97,16 @@ def test_refuses_trace_that_does_not_cover_patch():
         "before.csv: the profile is 10 mm long, but the patch is 12.7 mm long; measure a "
         'longer trace or set contact.length = "10 mm"'
     )
-    with pytest.raises(PatchfemError) as caught:
-        place_over_patch(make_trace(2 * x, x), NODES, "own")
-    assert str(caught.value) == (
+    message = (
         "before.csv: the profile runs from 0 um to 20 mm, but the patch reaches from -6.35 mm "
         "to 6.35 mm; shift x so that the profile covers the patch"
     )
-    with pytest.raises(PatchfemError, match="the profile runs from 0 um to 20 mm"):
+    with pytest.raises(PatchfemError, match=message):
         average_at_nodes(make_trace(2 * x, x), NODES)
 
 
-def test_refuses_missing_heights_invalid_nodes_and_placing():
-    """Missing heights, invalid nodes and an unknown placing are refused."""
+def test_refuses_missing_heights_and_invalid_nodes():
+    """Missing heights and invalid nodes are refused."""
     x = np.linspace(-HALF_LENGTH, HALF_LENGTH, 100)
     with pytest.raises(
         PatchfemError, match=r"before\.csv: 1 heights are missing; clean the trace first"
@@ -125,9 +118,5 @@ def test_refuses_missing_heights_invalid_nodes_and_placing():
                 PatchfemError, match="a profile needs two or more nodes with rising x"
             ):
                 function(make_trace(x, x), nodes)
-    with pytest.raises(
-        PatchfemError, match="unknown placing 'middle' of a profile; use auto, own or centred"
-    ):
-        place_over_patch(make_trace(x, x), NODES, "middle")
     with pytest.raises(PatchfemError, match=r"before\.csv: 1 heights; a trace needs at least two"):
         place_over_patch(make_trace(x, np.where(x == x[50], 0, np.nan)), NODES)

@@ -189,10 +189,9 @@ def build(
 
 
 def _is_repeated(name: str, values: dict[str, Quantity]) -> bool:
-    """Return whether a number of a track is that of the whole section, or does not apply to the shape of the track."""
+    """Return whether a number of a track is that of the whole section."""
     area = values.get("worn_area")
-    is_whole = name == "track_area_gross" and area is not None and area[:3] == values[name][:3]
-    return is_whole or values[name].reason == "not_flat"
+    return name == "track_area_gross" and area is not None and area[:3] == values[name][:3]
 
 
 def _describe_place(comparison: Comparison) -> dict:

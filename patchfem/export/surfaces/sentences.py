@@ -62,10 +62,8 @@ IN_VERDICT = {
     "worn_tops": "Only the tops are lost; the valleys between them are those of the first surface.",
 }
 WARNINGS = {
-    "identical_files": "Both files hold the same heights; was the same file given twice?",
     "other_gain": "All heights after wear are {gain} times those before, as another gain of the instrument would make "
     "them, and wear does not; calibrate z of both measurements.",
-    "exchanged": "Material stands above the first surface: maybe the files are in the wrong order.",
     "other_step": "The traces have different steps, {before} before and {after} after; slopes and the largest depth depend "
     "on them.",
     "likely_place": "The place is likely, not sure: there the surfaces agree by {significance} standard deviations more "
@@ -96,7 +94,6 @@ REASONS = {
     "noise": "the noise is as large as the roughness",
     "too_short": "the surface is too short",
     "no_limit": "even or wedge-shaped wear of any size looks like an offset or tilt of the datum",
-    "not_flat": "the bottom of the track is not flat",
     "not_hidden": "unworn parts show where the datum is, so that no wear can hide",
     "identical": "both files hold the same heights",
     "no_datum": "too few heights agree to measure depths from",

@@ -53,7 +53,6 @@ MIN_OTHER_LENGTH = 5e-4  # smallest error of length that is reported
 MAX_STEP_RATIO = 1.01  # ratio of two sampling intervals that counts as equal
 # Fraction of worn heights in a track below which it consists of worn tops.
 MIN_TOPS_FRACTION = 0.6
-END_NAMES = ("worn_from_before", "worn_from_after", "worn_to_before", "worn_to_after")
 RATIO_NAMES = ("amplitude_ratio", "slope_ratio")
 
 
@@ -79,7 +78,7 @@ NAMES = {
             "worn_area",
             "grown_area",
             "worn_depth_within",
-            *END_NAMES,
+            *("worn_from_before", "worn_from_after", "worn_to_before", "worn_to_after"),
         ),
         place=("shift", "tilt", "scale", "offset", "gain"),
     ),
@@ -155,8 +154,7 @@ def compare_surfaces(
     names = NAMES[first.z.ndim]
     if np.array_equal(first.z, second.z, equal_nan=True) and (first.origin == second.origin).all():
         values = _name_unknowns((*names.wear, *names.place, "hidden_wear"), "identical")
-        findings = (Finding("identical_files", {}),)
-        result = Comparison(before, after, Finding("identical", {}), values, (), findings)
+        result = Comparison(before, after, Finding("identical", {}), values)
     else:
         aligned = align(first, second, options.shift, is_straight=bool(options.datum))
         result = _measure(surfaces, (first, second), aligned)
@@ -169,20 +167,20 @@ def compare_surfaces(
 def _check_options(surfaces: tuple[Profile | Areal, Profile | Areal], options: Options) -> None:
     """Raise PatchfemError if the options do not suit the surfaces, or a trace stands beside a scan."""
     n_scans = sum(isinstance(surface, Areal) for surface in surfaces)
-    datum = options.datum
-    direction = options.direction
-    needs = "is needed"
+    of_traces = options.shift is not None or bool(options.datum)
     rules = (
-        (datum not in ("", "straight"), f"datum {datum!r}: straight {needs}, or nothing"),
-        (direction not in ("", "x", "y"), f"direction {direction!r}: x or y {needs}"),
-        (n_scans == 1, "two traces are needed, or two areal scans"),
         (
-            n_scans == 2 and options.shift is not None,
-            "a shift can be given only for traces; areal scans are registered automatically",
+            options.datum not in ("", "straight"),
+            f"datum {options.datum!r}: straight is needed, or nothing",
         ),
         (
-            n_scans == 2 and datum,
-            "a datum can be given only for traces; the plane of areal scans is fitted",
+            options.direction not in ("", "x", "y"),
+            f"direction {options.direction!r}: x or y is needed",
+        ),
+        (n_scans == 1, "two traces are needed, or two areal scans"),
+        (
+            n_scans == 2 and of_traces,
+            "a shift and a datum can be given only for traces; those of scans are found",
         ),
     )
     for is_wrong, message in rules:
@@ -259,7 +257,7 @@ def _measure(
         else:
             values["worn_share"] = _measure_share(depths)
         if is_trace and is_placed:
-            regions, cutoff = waves.measure_roughness(depths, spans[:1])
+            regions, cutoff = waves.measure_roughness(depths, spans)
     limit = find_detection_limit(depths.depth, depths.noise) if is_placed else None
     datum = Datum(
         unworn=float(depths.unworn[depths.inside & ~depths.missing].mean()),
@@ -357,7 +355,6 @@ def _collect_findings(
             "drift",
             {"height": depths.errors.drift},
         ),
-        (verdict.code == "grown", "exchanged", {}),
         (len(tracks) > 1, "other_tracks", {"count": len(tracks) - 1}),
         (tracks and any(tracks[0].cut), "track_cut", {}),
         (has_tops, "worn_tops", {}),
@@ -471,18 +468,17 @@ def _name_ends(
     values = {"worn_depth_within": name_quantity("worn_depth_within", *track["depth_mean"][:3])}
     shift = placement.values["shift"].value
     for end in ("from", "to"):
+        before, after = (f"worn_{end}_{side}" for side in ("before", "after"))
         places = track[end][:3]
-        reason = "cut_off" if places[0] is None else ""
-        values[f"worn_{end}_after"] = places, reason
-        if not reason and shift is None:
-            reason = "elsewhere"
-        if not reason:
+        if places[0] is None:
+            values |= _name_unknowns((before, after), "cut_off")
+            continue
+        values[after] = name_quantity(after, *places)
+        values[before] = name_unknown(before, "elsewhere")
+        if shift is not None:
             scale = placement.values["scale"].value
             places = [middle + (x - middle) / scale - shift for x in places]
-        values[f"worn_{end}_before"] = places, reason
-    for name in END_NAMES:
-        places, reason = values[name]
-        values[name] = name_unknown(name, reason) if reason else name_quantity(name, *places)
+            values[before] = name_quantity(before, *places)
     return values
 
 

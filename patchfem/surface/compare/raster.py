@@ -1,5 +1,6 @@
 """Surfaces on an even raster of one axis (traces) or two axes (areal scans), in which both look alike."""
 
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -73,9 +74,7 @@ def clean_surface(surface: Profile | Areal, *, keep_spikes: bool = False) -> Pro
         raise PatchfemError(
             f"compare: {surface.source}: {count} heights; a comparison needs at least {MIN_HEIGHTS}"
         )
-    if isinstance(surface, Areal):
-        return Areal(surface.x, surface.y, z, surface.source, surface.notes)
-    return Profile(surface.x, z, surface.source, surface.notes)
+    return replace(surface, z=z)
 
 
 def _find_saturated(z) -> np.ndarray:

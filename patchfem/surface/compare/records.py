@@ -62,14 +62,8 @@ DEFINITIONS = {
     "width": ("m", "width of the track"),
     "depth_mean": ("m", "lost area divided by width"),
     "depth_floor": ("m", "mean depth of the deepest fifth of the width"),
-    "step": (
-        "m",
-        "mean depth over the middle third of a track with a flat bottom (ISO 5436-1, type A1)",
-    ),
     "area_gross": ("m2", "area lost in the track"),
     "pile_up": ("m2", "area above the first trace within one width of the track on both sides"),
-    "pile_up_left": ("m2", "area above the first trace within one width before the track"),
-    "pile_up_right": ("m2", "area above the first trace within one width behind the track"),
     "area_net": ("m2", "lost area less pile-up"),
     "length": ("m", "length of the track in the common part of the scans"),
     "volume": ("m3", "area lost in the mean section times the length of the track"),
@@ -127,8 +121,8 @@ class Datum:
 class Track:
     """Single worn track.
 
-    - values: from, to, width, depth_mean, depth_floor, step, area_gross, area_net, pile_up,
-      pile_up_left, pile_up_right; of a scan direction, length and volume too.
+    - values: from, to, width, depth_mean, depth_floor, area_gross, area_net, pile_up;
+      of a scan direction, length and volume too.
     - cut: whether the track leaves the common part at its beginning, and at its end.
     - section: places (k,), mean depth (k,) and scatter (k,) of the sections of a scan [m].
     """

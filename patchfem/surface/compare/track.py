@@ -34,8 +34,6 @@ MAX_CANDIDATES = 80  # number of places that are tried as an end
 END_STEPS = 2  # number of samples beyond the likely places that belong to the interval of an end
 MAX_SQUARE = 16.0  # squared residual of a single depth beyond which it counts no more
 RIDGE_TAIL = 0.5  # length of the low outer flank of a ridge relative to what is found as grown
-N_STEP_PARTS = 3  # parts of the middle third of a track, which a flat bottom has equally deep
-MAX_UNEVENNESS = 0.02  # largest difference of their depths, relative to the depth, on a flat bottom
 N_FIFTHS = 5  # number of parts of a track, of which the deepest is the floor
 
 
@@ -198,28 +196,22 @@ def measure_track(
         gross = name_quantity("area_gross", *lost)
     mean = area / width
     mean_error = float(np.hypot(error / width, mean * max(shorter, longer) / SIDE / width))
-    left = _measure_pile_up(depths, "pile_up_left", start, -width)
-    right = _measure_pile_up(depths, "pile_up_right", end, width)
-    piled = left.value + right.value
-    piled_error = float(np.hypot(left.high - left.value, right.high - right.value)) / SIDE
+    piled, piled_error = _measure_pile_up(depths, (start, end), width)
+    net = name_estimate("area_net", area - piled, float(np.hypot(error, piled_error)))
     values = {
         "from": name_quantity("from", *start),
         "to": name_quantity("to", *end),
         "width": name_quantity("width", width, max(width - shorter, 0.0), width + longer),
         "depth_mean": name_estimate("depth_mean", mean, mean_error, 0.0),
         "depth_floor": _measure_floor(depths, start.value, width),
-        "step": _measure_step(depths, start.value, width),
         "area_gross": gross,
         "pile_up": name_estimate("pile_up", piled, piled_error, 0.0),
-        "pile_up_left": left,
-        "pile_up_right": right,
-        "area_net": name_estimate("area_net", area - piled, float(np.hypot(error, piled_error))),
+        "area_net": net,
     }
 
     # Where the section cuts the track off, its end and what lies beyond are unknown.
     cut = (span[0] < MAX_CUT_SAMPLES, span[1] >= x.size - MAX_CUT_SAMPLES)
-    unknown = {"from": cut[0], "to": cut[1], "pile_up_left": cut[0], "pile_up_right": cut[1]}
-    unknown |= dict.fromkeys(("step", "pile_up", "area_net"), any(cut))
+    unknown = dict(zip(("from", "to"), cut)) | dict.fromkeys(("pile_up", "area_net"), any(cut))
     for name, is_unknown in unknown.items():
         if is_unknown:
             values[name] = name_unknown(name, "cut_off")
@@ -228,64 +220,41 @@ def measure_track(
     return Track(values, cut)
 
 
-def _average_parts(depths: DepthMap, name: str, edges) -> list[Quantity]:
-    """Return the mean depth between neighbouring edges [m]."""
+def _measure_floor(depths: DepthMap, start: float, width: float) -> Quantity:
+    """Return the mean depth of the deepest fifth of the width."""
     parts = []
-    for first, last in pairwise(edges):
+    for first, last in pairwise(start + width * np.arange(N_FIFTHS + 1) / N_FIFTHS):
         inside = (depths.x >= first) & (depths.x <= last)
         if not inside.any():
             inside[int(np.argmin(np.abs(depths.x - (first + last) / 2)))] = True
-        area, error = depths.integrate(inside)
         length = float(inside.sum()) * depths.cell
-        parts.append(name_estimate(name, area / length, error / length, 0.0))
-    return parts
+        mean, error = (number / length for number in depths.integrate(inside))
+        parts.append(name_estimate("depth_floor", mean, error, 0.0))
+    return max(parts, key=lambda part: part.value)
 
 
-def _measure_step(depths: DepthMap, start: float, width: float) -> Quantity:
-    """Return the mean depth of the middle third of the width, if its three parts are equally deep."""
-    edges = start + width * np.arange(N_STEP_PARTS, 2 * N_STEP_PARTS + 1) / 3 / N_STEP_PARTS
-    parts = _average_parts(depths, "step", edges)
-    values = [part.value for part in parts]
-    step = _average_parts(depths, "step", edges[[0, -1]])[0]
-    error = max(part.high - part.value for part in parts)
-    if max(values) - min(values) > MAX_UNEVENNESS * step.value + error:
-        return name_unknown("step", "not_flat")
-    return step
+def _measure_pile_up(depths: DepthMap, ends: tuple[End, End], width: float) -> tuple[float, float]:
+    """Return the area [m2] above the first surface within one width beside a track, and its standard deviation.
 
-
-def _measure_floor(depths: DepthMap, start: float, width: float) -> Quantity:
-    """Return the mean depth of the deepest fifth of the width."""
-    edges = start + width * np.arange(N_FIFTHS + 1) / N_FIFTHS
-    return max(_average_parts(depths, "depth_floor", edges), key=lambda part: part.value)
-
-
-def _measure_pile_up(depths: DepthMap, name: str, end: End, width: float) -> Quantity:
-    """Return the area above the first surface beside a track.
-
-    It reaches from the end of the track to behind the ridge, whose low flanks are not found as grown. Where nothing is
-    found as grown, the upper limit is what the noise may hide beside the track.
-
-    Parameters
-    ----------
-    depths : DepthMap
-    name : str
-    end : End
-        End of the track.
-    width : float
-        Length [m] beside the track that is searched, negative before the track.
+    It reaches from both ends of the track to behind the ridges, whose low flanks are not found as grown. Where nothing
+    is found as grown, the error is what the noise may hide beside the track.
     """
-    distance = (depths.x - end.value) * np.sign(width)
-    is_beside = (distance >= 0) & (distance <= abs(width))
-    grown = distance[is_beside & depths.grown]
-    if not grown.size:
-        near = is_beside & (distance <= FLANK_FRACTION * abs(width))
-        area, error = depths.integrate(near, -1.0)
-        return name_quantity(name, 0.0, 0.0, max(area, 0.0) + SIDE * error)
-
-    tail = max(float(grown.min()), RIDGE_TAIL * float(np.ptp(grown)))
-    inside = is_beside & (distance <= grown.max() + tail)
-    # A ridge may begin anywhere in the interval of the end.
-    is_end = (depths.x >= end.low) & (depths.x <= end.high) & (depths.depth < 0)
-    area, error = depths.integrate(inside | is_end, -1.0)
-    beginning = depths.integrate(is_end, -1.0)[0]
-    return name_estimate(name, area, float(np.hypot(error, beginning / (2 * SIDE))), 0.0)
+    total = 0.0
+    variance = 0.0
+    for end, sign in zip(ends, (-1, 1)):
+        distance = (depths.x - end.value) * sign
+        is_beside = (distance >= 0) & (distance <= width)
+        grown = distance[is_beside & depths.grown]
+        if not grown.size:
+            area, error = depths.integrate(is_beside & (distance <= FLANK_FRACTION * width), -1.0)
+            variance += (error + max(area, 0.0) / SIDE) ** 2
+            continue
+        tail = max(float(grown.min()), RIDGE_TAIL * float(np.ptp(grown)))
+        inside = is_beside & (distance <= grown.max() + tail)
+        # A ridge may begin anywhere in the interval of the end.
+        is_end = (depths.x >= end.low) & (depths.x <= end.high) & (depths.depth < 0)
+        area, error = depths.integrate(inside | is_end, -1.0)
+        beginning = depths.integrate(is_end, -1.0)[0] / (2 * SIDE)
+        total += max(area, 0.0)
+        variance += error**2 + beginning**2
+    return total, float(np.sqrt(variance))

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 
 import numpy as np
-from scipy import ndimage, special
+from scipy import ndimage, signal, special
 
 from ..profile import find_runs
 from ..quantity import SIDE, Quantity
@@ -22,8 +22,7 @@ RATIO_ERROR = 0.004  # standard deviation of a ratio due to tip, interpolation a
 MAX_NOISE_FRACTION = 0.5  # noise relative to the size of the surface above which a ratio is unknown
 MIN_WAVES = 3.0  # smallest length of a trace relative to the longest wave of the band
 MIN_STEPS = 4.0  # smallest length of the shortest wave of the band in steps
-# Sizes of the roughness in a track.
-ROUGHNESS_NAMES = ("Ra", "Rq", "slope")
+POWERS = {"Ra": 1.0, "Rq": 0.5, "slope": 0.5}  # of the mean over sections, which gives the size
 
 
 def compare_waves(
@@ -55,28 +54,38 @@ def compare_waves(
     if kept.sum() * step < MIN_WAVES * BAND[1]:
         kept = np.ones(count, bool)
     # The shape of a track has no part in its waves: the second filter removes what the first one leaves of a bend.
-    lines = [_level(line[:n_lines, :count]) for line in lines]
+    lines = [signal.detrend(line[:n_lines, :count], axis=1) for line in lines]
     lines = [z - _filter(z, BAND[1] / step) for z in lines]
     passed = [(_filter(z, BAND[0] / step) - _filter(z, BAND[1] / step))[:, kept] for z in lines]
     slopes = [(np.diff(z, axis=1) / step)[:, kept[1:]] for z in lines]
     # White noise has the slope noise sqrt(2)/step, and the fraction of its band in the amplitude.
     band_noise = noise / np.sqrt(2) * np.sqrt(2 * step * (1 / BAND[0] - 1 / BAND[1]))
-    count = int(np.clip(length / (BLOCK_WAVES * BAND[1]), MIN_BLOCKS, MAX_BLOCKS))
-    if min(len(line) for line in lines) >= MAX_BLOCKS:
-        count = MAX_BLOCKS  # groups of lines
+    # Blocks are parts of a single line, or groups of lines.
+    n_blocks = int(np.clip(length / (BLOCK_WAVES * BAND[1]), MIN_BLOCKS, MAX_BLOCKS))
+    axis = 1
+    if n_lines >= MAX_BLOCKS:
+        n_blocks = MAX_BLOCKS
+        axis = 0
     values = {}
     for name, sizes, error in (
         ("amplitude_ratio", passed, band_noise),
         ("slope_ratio", slopes, noise / step),
     ):
-        blocks = np.array([_mean_squares(size, count) for size in sizes])
-        totals = blocks.mean(axis=1)
-        if not totals.min() > 0 or error**2 > MAX_NOISE_FRACTION * totals.min():
+        blocks = [
+            np.array([np.mean(part**2) for part in np.array_split(size, n_blocks, axis)])
+            for size in sizes
+        ]
+        smallest = min(block.mean() for block in blocks)
+        if not smallest > 0 or error**2 > MAX_NOISE_FRACTION * smallest:
             values[name] = name_unknown(name, "noise")
             continue
-        ratio = _divide_means(*blocks, 0.5, DEFINITIONS[name][1])
-        values[name] = ratio._replace(name=name)
+        values[name] = _divide_means(*blocks, 0.5, DEFINITIONS[name][1])._replace(name=name)
     return values
+
+
+def _filter(z, wave: float) -> np.ndarray:
+    """Return the Gaussian mean lines (k, n) [m] of a cut-off in samples."""
+    return ndimage.gaussian_filter1d(z, CUTOFF_TO_DEVIATION * wave)
 
 
 def _divide_means(before, after, power: float, text: str) -> Quantity:
@@ -98,34 +107,18 @@ def _divide_means(before, after, power: float, text: str) -> Quantity:
     return Quantity(ratio, *ends.tolist(), "1", text)
 
 
-def _filter(z, wave: float) -> np.ndarray:
-    """Return the Gaussian mean lines (k, n) [m] of a cut-off in samples."""
-    return ndimage.gaussian_filter1d(z, CUTOFF_TO_DEVIATION * wave)
+def measure_roughness(depths: DepthMap, spans: list[tuple[int, int]]) -> tuple[dict, float | None]:
+    """Measure Ra, Rq and slope inside of the longest track and outside of all tracks, before and after wear.
 
-
-def _mean_squares(values, count: int) -> np.ndarray:
-    """Return the mean squares of blocks: along a single line, or of groups of lines."""
-    parts = np.array_split(values, count, axis=0 if len(values) >= MAX_BLOCKS else 1)
-    return np.array([np.mean(part**2) for part in parts])
-
-
-def _level(lines) -> np.ndarray:
-    """Subtract its least-squares line from each line (k, n)."""
-    base = np.vander(np.linspace(-1, 1, lines.shape[1]), 2)
-    return lines - (base @ np.linalg.lstsq(base, lines.T, rcond=None)[0]).T
-
-
-def measure_roughness(depths: DepthMap, spans) -> tuple[dict, float | None]:
-    """Measure Ra, Rq and slope inside and outside of the tracks, before and after wear.
-
-    Half a cut-off of the roughness profile is trimmed on both sides of an end of a track.
+    Half a cut-off of the roughness profile is trimmed on both sides of an end of a track. The scatter of sections of
+    a cut-off gives the intervals.
 
     Parameters
     ----------
     depths : DepthMap
         Of traces.
     spans : list
-        First and last sample of each track.
+        First and last sample of each track, the longest one first.
 
     Returns
     -------
@@ -135,64 +128,58 @@ def measure_roughness(depths: DepthMap, spans) -> tuple[dict, float | None]:
         Cut-off [m] that fits both regions.
     """
     step = depths.cell
-    inside = np.zeros(depths.x.size, bool)
+    outside = np.ones(depths.x.size, bool)
     for first, last in spans:
-        inside[first : last + 1] = True
-    pieces = {"inside": find_runs(inside), "outside": find_runs(~inside)}
-    lengths = [max((last - first for first, last in runs), default=0) for runs in pieces.values()]
+        outside[first : last + 1] = False
+    parts = {"inside": spans[:1], "outside": find_runs(outside)}
+    lengths = [max((last - first for first, last in runs), default=0) for runs in parts.values()]
     cutoff = fitting_cutoff(min(lengths) * step, step)
     if cutoff is None:
         return {}, None
 
-    rough = {}
-    for side in ("before", "after"):
-        z = getattr(depths, side)
-        rough[side] = z - mean_surface(z, (cutoff / step,))
-    edge = int(np.ceil(cutoff / 2 / step))
     regions = {}
-    for region, runs in pieces.items():
+    edge = int(np.ceil(cutoff / 2 / step))
+    for region, runs in parts.items():
         sections = []
         for first, last in runs:
             kept = np.arange(first + edge, last + 1 - edge)
             if kept.size > edge:
                 sections += np.array_split(kept, max(int(kept.size * step / cutoff), 1))
-        if not sections:
-            return {}, None
-        tables = {side: _tabulate(z, sections, step) for side, z in rough.items()}
-        regions[region] = {side: _pool(table) for side, table in tables.items()}
-        regions[region]["ratio"] = _divide(tables["before"], tables["after"])
+        sizes = {}
+        for side in ("before", "after"):
+            z = getattr(depths, side)
+            rough = z - mean_surface(z, (cutoff / step,))
+            sizes[side] = _measure_sections(rough, sections, step)
+        regions[region] = {
+            side: {name: _average(name, values) for name, values in table.items()}
+            for side, table in sizes.items()
+        }
+        regions[region]["ratio"] = {
+            name: _divide_means(
+                sizes["before"][name],
+                sizes["after"][name],
+                power,
+                f"{DEFINITIONS[name][1]}, after wear divided by before",
+            )
+            for name, power in POWERS.items()
+        }
     return regions, cutoff
 
 
-def _tabulate(z, sections: list, step: float) -> np.ndarray:
-    """Return Ra [m], mean square height [m2] and mean square slope (k, 3) of sections."""
+def _measure_sections(z, sections: list, step: float) -> dict[str, np.ndarray]:
+    """Return the mean (k,) in each section of the absolute height [m], of its square, and of the squared slope."""
     # The bottom of a track is bent, which shifts the mean line.
     parts = [z[section] - z[section].mean() for section in sections]
-    sizes = [
-        (np.abs(part).mean(), np.mean(part**2), np.mean(np.diff(part) ** 2) / step**2)
-        for part in parts
-    ]
-    return np.array(sizes)
+    return {
+        "Ra": np.array([np.abs(part).mean() for part in parts]),
+        "Rq": np.array([np.mean(part**2) for part in parts]),
+        "slope": np.array([np.mean(np.diff(part) ** 2) for part in parts]) / step**2,
+    }
 
 
-def _pool(table) -> dict[str, Quantity]:
-    """Return the sizes of sections (k, 3) together; their scatter gives the intervals."""
-    means = table.mean(axis=0)
-    errors = SIDE * table.std(axis=0, ddof=1) / np.sqrt(len(table)) if len(table) > 1 else means
-    out = {}
-    for k, name in enumerate(ROUGHNESS_NAMES):
-        bounds = np.array([means[k], max(means[k] - errors[k], 0.0), means[k] + errors[k]])
-        if name != "Ra":
-            bounds = np.sqrt(bounds)
-        out[name] = name_quantity(name, *bounds)
-    return out
-
-
-def _divide(before, after) -> dict[str, Quantity]:
-    """Return the ratios of the sizes of sections (k, 3), after divided by before, with their intervals."""
-    out = {}
-    for k, name in enumerate(ROUGHNESS_NAMES):
-        text = f"{DEFINITIONS[name][1]}, after wear divided by before"
-        power = 1.0 if name == "Ra" else 0.5
-        out[name] = _divide_means(before[:, k], after[:, k], power, text)
-    return out
+def _average(name: str, values) -> Quantity:
+    """Return a size of all sections together; their means (k,) are of its square, but for Ra."""
+    mean = values.mean()
+    error = SIDE * values.std(ddof=1) / np.sqrt(len(values)) if len(values) > 1 else mean
+    bounds = np.array([mean, max(mean - error, 0.0), mean + error])
+    return name_quantity(name, *bounds ** POWERS[name])

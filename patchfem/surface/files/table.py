@@ -28,7 +28,7 @@ MIN_ROUNDED = (
 MAX_ROUNDING = (
     0.75  # largest distance from even positions in printed digits, half of which is rounding
 )
-MIN_DIGIT = 1e-5  # smallest printed digit of a position, in the unit of the file
+MIN_DIGIT = 1e-11  # smallest printed digit of a position [m]
 DIGIT_TOL = 1e-4  # largest deviation from a multiple of a digit, relative to it, that is round-off
 # Largest distance of positions that count as equal, relative to the length of the axis.
 ROUND_OFF = 1e-9
@@ -55,6 +55,10 @@ class Table(NamedTuple):
     remedy: str = HEADER_EXAMPLE
     length: float | None = None
 
+    def add_notes(self, *texts: str) -> "Table":
+        """Return the table with further sentences about the file."""
+        return self._replace(notes=(*self.notes, *(f"{self.place}: {text}" for text in texts)))
+
     def locate(self, sample: int) -> str:
         """Return the place of a sample in the file for a message."""
         if self.lines is None:
@@ -74,64 +78,48 @@ def make_surface(table: Table, units: tuple[str, str] | None = None) -> Profile 
         Units of x (and y) and of z, or the size of a pixel and the unit of z. They complete and overrule those
         of the file, with a note, except in formats that always state their units.
     """
-    path = table.path
-    z = table.columns["z"]
-    if z.size > MAX_POINTS:
+    size = table.columns["z"].size
+    if size > MAX_POINTS:
         raise PatchfemError(
-            f"{path}: {z.size} heights, more than {MAX_POINTS:.0e}; export a part of the scan"
+            f"{table.path}: {size} heights, more than {MAX_POINTS:.0e}; export a part of the scan"
         )
     if units is not None and table.are_units_fixed:
-        note = f"{path}: the file states its own units; the units that you gave are ignored"
-        table = table._replace(notes=(*table.notes, note))
+        table = table.add_notes(
+            "the file states its own units; the units that you gave are ignored"
+        )
         units = None
     pixel = parse_pixel_size(units[0]) if units else None
     for unit in units or ():
         if parse_length_unit(unit) is None and (pixel is None or unit != units[0]):
-            raise PatchfemError(f"{path}: unknown unit '{shorten(unit)}'; use one of {UNIT_LIST}")
-    table = _set_axes(table, units[0] if pixel else None)
-
-    factors = {}
+            raise PatchfemError(
+                f"{table.path}: unknown unit '{shorten(unit)}'; use one of {UNIT_LIST}"
+            )
+    table = _set_axes(table, pixel)
     for role in table.columns:
-        if pixel and role != "z":
-            factors[role] = pixel
-            continue
-        given = units[role == "z"] if units else None
-        factors[role], notes = _find_factor(table, role, given)
-        table = table._replace(notes=table.notes + notes)
-    n_heights = np.isfinite(z).sum()
-    if n_heights < 2:
-        raise PatchfemError(f"{path}: {n_heights} heights; a trace needs at least two")
-    for role, factor in factors.items():
-        _check_numbers(table, role, factor)
-
-    # Steep heights have probably a wrong unit, unless somebody states it.
-    stated = "the file states these units" if table.are_units_fixed else ""
-    stated = "heights and length were read in the given units" if units else stated
+        # The size of a pixel gives places in metres.
+        given = "m" if pixel and role != "z" else units[role == "z"] if units else None
+        table = _convert_column(table, role, given)
+        _check_numbers(table, role)
+    _require_heights(table)
     if table.columns["z"].ndim == 1 and "y" in table.columns:
-        table = _fill_raster(table, factors)
-    return _make_surface(table, factors, stated)
+        table = _fill_raster(table)
+    return _make_surface(table, has_stated_units=table.are_units_fixed or units is not None)
 
 
-def _set_axes(table: Table, pixel: str | None) -> Table:
-    """Give a matrix of heights the axes of a pixel size; a single row of it is a trace."""
+def _set_axes(table: Table, pixel: float | None) -> Table:
+    """Give a matrix of heights the axes of a pixel size [m]; a single row of it is a trace."""
     columns = dict(table.columns)
     z = columns["z"]
     if z.ndim == 1:
         if pixel is not None:
             raise PatchfemError(
-                f"{table.path}: '{shorten(pixel)}' is a pixel size, which is needed only for a matrix of "
-                "heights, but this file has columns; give the units of the columns"
+                f"{table.path}: the size of a pixel is needed only for a matrix of heights, but this file has columns; "
+                "give the units of the columns"
             )
         return table
-    notes = table.notes
     if pixel is not None:
-        notes += tuple(
-            f"{table.path}: the header gives the size of the scan along {role}, but the pixel size that "
-            f"you gave, {pixel}, is used instead"
-            for role in ("x", "y")
-            if role in columns
-        )
-        columns |= {role: np.arange(float(n)) for role, n in zip("yx", z.shape)}
+        columns |= {role: pixel * np.arange(n) for role, n in zip("yx", z.shape)}
+        table = table._replace(units=table.units | dict.fromkeys("xy", "m"))
     if z.shape[0] == 1:
         columns = {"x": columns.get("x"), "z": z[0]}
     for role, name in (("x", "width"), ("y", "height")):
@@ -141,11 +129,11 @@ def _set_axes(table: Table, pixel: str | None) -> Table:
                 f"row), but the {name} of the scan is not given; write the scan's {SIZE_LINES} and "
                 f"`# Value units: um` above its rows, or {GIVE_PIXEL_SIZE}"
             )
-    return table._replace(columns=columns, notes=notes)
+    return table._replace(columns=columns)
 
 
-def _find_factor(table: Table, role: str, given: str | None) -> tuple[float, tuple[str, ...]]:
-    """Find the factor of a column to metres; a unit of the user overrules the file, with a note."""
+def _convert_column(table: Table, role: str, given: str | None) -> Table:
+    """Convert a column to metres; a unit of the user overrules the file, with a note."""
     stated = table.units.get(role)
     unit = stated if given is None else given
     if unit is None:
@@ -158,31 +146,39 @@ def _find_factor(table: Table, role: str, given: str | None) -> tuple[float, tup
         raise PatchfemError(
             f"{table.place}: unknown unit '{shorten(unit)}' of {role}; use one of {UNIT_LIST}"
         )
-    if stated is None or parse_length_unit(stated) == factor:
-        return factor, ()
-    note = f"the header gives {role} in {shorten(stated)}, but {unit} is used, as given by --units"
-    return factor, (f"{table.place}: {note}",)
+    if stated is not None and parse_length_unit(stated) != factor:
+        table = table.add_notes(
+            f"the header gives {role} in {shorten(stated)}, but {unit} is used, as given by --units"
+        )
+    return table._replace(columns=table.columns | {role: table.columns[role] * factor})
 
 
-def _check_numbers(table: Table, role: str, factor: float) -> None:
-    """Raise PatchfemError if numbers of a column are not finite or too large; a height may be missing."""
+def _check_numbers(table: Table, role: str) -> None:
+    """Raise PatchfemError if numbers of a column [m] are not finite or too large; a height may be missing."""
     values = table.columns[role].ravel()
-    known = np.isfinite(values)
-    bad = np.isinf(values) if role == "z" else ~known
+    bad = np.isinf(values) if role == "z" else ~np.isfinite(values)
     if bad.any():
         first = int(np.argmax(bad))
         raise PatchfemError(
             f"{table.locate(first)}: {role} is {values[first]:g}; finite numbers are needed"
         )
-    largest = int(np.nanargmax(np.abs(values)))
-    if abs(values[largest]) > MAX_LENGTH / factor:
+    is_far = np.abs(values) > MAX_LENGTH
+    if is_far.any():
+        first = int(np.argmax(is_far))
         raise PatchfemError(
-            f"{table.locate(largest)}: {role} is {float(values[largest]) * factor:.4g} m; is the unit right? "
+            f"{table.locate(first)}: {role} is {values[first]:.4g} m; is the unit right? "
             "write a missing height as nan"
         )
 
 
-def _fill_raster(table: Table, factors: dict[str, float]) -> Table:
+def _require_heights(table: Table) -> None:
+    """Raise PatchfemError for fewer than two heights."""
+    count = np.isfinite(table.columns["z"]).sum()
+    if count < 2:
+        raise PatchfemError(f"{table.path}: {count} heights; a trace needs at least two")
+
+
+def _fill_raster(table: Table) -> Table:
     """Arrange points as a matrix, whose cells without a point are missing, or as a trace if they form a line."""
     x, y, z = (table.columns[role] for role in "xyz")
     columns, in_column = _find_positions(x)
@@ -190,7 +186,6 @@ def _fill_raster(table: Table, factors: dict[str, float]) -> Table:
     if rows.size == 1:
         return table._replace(columns={"x": x, "z": z})
     if columns.size == 1:
-        factors["x"] = factors["y"]
         return table._replace(columns={"x": y, "z": z})
     cells = rows.size * columns.size
     if cells > max(MAX_CELLS_PER_POINT * z.size, 16) or cells > MAX_POINTS:
@@ -203,8 +198,8 @@ def _fill_raster(table: Table, factors: dict[str, float]) -> Table:
     if first.size < cell.size:
         second = int(np.setdiff1d(np.arange(cell.size), first)[0])
         raise PatchfemError(
-            f"{table.locate(second)}: a second height at x = {format_length(x[second] * factors['x'])}, y = "
-            f"{format_length(y[second] * factors['y'])}; keep one scan per file"
+            f"{table.locate(second)}: a second height at x = {format_length(x[second])}, y = "
+            f"{format_length(y[second])}; keep one scan per file"
         )
     heights = np.full(cells, np.nan)
     heights[cell] = z
@@ -221,9 +216,9 @@ def _find_positions(values) -> tuple[np.ndarray, np.ndarray]:
     return values[order][np.concatenate([[True], is_new])], index
 
 
-def _make_surface(table: Table, factors: dict[str, float], stated: str) -> Profile | Areal:
-    """Make the surface of a trace (n,) or of a matrix (m, n), whose positions increase."""
-    z = table.columns["z"] * factors["z"]
+def _make_surface(table: Table, *, has_stated_units: bool) -> Profile | Areal:
+    """Make the surface of a trace (n,) or of a matrix (m, n) in metres, whose positions increase."""
+    z = table.columns["z"]
     axes = []
     for axis, role in enumerate("yx"[2 - z.ndim :]):
         places = table.columns[role]
@@ -231,27 +226,23 @@ def _make_surface(table: Table, factors: dict[str, float], stated: str) -> Profi
             places = places[::-1]
             z = np.flip(z, axis)
             table = table._replace(lines=None if table.lines is None else table.lines[::-1])
-        places, notes = _undo_rounding(table, role, places, factors[role])
-        table = table._replace(notes=table.notes + notes)
-        if z.ndim == 1:
-            places, z, notes = _average_equal(table, places, z)
-            table = table._replace(notes=table.notes + notes)
+        places, notes = _undo_rounding(table, role, places)
+        table = table.add_notes(*notes)
         _require_increase(table, role, places)
         axes.append(frozen_array(places))
-    known = z[np.isfinite(z)]
-    if known.size <= z.ndim:
-        raise PatchfemError(
-            f"{table.path}: {known.size} heights; a {'scan' if z.ndim > 1 else 'trace'} needs more"
-        )
-    length = max(float(np.ptp(axis)) for axis in axes)
-    notes = table.notes + _check_span(table.path, length, known, stated)
+    _check_span(
+        table.path,
+        max(float(np.ptp(axis)) for axis in axes),
+        float(np.nanmax(z) - np.nanmin(z)),
+        has_stated_units=has_stated_units,
+    )
     surface = Profile if z.ndim == 1 else Areal
-    return surface(*reversed(axes), frozen_array(z), str(table.path), notes)
+    return surface(*reversed(axes), frozen_array(z), str(table.path), table.notes)
 
 
 def _require_increase(table: Table, role: str, places) -> None:
     """Raise PatchfemError if positions [m] do not increase, or there are fewer than two of them."""
-    if places.size < 2:
+    if not np.ptp(places) > 0:
         raise PatchfemError(
             f"{table.path}: every sample lies at {role} = {format_length(places[0])}; a surface needs at least two "
             f"different {role}"
@@ -270,59 +261,40 @@ def _require_increase(table: Table, role: str, places) -> None:
     )
 
 
-def _average_equal(table: Table, x, z) -> tuple[np.ndarray, np.ndarray, tuple[str, ...]]:
-    """Average the heights (n,) of neighbouring samples with the same x, with a note."""
-    equal = 1e-6 * (x[-1] - x[0]) / x.size
-    is_new = np.abs(np.diff(x)) > equal
-    if is_new.all():
-        return x, z, ()
-    group = np.concatenate([[0], np.cumsum(is_new)])
-    first = int(np.argmin(is_new)) + 1
-    place = f"sample {first + 1}" if table.lines is None else f"line {table.lines[first]}"
-    note = (
-        f"{table.path}: {x.size - group[-1] - 1} samples have the same x as another sample (the first in {place}); "
-        "the mean of their heights is used"
-    )
-    with np.errstate(invalid="ignore"):
-        z = np.bincount(group, np.nan_to_num(z)) / np.bincount(group, np.isfinite(z))
-    return np.bincount(group, x) / np.bincount(group), z, (note,)
-
-
-def _undo_rounding(table: Table, role: str, x, factor: float) -> tuple[np.ndarray, tuple[str, ...]]:
-    """Convert positions (n,) to metres, equally spaced ones if they differ from these only by rounding, with a note.
+def _undo_rounding(table: Table, role: str, x) -> tuple[np.ndarray, tuple[str, ...]]:
+    """Return equally spaced positions (n,) [m] if these differ from them only by rounding, with a note.
 
     A step of 0.15625 um printed to 0.1 um makes the slopes 14 % too large. If the header gives the length of the scan, it
     gives the step.
     """
     if x.size < MIN_ROUNDED or not x[-1] > x[0]:
-        return x * factor, ()
+        return x, ()
     digit = find_printed_digit(x)
     count = np.arange(x.size) - (x.size - 1) / 2
     step = float(count @ x / (count @ count))
     evens = [float(x.mean()) + step * count]
     if table.length is not None:
-        steps = (table.length / factor / n for n in (x.size, x.size - 1))
-        evens = [x[0] + step * np.arange(x.size) for step in steps]
+        evens = [x[0] + table.length / n * np.arange(x.size) for n in (x.size, x.size - 1)]
     for even in evens:
         distance = float(np.abs(x - even).max())
         step = float(even[1] - even[0])
         if step > 0 and 1e-6 * step < distance <= MAX_ROUNDING * max(digit, MIN_DIGIT):
             note = (
-                f"{table.path}: {role} is rounded to {format_length(digit * factor)} in the file; the samples are "
-                f"taken as evenly spaced by {format_length(step * factor)}"
+                f"{role} is rounded to {format_length(digit)} in the file; the samples are taken as evenly spaced by "
+                f"{format_length(step)}"
             )
-            return even * factor, (note,)
+            return even, (note,)
     if table.length is None:
-        return x * factor, ()
+        return x, ()
     note = (
-        f"{table.path}: the length of {format_length(table.length)} in the header does not fit {x.size} samples that "
-        f"end at {format_length(x[-1] * factor)}: the x values of the samples are used"
+        f"the length of {format_length(table.length)} in the header does not fit {x.size} samples that "
+        f"end at {format_length(x[-1])}: the x values of the samples are used"
     )
-    return x * factor, (note,)
+    return x, (note,)
 
 
 def find_printed_digit(x) -> float:
-    """Return the largest power of ten that divides all positions (n,), or 0 if there is none."""
+    """Return the largest power of ten [m] that divides all positions (n,), or 0 if there is none."""
     largest = int(np.floor(np.log10((x[-1] - x[0]) / 5)))
     for digit in 10.0 ** np.arange(largest, largest - 8, -1):
         if np.abs(x / digit - np.rint(x / digit)).max() < DIGIT_TOL:
@@ -330,19 +302,14 @@ def find_printed_digit(x) -> float:
     return 0.0
 
 
-def _check_span(path, length: float, heights, stated: str) -> tuple[str, ...]:
-    """Return a note on heights [m] that span more than the length [m]; raise PatchfemError if nobody states their unit."""
+def _check_span(path, length: float, span: float, *, has_stated_units: bool) -> None:
+    """Raise PatchfemError for a tiny length [m], and for heights that span more [m] in units from a header."""
     if length < MIN_LENGTH:
         raise PatchfemError(
             f"{path}: the profile is {format_length(length, 3)} long; is the unit of x right?"
         )
-    span = float(np.ptp(heights))
-    if span <= length:
-        return ()
-    text = f"{path}: heights span {format_length(span)} over a length of {format_length(length)}"
-    if not stated:
+    if span > length and not has_stated_units:
         raise PatchfemError(
-            f"{text}; is the unit of z right? If not, correct the header or give --units to "
-            "profile and compare; write a missing height as nan"
+            f"{path}: heights span {format_length(span)} over a length of {format_length(length)}; is the unit of z "
+            "right? If not, correct the header or give --units to profile and compare; write a missing height as nan"
         )
-    return (f"{text}: {stated}",)

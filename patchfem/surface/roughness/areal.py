@@ -3,15 +3,16 @@
 Missing heights give no point, no slope, no cell of the area and no pair of heights.
 """
 
-from typing import NamedTuple
-
 import numpy as np
+from scipy import fft, ndimage
 
 from .parameters import compute_core, compute_moments
 
 DECAY_LEVEL = 0.2  # autocorrelation at the autocorrelation length Sal (ISO 25178-3)
 # Smallest autocorrelation length in raster steps; the raster does not resolve a shorter one.
 MIN_LENGTH_STEPS = 2.0
+N_RAYS = 360  # number of directions in which the autocorrelation is followed
+RAY_POINTS = 4  # number of points on a ray per raster step
 
 
 # Unit and definition of the parameters of a scan.
@@ -38,13 +39,6 @@ AREAL = {
 }
 
 
-class Lobe(NamedTuple):
-    """Shortest and longest distance [m] over which the autocorrelation falls to 0.2."""
-
-    shortest: float | None
-    longest: float | None
-
-
 def compute_areal_parameters(z, steps: tuple[float, float]) -> dict[str, float | str]:
     """Compute the parameters of a scan, by the names in AREAL; a code of the reason where there is none.
 
@@ -65,16 +59,17 @@ def compute_areal_parameters(z, steps: tuple[float, float]) -> dict[str, float |
     values["Sdq"] = float(np.sqrt(sum(np.nanmean(slope**2) for slope in slopes)))
     values["Sdr"] = _compute_area_ratio(*(slope**2 for slope in slopes))
 
-    lobe = Lobe(None, None)
+    values |= {"Sal": "not_falling", "Str": "not_falling"}
+    distances = np.full(1, np.inf)
     if values["Sq"] > 0:
-        lobe = _measure_lobe(autocorrelation(z), steps)
-    values |= {"Sal": lobe.shortest, "Str": "not_falling"}
-    if lobe.shortest is None:
-        values["Sal"] = "not_falling"
-    elif lobe.shortest < MIN_LENGTH_STEPS * max(steps):
+        distances = _find_decay_lengths(autocorrelation(z), steps)
+    shortest = float(distances.min())
+    if shortest < MIN_LENGTH_STEPS * max(steps):
         values |= {"Sal": "too_short", "Str": "too_short"}
-    elif lobe.longest is not None:
-        values["Str"] = lobe.shortest / lobe.longest
+    elif np.isfinite(shortest):
+        values["Sal"] = shortest
+        if np.isfinite(distances).all():
+            values["Str"] = shortest / float(distances.max())
     unknown = "flat" if values["Sq"] == 0 else "undetermined"
     return {name: unknown if values[name] is None else values[name] for name in AREAL}
 
@@ -95,13 +90,11 @@ def autocorrelation(z: np.ndarray) -> np.ndarray:
     Missing heights are NaN. Returns (2 (m // 2) + 1, 2 (n // 2) + 1) with the zero lag in the
     middle; each lag averages its measured pairs.
     """
-    from scipy.fft import irfft2, next_fast_len, rfft2
-
     known = ~np.isnan(z)
     halves = [count // 2 for count in z.shape]
-    shape = [next_fast_len(count + half + 1, real=True) for count, half in zip(z.shape, halves)]
+    shape = [fft.next_fast_len(count + half + 1, real=True) for count, half in zip(z.shape, halves)]
     products, pairs = (
-        irfft2(np.abs(rfft2(part, shape)) ** 2, shape)
+        fft.irfft2(np.abs(fft.rfft2(part, shape)) ** 2, shape)
         for part in (np.where(known, z, 0.0), known.astype(float))
     )
     mean = products / np.maximum(pairs, 0.5)
@@ -109,24 +102,18 @@ def autocorrelation(z: np.ndarray) -> np.ndarray:
     return mean[np.ix_(rows, columns)] / mean[0, 0]
 
 
-def _measure_lobe(rho, steps: tuple) -> Lobe:
-    """Find the contour on which an autocorrelation falls to 0.2.
-
-    The longest distance is None if the contour is open.
-    """
-    from contourpy import contour_generator
-
-    y, x = (
-        step * np.arange(-(count // 2), count // 2 + 1) for step, count in zip(steps, rho.shape)
-    )
-    shortest = []
-    closed = []
-    for line in contour_generator(x, y, rho).lines(DECAY_LEVEL):
-        start = line[:-1]
-        along = np.diff(line, axis=0)
-        position = np.clip(-(start * along).sum(1) / np.maximum((along**2).sum(1), 1e-300), 0, 1)
-        shortest.append(float(np.hypot(*(start + position[:, None] * along).T).min()))
-        angle = np.unwrap(np.arctan2(line[:, 1], line[:, 0]))
-        if abs(angle[-1] - angle[0]) > 6:  # the contour encircles the origin, by an angle of 2 pi
-            closed.append((shortest[-1], float(np.hypot(*line.T).max())))
-    return Lobe(min(shortest, default=None), min(closed)[1] if closed else None)
+def _find_decay_lengths(rho, steps: tuple[float, float]) -> np.ndarray:
+    """Return the distance [m] at which an autocorrelation falls to 0.2 in each direction; inf where it does not."""
+    sizes = (np.array(rho.shape) // 2) * steps
+    radius = np.arange(0.0, float(np.hypot(*sizes)), min(steps) / RAY_POINTS)
+    angle = np.linspace(0.0, np.pi, N_RAYS, endpoint=False)
+    rays = np.array([np.sin(angle), np.cos(angle)])[..., None] * radius
+    pixels = rays / np.reshape(steps, (2, 1, 1)) + np.reshape(rho.shape, (2, 1, 1)) // 2
+    along = ndimage.map_coordinates(rho, pixels, order=1, cval=np.nan)
+    is_low = along < DECAY_LEVEL
+    distances = np.full(N_RAYS, np.inf)
+    for k in np.flatnonzero(is_low.any(axis=1)):
+        first = int(is_low[k].argmax())
+        ends = slice(first - 1, first + 1)
+        distances[k] = np.interp(-DECAY_LEVEL, -along[k, ends], radius[ends])
+    return distances

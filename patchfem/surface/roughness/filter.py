@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
+from scipy import signal
 
 from ...core import PatchfemError, frozen_array
 from ...formatting import format_length
@@ -66,8 +67,9 @@ def mean_surface(z: np.ndarray, cutoffs: tuple[float, ...]) -> np.ndarray:
     sums = []
     for values in (np.where(known, z, 0.0), known.astype(float)):
         for axis, cutoff in enumerate(cutoffs):
-            _, weight = _gaussian_weights(cutoff, z.shape[axis])
-            values = _convolve(values, weight, axis)
+            weight = _gaussian_weights(cutoff, z.shape[axis])[1]
+            column = weight.reshape([-1 if k == axis else 1 for k in range(z.ndim)])
+            values = signal.fftconvolve(values, column, "same", axis)
         sums.append(values)
     return np.divide(*sums, out=np.full(z.shape, np.nan), where=known)
 
@@ -78,24 +80,13 @@ def mean_line(z: np.ndarray, cutoff: float) -> np.ndarray:
     The weights that an end cuts off fit a straight line, not a constant (ISO 16610-28, first moment). Cut-off in steps.
     """
     offsets, weight = _gaussian_weights(cutoff, z.size)
-    ones = np.ones(z.size)
-    sum_w = _convolve(ones, weight)
-    sum_wz = _convolve(z, weight)
-    sum_wt = _convolve(ones, -offsets * weight)  # a convolution reverses the weights
-    sum_wtt = _convolve(ones, offsets**2 * weight)
-    sum_wtz = _convolve(z, -offsets * weight)
+    # A convolution reverses the weights.
+    kernels = (weight, -offsets * weight, offsets**2 * weight)
+    sum_w, sum_wt, sum_wtt = (
+        signal.fftconvolve(np.ones(z.size), kernel, "same") for kernel in kernels
+    )
+    sum_wz, sum_wtz = (signal.fftconvolve(z, kernel, "same") for kernel in kernels[:2])
     return (sum_wz * sum_wtt - sum_wtz * sum_wt) / (sum_w * sum_wtt - sum_wt**2)
-
-
-def _convolve(values, weights, axis: int = 0) -> np.ndarray:
-    """Convolve values with centred weights (2 k + 1,) along an axis, zero beyond the ends."""
-    from scipy.fft import irfft, next_fast_len, rfft
-
-    count = values.shape[axis]
-    size = next_fast_len(count + weights.size - 1, real=True)
-    spectrum = rfft(np.moveaxis(values, axis, -1), size) * rfft(weights, size)
-    first = weights.size // 2
-    return np.moveaxis(irfft(spectrum, size)[..., first : first + count], -1, axis)
 
 
 def _gaussian_weights(cutoff: float, count: int) -> tuple[np.ndarray, np.ndarray]:

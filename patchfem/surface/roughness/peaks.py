@@ -14,7 +14,6 @@ from typing import NamedTuple
 import numpy as np
 
 from ...core import PatchfemError
-from ...formatting import format_length, format_number
 from ..profile import Profile, level, remove_spikes, resample_evenly
 from .filter import filter_surface
 from .parameters import MIN_SAMPLES, ROUND_OFF
@@ -23,11 +22,6 @@ SUMMIT_FACTOR = 0.8968  # coefficient of 1/alpha in the variance of summit heigh
 MIN_ALPHA = 1.5  # alpha of an isotropic surface whose waves all have the same length
 # Ratio of u_0 to rms height by Persson 2007, and by simulation (Pastewka 2013).
 PERSSON = (0.4, 0.5)
-# Fraction of the heights that are examined as the sharpest; in a
-# Gaussian trace they have 5 % of m_4.
-SHARPEST_FRACTION = 0.005
-# Largest fraction of the mean square curvature in the sharpest heights; more may be due to dust.
-MAX_SHARPEST_POWER = 0.5
 # Largest fraction of the samples in spikes; more apparent spikes belong to the surface.
 MAX_SPIKE_FRACTION = 0.1
 # Largest skewness whose effect on the stiffness is below the uncertainty of the theory.
@@ -48,10 +42,6 @@ class Moments(NamedTuple):
         """Nayak's bandwidth m_0 m_4/m_2^2."""
         return (self.height * self.curvature / self.slope**2) ** 2
 
-    def combine(self, other: "Moments") -> "Moments":
-        """Return the moments of the gap between two rough surfaces, whose mean squares add up."""
-        return Moments(*np.hypot(self, other).tolist())
-
 
 class Peaks(NamedTuple):
     """Asperity peaks of a surface: radius [m], density [1/m2] and height deviation [m]."""
@@ -66,21 +56,13 @@ class TraceMoments(NamedTuple):
 
     fine: from all samples; coarse: from every second sample, None if these are too few;
     not_gaussian: a clause if the heights are not Gaussian, else ""; dust: clauses on heights that
-    were left out or that look like dust.
+    were left out.
     """
 
     fine: Moments
     coarse: Moments | None
     not_gaussian: str
     dust: tuple = ()
-
-    def combine(self, other: "TraceMoments") -> "TraceMoments":
-        """Return the moments of the gap between two rough surfaces."""
-        coarse = self.coarse.combine(other.coarse) if self.coarse and other.coarse else None
-        fine = self.fine.combine(other.fine)
-        return TraceMoments(
-            fine, coarse, self.not_gaussian or other.not_gaussian, (*self.dust, *other.dust)
-        )
 
 
 def trace_moments(trace: Profile, cutoff: float | None = None) -> TraceMoments:
@@ -101,9 +83,7 @@ def trace_moments(trace: Profile, cutoff: float | None = None) -> TraceMoments:
         dust = (
             f"{removed} of {trace.z.size} heights are spikes, dropouts or dust and are left out",
         )
-    return TraceMoments(
-        fine, coarse, _describe_skew(flat.z, fine, flat.length), (*dust, *_describe_dust(flat))
-    )
+    return TraceMoments(fine, coarse, _describe_skew(flat.z, fine, flat.length), dust)
 
 
 def rms_moments(trace: Profile, every: int = 1) -> Moments:
@@ -137,31 +117,6 @@ def _filter_short_waves(trace: Profile, cutoff: float | None) -> Profile:
             f"{trace.source}: the trace is flat, so it has no peaks; leave [contact.asperities] out"
         )
     return flat if cutoff is None or cutoff >= flat.length else filter_surface(flat, cutoff)[1]
-
-
-def _describe_dust(trace: Profile) -> tuple:
-    """Describe the few heights, such as dust, that dominate the mean square curvature.
-
-    Returns () if no heights do.
-    """
-    bend = np.diff(trace.z, 2) ** 2
-    count = max(int(SHARPEST_FRACTION * bend.size), 1)
-    sharpest = np.argsort(bend)[-count:]
-    power = float(bend[sharpest].sum()) / max(float(bend.sum()), 1e-300)
-    if power < MAX_SHARPEST_POWER:
-        return ()
-    step = trace.step
-    kept = np.ones(trace.z.size, bool)
-    kept[sharpest + 1] = False
-    slope = np.diff(trace.z)[kept[1:] & kept[:-1]] / step
-    curvature = float(np.sqrt(bend[kept[1:-1]].mean())) / step**2
-    place = format_length(float(trace.x[sharpest[-1] + 1]))
-    return (
-        f"{count} of {trace.z.size} heights, the sharpest at x = {place}, make up "
-        f"{100 * power:.3g} % of the mean square curvature, as dust does; without them rms_slope "
-        f"is {float(np.sqrt(np.mean(slope**2))):.4g} and rms_curvature {format_number(curvature, 4)} 1/m; "
-        "if they are dust, use these values or remove the dust from the trace",
-    )
 
 
 def _describe_skew(z, moments: Moments, length: float) -> str:

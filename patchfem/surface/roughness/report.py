@@ -4,6 +4,7 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
+from scipy import special
 
 from ...core import PatchfemError, frozen_array
 from ...formatting import format_length
@@ -156,10 +157,7 @@ def _measure_trace(
     primary = parts.primary
     values = compute_parameters(primary.z, primary.step)
     del values["z"]  # of one section, which is Pt
-    quantities = [
-        _name_value(f"P{name}", value, PROFILE[name], "the levelled trace")
-        for name, value in values.items()
-    ]
+    quantities = [_name_value("P", name, value) for name, value in values.items()]
     quantities += _measure_waves(primary, parts.spectrum)
     rough = parts.roughness
     if rough is None:
@@ -168,24 +166,22 @@ def _measure_trace(
     errors = estimate_errors(rough.z, primary.step, cutoff)
     n_sections = rough.z.size // round(cutoff / primary.step)
     for name, value in compute_parameters(rough.z, primary.step, cutoff).items():
-        long_name = name if name.startswith("Mr") else f"R{name}"
-        quantity = _name_value(long_name, value, PROFILE[name], "the roughness profile")
+        quantity = _name_value("R", name, value)
         quantities.append(_add_interval(quantity, errors.get(name), n_sections))
-    notes = ()
-    remaining = f"{format_length(rough.length)}"
-    if n_sections < MIN_SECTIONS:
-        notes += (
-            f"{primary.source}: the {remaining} within half a cut-off of the ends hold {n_sections} sections of "
-            f"{format_length(cutoff)}, and intervals need {MIN_SECTIONS}: evaluate at least "
-            f"{format_length((MIN_SECTIONS + 1) * cutoff)}, or take a shorter cut-off",
+    if n_sections >= MIN_SECTIONS:
+        return quantities, ()
+    advice = (
+        f"evaluate at least {format_length((MIN_SECTIONS + 1) * cutoff)}, or take a shorter cut-off"
+    )
+    if not n_sections:
+        advice = (
+            f"do not use these roughness parameters, as ISO 21920 needs a whole section: {advice}"
         )
-    if rough.length < cutoff * (1 - 1e-9):
-        notes += (
-            f"{primary.source}: half a cut-off is trimmed at each end, and the {remaining} that remain are shorter "
-            f"than one section of {format_length(cutoff)}, the least that ISO 21920 needs; do not use these "
-            "roughness parameters: evaluate a longer part, or take a shorter cut-off",
-        )
-    return quantities, notes
+    note = (
+        f"{primary.source}: the {format_length(rough.length)} within half a cut-off of the ends hold {n_sections} "
+        f"sections of {format_length(cutoff)}, and intervals need {MIN_SECTIONS}: {advice}"
+    )
+    return quantities, (note,)
 
 
 def _measure_scan(scan: Areal) -> tuple[list[Quantity], tuple[str, ...]]:
@@ -197,62 +193,61 @@ def _measure_scan(scan: Areal) -> tuple[list[Quantity], tuple[str, ...]]:
     steps = tuple(float(axis[-1] - axis[0]) / (axis.size - 1) for axis in (scan.y, scan.x))
     quantities = []
     for name, value in compute_areal_parameters(scan.z, steps).items():
-        reason = value if isinstance(value, str) else ""
-        number = None if reason else value
+        number, reason = (None, value) if isinstance(value, str) else (value, "")
         quantities.append(Quantity(number, None, None, *AREAL[name], reason, name))
     count = int(scan.missing.sum())
-    if not count:
-        return quantities, ()
     note = f"{scan.source}: {count} of {scan.z.size} heights are missing and are left out"
-    return quantities, (note,)
+    return quantities, (note,) if count else ()
 
 
 def _measure_waves(primary: Profile, spectrum: Spectrum) -> list[Quantity]:
     """Return the dominant wavelength, and the amplitude of the waves of the band."""
     low, high = BAND
-    text = (
-        "amplitude of a sine with the mean square of the waves from {} to {}, of the levelled trace"
+    amplitude = None
+    if 2 * high <= primary.length and low >= 2 * primary.step:
+        amplitude = spectrum.band_amplitude(low, high)
+    of_band = (
+        f"amplitude of a sine with the mean square of the waves from {format_length(low)} to "
+        f"{format_length(high)}, of the levelled trace"
     )
-    definition = ("m", text.format(format_length(low), format_length(high)))
-    wave = ("m", "wavelength of the octave with the largest mean square height")
-    out = [
-        _name_value("dominant_wavelength", spectrum.dominant_wavelength, wave, "the levelled trace")
+    of_octave = (
+        "wavelength of the octave with the largest mean square height, of the levelled trace"
+    )
+    return [
+        Quantity(value, None, None, "m", text, "" if value is not None else reason, name)
+        for name, value, text, reason in (
+            ("dominant_wavelength", spectrum.dominant_wavelength, of_octave, "undetermined"),
+            ("band_amplitude", amplitude, of_band, "band"),
+        )
     ]
-    if 2 * high > primary.length or low < 2 * primary.step:
-        return [*out, Quantity(None, None, None, *definition, "band", "band_amplitude")]
-    amplitude = spectrum.band_amplitude(low, high)
-    return [*out, Quantity(amplitude, None, None, *definition, name="band_amplitude")]
 
 
-def _name_value(name: str, value, definition: tuple[str, str], of: str) -> Quantity:
-    unit, text = definition
+def _name_value(letter: str, name: str, value: float | None) -> Quantity:
+    """Return a parameter of the primary profile "P", or of the roughness profile "R", by its name in PROFILE."""
+    unit, text = PROFILE[name]
+    profile = "the levelled trace" if letter == "P" else "the roughness profile"
+    long_name = name if name.startswith("Mr") and letter == "R" else f"{letter}{name}"
     reason = "" if value is not None else "undetermined"
-    return Quantity(value, None, None, unit, f"{text}, of {of}", reason, name)
+    return Quantity(value, None, None, unit, f"{text}, of {profile}", reason, long_name)
 
 
 def _add_interval(quantity: Quantity, error: float | None, n_sections: int) -> Quantity:
     """Add the 90 % interval of a mean over sections by Student's t of its logarithm; without errors, the reason."""
-    from scipy.special import stdtrit
-
     if error is None and n_sections < MIN_SECTIONS and not quantity.reason:
         return quantity._replace(reason="sections")
     if not quantity.value or not error:
         return quantity
-    width = float(stdtrit(n_sections - 1, 1 - CONFIDENCE_TAIL)) * error / quantity.value
+    width = float(special.stdtrit(n_sections - 1, 1 - CONFIDENCE_TAIL)) * error / quantity.value
     low, high = quantity.value * np.exp([-width, width])
-    # a material ratio is at most 1
+    # A material ratio is at most 1.
     high = min(high, 1.0) if quantity.name.startswith("Mr") else high
     return quantity._replace(low=float(low), high=float(high))
 
 
 def fitting_cutoff(length: float, step: float) -> float | None:
     """Return the longest standard cut-off [m] that a trace of this length and step [m] allows."""
-    fitting = [
-        cutoff
-        for cutoff in STANDARD_CUTOFFS
-        if SECTIONS_PER_TRACE * cutoff <= length * (1 + 1e-9) and cutoff >= 4 * step
-    ]
-    return max(fitting, default=None)
+    longest = length * (1 + 1e-9) / SECTIONS_PER_TRACE
+    return max((each for each in STANDARD_CUTOFFS if 4 * step <= each <= longest), default=None)
 
 
 def crop(surface: Profile | Areal, *ends: float) -> Profile | Areal:
@@ -262,18 +257,17 @@ def crop(surface: Profile | Areal, *ends: float) -> Profile | Areal:
     position to the last at or before the second. Raises PatchfemError for a window that is reversed
     or not within the surface.
     """
-    source = surface.source
-    is_scan = isinstance(surface, Areal)
-    if len(ends) != (4 if is_scan else 2):
-        needed = (
-            "four positions: from and to in x, from and to in y" if is_scan else "two positions"
+    names = "xy" if isinstance(surface, Areal) else "x"
+    if len(ends) != 2 * len(names):
+        raise PatchfemError(
+            f"{surface.source}: a window needs a first and a last position along {' and along '.join(names)}"
         )
-        raise PatchfemError(f"{source}: a window of this surface needs {needed}")
-    columns = _find_part(source, "x", surface.x, ends[:2])
-    if not is_scan:
-        return replace(surface, x=surface.x[columns], z=surface.z[columns])
-    rows = _find_part(source, "y", surface.y, ends[2:])
-    return replace(surface, x=surface.x[columns], y=surface.y[rows], z=surface.z[rows, columns])
+    parts = {
+        name: _find_part(surface.source, name, getattr(surface, name), pair)
+        for name, pair in zip(names, (ends[:2], ends[2:]))
+    }
+    axes = {name: getattr(surface, name)[part] for name, part in parts.items()}
+    return replace(surface, **axes, z=surface.z[tuple(parts[name] for name in reversed(names))])
 
 
 def _find_part(source: str, name: str, axis: np.ndarray, ends: tuple[float, ...]) -> slice:

@@ -4,14 +4,13 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from scipy import signal
 
 from ...core import frozen_array
 
 MIN_TAPERS = 3  # smallest number of averaged spectra; fewer are too noisy to show the dominant wave
 # Largest number of averaged spectra; more blur the dominant wave and do not narrow the intervals.
 MAX_TAPERS = 16
-# Largest number of samples that are not trimmed to a length with a fast transform.
-MAX_UNTRIMMED = 65_536
 BLUR_FRACTION = 0.15  # half-width of the smoothing relative to the frequency of the dominant wave
 BAND = (
     60e-6,
@@ -72,36 +71,32 @@ def estimate_spectrum(z: np.ndarray, step: float, tapers: int | None = None) -> 
     Parameters
     ----------
     z : (n,) array [m]
-        Evenly spaced heights; their mean is subtracted. Beyond 65536 samples up to 0.1 % are left
-        out at the end.
+        Evenly spaced heights; their mean is subtracted.
     step : float [m]
     tapers : int, optional
         Spectra that are averaged; by default as many as smooth over 15 % of the dominant frequency
         to either side.
     """
-    from scipy.fft import prev_fast_len
-
-    n = z.size if z.size <= MAX_UNTRIMMED else prev_fast_len(z.size + 1, real=True) - 1
-    z = z[:n] - z[:n].mean()
-    if tapers is None:
-        first = _average_tapers(z, step, min(MIN_TAPERS, max(n // 4, 1)))
-        wave = first.dominant_wavelength
-        if wave is None:
-            return first
-        n_tapers = np.floor(2 * BLUR_FRACTION * n * step / wave) - 1
-        tapers = int(np.clip(n_tapers, MIN_TAPERS, MAX_TAPERS))
-    return _average_tapers(z, step, tapers)
+    z = z - z.mean()
+    if tapers is not None:
+        return _average_tapers(z, step, tapers)
+    first = _average_tapers(z, step, min(MIN_TAPERS, max(z.size // 4, 1)))
+    wave = first.dominant_wavelength
+    if wave is None:
+        return first
+    n_tapers = np.floor(2 * BLUR_FRACTION * z.size * step / wave) - 1
+    return _average_tapers(z, step, int(np.clip(n_tapers, MIN_TAPERS, MAX_TAPERS)))
 
 
 def _average_tapers(z, step: float, tapers: int) -> Spectrum:
     """Return the mean of the spectra under the sine tapers 1, 2, ... of heights without their mean."""
-    from scipy.fft import rfft
-
     n = z.size
-    total = np.zeros(n + 1)
+    places = np.arange(1, n + 1) / (n + 1)
+    total = 0.0
     for k in range(1, tapers + 1):
-        taper = np.sin(np.pi * k * np.arange(1, n + 1) / (n + 1))
-        total += np.abs(rfft(z * taper, 2 * (n + 1))[1:]) ** 2
-    density = total * (4 * step / (n + 1) / tapers)
-    frequency = np.arange(1, n + 2) / ((n + 1) * step) / 2
-    return Spectrum(frozen_array(frequency), frozen_array(density), tapers, n * step)
+        frequency, density = signal.periodogram(
+            z, 1 / step, np.sin(np.pi * k * places), 2 * (n + 1), detrend=False
+        )
+        total = total + density[1:] / tapers
+    total[-1] *= 2  # both sides of the last frequency, as of all others
+    return Spectrum(frozen_array(frequency[1:]), frozen_array(total), tapers, n * step)

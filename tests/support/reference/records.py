@@ -23,8 +23,6 @@ TRACK_PARTS = (
     "area_gross",
     "area_net",
     "pile_up",
-    "pile_up_left",
-    "pile_up_right",
     "length",
     "volume",
     "direction",

@@ -131,8 +131,8 @@ def test_refuses_mixed_and_small_surfaces():
     trace = Profile(before.x, before.z[0], "trace")
     for arguments, message in (
         ((before, trace), "two traces are needed, or two areal scans"),
-        ((before, after, Options(shift=0.0)), "areal scans are registered automatically"),
-        ((before, after, Options(datum="straight")), "the plane of areal scans is fitted"),
+        ((before, after, Options(shift=0.0)), "can be given only for traces"),
+        ((before, after, Options(datum="straight")), "can be given only for traces"),
     ):
         with pytest.raises(PatchfemError, match=message):
             compare_surfaces(*arguments)

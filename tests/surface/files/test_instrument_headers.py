@@ -139,7 +139,7 @@ def test_exact_given_units_override_header_with_note(tmp_path):
 def test_exact_matrix_with_given_pixel_size(tmp_path):
     """A matrix without a header is read with a given pixel size, as text and as .npy.
 
-    A size in the header is ignored with a note.
+    It overrules a size in the header.
     """
     z = np.where(np.arange(Z.size).reshape(Z.shape) == 5, np.nan, Z)
     rows = "\n".join(" ".join(repr(float(height)) for height in row) for row in z) + "\n"
@@ -149,10 +149,8 @@ def test_exact_matrix_with_given_pixel_size(tmp_path):
     assert_scan_equal(found, (0.8e-6, 0.8e-6), z * 1e-9)
     scan_with_size = read_text(tmp_path, f"# Width: 4 um\n# Height: 3 um\n{rows}", ("0.8 um", "nm"))
     assert_scan_equal(scan_with_size, (0.8e-6, 0.8e-6), z * 1e-9)
-    assert len(scan_with_size.notes) == 2
-    assert "the pixel size that you gave, 0.8 um, is used" in scan_with_size.notes[0]
     for text, units, message in (
-        (PAIRS, ("0.8 um", "nm"), "is a pixel size, which is needed only for a matrix"),
+        (PAIRS, ("0.8 um", "nm"), "the size of a pixel is needed only for a matrix"),
         (rows, ("-1 um", "nm"), "unknown unit '-1 um'"),
         (rows, ("0.8 um", "2 nm"), "unknown"),
     ):

@@ -70,21 +70,6 @@ def test_exact_missing_heights_keep_their_positions(tmp_path):
     assert np.array_equal(profile.z[[0, 5, 7]], np.array([1.0, 2.0, 1.0]) * UM)
 
 
-def test_exact_samples_with_equal_x_are_averaged(tmp_path):
-    """Samples with equal x are replaced by their mean, with a note."""
-    profile = read_content(
-        tmp_path, "# a step\nx [um],z [um]\n0,1\n1,1\n1,2\n1,nan\n4,3\n4,nan\n9,3\n"
-    )
-    assert profile.x == pytest.approx(np.array([0, 1, 4, 9]) * UM) and profile.z == pytest.approx(
-        np.array([1, 1.5, 3, 3]) * UM
-    )
-    path = tmp_path / "before.csv"
-    assert profile.notes == (
-        f"{path}: 3 samples have the same x as another sample (the first in line 5); the mean of "
-        "their heights is used",
-    )
-
-
 @pytest.mark.parametrize("step", [0.052, 0.37137, 7.3])
 def test_exact_rounded_x_becomes_evenly_spaced(tmp_path, step):
     """Values of x that the file rounds become evenly spaced, with a note; exact values give no note."""
@@ -189,6 +174,8 @@ REFUSED = {
                                                   "only rise or only fall, so keep one trace or scan per file",
     "x [um],z [um]\n4,1\n1,2\n2,1\n0,2\n": "{path}:4: x reverses: 1 um and then 2 um; x must only rise or "
                                            "only fall, so keep one trace or scan per file",
+    "x [um],z [um]\n0,1\n1,1\n1,2\n4,3\n": "{path}:4: x reverses: 1 um and then 1 um; x must "
+                                          "only rise or only fall, so keep one trace or scan per file",
     "x [um],z [um]\n5,1\n5,2\n": "{path}: every sample lies at x = 5 um; a surface needs at least two different x",
     "x [um],z [um]\n" + "1" * 2000: "{path}:2: '1111111111111111111111111111111111111...': 2 numbers are needed; "
                                     "write nan for a missing height",

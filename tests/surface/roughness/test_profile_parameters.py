@@ -139,7 +139,10 @@ def test_exact_fitting_cutoff_is_longest_standard_one(length, expected):
             lambda: make_report(make_trace(np.zeros(99)), window=(50 * UM, 20 * UM)),
             "the window runs",
         ),
-        (lambda: make_report(make_trace(np.zeros(99)), window=(0.0,)), "needs two positions"),
+        (
+            lambda: make_report(make_trace(np.zeros(99)), window=(0.0,)),
+            "a window needs a first and a last position along x",
+        ),
         (lambda: parse_form_option("2"), "use 1"),
         (lambda: subtract_form(make_trace([0.0, 1.0]), "circle"), "needs at least 10"),
     ],
