@@ -49,9 +49,8 @@ def place_over_patch(profile: Profile, x: np.ndarray) -> Profile:
     if not _covers(known, x):
         shift = float(x[0] + x[-1] - known[0] - known[-1]) / 2
         digit = 10.0 ** np.floor(np.log10(ROUND_OFF * np.median(np.diff(known))))
-        first, last, added = (
-            format_length(digit * round(length / digit)) for length in (known[0], known[-1], shift)
-        )
+        rounded = digit * np.rint(np.array([known[0], known[-1], shift]) / digit)
+        first, last, added = map(format_length, rounded.tolist())
         notes += (
             f"{profile.source}: x runs from {first} to {last} in the file and does not cover the patch, from "
             f"{format_length(x[0])} to {format_length(x[-1])}; {NOTES[0]}, which adds {added} to x",

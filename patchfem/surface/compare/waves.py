@@ -22,7 +22,8 @@ RATIO_ERROR = 0.004  # standard deviation of a ratio due to tip, interpolation a
 MAX_NOISE_FRACTION = 0.5  # noise relative to the size of the surface above which a ratio is unknown
 MIN_WAVES = 3.0  # smallest length of a trace relative to the longest wave of the band
 MIN_STEPS = 4.0  # smallest length of the shortest wave of the band in steps
-POWERS = {"Ra": 1.0, "Rq": 0.5, "slope": 0.5}  # of the mean over sections, which gives the size
+# Power of the mean over sections that gives a size of the roughness.
+POWERS = {"Ra": 1.0, "Rq": 0.5, "slope": 0.5}
 
 
 def compare_waves(
@@ -71,16 +72,18 @@ def compare_waves(
         ("amplitude_ratio", passed, band_noise),
         ("slope_ratio", slopes, noise / step),
     ):
-        blocks = [
-            np.array([np.mean(part**2) for part in np.array_split(size, n_blocks, axis)])
-            for size in sizes
-        ]
+        blocks = [_average_squares(size, n_blocks, axis) for size in sizes]
         smallest = min(block.mean() for block in blocks)
         if not smallest > 0 or error**2 > MAX_NOISE_FRACTION * smallest:
             values[name] = name_unknown(name, "noise")
             continue
         values[name] = _divide_means(*blocks, 0.5, DEFINITIONS[name][1])._replace(name=name)
     return values
+
+
+def _average_squares(values, n_blocks: int, axis: int) -> np.ndarray:
+    """Return the mean squares (n_blocks,) of blocks of values (k, n)."""
+    return np.array([np.mean(part**2) for part in np.array_split(values, n_blocks, axis)])
 
 
 def _filter(z, wave: float) -> np.ndarray:
@@ -150,19 +153,12 @@ def measure_roughness(depths: DepthMap, spans: list[tuple[int, int]]) -> tuple[d
             z = getattr(depths, side)
             rough = z - mean_surface(z, (cutoff / step,))
             sizes[side] = _measure_sections(rough, sections, step)
-        regions[region] = {
-            side: {name: _average(name, values) for name, values in table.items()}
-            for side, table in sizes.items()
-        }
-        regions[region]["ratio"] = {
-            name: _divide_means(
-                sizes["before"][name],
-                sizes["after"][name],
-                power,
-                f"{DEFINITIONS[name][1]}, after wear divided by before",
-            )
-            for name, power in POWERS.items()
-        }
+        regions[region] = {side: _average_all(table) for side, table in sizes.items()}
+        regions[region]["ratio"] = {}
+        for name, power in POWERS.items():
+            pair = (sizes[side][name] for side in ("before", "after"))
+            text = f"{DEFINITIONS[name][1]}, after wear divided by before"
+            regions[region]["ratio"][name] = _divide_means(*pair, power, text)
     return regions, cutoff
 
 
@@ -177,9 +173,12 @@ def _measure_sections(z, sections: list, step: float) -> dict[str, np.ndarray]:
     }
 
 
-def _average(name: str, values) -> Quantity:
-    """Return a size of all sections together; their means (k,) are of its square, but for Ra."""
-    mean = values.mean()
-    error = SIDE * values.std(ddof=1) / np.sqrt(len(values)) if len(values) > 1 else mean
-    bounds = np.array([mean, max(mean - error, 0.0), mean + error])
-    return name_quantity(name, *bounds ** POWERS[name])
+def _average_all(table: dict[str, np.ndarray]) -> dict[str, Quantity]:
+    """Return the sizes of all sections together; means (k,) of sections are of the square, but for Ra."""
+    sizes = {}
+    for name, values in table.items():
+        mean = values.mean()
+        error = SIDE * values.std(ddof=1) / np.sqrt(len(values)) if len(values) > 1 else mean
+        bounds = np.array([mean, max(mean - error, 0.0), mean + error])
+        sizes[name] = name_quantity(name, *bounds ** POWERS[name])
+    return sizes

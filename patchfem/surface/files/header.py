@@ -139,11 +139,8 @@ def parse_column(cell: str) -> Column:
     match = _COLUMN.fullmatch(cell) if len(cell) <= MAX_NAME else None
     if match and match[6] and not parse_length_unit(match[6]):
         match = None  # the second word of a name
-    unit = (
-        next((part.strip() for part in match.groups()[1:] if part is not None), None)
-        if match
-        else None
-    )
+    parts = match.groups()[1:] if match else ()
+    unit = next((part.strip() for part in parts if part is not None), None)
     name = (match[1] if match else cell).strip(" _").lower()
     return Column(ROLES.get(name, name), unit, cell)
 

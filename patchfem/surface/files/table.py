@@ -97,8 +97,8 @@ def make_surface(table: Table, units: tuple[str, str] | None = None) -> Profile 
     table = _set_axes(table, pixel)
     for role in table.columns:
         # The size of a pixel gives places in metres.
-        given = "m" if pixel and role != "z" else units[role == "z"] if units else None
-        table = _convert_column(table, role, given)
+        given = units[role == "z"] if units else None
+        table = _convert_column(table, role, "m" if pixel and role != "z" else given)
         _check_numbers(table, role)
     _require_heights(table)
     if table.columns["z"].ndim == 1 and "y" in table.columns:

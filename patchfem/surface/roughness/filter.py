@@ -82,10 +82,9 @@ def mean_line(z: np.ndarray, cutoff: float) -> np.ndarray:
     offsets, weight = _gaussian_weights(cutoff, z.size)
     # A convolution reverses the weights.
     kernels = (weight, -offsets * weight, offsets**2 * weight)
-    sum_w, sum_wt, sum_wtt = (
-        signal.fftconvolve(np.ones(z.size), kernel, "same") for kernel in kernels
-    )
-    sum_wz, sum_wtz = (signal.fftconvolve(z, kernel, "same") for kernel in kernels[:2])
+    ones = np.ones(z.size)
+    sum_w, sum_wt, sum_wtt = [signal.fftconvolve(ones, kernel, "same") for kernel in kernels]
+    sum_wz, sum_wtz = [signal.fftconvolve(z, kernel, "same") for kernel in kernels[:2]]
     return (sum_wz * sum_wtt - sum_wtz * sum_wt) / (sum_w * sum_wtt - sum_wt**2)
 
 

@@ -213,13 +213,15 @@ def _measure_waves(primary: Profile, spectrum: Spectrum) -> list[Quantity]:
     of_octave = (
         "wavelength of the octave with the largest mean square height, of the levelled trace"
     )
-    return [
-        Quantity(value, None, None, "m", text, "" if value is not None else reason, name)
-        for name, value, text, reason in (
-            ("dominant_wavelength", spectrum.dominant_wavelength, of_octave, "undetermined"),
-            ("band_amplitude", amplitude, of_band, "band"),
-        )
-    ]
+    rows = (
+        ("dominant_wavelength", spectrum.dominant_wavelength, of_octave, "undetermined"),
+        ("band_amplitude", amplitude, of_band, "band"),
+    )
+    quantities = []
+    for name, value, text, reason in rows:
+        reason = "" if value is not None else reason
+        quantities.append(Quantity(value, None, None, "m", text, reason, name))
+    return quantities
 
 
 def _name_value(letter: str, name: str, value: float | None) -> Quantity:
@@ -262,10 +264,9 @@ def crop(surface: Profile | Areal, *ends: float) -> Profile | Areal:
         raise PatchfemError(
             f"{surface.source}: a window needs a first and a last position along {' and along '.join(names)}"
         )
-    parts = {
-        name: _find_part(surface.source, name, getattr(surface, name), pair)
-        for name, pair in zip(names, (ends[:2], ends[2:]))
-    }
+    parts = {}
+    for name, pair in zip(names, (ends[:2], ends[2:])):
+        parts[name] = _find_part(surface.source, name, getattr(surface, name), pair)
     axes = {name: getattr(surface, name)[part] for name, part in parts.items()}
     return replace(surface, **axes, z=surface.z[tuple(parts[name] for name in reversed(names))])
 

@@ -6,9 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from patchfem.surface import Profile
+from patchfem.surface import Profile, read_surface
 from patchfem.surface.compare.compare import compare_surfaces
-from patchfem.surface.files.read import read_surface
 
 UM = 1e-6
 FILE = Path(os.environ.get("PATCHFEM_DATA") or "no folder") / "dektak-1.csv"
