@@ -3,7 +3,6 @@
 from dataclasses import replace
 
 import numpy as np
-from scipy.interpolate import make_interp_spline
 
 from ..core import PatchfemError, frozen_array
 from ..formatting import format_length
@@ -104,6 +103,8 @@ def average_at_nodes(profile: Profile, x: np.ndarray, integral=None) -> np.ndarr
     _require_cover(profile.source, profile.x, x)
     edges = np.concatenate([x[:1], (x[1:] + x[:-1]) / 2, x[-1:]])
     if integral is None:
+        from scipy.interpolate import make_interp_spline
+
         integral = make_interp_spline(profile.x, profile.z, k=1).antiderivative()
     inside = np.clip(edges, profile.x[0], profile.x[-1])
     ends = np.where(edges < inside, profile.z[0], profile.z[-1])

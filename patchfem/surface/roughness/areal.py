@@ -4,7 +4,6 @@ Missing heights give no point, no slope, no cell of the area and no pair of heig
 """
 
 import numpy as np
-from scipy import fft, ndimage
 
 from .parameters import compute_core, compute_moments
 
@@ -90,6 +89,8 @@ def autocorrelation(z: np.ndarray) -> np.ndarray:
     Missing heights are NaN. Returns (2 (m // 2) + 1, 2 (n // 2) + 1) with the zero lag in the
     middle; each lag averages its measured pairs.
     """
+    from scipy import fft
+
     known = ~np.isnan(z)
     halves = [count // 2 for count in z.shape]
     shape = [fft.next_fast_len(count + half + 1, real=True) for count, half in zip(z.shape, halves)]
@@ -104,6 +105,8 @@ def autocorrelation(z: np.ndarray) -> np.ndarray:
 
 def _find_decay_lengths(rho, steps: tuple[float, float]) -> np.ndarray:
     """Return the distance [m] at which an autocorrelation falls to 0.2 in each direction; inf where it does not."""
+    from scipy import ndimage
+
     sizes = (np.array(rho.shape) // 2) * steps
     radius = np.arange(0.0, float(np.hypot(*sizes)), min(steps) / RAY_POINTS)
     angle = np.linspace(0.0, np.pi, N_RAYS, endpoint=False)

@@ -3,7 +3,6 @@
 from dataclasses import replace
 
 import numpy as np
-from scipy import signal
 
 from ...core import PatchfemError, frozen_array
 from ...formatting import format_length
@@ -63,6 +62,8 @@ def mean_surface(z: np.ndarray, cutoffs: tuple[float, ...]) -> np.ndarray:
 
     Missing heights are NaN in both. Cut-offs in steps along each axis. A million heights take 0.2 s.
     """
+    from scipy import signal
+
     known = ~np.isnan(z)
     sums = []
     for values in (np.where(known, z, 0.0), known.astype(float)):
@@ -79,6 +80,8 @@ def mean_line(z: np.ndarray, cutoff: float) -> np.ndarray:
 
     The weights that an end cuts off fit a straight line, not a constant (ISO 16610-28, first moment). Cut-off in steps.
     """
+    from scipy import signal
+
     offsets, weight = _gaussian_weights(cutoff, z.size)
     # A convolution reverses the weights.
     kernels = (weight, -offsets * weight, offsets**2 * weight)
