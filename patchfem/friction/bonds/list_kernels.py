@@ -13,11 +13,10 @@ from typing import NamedTuple
 
 import numpy as np
 from numba import uint64
-from numpy.polynomial.legendre import leggauss
 
 from ...compiled.jit import njit
 from ..flags_kernels import NJIT_KERNEL, NJIT_NO_REFCOUNT
-from .list_math_kernels import fast_exp, power
+from .list_math_kernels import LONG_RULE, MAX_SHORT_PANEL, SHORT_RULE, fast_exp, power
 from .list_rows_kernels import (
     FORM_GROWING,
     FORM_REPORT,
@@ -69,11 +68,6 @@ MIN_ENERGY_STEP_SPREAD = 1e-6
 MAX_SIMPSON_STEP = 0.1
 MAX_SIMPSON_STEP_STEEP = 0.03  # the same limit for an order below 1
 MAX_PANEL_LENGTH = 0.5  # largest length of the first panel of Gauss points, in bond lengths
-MAX_SHORT_PANEL = 0.1  # largest length of a panel with fewer Gauss points, in bond lengths
-N_SHORT_POINTS = 3
-N_LONG_POINTS = 5
-SHORT_POINTS, SHORT_WEIGHTS = leggauss(N_SHORT_POINTS)
-LONG_POINTS, LONG_WEIGHTS = leggauss(N_LONG_POINTS)
 # Increment [bond lengths] at which the slope of the force at rest is the mean of both directions
 SLOPE_INCREMENT_RATIO = 1e-9
 
@@ -388,7 +382,7 @@ def _add_to_mean(weight, row, bonds):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def _integrate_panels(weight, row, increment, bonds, v0, dt):
-    """Add a row, averaged over an increment by panels of five Gauss points, to the row of the mean force.
+    """Add a row, averaged over an increment by panels of Gauss points, to the row of the mean force.
 
     Each panel is twice as long as the one before. The last one may be short, so that the mean force depends continuously
     on the increment.
@@ -398,9 +392,8 @@ def _integrate_panels(weight, row, increment, bonds, v0, dt):
     high = min(MAX_PANEL_LENGTH / path, 1.0)
     while low < 1:
         is_short = path * (high - low) <= MAX_SHORT_PANEL and bonds.law[LAW.order] >= 0
-        for k in range(N_SHORT_POINTS if is_short else N_LONG_POINTS):
-            point = SHORT_POINTS[k] if is_short else LONG_POINTS[k]
-            point_weight = SHORT_WEIGHTS[k] if is_short else LONG_WEIGHTS[k]
+        rule = SHORT_RULE if is_short else LONG_RULE
+        for point, point_weight in zip(rule[0], rule[1]):
             fraction = low + (high - low) * (1 + point) / 2
             sum_list(fraction, increment, bonds, v0, dt)
             _add_to_mean(weight * (high - low) * point_weight / 2, row, bonds)
