@@ -18,6 +18,7 @@ from .keys.types import (
     find_inner_table,
     find_meaning,
     find_quantity_kind,
+    list_inner_tables,
 )
 
 SCHEMA_DIALECT = "https://json-schema.org/draft/2020-12/schema"
@@ -29,7 +30,7 @@ UNIT_SPELLINGS = {"u": "[uµμ]", "^2": "(?:\\^2|²)", "^3": "(?:\\^3|³)", " ":
 
 def make_schema() -> dict:
     """Return the JSON schema (draft 2020-12) of a scene: meaning, limits, default, unit of keys."""
-    tables = sorted(_list_inner_models(Tables), key=lambda model: model.__name__)
+    tables = sorted(set(list_inner_tables(Tables).values()), key=lambda model: model.__name__)
     definitions = {model.__name__: _describe_table(model) for model in tables}
     definitions[Material.__name__] = _describe_material(definitions[Material.__name__])
     scene = _describe_table(Tables)
@@ -38,12 +39,6 @@ def make_schema() -> dict:
     # Pydantic describes each table by itself, in which an inner table is only named.
     text = json.dumps(schema).replace(f'"{TABLE_WORD}": "', '"$ref": "#/$defs/')
     return json.loads(text)
-
-
-def _list_inner_models(model: type[Table]) -> set[type[Table]]:
-    """Return the models of all tables inside a table, at any depth."""
-    inner = {find_inner_table(model, name) for name in attributes_by_key(model).values()} - {None}
-    return inner.union(*map(_list_inner_models, inner))
 
 
 def _describe_table(model: type[Table]) -> dict:

@@ -299,6 +299,18 @@ def find_inner_table(model: type[BaseModel], name: str) -> type[Table] | None:
 
 
 @cache
+def list_inner_tables(model: type[BaseModel]) -> dict[str, type[Table]]:
+    """Return a dict that maps the dotted key of every table inside a table, at any depth, to its model."""
+    tables = {}
+    for key, name in attributes_by_key(model).items():
+        inner = find_inner_table(model, name)
+        if inner is not None:
+            tables[key] = inner
+            tables |= {f"{key}.{deeper}": last for deeper, last in list_inner_tables(inner).items()}
+    return tables
+
+
+@cache
 def is_array_attribute(model: type[BaseModel], name: str) -> bool:
     """Return whether an attribute holds an array, of values or of tables."""
     return get_origin(model.model_fields[name].annotation) is tuple
