@@ -8,6 +8,7 @@ from typing import Any
 
 from pydantic import ValidationError
 
+from ..effects import MAX_COORDINATES
 from .keys.lookup import (
     LIMITS_BY_ERROR_TYPE,
     KeyDefinition,
@@ -74,6 +75,12 @@ def _read_inner(draft: SceneDraft, definition: KeyDefinition, value: Any, path: 
         if isinstance(value, dict):
             return _read_table(draft, inner, value, path)
         draft.add_mistake(path, f"a table [{path}] is needed, not {format_for_message(value)}")
+    elif isinstance(value, list) and len(value) > MAX_COORDINATES:
+        draft.add_mistake(
+            path,
+            f"{len(value)} tables are too many; at most {MAX_COORDINATES} are possible; many modes or masses belong "
+            "into a file of arrays that structure.file names",
+        )
     elif isinstance(value, list) and value and all(isinstance(item, dict) for item in value):
         return tuple(_read_table(draft, inner, item, f"{path}.{k}") for k, item in enumerate(value))
     else:

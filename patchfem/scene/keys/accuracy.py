@@ -1,30 +1,13 @@
 """The table [accuracy] of a scene."""
 
-from typing import Annotated, Literal
+from typing import Literal
 
-from pydantic import BeforeValidator
-
-from .removed import describe_removed
 from .types import Fraction, Table, key, number, whole_number
 
 # Largest number of time steps per cycle; more would take days for a single cycle.
 MAX_STEPS_PER_CYCLE = 10_000_000
 # Largest number of harmonics or shear modes; more make the dense matrices too large.
 MAX_MODES = 10_000
-
-
-def _refuse_removed(value: object) -> object:
-    """Return a value of a key; raise ValueError for a removed value, with the replacement."""
-    for name in ("accuracy.method", "accuracy.quadrature"):
-        if sentence := describe_removed(f"{name}={value}", f"'{value}'"):
-            raise ValueError(sentence)
-    return value
-
-
-Quadrature = Annotated[
-    Literal["auto", "direct", "truncated", "merged", "recursion"], BeforeValidator(_refuse_removed)
-]
-Method = Annotated[Literal["auto", "exact", "march", "harmonic"], BeforeValidator(_refuse_removed)]
 
 
 class Accuracy(Table):
@@ -36,7 +19,7 @@ class Accuracy(Table):
         "follow from this tolerance",
     ) = 1e-3
     method: key(
-        Method,
+        Literal["auto", "exact", "march", "harmonic"],
         "method that computes the motion; default: the program chooses a method for the scene",
     ) = "auto"
     steps_per_cycle: key(
@@ -44,7 +27,7 @@ class Accuracy(Table):
         "time steps per cycle; default: set by the tolerance",
     ) = None
     quadrature: key(
-        Quadrature,
+        Literal["auto", "direct", "truncated", "merged", "recursion"],
         "method that computes the sum over bonds; default: the fastest method that meets the "
         "tolerance",
     ) = "auto"

@@ -180,6 +180,9 @@ def describe_error(definition: KeyDefinition, error: Any, value: Any) -> str:
         return f"must be {limit.sign} {bound}, not {format_for_message(value)}; {needed}"
     if error["type"] == "too_short" and value and error["ctx"]["min_length"] > 1:
         return f"at least {error['ctx']['min_length']} values are needed, not {len(value)}"
+    if error["type"] == "too_long":
+        most = error["ctx"]["max_length"]
+        return f"{len(value)} values are too many; at most {most} are possible"
     if error["type"] == "value_error":
         return str(error["ctx"]["error"])
     allowed = list_allowed_values(*definition)

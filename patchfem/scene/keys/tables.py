@@ -10,7 +10,7 @@ from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import Field, field_validator
 
-from ...effects import LAWS, WAVEFORMS
+from ...effects import LAWS, MAX_COORDINATES, WAVEFORMS
 from .accuracy import Accuracy
 from .contact import Contact, Grooves
 from .quantities import format_si, parse_quantity
@@ -421,7 +421,7 @@ class Structure(Table):
     stiffening: Stiffening | None = None
     bonded: Bonded | None = None
     masses: key(
-        tuple[Mass, ...] | None,
+        Annotated[tuple[Mass, ...], Field(max_length=MAX_COORDINATES)] | None,
         "masses that are connected by springs; these masses replace the modes",
     ) = None
     output_mass: key(
