@@ -85,32 +85,6 @@ BOUNDS = Form(
 )
 
 
-class FormattedNumbers(Sequence):
-    """Sequence of numbers, each formatted as text only when it is accessed.
-
-    Parameters
-    ----------
-    numbers : array of float64
-        Numbers in this unit.
-    unit : str
-        Unit of the scene; "" for plain numbers.
-    """
-
-    __slots__ = "numbers", "unit"
-
-    def __init__(self, numbers: array, unit: str):
-        self.numbers = numbers
-        self.unit = unit
-
-    def __len__(self) -> int:
-        return len(self.numbers)
-
-    def __getitem__(self, index: int | slice) -> str | list[str]:
-        if isinstance(index, slice):
-            return [_format_with_unit(number, self.unit) for number in self.numbers[index]]
-        return _format_with_unit(self.numbers[index], self.unit)
-
-
 @dataclass(frozen=True, slots=True)
 class Axis:
     """Swept key with its values.
@@ -157,13 +131,8 @@ class Interval(NamedTuple):
             return float(self.high if fraction else self.low)
         return float(self.low) * (float(self.high) / float(self.low)) ** float(fraction)
 
-    def list_texts(self) -> list[str]:
-        """Return the values of the range as a scene writes them."""
-        if not 2 <= self.count <= MAX_RANGE_VALUES:
-            raise ValueError(
-                f"{self.text}: give the number of values after a colon, from 2 to {MAX_RANGE_VALUES}, such as :9"
-            )
-        fractions = (Fraction(k, self.count - 1) for k in range(self.count))
+    def list_texts(self, fractions: Iterable[Fraction | float]) -> list[str]:
+        """Return the values at the given fractions of the range, as a scene writes them."""
         return [_format_with_unit(self.interpolate(part), self.unit) for part in fractions]
 
 
@@ -195,8 +164,7 @@ class Range:
 
     def make_axis(self, fractions: Iterable[float]) -> Axis:
         """Return the key with the values at the given fractions of its range."""
-        numbers = array("d", map(self.interval.interpolate, fractions))
-        texts = FormattedNumbers(numbers, self.interval.unit)
+        texts = self.interval.list_texts(fractions)
         return Axis(
             self.key, texts, array("d", map(_make_value_reader(self.key), texts)), self.unit
         )
@@ -379,7 +347,13 @@ def _list_texts(key: str, piece: str) -> list[str]:
             f"{piece}: write this range as {about}:9 for 9 values in it, or as {about} with --random"
         )
     interval = _parse_interval(key, piece)
-    return [piece] if interval is None else interval.list_texts()
+    if interval is None:
+        return [piece]
+    if not 2 <= interval.count <= MAX_RANGE_VALUES:
+        raise ValueError(
+            f"{interval.text}: give the number of values after a colon, from 2 to {MAX_RANGE_VALUES}, such as :9"
+        )
+    return interval.list_texts(Fraction(k, interval.count - 1) for k in range(interval.count))
 
 
 def _parse_interval(key: str, piece: str) -> Interval | None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cached_property
+
 from ...effects import (
     law_has_trait,
     law_takes_key,
@@ -12,7 +14,7 @@ from ..keys.tables import Friction
 from .methods import find_climbed_grooves
 from .rule_table import MissingKeyRule, MistakeRule, RemarkRule, TableFacts, apply_rules
 from .scene_draft import SceneDraft
-from .view import UNKNOWN_VALUE, TableView
+from .view import TableView
 
 
 class LawFacts(TableFacts):
@@ -32,11 +34,10 @@ class LawFacts(TableFacts):
         """Return whether the law has a trait of `effects.LAWS[...].traits`."""
         return law_has_trait(self.table.law, trait)
 
-    @property
-    def normal_load(self) -> float:
-        """Mean normal load [N] of the contact, or UNKNOWN_VALUE if the scene prescribes its approach."""
-        own = self.load if self.table_key != "friction" else UNKNOWN_VALUE
-        return own or self.contact.load or self.scene.normal.load
+    @cached_property
+    def unused_keys(self) -> list[str]:
+        """Keys without effect, because the length of the bonds is constant or does not grow at rest."""
+        return find_unused_law_keys(self.table)
 
     @property
     def has_unsupported_kinetic(self) -> bool:
@@ -91,13 +92,13 @@ LAW_RULES = (
         lambda law: (
             not law.has_unsupported_kinetic
             and not law.is_kinetic_larger
-            and is_kinetic_unused(law.table)
+            and "kinetic" in law.unused_keys
         ),
         "{table_key}.kinetic",
         "has no effect while the bond length is constant; add rest_growth and slip_growth",
     ),
     RemarkRule(
-        lambda law: is_rest_speed_unused(law.table),
+        lambda law: "rest_speed" in law.unused_keys,
         "{table_key}.rest_speed",
         "has no effect while the bond length is constant; add rest_growth and slip_growth",
     ),
@@ -113,7 +114,7 @@ LAW_RULES = (
         "friction.spread needs this key",
     ),
     RemarkRule(
-        lambda law: is_temperature_unused(law.table),
+        lambda law: "temperature" in law.unused_keys,
         "{table_key}.temperature",
         "has no effect without {missing_temperature_keys}",
     ),
@@ -167,29 +168,18 @@ def _check_law(draft: SceneDraft, table_key: str, law: Friction, contact: Contac
     apply_rules(draft, LAW_RULES, facts)
 
 
-def is_temperature_unused(law: Friction) -> bool:
-    """Return whether a surface temperature has no effect on the growth of bonds."""
-    temperature = law.temperature
-    if temperature is None or not law_has_trait(law.law, "bonds"):
-        return False
-    is_inactive = not temperature.rest_activation and not temperature.slip_activation
-    return is_inactive or (law.rest_growth is None and law.slip_growth is None)
-
-
-def is_kinetic_unused(law: Friction) -> bool:
-    """Return whether a smaller kinetic coefficient is given for bonds of constant length."""
+def find_unused_law_keys(law: Friction) -> list[str]:
+    """Return the keys that have no effect on the bonds of a law, whose length is constant or does not grow at rest."""
+    if not law_has_trait(law.law, "bonds"):
+        return []
     bond = TableView(law)
-    return (
-        law_has_trait(law.law, "bonds")
-        and bond.kinetic < bond.static
-        and not (bond.rest_growth or bond.slip_growth)
-    )
-
-
-def is_rest_speed_unused(law: Friction) -> bool:
-    """Return whether a lower limit of the speed is given for bonds that do not grow at rest."""
-    return (
-        law.rest_speed is not None
-        and law_takes_key(law.law, "rest_speed")
-        and law.rest_growth is None
-    )
+    unused = {
+        "temperature": law.temperature is not None
+        and not (
+            (bond.temperature.rest_activation or bond.temperature.slip_activation)
+            and (law.rest_growth is not None or law.slip_growth is not None)
+        ),
+        "kinetic": bond.kinetic < bond.static and not (bond.rest_growth or bond.slip_growth),
+        "rest_speed": law.rest_speed is not None and law.rest_growth is None,
+    }
+    return [key for key, is_unused in unused.items() if is_unused]

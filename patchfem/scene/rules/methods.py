@@ -167,7 +167,7 @@ def _has_finite_state(joint: Joint, motion: MotionFeatures) -> bool:
         return law in VARYING_LAWS
     if law_has_trait(law, "bonds"):
         moves = bool(motion.lower_shape)
-        return not (needs_bond_list(joint.law) or joint.law.breakaway or moves)
+        return not (needs_bond_list(joint.law) or moves)
     return True
 
 
@@ -340,6 +340,6 @@ def _find_harmonic_law_obstacle(motion: MotionFeatures) -> str:
         )
     if not law_has_trait(law.law, "bonds"):
         return ""
-    keys = [f"friction.{key}" for key in ("rest_growth", "breakaway") if getattr(law, key)]
-    beside = next(filter(None, (*keys, motion.compliance, motion.lower_shape)), "")
+    growth = "friction.rest_growth" if law.rest_growth else ""
+    beside = next(filter(None, (growth, motion.compliance, motion.lower_shape)), "")
     return beside and describe_unsupported(f"'harmonic' with law '{law.law}' and {beside}", "march")
