@@ -12,7 +12,6 @@ from array import array
 from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
-from fractions import Fraction
 from itertools import chain
 from typing import Any, NamedTuple, get_origin
 
@@ -117,23 +116,19 @@ class Interval(NamedTuple):
     """
 
     text: str
-    low: Fraction
-    high: Fraction
+    low: float
+    high: float
     unit: str
     count: int
     is_log: bool
 
-    def interpolate(self, fraction: Fraction | float) -> float:
-        """Return the value at a given fraction of the range."""
-        if not self.is_log:
-            return float(self.low + (self.high - self.low) * fraction)
-        if fraction in (0, 1):
-            return float(self.high if fraction else self.low)
-        return float(self.low) * (float(self.high) / float(self.low)) ** float(fraction)
-
-    def list_texts(self, fractions: Iterable[Fraction | float]) -> list[str]:
+    def list_texts(self, fractions: Iterable[float]) -> list[str]:
         """Return the values at the given fractions of the range, as a scene writes them."""
-        return [_format_with_unit(self.interpolate(part), self.unit) for part in fractions]
+        if self.is_log:
+            numbers = (self.low ** (1 - part) * self.high**part for part in fractions)
+        else:
+            numbers = (self.low * (1 - part) + self.high * part for part in fractions)
+        return [_format_with_unit(number, self.unit) for number in numbers]
 
 
 @dataclass(frozen=True, slots=True)
@@ -353,7 +348,7 @@ def _list_texts(key: str, piece: str) -> list[str]:
         raise ValueError(
             f"{interval.text}: give the number of values after a colon, from 2 to {MAX_RANGE_VALUES}, such as :9"
         )
-    return interval.list_texts(Fraction(k, interval.count - 1) for k in range(interval.count))
+    return interval.list_texts(k / (interval.count - 1) for k in range(interval.count))
 
 
 def _parse_interval(key: str, piece: str) -> Interval | None:
@@ -377,28 +372,24 @@ def _parse_interval(key: str, piece: str) -> Interval | None:
         low, high = (str(quantities.read_percentage(end)) for end in (low, high))
         if any(re.fullmatch(quantities.NUMBER_PATTERN, end) is None for end in (low, high)):
             raise ValueError(f"{text}: both ends of this range must be plain numbers")
-        ends = Fraction(low), Fraction(high)
+        factor = 1.0
         unit = ""
     else:
-        for end in (low, high):
-            quantities.parse_quantity(end, kind)
-        (low, unit), (high, high_unit) = map(quantities.split_quantity, (low, high))
-        factor = Fraction(_find_factor(high_unit, kind)) / Fraction(_find_factor(unit, kind))
-        ends = Fraction(low), Fraction(high) * factor
+        quantities.parse_quantity(low, kind)
+        high = str(quantities.parse_quantity(high, kind))
+        low, unit = quantities.split_quantity(low)
+        factor = quantities.UNIT_FACTORS[kind][quantities.normalize_unit(unit)]
+    ends = _round(float(low)), _round(float(high) / factor)
     if ends[0] == ends[1]:
         raise ValueError(f"{text}: both ends are the same value")
     return Interval(text, *ends, unit, int(count or 0), _is_log(*ends, spacing))
 
 
-def _find_factor(unit: str, kind: str) -> str:
-    return repr(quantities.UNIT_FACTORS[kind][quantities.normalize_unit(unit)])
-
-
-def _is_log(low: Fraction, high: Fraction, spacing: str | None) -> bool:
+def _is_log(low: float, high: float, spacing: str | None) -> bool:
     """Return whether the values of a range are spaced logarithmically."""
     is_positive = low > 0 and high > 0
     if spacing is None and is_positive:
-        return max(low / high, high / low) >= MIN_LOG_RATIO
+        return _round(max(low / high, high / low)) >= MIN_LOG_RATIO
     if spacing == "log" and not is_positive:
         raise ValueError("a logarithmic range needs both ends > 0")
     return spacing == "log"
@@ -414,8 +405,8 @@ def _range_about(text: str) -> str:
         return ""
     number, unit, width, width_unit = match.groups()
     try:
-        middle = Fraction(number)
-        half = Fraction(width)
+        middle = float(number)
+        half = float(width)
     except ValueError:  # the string is not a number, such as 1.2.3
         return ""
     if width_unit not in ("%", "", unit):
@@ -425,7 +416,7 @@ def _range_about(text: str) -> str:
         )
     if width_unit == "%":
         half = abs(middle) * half / 100
-    return "..".join(_format_with_unit(float(end), unit) for end in (middle - half, middle + half))
+    return "..".join(_format_with_unit(end, unit) for end in (middle - half, middle + half))
 
 
 def _make_range(key: str, interval: Interval, form: Form) -> Range:
@@ -439,7 +430,7 @@ def _make_range(key: str, interval: Interval, form: Form) -> Range:
         raise ValueError(
             f"{interval.text}:{interval.count}: the values lie anywhere between the ends; leave out :{interval.count}"
         )
-    texts = [_format_with_unit(float(end), interval.unit) for end in interval[1:3]]
+    texts = [_format_with_unit(end, interval.unit) for end in interval[1:3]]
     low, high = map(_make_value_reader(key), texts)
     if not form.has_lists:
         if not low < high:
@@ -550,6 +541,10 @@ def _make_value_reader(key: str) -> Callable[[str], float | str]:
 
 def _format_with_unit(value: float, unit: str) -> str:
     """Format a value of a swept key with its unit."""
-    number = float(f"{value:.{SIGNIFICANT_DIGITS}g}")
     # repr writes whole numbers below 1e16 without an exponent.
-    return f"{repr(number).removesuffix('.0')} {unit}".rstrip()
+    return f"{repr(_round(value)).removesuffix('.0')} {unit}".rstrip()
+
+
+def _round(value: float) -> float:
+    """Return a number rounded to SIGNIFICANT_DIGITS."""
+    return float(f"{value:.{SIGNIFICANT_DIGITS}g}")

@@ -417,6 +417,8 @@ def check_combinations(draft: SceneDraft, kind: str) -> None:
     for joint in joints:
         _check_shape_sides(joint)
         apply_rules(draft, JOINT_RULES if joint.is_read else (), joint)
+        # Many rows name the same feature, which is looked for only once.
+        is_there = cache(lambda name, joint=joint: find_feature(name).is_there(joint))
         reported: set[str] = set()  # one mistake for each key is enough
         for names, instead in SUPPORT:
             first, *others = names.split(", ")
@@ -424,7 +426,7 @@ def check_combinations(draft: SceneDraft, kind: str) -> None:
             is_tried = not joint.is_interface if first in SCENE_FEATURES else joint.is_read
             if not is_tried or feature.key in reported:
                 continue
-            if all(find_feature(name).is_there(joint) for name in (first, *others)):
+            if all(map(is_there, (first, *others))):
                 beside = " and ".join(filter(None, map(name_feature, others)))
                 words = f"{feature.words} with {beside}".strip()
                 message = describe_unsupported(words, instead).format_map(joint)
