@@ -17,20 +17,8 @@ from typing import Any, NamedTuple, get_origin
 
 from ..core import PatchfemError
 from .keys import quantities
-from .keys.lookup import (
-    LIMITS_BY_ERROR_TYPE,
-    find_key,
-    is_table_or_value,
-    validate_value,
-)
-from .keys.types import (
-    attributes_by_key,
-    find_inner_table,
-    find_quantity_kind,
-    is_array_attribute,
-    list_key_types,
-    list_required_keys,
-)
+from .keys.lookup import LIMITS_BY_ERROR_TYPE, find_key, validate_value
+from .keys.types import list_keys, list_required_keys
 from .lines import split_assignment, split_key
 from .reader import read_set_value
 from .suggestions import require_key
@@ -271,7 +259,7 @@ def make_axis(key: str, texts: Iterable[str], *, distinct: bool = True) -> Axis:
     if mistakes:
         raise ValueError("\n".join(mistakes))
     if all(isinstance(value, float) for value in values):
-        kind = find_quantity_kind(*find_key(key))
+        kind = find_key(key).kind
         return Axis(key, texts, tuple(values), quantities.find_si_unit(kind))
     return Axis(key, texts, texts, "")
 
@@ -367,7 +355,7 @@ def _parse_interval(key: str, piece: str) -> Interval | None:
     if all(units) and units[1][1] and not units[0][1]:
         low = f"{low} {units[1][1]}"
 
-    kind = find_quantity_kind(*find_key(key))
+    kind = find_key(key).kind
     if kind is None:
         low, high = (str(quantities.read_percentage(end)) for end in (low, high))
         if any(re.fullmatch(quantities.NUMBER_PATTERN, end) is None for end in (low, high)):
@@ -421,8 +409,8 @@ def _range_about(text: str) -> str:
 
 def _make_range(key: str, interval: Interval, form: Form) -> Range:
     """Return the range in which a key varies; raise ValueError if the key does not accept it."""
-    definition = find_key(key)
-    if float not in list_key_types(*definition):
+    known = find_key(key)
+    if float not in known.types:
         raise ValueError(
             f"{interval.text}: a key that takes whole numbers takes no range; list the values, such as 1,2,3"
         )
@@ -437,7 +425,7 @@ def _make_range(key: str, interval: Interval, form: Form) -> Range:
             raise ValueError(f"{interval.text}: the low bound must lie below the high bound")
         for text, value in zip(texts, (low, high)):
             validate_value(key, text if interval.unit else value)
-    return Range(key, low, high, find_quantity_kind(*definition), interval)
+    return Range(key, low, high, known.kind, interval)
 
 
 def _flatten_table(table: dict, table_key: str = "") -> list[tuple[str, Any]]:
@@ -452,23 +440,18 @@ def _flatten_table(table: dict, table_key: str = "") -> list[tuple[str, Any]]:
 def _require_value_key(key: str, texts: Sequence[str]) -> None:
     """Raise ValueError for an unknown key, or for values that are assigned to a table; suggest keys."""
     first = re.split(r"\.\.", texts[0])[0] if texts else ""
-    model, name = require_key(key, read_set_value("", first))
-    inner = find_inner_table(model, name)
-    if inner is None or is_table_or_value(model, name):
+    known = require_key(key, read_set_value("", first))
+    if known.accepts_value:
         return
     if texts and all(text.startswith(("{", "[", '"', "'")) for text in texts):
         return
-    required = list_required_keys(inner)
-    suggested = [
-        *required,
-        *(inner_key for inner_key in attributes_by_key(inner) if inner_key not in required),
-    ]
+    suggested = list(dict.fromkeys([*list_required_keys(known.inner), *list_keys(known.inner)]))
     pieces = split_key(key)
-    if is_array_attribute(model, name):
+    if known.is_array:
         # The last piece names the array, an item of it, or a key for which no item is named.
         if pieces[-1] in suggested:
             suggested = [pieces.pop()]
-        if pieces[-1] == name:
+        if pieces[-1] == known.name:
             pieces.append("NAME")
     table = ".".join(pieces)
     raise ValueError(
@@ -479,10 +462,9 @@ def _require_value_key(key: str, texts: Sequence[str]) -> None:
 
 def _holds_number(key: str) -> bool:
     """Return whether the value of a key is a single number, with or without unit."""
-    place = find_key(key)
-    types = list_key_types(*place)
-    is_single = find_inner_table(*place) is None and tuple not in map(get_origin, types)
-    return is_single and (float in types or int in types)
+    known = find_key(key)
+    is_single = known.inner is None and tuple not in map(get_origin, known.types)
+    return is_single and (float in known.types or int in known.types)
 
 
 def _split_at_commas(text: str) -> list[str]:
@@ -516,10 +498,10 @@ def _make_value_reader(key: str) -> Callable[[str], float | str]:
 
     The function raises ValueError if the key does not accept the text.
     """
-    place = find_key(key)
-    kind = find_quantity_kind(*place)
+    known = find_key(key)
+    kind = known.kind
     is_number = _holds_number(key)
-    takes_float = float in list_key_types(*place)
+    takes_float = float in known.types
 
     def read_value(text: str) -> float | str:
         if is_number and kind is not None:
@@ -528,7 +510,7 @@ def _make_value_reader(key: str) -> Callable[[str], float | str]:
         if is_number and takes_float and re.fullmatch(quantities.NUMBER_PATTERN, text):
             return float(text)
         value = quantities.read_percentage(read_set_value(key, text))
-        if isinstance(value, dict) and find_inner_table(*place) is not None:
+        if isinstance(value, dict) and known.inner is not None:
             return text
         has_number = isinstance(value, int | float) and not isinstance(value, bool)
         validate_value(

@@ -8,7 +8,7 @@ from .keys import tables
 from .keys.choices import find_choices
 from .keys.contact import Contact
 from .keys.memoize import memoize
-from .keys.types import Table, attributes_by_key, find_inner_table
+from .keys.types import Table, list_keys
 from .rules.accuracy import find_unused_settings
 from .rules.friction import find_unused_law_keys
 from .rules.methods import list_unused_methods
@@ -45,16 +45,16 @@ def complete_table(table: Table) -> Table:
 def _complete_inner_tables(table: Table) -> dict[str, Any]:
     """Return the tables inside a table that differ after their completion, by attribute."""
     changed = {}
-    for name in type(table).model_fields:
-        value = getattr(table, name)
+    for key in list_keys(type(table)).values():
+        value = getattr(table, key.attribute)
         if isinstance(value, Table):
             completed = complete_table(value)
-        elif isinstance(value, tuple) and find_inner_table(type(table), name):
+        elif isinstance(value, tuple) and key.inner is not None:
             completed = tuple(map(complete_table, value))
         else:
             continue
         if completed is not value:
-            changed[name] = completed
+            changed[key.attribute] = completed
     return changed
 
 
@@ -91,6 +91,5 @@ def _complete_mode(mode: tables.Mode, index: int) -> tables.Mode:
 
 def _find_default_values(table: Table, keys: list[str]) -> dict[str, Any]:
     """Return the default values of the given keys, by attribute."""
-    fields = type(table).model_fields
-    names = attributes_by_key(type(table))
-    return {names[key]: fields[names[key]].default for key in keys}
+    known = [list_keys(type(table))[key] for key in keys]
+    return {key.attribute: key.field.default for key in known}

@@ -13,12 +13,10 @@ from .keys.quantities import NUMBER_PATTERN, PERCENTAGE_PATTERN, UNIT_FACTORS, f
 from .keys.tables import Tables
 from .keys.types import (
     TABLE_WORD,
+    Key,
     Table,
-    attributes_by_key,
-    find_inner_table,
-    find_meaning,
-    find_quantity_kind,
     list_inner_tables,
+    list_keys,
 )
 
 SCHEMA_DIALECT = "https://json-schema.org/draft/2020-12/schema"
@@ -45,17 +43,18 @@ def _describe_table(model: type[Table]) -> dict:
     """Return the schema of a table: the meaning and default of each key; null is not allowed."""
     raw = model.model_json_schema(by_alias=True)
     properties = raw.get("properties", {})
-    keys = attributes_by_key(model)
     schema = {
         "type": "object",
         "description": " ".join((model.__doc__ or "").split()),
         "additionalProperties": False,
-        "properties": {key: _describe_key(model, key, properties[key]) for key in keys},
+        "properties": {
+            name: _describe_key(key, properties[name]) for name, key in list_keys(model).items()
+        },
     }
     return schema | ({"required": raw["required"]} if raw.get("required") else {})
 
 
-def _describe_key(model: type[Table], key: str, raw: dict) -> dict:
+def _describe_key(key: Key, raw: dict) -> dict:
     """Return the schema of a key, based on the one that pydantic makes."""
     schema = {word: raw[word] for word in raw if word not in ("title", "anyOf", "default")}
     types = [choice for choice in raw.get("anyOf", []) if choice.get("type") != "null"]
@@ -66,14 +65,13 @@ def _describe_key(model: type[Table], key: str, raw: dict) -> dict:
     default = raw.get("default")
     if default not in (None, "", []) and not isinstance(default, dict):
         schema["default"] = default
-    name = attributes_by_key(model)[key]
-    if kind := find_quantity_kind(model, name):
-        _add_units(schema, kind)
+    if key.kind:
+        _add_units(schema, key.kind)
     elif schema.get("type") == "number":
         number = {word: schema.pop(word) for word in NUMBER_WORDS if word in schema}
         schema["anyOf"] = [number, {"type": "string", "pattern": f"^{PERCENTAGE_PATTERN}$"}]
-    if find_inner_table(model, name) in (None, Material):
-        clauses = (find_meaning(model, key), _describe_selection(model, key))
+    if key.inner in (None, Material):
+        clauses = (key.record.meaning, _describe_selection(key.table, key.name))
         schema["description"] = "; ".join(filter(None, clauses))
     return schema
 

@@ -9,7 +9,6 @@ from typing import Any
 
 from .keys.lookup import find_key
 from .keys.quantities import format_si
-from .keys.types import find_quantity_kind
 from .rules.scene_draft import SceneError
 
 MAX_JOINT_LENGTH = 1.0  # largest length of a joint [m]; of its lengths, only a radius can be larger
@@ -122,8 +121,8 @@ def _to_plain_value(value: Any) -> Any:
 
 def _find_kind(key: str) -> str | None:
     """Return the kind of quantity of a key, or None for a number without unit and an unknown key."""
-    place = find_key(key)
-    return find_quantity_kind(*place) if place.model is not None else None
+    known = find_key(key)
+    return known.kind if known is not None else None
 
 
 def _format_value(key: str, value: Any) -> str:

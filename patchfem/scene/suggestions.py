@@ -9,16 +9,15 @@ from pydantic import ValidationError
 
 from ..effects import join_words
 from .keys.choices import find_selectors, split_keys
-from .keys.lookup import KeyDefinition, find_key, is_table_or_value
+from .keys.lookup import find_key
 from .keys.removed import describe_removed
 from .keys.tables import Tables
 from .keys.types import (
     MIN_NAME_SIMILARITY,
+    Key,
     Table,
-    attributes_by_key,
-    find_inner_table,
-    is_array_attribute,
     list_inner_tables,
+    list_keys,
     list_required_keys,
 )
 from .lines import split_key
@@ -31,7 +30,7 @@ class UnknownKey(NamedTuple):
     suggestion: str
 
 
-def require_key(key: str, value: Any = "") -> KeyDefinition:
+def require_key(key: str, value: Any = "") -> Key:
     """Find a key as `find_key` does; raise ValueError, with the nearest known key, if no scene has it.
 
     Parameters
@@ -41,13 +40,13 @@ def require_key(key: str, value: Any = "") -> KeyDefinition:
     value
         Value that the key is given; a key that accepts it is suggested first.
     """
-    definition = find_key(key)
-    if definition.model is not None:
-        return definition
+    known = find_key(key)
+    if known is not None:
+        return known
     pieces = split_key(key)
-    depth = next(k for k in range(len(pieces)) if find_key(".".join(pieces[: k + 1])).model is None)
+    depth = next(k for k in range(len(pieces)) if not find_key(".".join(pieces[: k + 1])))
     table_key = ".".join(pieces[:depth])
-    model = find_inner_table(*find_key(table_key)) if table_key else Tables
+    model = find_key(table_key).inner if table_key else Tables
     if model is None:
         raise ValueError(f"{table_key} is a value, not a table")
     for piece in reversed(pieces[depth + 1 :]):
@@ -93,11 +92,10 @@ def describe_unknown_key(
         advice = "" if is_near else f" {wrong_table}".rstrip()
         return UnknownKey(f"{subject}; did you mean '{suggestion}'?{advice}", suggestion)
 
-    names = attributes_by_key(model)
-    known = list(names)
+    keys = list_keys(model)
+    known = list(keys)
     if is_table:
-        tables = [name for name in list_inner_tables(model) if "." not in name]
-        known = [name for name in tables if not is_table_or_value(model, names[name])] or known
+        known = [name for name in keys if not keys[name].accepts_value] or known
     advice = f"known here: {', '.join(known)}" if known else "this table has no keys"
     return UnknownKey("; ".join(filter(None, (subject, wrong_table, advice))), "")
 
@@ -112,7 +110,7 @@ def _is_table(value: Any) -> bool:
 def _list_tables_with_key(key: str) -> list[str]:
     """Return the dotted names of the tables that have a key of this name, of the least depth at which one has it."""
     tables = {"": Tables, **list_inner_tables(Tables)}
-    owners = [name for name, model in tables.items() if key in attributes_by_key(model)]
+    owners = [name for name, model in tables.items() if key in list_keys(model)]
     least = min((bool(name) + name.count(".") for name in owners), default=0)
     return [name for name in owners if bool(name) + name.count(".") == least]
 
@@ -146,7 +144,7 @@ def _suggest_name(
 
 def _name_item(table_key: str) -> str:
     """Return the key of a table, with NAME for the name of an item if it is an array of tables."""
-    return f"{table_key}.NAME" if is_array_attribute(*find_key(table_key)) else table_key
+    return f"{table_key}.NAME" if find_key(table_key).is_array else table_key
 
 
 def _find_best(ratings: dict[str, float]) -> str:
@@ -169,7 +167,7 @@ def _rate_keys(
     else 1. A key of a similar name that does not accept the value, or is written already, has 0 to 1.
     """
     ratings = {}
-    for name in attributes_by_key(model):
+    for name in list_keys(model):
         similarity = _compare_names(key, name)
         near = similarity if similarity >= MIN_NAME_SIMILARITY else 0.0
         shares_word = bool(set(key.lower().split("_")) & set(name.split("_")))
@@ -192,7 +190,7 @@ def _rate_tables(model: type[Table], key: str, value: Any) -> dict[str, float]:
     for name, inner in list_inner_tables(model).items():
         if name.count(".") > 1:
             continue
-        shared = len(inside & attributes_by_key(inner).keys()) / max(len(inside), 1)
+        shared = len(inside & list_keys(inner).keys()) / max(len(inside), 1)
         similarity = _compare_names(key, name)
         near = similarity if similarity >= MIN_NAME_SIMILARITY else 0.0
         ratings[name] = near + shared if near or shared > 0.5 else 0.0
@@ -206,7 +204,7 @@ def _accepts_value(model: type[Table], key: str, value: object) -> bool:
     valid: dict[str, Any] = {}
     with suppress(ValidationError):
         model.model_validate({key: value}, context=valid)
-    return attributes_by_key(model)[key] in valid
+    return list_keys(model)[key].attribute in valid
 
 
 def _list_missing_keys(

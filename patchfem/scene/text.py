@@ -12,7 +12,7 @@ from .keys.contact import Material, OnePiece
 from .keys.memoize import memoize
 from .keys.quantities import format_si
 from .keys.tables import Accuracy, Drive, Interface, Measured, Tables
-from .keys.types import Table, attributes_by_key, find_inner_table, find_quantity_kind
+from .keys.types import Key, Table, list_keys
 
 EFFECT_KEYS = ("kind", "law", "reading", "waveform")  # keys whose values are effects
 
@@ -85,44 +85,45 @@ def _find_effect_sources(model: type[Table]) -> _EffectSources:
     selectors = [key for key in EFFECT_KEYS if key in names]
     if issubclass(model, OnePiece):
         return _EffectSources(selectors, [])
-    return _EffectSources(selectors, [name for name in names if find_inner_table(model, name)])
+    return _EffectSources(
+        selectors, [key.attribute for key in list_keys(model).values() if key.inner]
+    )
 
 
 def _format_lines(table: Table, table_key: str) -> Iterator[str]:
     """Yield the TOML lines of a table and of the tables inside it."""
     unused = find_choices(table).unused
     inner = []
-    for key, name in attributes_by_key(type(table)).items():
-        value = getattr(table, name)
-        if value in (None, ()) or key in unused:
+    for name, key in list_keys(type(table)).items():
+        value = getattr(table, key.attribute)
+        if value in (None, ()) or name in unused:
             continue
-        path = f"{table_key}.{key}" if table_key else key
+        path = f"{table_key}.{name}" if table_key else name
         if isinstance(value, tuple) and isinstance(value[0], Table):
             inner += [(f"[[{path}]]", path, item) for item in value]
         elif isinstance(value, Table) and not isinstance(value, Material):
             inner.append((f"[{path}]", path, value))
         else:
-            yield f"{key} = {_format_value(value, _find_kind(table, name))}"
+            yield f"{name} = {_format_value(value, _find_kind(table, key))}"
     for header, path, item in inner:
         yield ""
         yield header
         yield from _format_lines(item, path)
 
 
-def _find_kind(table: Table, name: str) -> str | None:
+def _find_kind(table: Table, key: Key) -> str | None:
     """Return the kind of quantity of an attribute; the levels of a force drive are forces."""
-    if isinstance(table, Drive) and name == "levels" and table.kind == "force":
-        return "force"
-    return find_quantity_kind(type(table), name)
+    is_force = isinstance(table, Drive) and key.name == "levels" and table.kind == "force"
+    return "force" if is_force else key.kind
 
 
 def _format_value(value: Any, kind: str | None) -> str:
     """Format a value as TOML."""
     if isinstance(value, Material):
-        record = {key: getattr(value, name) for key, name in attributes_by_key(Material).items()}
+        given = {key: getattr(value, key.attribute) for key in list_keys(Material).values()}
         pairs = [
-            f"{key} = {_format_value(item, find_quantity_kind(Material, attributes_by_key(Material)[key]))}"
-            for key, item in record.items()
+            f"{key.name} = {_format_value(item, key.kind)}"
+            for key, item in given.items()
             if item is not None
         ]
         return f"{{{', '.join(pairs)}}}"

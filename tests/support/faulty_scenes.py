@@ -23,14 +23,7 @@ from typing import Any, get_args, get_origin
 from patchfem.effects import LAWS, WAVEFORMS
 from patchfem.scene.keys.quantities import EXAMPLE_QUANTITIES
 from patchfem.scene.keys.tables import Tables
-from patchfem.scene.keys.types import (
-    attributes_by_key,
-    find_inner_table,
-    find_quantity_kind,
-    is_array_attribute,
-    list_allowed_values,
-    list_key_types,
-)
+from patchfem.scene.keys.types import list_keys
 from patchfem.scene.scene import SceneError, loads
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -146,8 +139,7 @@ def iterate_tables(values: dict, model: Any = Tables) -> Any:
     """Yield (model, plain table) for all tables of a scene that the program knows."""
     yield model, values
     for key, value in values.items():
-        name = attributes_by_key(model).get(key)
-        inner = name and find_inner_table(model, name)
+        inner = key in list_keys(model) and list_keys(model)[key].inner
         for item in value if isinstance(value, list) else [value]:
             if inner and isinstance(item, dict):
                 yield from iterate_tables(item, inner)
@@ -165,11 +157,11 @@ def collect_values(scenes: list[dict]) -> dict[str, list]:
 
 def make_value(rng: random.Random, model: Any, key: str, pool: dict[str, list]) -> Any:
     """Return a value for a key: mostly one that the key accepts."""
-    name = attributes_by_key(model)[key]
-    types = list_key_types(model, name)
-    choices = list(list_allowed_values(model, name))
+    known = list_keys(model)[key]
+    types = known.types
+    choices = list(known.allowed)
     choices += pool.get(f"{model.__name__}.{key}", [])[:6]
-    kind = find_quantity_kind(model, name)
+    kind = known.kind
     if tuple in map(get_origin, types) and kind:
         choices += [
             [EXAMPLE_QUANTITIES[kind]] * 2,
@@ -180,14 +172,13 @@ def make_value(rng: random.Random, model: Any, key: str, pool: dict[str, list]) 
             EXAMPLE_QUANTITIES[kind],
             re.sub("[0-9.e-]+", "1e-3", EXAMPLE_QUANTITIES[kind], count=1),
         ]
-    elif find_inner_table(model, name) is not None:
-        inner = find_inner_table(model, name)
+    elif known.inner is not None:
         table = {
-            k: make_value(rng, inner, k, pool)
-            for k, n in attributes_by_key(inner).items()
-            if inner.model_fields[n].is_required() or rng.random() < 0.2
+            name: make_value(rng, known.inner, name, pool)
+            for name, inside in list_keys(known.inner).items()
+            if inside.field.is_required() or rng.random() < 0.2
         }
-        choices.append([table] if is_array_attribute(model, name) else table)
+        choices.append([table] if known.is_array else table)
     elif any(get_args(part) == (int, int) for part in types):
         choices += [[1, 0], [2, 1], [3, 3]]
     elif float in types:
@@ -203,7 +194,7 @@ def change_scene(rng: random.Random, scene: dict, pool: dict[str, list]) -> None
     """Change a scene in one random way."""
     tables = list(iterate_tables(scene))
     model, table = rng.choice(tables)
-    keys = attributes_by_key(model)
+    keys = list_keys(model)
     written = list(table)
     way = rng.choice(("misspell", "drop", "value", "add", "add", "select", "table", "swap"))
     if way == "misspell" and written:
@@ -223,20 +214,16 @@ def change_scene(rng: random.Random, scene: dict, pool: dict[str, list]) -> None
             (m, t, key)
             for m, t in tables
             for key in t
-            if key in attributes_by_key(m) and list_allowed_values(m, attributes_by_key(m)[key])
+            if key in list_keys(m) and list_keys(m)[key].allowed
         ]
         if selectors:
             m, t, key = rng.choice(selectors)
             names = (
                 LAWS if key == "law" and "static" in t else WAVEFORMS if key == "waveform" else ()
             )
-            t[key] = rng.choice(
-                list(names) or list(list_allowed_values(m, attributes_by_key(m)[key]))
-            )
+            t[key] = rng.choice(list(names) or list(list_keys(m)[key].allowed))
     elif way == "table":
-        key = rng.choice(
-            [k for k, n in attributes_by_key(Tables).items() if find_inner_table(Tables, n)]
-        )
+        key = rng.choice([name for name, known in list_keys(Tables).items() if known.inner])
         scene[key] = make_value(rng, Tables, key, pool)
     elif keys:
         key = rng.choice(list(keys))

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 
 from ... import effects
 from . import contact, tables
-from .types import Table, attributes_by_key, find_inner_table
+from .types import Table, list_keys
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -194,11 +194,11 @@ def find_choices(table: Table) -> TableChoices:
 def iterate_tables(table: Table, table_key: str = "") -> Iterator[tuple[str, Any]]:
     """Yield (dotted key, table) for a table and all tables inside it."""
     yield table_key, table
-    for key, name in attributes_by_key(type(table)).items():
-        value = getattr(table, name)
-        path = f"{table_key}.{key}" if table_key else key
+    for name, key in list_keys(type(table)).items():
+        value = getattr(table, key.attribute)
+        path = f"{table_key}.{name}" if table_key else name
         if isinstance(value, Table):
             yield from iterate_tables(value, path)
-        elif isinstance(value, tuple) and find_inner_table(type(table), name) is not None:
+        elif isinstance(value, tuple) and key.inner is not None:
             for index, item in enumerate(value):
                 yield from iterate_tables(item, f"{path}.{index}")

@@ -6,7 +6,7 @@ As in `tables`, each model is a table and each attribute is a key.
 from __future__ import annotations
 
 from functools import cache
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Literal
 
 from pydantic import BeforeValidator, Field
 
@@ -19,9 +19,8 @@ from .types import (
     Positive,
     Table,
     Text,
-    attributes_by_key,
-    find_inner_table,
     key,
+    list_inner_tables,
     number,
     quantity,
     whole_number,
@@ -39,6 +38,8 @@ MATERIAL_REQUIREMENT = (
 
 class Material(Table):
     """Elastic constants and density of a piece or a coating, given as values or by the name of a material."""
+
+    has_name: ClassVar[bool] = True
 
     name: key(str | None, "name of a material that is listed in MATERIALS.md") = None
     young: key(quantity("pressure", gt=0), "Young's modulus")
@@ -391,6 +392,5 @@ class Contact(Table):
 @cache
 def _list_shape_names() -> tuple[str, ...]:
     """Return the names of the tables in [contact] that have a key `on`."""
-    models = {name: find_inner_table(Contact, name) for name in Contact.model_fields}
-    tables = {name: model for name, model in models.items() if model is not None}
-    return tuple(name for name, model in tables.items() if "on" in attributes_by_key(model))
+    tables = list_inner_tables(Contact).items()
+    return tuple(name for name, model in tables if "on" in model.model_fields)
