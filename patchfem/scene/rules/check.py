@@ -15,7 +15,7 @@ from .grooves import check_grooves
 from .needed_keys import check_needed_keys
 from .rule_table import MistakeRule, RemarkRule, Rule, TableFacts, apply_rules
 from .scene_draft import SceneDraft
-from .structure import advise_modes, check_energy_gain, check_structure
+from .structure import MODES_ADVICE, check_energy_gain, check_structure
 from .wear import check_wear
 
 RUN_TABLES = ("contact", "normal", "friction", "slide", "structure", "drive", "wear")
@@ -172,7 +172,7 @@ def _require_friction(draft: SceneDraft, tables: set[str], has_rig: bool) -> Non
         if "contact" in tables:
             draft.add_mistake(
                 "structure.masses",
-                f"structure.masses cannot be used with [contact]; {advise_modes(draft)}, or keep the masses, write the "
+                f"structure.masses cannot be used with [contact]; {MODES_ADVICE}, or keep the masses, write the "
                 "friction law in [[structure.interface]] and the patch in [structure.interface.contact]",
             )
         else:

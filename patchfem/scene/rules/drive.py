@@ -7,7 +7,6 @@ from functools import cached_property
 from ...effects import Waveform, find_waveform
 from .rule_table import MissingKeyRule, MistakeRule, TableFacts, apply_rules
 from .scene_draft import SceneDraft
-from .structure import check_driven_mass
 
 # Smallest number of cycles in a run; a shorter one does not reach the first peak of the drive.
 MIN_CYCLES = 0.25
@@ -109,7 +108,6 @@ def check_drive(draft: SceneDraft) -> None:
         return
     facts = DriveFacts(draft, "drive", drive)
     apply_rules(draft, SIZE_RULES, facts)
-    check_driven_mass(draft)
     if facts.is_driven:
         apply_rules(draft, WAVEFORM_RULES, facts)
 

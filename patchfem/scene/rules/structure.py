@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from functools import cached_property
-from math import pi, sqrt
 from typing import Any, NamedTuple
 
 from ..keys.removed import describe_removed
@@ -22,6 +22,11 @@ MATRIX_EXTENSIONS = (".mtx", ".mat", ".npz")
 # cycle; a larger value probably has a wrong unit, because 1 % is 0.01.
 MAX_USUAL_DAMPING = 0.5
 LOCATION_KEYS = ("slide_at", "output_at", "base_at", "force_at", "normal_at", "pitch_at")
+# What describes a rig of masses in a scene with [contact].
+MODES_ADVICE = (
+    "with [contact], describe these masses and springs by their modes: give structure.moving_mass, and for each mode a "
+    "[[structure.mode]] with its frequency (sqrt(k/m)/(2 pi) for one mass on one spring)"
+)
 # Keys that describe a rig; a scene has one of them.
 DESCRIPTION_KEYS = ("mode", "masses", "file", "reduced")
 
@@ -61,11 +66,6 @@ class StructureFacts(TableFacts):
     def description(self) -> str:
         """Description of the structure if there is exactly one, or "" otherwise."""
         return self.descriptions[0] if len(self.descriptions) == 1 else ""
-
-    @property
-    def modes_advice(self) -> str:
-        """Advice on the modes that replace the masses."""
-        return advise_modes(self.draft)
 
     @property
     def is_universal(self) -> bool:
@@ -110,6 +110,17 @@ class StructureFacts(TableFacts):
 
 
 DESCRIPTION_RULES = (
+    MistakeRule(
+        lambda s: s.table.masses == (),
+        "structure.masses",
+        'at least one mass is needed, such as masses = ["1 kg"]',
+    ),
+    MistakeRule(
+        lambda s: s.scene.drive.mass and s.scene.drive.kind != "base" and s.has("mode"),
+        "drive.mass",
+        "applies only to structure.masses, but a structure of [[structure.mode]] is driven at its output point: "
+        "leave drive.mass out",
+    ),
     MissingKeyRule(
         lambda s: not s.has("moving_mass") and s.descriptions in ([], ["mode"]),
         "structure.moving_mass",
@@ -119,7 +130,7 @@ DESCRIPTION_RULES = (
         MistakeRule(
             lambda s, key=key: s.has(key) and not s.has("masses") and s.draft.has("contact"),
             f"structure.{key}",
-            "joins masses, which cannot be used with [contact]; {modes_advice}",
+            f"joins masses, which cannot be used with [contact]; {MODES_ADVICE}",
         )
         for key in ("spring", "damper")
     ),
@@ -229,43 +240,14 @@ def check_structure(draft: SceneDraft) -> None:
     facts = StructureFacts(draft, "structure", structure)
     apply_rules(draft, DESCRIPTION_RULES, facts)
     _check_modes(draft)
-    _check_masses(draft)
+    _check_numbered_places(draft)
     apply_rules(draft, FILE_RULES, facts)
     if structure.reduced is not None:
         _check_matrix_files(draft)
-        _check_mass_pair(draft, "structure.reduced.slide", structure.reduced.slide)
         apply_rules(draft, REDUCED_RULES, facts)
     apply_rules(draft, JOINT_RULES, facts)
     if structure.start is not None:
         _check_start(draft)
-
-
-def advise_modes(draft: SceneDraft) -> str:
-    """Return advice on the modes that replace masses and springs in a scene with [contact].
-
-    One mass m on springs k and dampers c to the base is a mode of the frequency sqrt(k/m)/(2 pi) and the damping ratio
-    c/(2 sqrt(k m)). The advice gives these numbers if the scene describes such a mass.
-    """
-    structure = draft.values.structure
-    masses = structure.masses or (structure.moving_mass,)
-    links = (*structure.spring, *structure.damper)
-    stiffness = sum(spring.stiffness or 0.0 for spring in structure.spring)
-    damping = sum(damper.coefficient or 0.0 for damper in structure.damper)
-    is_single = len(masses) == 1 and all(sorted(link.between) == [0, 1] for link in links)
-    if not (is_single and masses[0] and stiffness):
-        return (
-            "with [contact], describe these masses and springs by their modes: give structure.moving_mass, and for "
-            "each mode a [[structure.mode]] with its frequency (sqrt(k/m)/(2 pi) for one mass on one spring)"
-        )
-    frequency = sqrt(stiffness / masses[0]) / (2 * pi)
-    ratio = damping / (2 * sqrt(stiffness * masses[0]))
-    damping_advice = "its damping ratio"
-    if structure.damper:
-        damping_advice = f"damping = {ratio:.3g} (c/(2 sqrt(k m)))"
-    return (
-        f'with [contact], give structure.moving_mass = "{masses[0]:g} kg" and a [[structure.mode]] with '
-        f'frequency = "{frequency:.6g} Hz" (sqrt(k/m)/(2 pi)), {damping_advice} and `slide` = 1.0'
-    )
 
 
 def _check_modes(draft: SceneDraft) -> None:
@@ -359,62 +341,34 @@ def find_instrument_key(draft: SceneDraft) -> str:
     return ""
 
 
-def _check_masses(draft: SceneDraft) -> None:
-    """Report springs, dampers, interfaces and outputs that name masses that do not exist."""
-    structure = draft.tables.structure
-    if structure.masses is not None and not structure.masses:
-        draft.add_mistake(
-            "structure.masses", 'at least one mass is needed, such as masses = ["1 kg"]'
-        )
-        return
+def _iterate_numbered_places(draft: SceneDraft) -> Iterator[tuple[str, tuple[int, ...]]]:
+    """Yield each key that names masses or boundary coordinates by number, with the numbers."""
+    structure = draft.values.structure
     for name in ("spring", "damper", "interface"):
-        for index, item in enumerate(getattr(structure, name) or ()):
-            _check_mass_pair(draft, f"structure.{name}.{index}.between", item.between)
-    _check_mass_number(draft, "structure.output_mass", structure.output_mass)
+        for index, item in enumerate(structure[name]):
+            yield f"structure.{name}.{index}.between", item.between
+    yield "structure.reduced.slide", structure.reduced.slide
+    yield "structure.output_mass", (structure.output_mass or 0,)
+    if draft.values.drive.kind != "base" and not draft.has("structure.mode"):
+        yield "drive.mass", (draft.values.drive.mass or 0,)
 
 
-def _check_mass_pair(draft: SceneDraft, key: str, pair: tuple | None) -> None:
-    """Report a pair that joins a mass to itself or names a mass that does not exist."""
-    if pair is None:
-        return
-    if pair[0] == pair[1]:
-        noun = CoordinateNumbers.from_structure(draft.tables.structure).noun
-        place = f"{noun} {pair[0]}" if pair[0] else "the base"
-        draft.add_mistake(
-            key,
-            f"joins {place} to itself; two different ends are needed, where 0 stands for the base",
-        )
-    for number in dict.fromkeys(pair):
-        _check_mass_number(draft, key, number)
-
-
-def _check_mass_number(draft: SceneDraft, key: str, number: int | None) -> None:
-    """Report the number of a mass that does not exist."""
+def _check_numbered_places(draft: SceneDraft) -> None:
+    """Report masses or boundary coordinates that do not exist, and pairs that join one of them to itself."""
     coordinates = CoordinateNumbers.from_structure(draft.tables.structure)
-    if coordinates.number is None or number is None or number <= coordinates.number:
-        return
-    base = ""
-    if key.endswith(("between", "slide")):
-        base = "; 0 stands for the base"
-    draft.add_mistake(
-        key,
-        f"there is no {coordinates.noun} {number}: {coordinates.key} has {coordinates.number}, numbered from 1{base}",
-    )
-
-
-def check_driven_mass(draft: SceneDraft) -> None:
-    """Report a drive.mass that does not exist, or that is given for a rig of modes."""
-    drive = draft.tables.drive
-    if drive.mass is None or draft.tables.structure is None or drive.kind == "base":
-        return
-    if draft.has("structure.mode"):
-        draft.add_mistake(
-            "drive.mass",
-            "applies only to structure.masses, but a structure of [[structure.mode]] is driven at its output point: "
-            "leave drive.mass out",
-        )
-    else:
-        _check_mass_number(draft, "drive.mass", drive.mass)
+    for key, numbers in _iterate_numbered_places(draft):
+        numbers = tuple(numbers)
+        base = "; 0 stands for the base" if len(numbers) == 2 else ""
+        if len(numbers) == 2 and numbers[0] == numbers[1]:
+            place = f"{coordinates.noun} {numbers[0]}" if numbers[0] else "the base"
+            draft.add_mistake(key, f"joins {place} to itself; two different ends are needed{base}")
+        for number in dict.fromkeys(numbers):
+            if coordinates.number is not None and number > coordinates.number:
+                draft.add_mistake(
+                    key,
+                    f"there is no {coordinates.noun} {number}: {coordinates.key} has {coordinates.number}, numbered "
+                    f"from 1{base}",
+                )
 
 
 def _check_matrix_files(draft: SceneDraft) -> None:
