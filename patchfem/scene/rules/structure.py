@@ -363,7 +363,7 @@ def _check_numbered_places(draft: SceneDraft) -> None:
             place = f"{coordinates.noun} {numbers[0]}" if numbers[0] else "the base"
             draft.add_mistake(key, f"joins {place} to itself; two different ends are needed{base}")
         for number in dict.fromkeys(numbers):
-            if coordinates.number is not None and number > coordinates.number:
+            if coordinates.number and number > coordinates.number:
                 draft.add_mistake(
                     key,
                     f"there is no {coordinates.noun} {number}: {coordinates.key} has {coordinates.number}, numbered "
