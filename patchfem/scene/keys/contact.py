@@ -13,12 +13,12 @@ from pydantic import BeforeValidator, Field
 from .materials import MATERIALS, advise_on_material, find_material_name
 from .quantities import UNIT_FACTORS
 from .types import (
+    FileName,
     Force,
     Length,
     Position,
     Positive,
     Table,
-    Text,
     key,
     list_inner_tables,
     number,
@@ -197,7 +197,7 @@ class ProfileFile(Table):
     """Measured heights that are added to the gap."""
 
     file: key(
-        Text,
+        FileName,
         "file of one height trace along x: text with units in its header, or a file of a measuring "
         "instrument",
     )
@@ -239,7 +239,7 @@ class Asperities(Table):
     density: key(quantity("areal density", gt=0) | None, "number of peaks per area") = None
     height_deviation: key(Length | None, "standard deviation of the peak heights") = None
     from_: key(
-        Text | None,
+        FileName | None,
         "file of a height trace of a rough piece, from which the peaks are computed; the other "
         "piece is taken as smooth",
     ) = Field(None, alias="from")
@@ -349,7 +349,7 @@ class Contact(Table):
         "density and, if known, yield",
     )
     mesh: key(
-        Text | None,
+        FileName | None,
         "file with a mesh of both pieces, which needs the tags listed in MESH.md; default: a mesh "
         "is made from the dimensions",
     ) = None

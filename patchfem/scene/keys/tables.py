@@ -18,6 +18,7 @@ from .types import (
     AbsoluteTemperature,
     Acceleration,
     Duration,
+    FileName,
     Force,
     Fraction,
     Frequency,
@@ -206,7 +207,7 @@ class Slide(Table):
         None
     )
     file: key(
-        Text | None,
+        FileName | None,
         "table with the columns time and displacement",
     ) = None
 
@@ -335,13 +336,13 @@ class Reduced(Table):
     """Matrices of a finite-element program, reduced to boundary coordinates and a few modes."""
 
     stiffness: key(
-        Text,
+        FileName,
         "file of the stiffness matrix: Matrix Market or Abaqus text (.mtx), MATLAB (.mat), NumPy or "
         "SciPy (.npz)",
     )
-    mass: key(Text, "file of the mass matrix; may be the same file as for the stiffness matrix")
+    mass: key(FileName, "file of the mass matrix; may be the same file as for the stiffness matrix")
     damping: key(
-        number(ge=0, lt=1) | Text | None,
+        number(ge=0, lt=1) | FileName | None,
         "damping ratio of every mode of the structure with free "
         "interfaces, or a file of the damping matrix; default: no damping",
     ) = None
@@ -432,7 +433,7 @@ class Structure(Table):
     damper: tuple[Damper, ...] = ()
     interface: tuple[Interface, ...] = ()
     file: key(
-        Text | None,
+        FileName | None,
         "file of matrices, modes or measured responses (.npz, .mat, .uff); replaces the tables of "
         "modes",
     ) = None
@@ -550,7 +551,7 @@ class Drive(Table):
         Duration | None, "length of the run, or of each level, as a time; replaces `cycles`"
     ) = None
     file: key(
-        Text | None,
+        FileName | None,
         "file with a record of the drive, a table with units or UFF; for waveform 'random', a "
         "table of the spectrum",
     ) = None
@@ -608,7 +609,7 @@ class Wear(Table):
         "'energy': the worn depth is proportional to the friction work per area",
     ) = "archard"
     start: key(
-        Text | None,
+        FileName | None,
         "file result.nc of an earlier run with [wear], such as out/before/result.nc; the new run "
         "starts from the worn depth of the earlier run; default: the pieces are new",
     ) = None
@@ -619,7 +620,7 @@ class Measured(Table):
     """Measurements that are plotted together with the results."""
 
     file: key(
-        Text,
+        FileName,
         "table of measurements with the columns frequency, input, acceleration, displacement and flag",
     )
     acceleration_gain: key(

@@ -63,6 +63,10 @@ class Kind(str):
     """Annotation of a key whose value is a quantity of this kind (see `quantities.UNIT_FACTORS`)."""
 
 
+# Annotation of a key that names a file.
+FILE_MARK = object()
+
+
 def _require_magnitude(value: float, smallest: float) -> float:
     """Return a value; raise ValueError if its magnitude is above MAX_MAGNITUDE or in (0, `smallest`)."""
     if value and not smallest <= abs(value) <= MAX_MAGNITUDE:
@@ -151,6 +155,7 @@ def key(kind: Any, meaning: str, required: str = "") -> Any:
 
 # Types that many keys share.
 Text = Annotated[str, Field(min_length=1), CheckAfter(_require_printable)]
+FileName = Annotated[Text, FILE_MARK]
 Title = Annotated[str, CheckAfter(_require_printable)]
 Number = number()
 Fraction = number(ge=0, le=1)
@@ -261,6 +266,7 @@ class Key:
     - allowed: the words of a key that accepts one of a few.
     - accepts_value: whether the key accepts a value, as a material or a coating does in place of its table.
     - kind: kind of quantity of the value or of its items; None without unit.
+    - names_file: whether a text of this key is the name of a file.
     - record: documentation; that of a table is empty.
     """
 
@@ -281,6 +287,7 @@ class Key:
         self.allowed: tuple[str, ...] = get_args(literals[0]) if literals else ()
         self.accepts_value = self.inner is None or self.inner.has_name or bool(literals)
         self.kind = next((str(mark) for mark in marks if isinstance(mark, Kind)), None)
+        self.names_file = FILE_MARK in marks
         self.record = next(filter(_is_record, field.metadata), KeyRecord(""))
 
 
