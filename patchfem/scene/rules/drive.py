@@ -21,16 +21,6 @@ class DriveFacts(TableFacts):
         return find_waveform(self.table)
 
     @property
-    def is_driven(self) -> bool:
-        """Whether the kind of drive is known and is not a release."""
-        return self.kind in ("base", "force")
-
-    @property
-    def has_start(self) -> bool:
-        """Whether the scene has [structure.start]."""
-        return self.draft.has("structure.start")
-
-    @property
     def is_random(self) -> bool:
         """Whether the drive signal is a random record."""
         return self.wave.is_random
@@ -43,13 +33,15 @@ class DriveFacts(TableFacts):
 
 SIZE_RULES = (
     MissingKeyRule(
-        lambda d: d.kind == "free" and not d.has("displacement") and not d.has_start,
+        lambda d: (
+            d.kind == "free" and not d.has("displacement") and not d.draft.has("structure.start")
+        ),
         "drive.displacement",
         "kind 'free' needs this key, the displacement from which the structure is released; instead you can give "
         "[structure.start]",
     ),
     MistakeRule(
-        lambda d: d.kind == "free" and d.has("displacement") and d.has_start,
+        lambda d: d.kind == "free" and d.has("displacement") and d.draft.has("structure.start"),
         "structure.start",
         "[structure.start] and drive.displacement exclude each other: keep one",
     ),
@@ -108,7 +100,7 @@ def check_drive(draft: SceneDraft) -> None:
         return
     facts = DriveFacts(draft, "drive", drive)
     apply_rules(draft, SIZE_RULES, facts)
-    if facts.is_driven:
+    if facts.kind in ("base", "force"):
         apply_rules(draft, WAVEFORM_RULES, facts)
 
 

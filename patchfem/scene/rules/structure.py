@@ -73,11 +73,6 @@ class StructureFacts(TableFacts):
         return self.extension in UNIVERSAL_EXTENSIONS
 
     @property
-    def has_masses(self) -> bool:
-        """Whether the structure consists of masses and springs."""
-        return self.table.masses is not None
-
-    @property
     def repeated_coordinate(self) -> Any:
         """Boundary coordinate that is named twice, or None if there is none."""
         boundary = self.table.reduced.boundary or ()
@@ -97,16 +92,6 @@ class StructureFacts(TableFacts):
     def n_interfaces(self) -> int:
         """Number of interfaces that could be read."""
         return len(tuple(self.interface))
-
-    @property
-    def is_stuck(self) -> bool:
-        """Whether the modes were measured with the joint bolted."""
-        return self.measured == "stuck"
-
-    @property
-    def has_joint(self) -> bool:
-        """Whether the scene has a joint."""
-        return bool(self.scene.friction or self.interface)
 
 
 DESCRIPTION_RULES = (
@@ -188,19 +173,19 @@ FILE_RULES = (
 )
 JOINT_RULES = (
     MistakeRule(
-        lambda s: s.bonded and s.has_masses and s.n_interfaces != 1,
+        lambda s: s.bonded and s.table.masses is not None and s.n_interfaces != 1,
         "structure.bonded",
         "applies only to a single contact, but there are {n_interfaces} interfaces; instead write a "
         "[[structure.spring]] between the masses of the interface",
     ),
     MistakeRule(
-        lambda s: s.measured_joint and not s.is_stuck,
+        lambda s: s.measured_joint and s.measured != "stuck",
         "structure.measured_joint",
         'names the joint that is subtracted from the modes, but nothing is subtracted; add measured = "stuck" or leave '
         "`measured_joint` out",
     ),
     MistakeRule(
-        lambda s: s.is_stuck and not s.has_joint,
+        lambda s: s.measured == "stuck" and not (s.scene.friction or s.interface),
         "structure.measured",
         "'stuck' subtracts the stiffness of the joint from the modes, but this scene has no joint; add [friction] and "
         "its load, or leave `measured` out",

@@ -30,11 +30,6 @@ class WearFacts(TableFacts):
         return self.scene.friction
 
     @property
-    def groove_key(self) -> str:
-        """Key of the grooves, or "" if there are none."""
-        return find_groove_key(self.draft)
-
-    @property
     def has_coating(self) -> bool:
         """Whether a piece may have a coating."""
         contact = self.scene.contact
@@ -139,7 +134,10 @@ START_RULES = (
     ),
     RemarkRule(
         lambda w: (
-            not w.scene.normal and w.has("upper_share") and not w.groove_key and not w.has_coating
+            not w.scene.normal
+            and w.has("upper_share")
+            and not find_groove_key(w.draft)
+            and not w.has_coating
         ),
         "wear.upper_share",
         "has no effect on the measures without grooves or a coating: the measure worn_depth is the depth worn off both "
