@@ -367,7 +367,7 @@ def _parse_interval(key: str, piece: str) -> Interval | None:
         high = str(quantities.parse_quantity(high, kind))
         low, unit = quantities.split_quantity(low)
         factor = quantities.UNIT_FACTORS[kind][quantities.normalize_unit(unit)]
-    ends = _round(float(low)), _round(float(high) / factor)
+    ends = _round_digits(float(low)), _round_digits(float(high) / factor)
     if ends[0] == ends[1]:
         raise ValueError(f"{text}: both ends are the same value")
     return Interval(text, *ends, unit, int(count or 0), _is_log(*ends, spacing))
@@ -377,7 +377,7 @@ def _is_log(low: float, high: float, spacing: str | None) -> bool:
     """Return whether the values of a range are spaced logarithmically."""
     is_positive = low > 0 and high > 0
     if spacing is None and is_positive:
-        return _round(max(low / high, high / low)) >= MIN_LOG_RATIO
+        return _round_digits(max(low / high, high / low)) >= MIN_LOG_RATIO
     if spacing == "log" and not is_positive:
         raise ValueError("a logarithmic range needs both ends > 0")
     return spacing == "log"
@@ -524,9 +524,9 @@ def _make_value_reader(key: str) -> Callable[[str], float | str]:
 def _format_with_unit(value: float, unit: str) -> str:
     """Format a value of a swept key with its unit."""
     # repr writes whole numbers below 1e16 without an exponent.
-    return f"{repr(_round(value)).removesuffix('.0')} {unit}".rstrip()
+    return f"{repr(_round_digits(value)).removesuffix('.0')} {unit}".rstrip()
 
 
-def _round(value: float) -> float:
+def _round_digits(value: float) -> float:
     """Return a number rounded to SIGNIFICANT_DIGITS."""
     return float(f"{value:.{SIGNIFICANT_DIGITS}g}")

@@ -31,6 +31,7 @@ def _read_table(draft: SceneDraft, model: type[Table], raw: dict[str, Any], tabl
     """Read one table of a scene, and report missing or wrong values."""
     if id(raw) in draft.read_before:
         return draft.read_before[id(raw)]
+    # Inner tables are read first; the rest is left to the validator of the table.
     keys = list_keys(model)
     values = {}
     for name, value in raw.items():
@@ -44,6 +45,8 @@ def _read_table(draft: SceneDraft, model: type[Table], raw: dict[str, Any], tabl
         if value is not None:
             values[name] = value
     valid = _validate_values(draft, model, values, table_key)
+
+    # A missing or invalid value is None, so that the rules can go on.
     for name in list_required_keys(model):
         if name not in raw:
             draft.add_missing(f"{table_key}.{name}", "")
@@ -134,6 +137,8 @@ def apply_set(draft: SceneDraft, assignment: str) -> None:
             f"{assignment}: table.key=value is needed, such as contact.load=26 lbf"
         )
         return
+
+    # Walk to the table of the key, and make the tables that are not there.
     holder: Any = draft.raw
     for depth, piece in enumerate(pieces):
         path = ".".join(pieces[: depth + 1])

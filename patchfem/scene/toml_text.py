@@ -42,6 +42,8 @@ def read_text(path: str | Path) -> str:
         reason = getattr(error, "strerror", None) or str(error)
         advice = "; give a scene file, such as rig.toml" if Path(path).is_dir() else ""
         raise SceneError([f"{path}: cannot be read: {reason}{advice}"]) from None
+
+    # A large file would take minutes to read.
     if len(content) > MAX_BYTES:
         raise SceneError(
             [

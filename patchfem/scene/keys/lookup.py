@@ -98,11 +98,15 @@ def describe_requirement(key: Key | None) -> str:
         return ""
     types = key.types
     holds_array = tuple in map(get_origin, types)
+
+    # A quantity needs its unit, also in an array.
     if key.kind:
         if holds_array:
             example = quantities.EXAMPLE_QUANTITIES[key.kind]
             return f"an array of quantities is needed, such as ['{example}']"
         return quantities.describe_requirement(key.kind)
+
+    # Of several types of a key, the most specific one is named.
     if Material in types:
         return MATERIAL_REQUIREMENT
     if key.allowed:

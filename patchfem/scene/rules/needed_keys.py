@@ -28,6 +28,8 @@ def check_needed_keys(draft: SceneDraft) -> None:
     for table_key, table in iterate_tables(draft.tables):
         written = draft.written_value(table_key) or {}
         choices = find_choices(table)
+
+        # Keys that a selector or another key needs.
         for need, is_required, reason in choices.needs:
             used = [bundle for bundle in need.bundles if bundle[0] not in choices.unused]
             _check_need(
@@ -37,11 +39,15 @@ def check_needed_keys(draft: SceneDraft) -> None:
             for key, words in needed_by_key.items() if isinstance(table, model) else ():
                 for need in parse_needs(words) if key in written else ():
                     _check_need(draft, table_key, need, key, is_required=True)
+
+        # Lists with one value for each value of another list.
         for key, other in EQUAL_LENGTHS.get(type(table), {}).items():
             lengths = [len(getattr(table, name) or ()) for name in (key, other)]
             if key not in choices.unused and all(lengths) and lengths[0] != lengths[1]:
                 sentence = f"{lengths[0]} values for {lengths[1]} values of `{other}`; give one value for each"
                 draft.add_mistake(f"{table_key}.{key}", sentence)
+
+        # Keys without meaning; some of them would be mistaken for an effect, so they are refused.
         for key, reason in choices.unused.items():
             path = f"{table_key}.{key}"
             if key in written and key in REFUSED_KEYS:

@@ -15,7 +15,6 @@ from .scene_draft import SceneDraft
 ARRAY_EXTENSIONS = (".npz", ".mat")
 UNIVERSAL_EXTENSIONS = (".uff", ".unv")
 # File extensions of matrices from finite-element programs, for [structure.reduced].
-NASTRAN_EXTENSIONS = (".op4", ".pch", ".bdf", ".dat")  # files that are no longer read
 MATRIX_KEYS = ("stiffness", "mass", "damping")  # keys of the files of [structure.reduced]
 MATRIX_EXTENSIONS = (".mtx", ".mat", ".npz")
 # Largest plausible damping ratio, at which a free oscillation decays to a few per cent within one
@@ -364,7 +363,7 @@ def _check_matrix_files(draft: SceneDraft) -> None:
         if isinstance(file, str) and find_file_extension(file) not in MATRIX_EXTENSIONS:
             extension = find_file_extension(file)
             advice = advise_on_name(extension, MATRIX_EXTENSIONS)
-            if extension in NASTRAN_EXTENSIONS:
+            if extension in (".op4", ".pch", ".bdf", ".dat"):
                 removed = describe_removed("files of Nastran", "reading files of Nastran")
                 advice = f"{removed}; {advice}"
             draft.add_mistake(
