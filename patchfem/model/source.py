@@ -42,6 +42,19 @@ class Source:
 
 
 @contextmanager
+def name_key(key: str) -> Iterator[None]:
+    """Give a key of the scene to each PatchfemError that is raised in the block and names none.
+
+    Functions of this folder do not know the lines of a scene; `locate_errors` of `build` adds them.
+    """
+    try:
+        yield
+    except PatchfemError as error:
+        error.key = error.key or key
+        raise
+
+
+@contextmanager
 def locate_errors(source: Source) -> Iterator[None]:
     """Add file and line to each PatchfemError that is raised in the block and names a key."""
     try:

@@ -62,11 +62,11 @@ def read_arrays(path: Path) -> dict:
         return {name: _drop_dimensions(variables[name]) for name in names}
     except PatchfemError as error:
         reason = str(error).removeprefix(f"{path}: ")
-        raise PatchfemError(f"structure.file: {path} cannot be read ({reason})") from None
+        raise PatchfemError(f"{path} cannot be read ({reason})") from None
     except Exception as error:
         # NumPy and zipfile raise errors of many types for a damaged file.
         raise PatchfemError(
-            f"structure.file: {path} cannot be read ({error}); plain arrays are needed, not objects"
+            f"{path} cannot be read ({error}); plain arrays are needed, not objects"
         ) from None
 
 
@@ -127,13 +127,9 @@ def build_basis(
     PatchfemError
         If an array is missing or wrong; the message names it.
     """
-    try:
-        if "M" in data or "K" in data:
-            return _build_basis_from_matrices(data, pairs, driven_mass, is_forced)
-        return _build_basis_from_modes(data, pairs, driven_mass, is_forced, mass)
-    except PatchfemError as error:
-        message = str(error).removeprefix("structure: ")
-        raise PatchfemError(f"structure.file: {message}") from None
+    if "M" in data or "K" in data:
+        return _build_basis_from_matrices(data, pairs, driven_mass, is_forced)
+    return _build_basis_from_modes(data, pairs, driven_mass, is_forced, mass)
 
 
 def _refuse_missing(data: dict, missing_name: str) -> None:

@@ -193,7 +193,7 @@ def _compute_modes(root, K) -> tuple:
     min_square = len(K) * EIGENVALUE_TOL * np.abs(squares).max(initial=0.0)
     if squares[0] < -min_square:
         raise PatchfemError(
-            "structure: K is not positive semidefinite: for one motion the stiffness divided by the "
+            "K is not positive semidefinite: for one motion the stiffness divided by the "
             f"mass is {squares[0]:.3g} 1/s^2, which is {squares[0] / squares[-1]:.2g} times the largest "
             "such quotient; make the springs symmetric and >= 0, and write the matrix with all its "
             "digits"
@@ -204,9 +204,7 @@ def _compute_modes(root, K) -> tuple:
 def _require_finite(per_mass) -> np.ndarray:
     """Raise PatchfemError if the stiffness divided by the mass has overflowed."""
     if not np.isfinite(per_mass).all():
-        raise PatchfemError(
-            "structure: K/M is too large to compute; check that K and M are in SI units"
-        )
+        raise PatchfemError("K/M is too large to compute; check that K and M are in SI units")
     return per_mass
 
 
@@ -227,7 +225,7 @@ def _factor_mass(M):
         massless = np.flatnonzero(diagonal <= 0)
         example = f" (coordinate {massless[0] + 1} has none)" if massless.size else ""
         raise PatchfemError(
-            f"structure: M is not positive definite: every coordinate needs mass{example}; condense out "
+            f"M is not positive definite: every coordinate needs mass{example}; condense out "
             "the coordinates without mass, or give each of these coordinates a mass"
         )
     return root
@@ -247,11 +245,10 @@ def _check_matrix(matrix, name: str, shape=None) -> np.ndarray:
     """Return a matrix in full that is symmetric and has the shape of the mass matrix."""
     if hasattr(matrix, "toarray"):
         matrix = matrix.toarray()
-    matrix = symmetrize(matrix, f"structure: {name}")
+    matrix = symmetrize(matrix, f"{name}")
     if shape is not None and matrix.shape != shape:
         raise PatchfemError(
-            f"structure: {name} is {matrix.shape[0]} x {matrix.shape[0]} but M is "
-            f"{shape[0]} x {shape[0]}"
+            f"{name} is {matrix.shape[0]} x {matrix.shape[0]} but M is {shape[0]} x {shape[0]}"
         )
     return matrix
 
@@ -263,7 +260,7 @@ def _project_damping_matrix(phi, C) -> np.ndarray:
     values = eigh(D, eigvals_only=True)
     if values[0] < MIN_DAMPING_EIGENVALUE * max(abs(values[-1]), abs(values[0])):
         raise PatchfemError(
-            "structure: C adds energy: for one motion the damping divided by the mass is "
+            "C adds energy: for one motion the damping divided by the mass is "
             f"{values[0]:.3g} 1/s; dampers >= 0 are needed"
         )
     return D
@@ -296,15 +293,15 @@ def _decouple_equal_frequencies(phi, omega, D) -> tuple:
 def _check_row(row, n: int, name: str) -> np.ndarray:
     """Check that a row has n finite real numbers; `slide` may have several rows."""
     try:
-        row = np.asarray(to_real(row, f"structure: {name}"), float)
+        row = np.asarray(to_real(row, f"{name}"), float)
     except (TypeError, ValueError):
-        raise PatchfemError(f"structure: {name} does not contain real numbers") from None
+        raise PatchfemError(f"{name} does not contain real numbers") from None
     if row.ndim == 2 and 1 in row.shape and name != "slide":
         row = row.ravel()
     if row.shape[-1:] != (n,) or row.ndim > (2 if name == "slide" else 1):
-        raise PatchfemError(f"structure: {name} has shape {row.shape}, but M has {n} coordinates")
+        raise PatchfemError(f"{name} has shape {row.shape}, but M has {n} coordinates")
     if not np.isfinite(row).all():
-        raise PatchfemError(f"structure: {name} contains values that are not finite")
+        raise PatchfemError(f"{name} contains values that are not finite")
     return row
 
 

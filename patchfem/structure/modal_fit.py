@@ -126,7 +126,7 @@ class ModalFit:
     def __init__(self, omega, data, power):
         if np.unique(power).size != 1:
             raise PatchfemError(
-                "structure.file: responses of displacement, velocity and acceleration are mixed; use "
+                "responses of displacement, velocity and acceleration are mixed; use "
                 "responses of one kind"
             )
         self.omega = omega
@@ -288,7 +288,7 @@ def fit_poles(omega, data, power) -> FittedPoles:
     theta = _remove_weak_modes(fit, _refine_with_noise(fit, theta, cost))
     if not theta.size:
         raise PatchfemError(
-            "structure.file: no mode is visible in the frequency responses; responses that include a "
+            "no mode is visible in the frequency responses; responses that include a "
             "resonance are needed"
         )
     w, zeta = np.exp(np.split(theta, 2))
@@ -429,14 +429,14 @@ def identify_modes(frequency, measured: dict, notes: list) -> MeasuredModes:
     is_positive = frequency > 0
     omega = 2 * np.pi * frequency[is_positive]
     if omega.size < 8 or (np.diff(omega) <= 0).any():
-        raise PatchfemError("structure.file: at least 8 frequencies in rising order are needed")
+        raise PatchfemError("at least 8 frequencies in rising order are needed")
     data = np.stack(
         [measured[direction, reference][0][is_positive] for direction in places], axis=1
     )
     is_moving = np.abs(data).max(axis=0) > 0
     if not is_moving[driven]:
         raise PatchfemError(
-            f"structure.file: the response at the driven point itself, {_format_direction(reference)}, is zero"
+            f"the response at the driven point itself, {_format_direction(reference)}, is zero"
         )
     power = np.array([measured[direction, reference][1] for direction in places])
     poles = fit_poles(omega, data[:, is_moving], power[is_moving])
@@ -456,7 +456,7 @@ def identify_modes(frequency, measured: dict, notes: list) -> MeasuredModes:
     ]
     if not is_scaled.any():
         raise PatchfemError(
-            f"structure.file: no mode moves the driven point {_format_direction(reference)} in the direction of the "
+            f"no mode moves the driven point {_format_direction(reference)} in the direction of the "
             "force; check the sign of the response"
         )
     notes += _note_modes_below(poles, data[0, is_moving])
@@ -472,7 +472,7 @@ def _check_misfit(poles: FittedPoles, n_modes: int) -> list:
     misfit = np.linalg.norm(fit.residual(poles.theta)) / fit.norm
     if not np.isfinite(misfit) or misfit > MAX_MISFIT:
         raise NotConverged(
-            f"structure.file: the modes found leave {100 * misfit:.0f} % of the responses unexplained"
+            f"the modes found leave {100 * misfit:.0f} % of the responses unexplained"
         )
     if misfit <= 0.05:
         return []
@@ -510,7 +510,7 @@ def _choose_reference(measured: dict):
         references = sorted({reference for _, reference in measured})
         names = ", ".join(_format_direction(reference) for reference in references)
         raise PatchfemError(
-            f"structure.file: a response at the driven point itself ({names}) is missing, and without "
+            f"a response at the driven point itself ({names}) is missing, and without "
             "this response the mode shapes have no scale; measure the response at the driven point"
         )
     return max(candidates, key=lambda ref: sum(reference == ref for _, reference in measured))

@@ -102,7 +102,7 @@ def test_refuses_incomplete_or_invalid_matrices(change, message):
     data = {key: value for key, value in (FULL | change).items() if value is not None}
     with pytest.raises(PatchfemError) as caught:
         arrays.build_basis(data)
-    assert str(caught.value).startswith("structure.file: ") and message in str(caught.value)
+    assert message in str(caught.value)
 
 
 @pytest.mark.parametrize("change, message", [
@@ -117,7 +117,7 @@ def test_refuses_incomplete_or_invalid_modes(change, message):
     data = {key: value for key, value in (MODAL | change).items() if value is not None}
     with pytest.raises(PatchfemError) as caught:
         arrays.build_basis(data)
-    assert str(caught.value).startswith("structure.file: ") and message in str(caught.value)
+    assert message in str(caught.value)
 
 
 @pytest.mark.parametrize("name, content", [
