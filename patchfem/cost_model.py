@@ -15,8 +15,8 @@ HYBRID_MODES_SECONDS = 4e-8  # additional CPU time [s] per such step and pair of
 HYBRID_INTERFACES_SECONDS = 1e-6  # additional CPU time [s] per such step and pair of interfaces
 
 # Lists of bonds, which are evaluated in one or more passes per time step.
-# CPU time [s] per strip and pass, by the form of the list (`friction.bonds.list_forms_kernels`)
-STRIP_SECONDS = (3e-10, 3e-9, 2e-9, 3e-9)
+# CPU time [s] per strip and pass, by the form of the list (`friction.bonds.list_rows_kernels`)
+STRIP_SECONDS = (3e-9, 2e-9, 3e-9)
 # CPU time [s] per strip and pass for an order that requires a power function
 ANY_ORDER_STRIP_SECONDS = 2.5e-8
 PASS_SECONDS = 1.5e-7  # CPU time [s] per pass through a list, in addition to its strips

@@ -13,6 +13,7 @@ interface under a constant load. Optional features are:
 - `exact`: steady motions of the whole interface as one rigid element;
 - `pieces`: elements that stick or slip, for patches that slip part by part;
 - `harmonic`: harmonic balance;
+- `march`: time steps with return maps (`points.return_maps_kernels`);
 - `grooves`: grooves whose flanks the surfaces climb;
 
 Traits of laws:
@@ -26,7 +27,7 @@ Traits of laws:
 - `cells`: a continuous distribution of elements is discretised into cells;
 - `overshoots`: after a reversal, the force exceeds that of steady sliding for less than one time step.
 
-`runs.rig.varying_load` and `points.laws` have their own lists of supported laws.
+`runs.rig.interface` and `points.laws` have their own lists of supported laws.
 
 A gap shape has a table in `scene.keys.contact` and a function in `contact.gaps`. A waveform has a function in the table
 `DRIVE_BUILDERS` of its module; the class `Waveform` describes its traits.
@@ -191,7 +192,7 @@ EFFECTS = {
         "g += z(x); z is levelled and averaged over the elements at each node",
     ),
     "contact.strips": Effect(
-        "patchfem.contact.strips",
+        "patchfem.contact.press",
         "C f_j >= R_j q - g - roll y_j for each strip j; q is the motion of the common holder",
     ),
     "contact.shear": Effect("patchfem.slip.shear_modes", "slide_i = q - sum_j C_ij f_j"),
@@ -202,53 +203,53 @@ EFFECTS = {
         "laws.coulomb",
         "|F| <= mu_s N stuck, F = mu_k N sgn(v) sliding (2.1)",
         ("", "kinetic"),
-        "shear joints varying-load exact pieces grooves",
+        "shear joints varying-load exact pieces grooves march",
         "set-valued timeless memoryless",
     ),
     "friction.law=tanh": _make_law(
         "laws.tanh",
         "F = mu N tanh(v/v_0) (2.4)",
         ("reference_speed", ""),
-        "joints varying-load harmonic grooves",
+        "joints varying-load harmonic grooves march",
         "memoryless creeps",
     ),
     "friction.law=elastic-plastic": _make_law(
         "laws.elastic_plastic",
         "F' = k v, |F| <= mu N (3.12, corrected for reversals), k = stiffness or mu N/bond_length",
         ("bond_length|stiffness", ""),
-        "shear joints varying-load harmonic pieces grooves",
+        "shear joints varying-load harmonic pieces grooves march",
         "timeless",
     ),
     "friction.law=nonlocal": _make_law(
-        "bonds.quadrature",
+        "bonds.points",
         "tau = mu_s int phi(R/eps) sigma_n u/|u| dL1/eps_0 (2.17)",
         (
             "bond_length",
             "kinetic reading order rest_growth slip_growth rest_speed "
             "initial_bonds spread temperature",
         ),
-        "shear joints varying-load harmonic grooves",
+        "shear joints varying-load harmonic grooves march",
         "bonds",
     ),
     "friction.law=convolution": _make_law(
         "laws.convolution",
         "tau = mu_s sgn(v) int phi(s/eps)/eps sigma_n(x - s sgn v) ds (Oden, Pires)",
         ("bond_length", "order spread"),
-        "exact",
+        "exact march",
         "averaged set-valued timeless memoryless",
     ),
     "friction.law=iwan": _make_law(
         "laws.iwan",
         "F = int rho(phi) (u - x_phi) dphi, rho = R phi^chi + S delta(phi - phi_max) (Segalman)",
         ("stiffness chi beta", ""),
-        "joints harmonic pieces",
+        "joints harmonic pieces march",
         "timeless cells",
     ),
     "friction.law=bouc-wen": _make_law(
         "laws.bouc_wen",
         "F = mu N z, z' = v/eps (1 - |z|^n (s sgn(v z) + 1 - s)) (Wen)",
         ("stiffness", "exponent shape"),
-        "joints harmonic",
+        "joints harmonic march",
         "timeless",
     ),
     "friction.law=lugre": _make_law(
@@ -256,14 +257,14 @@ EFFECTS = {
         "F = k z + s_1 z' + s_2 v, z' = v - k |v| z/g(v), g = mu_k N + "
         "(mu_s - mu_k) N exp(-(v/v_s)^2) (Canudas de Wit; Dahl: mu_k = mu_s, no damping)",
         ("stiffness stribeck_speed", "kinetic micro_damping viscous"),
-        "joints harmonic",
+        "joints harmonic march",
         "overshoots",
     ),
     "friction.reading=stretch": Effect(
-        "patchfem.friction.bonds.recursion", "phi: (|u|/eps)^p exp(-int dR/eps)/Gamma(p+1)"
+        "patchfem.friction.bonds.point_kernels", "phi: (|u|/eps)^p exp(-int dR/eps)/Gamma(p+1)"
     ),
     "friction.reading=report": Effect(
-        "patchfem.friction.bonds.quadrature", "phi: (R/eps)^p exp(-R/eps)/Gamma(p+1) (2.14)"
+        "patchfem.friction.bonds.list_kernels", "phi: (R/eps)^p exp(-R/eps)/Gamma(p+1) (2.14)"
     ),
     "friction.temperature": Effect(
         "patchfem.friction.bonds.temperature",
@@ -290,9 +291,9 @@ EFFECTS = {
     ),
     "structure.bonded": Effect("patchfem.structure.bonded", "K += k s s^T, D += c s s^T / m"),
     "structure.start": Effect("patchfem.structure.starts", "z(0) = Phi^-1 x(0) (3.2)"),
-    "drive.kind=base": Effect("patchfem.dynamics.propagator", "G_i = -base_i a(t)"),
-    "drive.kind=force": Effect("patchfem.dynamics.propagator", "G_i = phi_i F(t)"),
-    "drive.kind=free": Effect("patchfem.dynamics.propagator", "z(0), z'(0) given, G = 0"),
+    "drive.kind=base": Effect("patchfem.structure.drives", "G_i = -base_i a(t)"),
+    "drive.kind=force": Effect("patchfem.structure.drives", "G_i = phi_i F(t)"),
+    "drive.kind=free": Effect("patchfem.structure.starts", "z(0), z'(0) given, G = 0"),
     "drive.waveform=sine": _make_waveform(
         "a(t) = a sin(2 pi f t)",
         (f"frequency {_DRIVE_SIZE_KEYS}", ""),
@@ -339,14 +340,14 @@ EFFECTS = {
         "random {what} {density}, record {seed}",
         "patchfem.structure.noise",
     ),
-    "structure.stiffening": Effect("patchfem.dynamics.march.joints", "F = k_3 x^3 at the output"),
+    "structure.stiffening": Effect("patchfem.points.contacts", "F = k_3 x^3 at the output"),
     "accuracy.method=exact": Effect(
         "patchfem.hybrid.runs",
         "Runge-Kutta steps of order 8 that end where a law changes its regime, with a step error of 1e-12",
     ),
     "accuracy.method=march": Effect(
-        "patchfem.dynamics.march.loop_kernels",
-        "exact propagator of the modes; the force is averaged over the path of each step "
+        "patchfem.points.march_kernels",
+        "exact motion of the modes; the force is averaged over the path of each step "
         "and found by Newton's method",
     ),
     "accuracy.method=harmonic": Effect(
@@ -460,6 +461,11 @@ def needs_bond_list(friction) -> bool:
     return law_has_trait(friction.law, "bonds") and (
         friction.reading == "report" or friction.order not in (1, None)
     )
+
+
+def has_return_map(friction) -> bool:
+    """Return whether time steps can integrate the law of a [friction] table."""
+    return "march" in LAWS[friction.law].supports.split()
 
 
 def law_supports(friction, feature: str) -> bool:

@@ -107,13 +107,9 @@ def test_exact_edited_law_is_compiled_again(tmp_path, shared_cache, parallel_res
     assert not again["numba"] and again["said"] == []
     assert (again["work"], again["peak"]) == (first["work"], first["peak"])
 
-    law = package / "patchfem" / "friction" / "laws" / "elastic_plastic_kernels.py"
+    law = package / "patchfem" / "points" / "return_maps_kernels.py"
     text, count = re.subn(
-        r"(def update_memory\(.*?stiffness = )(?=numbers\[2 \+ j\])",
-        r"\g<1>0.8 * ",
-        law.read_text("utf-8"),
-        count=1,
-        flags=re.S,
+        r"PointState\((?=mu \* state, 0.5)", "PointState(0.8 * ", law.read_text("utf-8")
     )
     assert count == 1
     law.write_text(text, "utf-8")
@@ -225,7 +221,7 @@ def test_exact_cache_key_depends_on_kernels(tmp_path):
     own, after_core, *others = compute_keys()
     assert own == after_core == compiled.compute_kernel_key()
     n_kernels = len(list((home / "patchfem").rglob("*kernels.py")))
-    assert len(others) == n_kernels + len(compiled.TUPLE_MODULES) > 40
+    assert len(others) == n_kernels + len(compiled.TUPLE_MODULES) > 35
     assert len({own, *others}) == 1 + len(others)
     metadata = home / "numba-0.0.dist-info" / "METADATA"
     metadata.parent.mkdir()

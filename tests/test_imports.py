@@ -79,8 +79,8 @@ RIG_KEYS = {"structure.bonded", "hybrid.periodic"}
 MODULES_OF_SCENES = {  # run from Python -> text of the scene, modules that are loaded, modules that are not
     "patch": (
         PATCH,
-        "contact.unilateral mesh.grid",
-        "compiled contact.asperity_laws contact.strips contact.conjugate_gradients elasticity.mortar "
+        "contact.press contact.unilateral mesh.grid",
+        "compiled contact.asperity_laws contact.conjugate_gradients elasticity.mortar "
         "elasticity.recovery export mesh.pieces mesh.checks response scipy skfem",
     ),
     "skin": (
@@ -88,13 +88,13 @@ MODULES_OF_SCENES = {  # run from Python -> text of the scene, modules that are 
         "contact.asperity_laws",
         PATCH_KEYS,
     ),
-    "strips": (PATCH + "[contact.strips]\ncount = 2\n", "contact.strips", PATCH_KEYS),
+    "strips": (PATCH + "[contact.strips]\ncount = 2\n", "contact.press", PATCH_KEYS),
     "point on a rig": (
         COULOMB_RIG,
         "hybrid.runs structure.modes",
         "structure.matrices structure.masses structure.arrays structure.universal structure.modal_fit structure.drives "
-        "dynamics.harmonic.harmonic dynamics.harmonic.continuation dynamics.harmonic.balance dynamics.propagator "
-        "dynamics.march runs.rig.steady " + " ".join(RIG_KEYS),
+        "dynamics.harmonic.harmonic dynamics.harmonic.continuation dynamics.harmonic.balance "
+        "points.time_march runs.rig.steady " + " ".join(RIG_KEYS),
     ),
     **{
         name: (COULOMB_RIG + lines, module, " ".join(RIG_KEYS - {module}))

@@ -262,7 +262,10 @@ print(json.dumps([out, "numba" in sys.modules]))
 
 
 def test_exact_motions_agree_without_compilation(monkeypatch):
-    """With NUMBA_DISABLE_JIT=1, where Python checks every index, the motions agree with compiled code within 1e-9."""
+    """With NUMBA_DISABLE_JIT=1, where Python checks every index, the motions agree with compiled code within 1e-8.
+
+    Round-off changes the lengths of the steps, whose tolerance is larger.
+    """
     answers = []
     for switch in "0", "1":
         monkeypatch.setenv("NUMBA_DISABLE_JIT", switch)
@@ -272,7 +275,7 @@ def test_exact_motions_agree_without_compilation(monkeypatch):
         answers.append(json.loads(done.stdout))
     (compiled, _), (interpreted, numba) = answers
     assert numba and all(np.ravel(compiled))
-    np.testing.assert_allclose(interpreted, compiled, rtol=1e-9)
+    np.testing.assert_allclose(interpreted, compiled, rtol=1e-8)
 
 
 def sum_with_enum_indices(table):

@@ -58,13 +58,9 @@ PACKAGE_FOLDER = Path(__file__).parents[1]  # folder of the package
 # machine code depends on the order of the fields and on the numbers.
 TUPLE_MODULES = (
     "contact/set_arrays.py",
-    "dynamics/grooves/arrays.py",
-    "dynamics/interfaces/arrays.py",
-    "dynamics/ledger.py",
-    "dynamics/march/element_arrays.py",
-    "dynamics/march/cycle_sum_arrays.py",
     "hybrid/records.py",
     "points/case_rows.py",
+    "points/law_rows.py",
     "points/march_rows.py",
 )
 # State of the environment variable that makes numba run all kernels as Python.
@@ -448,7 +444,7 @@ def load(module: str, report=None):
     Parameters
     ----------
     module : str
-        Name of the module without that of the package, such as "dynamics.modal_kernels".
+        Name of the module without that of the package, such as "points.march_kernels".
     report : callable or None
         Callback that receives a message if the cache is empty, so the code must be compiled.
 

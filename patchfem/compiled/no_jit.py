@@ -29,7 +29,7 @@ UNCOMPILED_MODULES = {}  # uncompiled kernel modules by full name
 def load_uncompiled(name: str) -> ModuleType:
     """Return a kernel module without compilation.
 
-    `name` is its full name, such as "patchfem.dynamics.modal_kernels".
+    `name` is its full name, such as "patchfem.points.march_kernels".
     """
     return execute_with_jit(name, JIT_REPLACEMENT, UNCOMPILED_MODULES)
 

@@ -5,10 +5,10 @@ forces f or pressures, the gap under load, the approach delta and the rotation t
 
     w = g + theta x - delta + C f >= 0,    f >= 0,    f . w = 0.
 
-`gaps` has the shapes of the surfaces. `unilateral.press` solves for one patch, by the methods of `active_set`
-and, if they fail, of `conjugate_gradients`; `strip_compliance` holds C. `strips` presses patches side by side,
-bare or with asperities (`asperity_laws`, `asperity_layer`). `edges` and `stiffness` derive quantities of a contact
-set. Read `gaps`, `unilateral` and `active_set` first.
+`gaps` has the shapes of the surfaces. `press.press_strips` presses one or more strips side by side, bare or with
+asperities (`asperity_laws`, `asperity_layer`): `unilateral` solves by the methods of `active_set` and, if they fail,
+of `conjugate_gradients`, and checks the solution; `strip_compliance` holds C. `edges` and `stiffness` derive quantities
+of a contact set. Read `gaps`, `press`, `unilateral` and `active_set` first.
 
 `contact_sets` and the kernels solve again and again while the holder moves (`press_kernels`, `polygon_kernels`,
 `press_path_kernels`), and `half_space` serves rows of thousands of points.
@@ -21,7 +21,6 @@ PUBLIC = {
         "ExponentialAsperities",
         "HertzAsperities",
         "LinearAsperities",
-        "SmoothAsperities",
     ),
     "conjugate_gradients": ("solve_by_gradients",),
     "contact_sets": ("ContactSets",),
@@ -42,6 +41,14 @@ PUBLIC = {
         "PointCompliance",
         "smooth_modes",
     ),
+    "press": (
+        "Holder",
+        "StripLayout",
+        "StripModel",
+        "press_strips",
+        "split_into_strips",
+        "strip_offsets",
+    ),
     "press_kernels": (
         "compute_energy",
         "find_set",
@@ -49,36 +56,22 @@ PUBLIC = {
     ),
     "press_path_kernels": ("path_mean",),
     "set_arrays": (
-        "N_BUILT",
         "REFERENCE_LOAD",
         "REFERENCE_MOMENT",
-        "REFERENCE_STIFFNESS",
         "SetArrays",
         "make_set_arrays",
         "hash_set",
     ),
     "stiffness": (
         "coupled_stiffness",
-        "rotational_stiffness",
         "tangential_stiffness",
     ),
     "strip_compliance": (
         "StripCompliance",
         "WarmStart",
     ),
-    "strips": (
-        "HolderLoads",
-        "StripLayout",
-        "StripModel",
-        "press_strips",
-        "split_into_strips",
-        "strip_offsets",
-        "strips_stiffness",
-    ),
     "unilateral": (
         "INDEFINITE_MESSAGE",
         "RESIDUAL_TOL",
-        "press",
-        "press_to_approach",
     ),
 }

@@ -5,6 +5,7 @@ smooth laws have P > 0 at every s; they are computed by the logarithm of P, whic
 """
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
@@ -37,6 +38,8 @@ class SmoothAsperities:
     """
 
     __slots__ = ()
+    is_smooth: ClassVar[bool] = True
+    needs_load: ClassVar[bool] = False
 
     def pressure(self, s: np.ndarray) -> np.ndarray:
         """Return the pressure P (m,) [Pa] at the separations s (m,) [m].
@@ -54,13 +57,18 @@ class SmoothAsperities:
 class ExponentialAsperities(SmoothAsperities):
     """Exponential law of the asperity layer: P = reference exp(-s/u0).
 
-    u0 [m] > 0 is the decay length, reference [Pa] the pressure at s = 0. Without a reference `strips.press_strips`
+    u0 [m] > 0 is the decay length, reference [Pa] the pressure at s = 0. Without a reference `press.press_strips`
     takes the mean pressure of the given load. Flat aligned pieces then have s = 0, and the approach is the closing of
     the bodies alone. The choice shifts the approach and nothing else.
     """
 
     u0: float
     reference: float | None = None
+
+    @property
+    def needs_load(self) -> bool:
+        """Whether the pressure at s = 0 is the mean pressure of a load."""
+        return self.reference is None
 
     def log_pressure(self, s: np.ndarray) -> tuple:
         """Return log P (m,) and its decay rate (m,) [1/m] at separations s (m,) [m]."""

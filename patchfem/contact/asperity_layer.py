@@ -18,7 +18,7 @@ from ..core import NotConverged, PatchfemError
 from .active_set import ContactProblem
 from .asperity_laws import SmoothAsperities
 from .strip_compliance import StripCompliance
-from .unilateral import solve
+from .unilateral import compute_balances, solve
 
 # Largest number of Newton steps; thin layers on rough gaps need up to 40
 MAX_NEWTON_STEPS = 60
@@ -36,6 +36,8 @@ MIN_RELATIVE_SLOPE = 1e-18
 NEWTON_TOL = 1e-12
 # Largest pressure that an unloaded node may reach in one step, relative to the mean pressure
 MAX_PRESSURE_RISE = 0.01
+# Smallest total force [N] in a divisor; it keeps quotients of an unloaded interface finite
+MIN_TOTAL_FORCE = 1e-150
 
 
 class AsperityProblem(NamedTuple):
@@ -310,3 +312,81 @@ def solve_asperity_layer(problem: AsperityProblem) -> AsperitySolution:
     if solution is None:
         raise NotConverged(DIVERGED_MESSAGE)
     return solution
+
+
+def compute_law_residuals(
+    asperities: SmoothAsperities, area, problem: ContactProblem, solution: AsperitySolution
+) -> dict:
+    """Compute the relative residuals of the contact conditions for strips with a smooth asperity layer.
+
+    The mismatch of the law is relative to the largest force and to 1e-5 of what the law gains over the depth of the gap;
+    pressures that count as none are left out.
+
+    Parameters
+    ----------
+    asperities : SmoothAsperities
+    area : (n,) ndarray
+        Nodal areas [m2].
+    problem : ContactProblem
+    solution : AsperitySolution
+        Its separations are those of the geometry.
+
+    Returns
+    -------
+    dict of float
+        tension, law, and the balances of `unilateral.compute_balances`.
+    """
+    force = solution.force
+    opening = solution.separation
+    depth = np.ptp(problem.gap) + np.abs(opening - problem.gap).max() + MIN_TOTAL_FORCE
+    largest = max(force.max(), np.exp(MIN_LOG_PRESSURE))
+    mismatch = np.abs(force - area * asperities.pressure(opening))
+    mismatch -= area * np.exp(MIN_LOG_PRESSURE)
+    gain = 1e-5 * depth * (area * asperities.stiffness(opening)).max()
+    return {
+        "tension": float(max(0.0, -force.min()) / largest),
+        "law": float(max(0.0, mismatch.max()) / (largest + gain)),
+        **compute_balances(problem, solution),
+    }
+
+
+def press_with_asperities(strips, problem: ContactProblem) -> tuple:
+    """Solve strips with an asperity layer of a smooth pressure law.
+
+    Parameters
+    ----------
+    strips : press.StripModel
+    problem : ContactProblem
+        Of all strips.
+
+    Returns
+    -------
+    solution : AsperitySolution
+    residuals : dict of float
+
+    Raises
+    ------
+    NotConverged
+        If Newton's method fails.
+    """
+    compliance, layout, asperities = strips
+    area = np.tile(layout.weight, layout.offsets.size)
+    if not problem.target.size:
+        layer = AsperityProblem(asperities, compliance, area, problem)
+        solution = solve_at_motion(layer, np.zeros(0))
+    else:
+        # The largest closing of a node per unit of motion becomes 1, and load and moments become comparable.
+        scale = 1 / np.abs(problem.motions).max(axis=0)
+        scaled = problem._replace(
+            motions=problem.motions * scale,
+            target=problem.target * scale,
+            springs=problem.springs * scale**2,
+        )
+        solution = solve_asperity_layer(AsperityProblem(asperities, compliance, area, scaled))
+        solution = solution._replace(motion=solution.motion * scale)
+
+    # The check takes the separations of the geometry, the solution has those of the law.
+    opening = problem.gap - problem.motions @ solution.motion + compliance.product(solution.force)
+    geometric = solution._replace(separation=opening)
+    residuals = compute_law_residuals(asperities, area, problem, geometric)
+    return solution, residuals

@@ -147,26 +147,49 @@ def find_edges(
     list of ContactEdge
         By increasing x.
     """
-    ends = _find_ends(force > 0)
-    if not ends:
-        return []
     compliance = normal.compliance
     force_rate = normal.solve(np.ones((x.size, 1)))[:, 0]
+
+    def _find_offset(node: int, inner: float, outer: float, fraction: float) -> float:
+        """Return the inward offset [m] of an edge beyond a node, between cells of given lengths [m]."""
+        offset = edge_offset(inner, outer, fraction, row_height, is_quadratic=is_quadratic)
+        return (
+            offset if softness is None else offset * (1 - softness[node] / compliance[node, node])
+        )
+
+    return place_edges(x, force, gap, force_rate, 1 - compliance @ force_rate, _find_offset)
+
+
+def place_edges(x, force, gap, force_rate, gap_rate, find_offset) -> list:
+    """Place the edges of a contact set between its nodes.
+
+    Parameters
+    ----------
+    x, force, gap : (m,) ndarray
+        Positions [m], forces [N] and gap under load [m].
+    force_rate, gap_rate : (m,) ndarray
+        Increase of the forces [N/m] and decrease of the gaps per approach.
+    find_offset : callable
+        Function of the last node, the lengths [m] of its cells inside and outside, and the fraction of the latter
+        that returns the inward offset [m] of the edge.
+
+    Returns
+    -------
+    list of ContactEdge
+        By increasing x.
+    """
     edges = []
-    for node, side in ends:
+    for node, side in _find_ends(force > 0):
         outside = node + side
         inside = node - side
         if not 0 <= inside < x.size:
             inside = outside
-        gap_rate = 1 - compliance[outside] @ force_rate
-        fraction = compute_edge_fraction(force[node], force_rate[node], gap[outside], gap_rate)
-        cell = abs(x[outside] - x[node])
-        offset = edge_offset(
-            abs(x[node] - x[inside]), cell, fraction, row_height, is_quadratic=is_quadratic
+        fraction = compute_edge_fraction(
+            force[node], force_rate[node], gap[outside], gap_rate[outside]
         )
-        if softness is not None:
-            offset *= 1 - softness[node] / compliance[node, node]
-        position = x[node] + fraction * (x[outside] - x[node]) - side * offset
+        cell = x[outside] - x[node]
+        offset = find_offset(node, abs(x[node] - x[inside]), abs(cell), fraction)
+        position = x[node] + fraction * cell - side * offset
         edges.append(ContactEdge(node, side, fraction, float(position)))
     return edges
 

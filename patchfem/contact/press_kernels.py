@@ -9,7 +9,7 @@ A set is stored under a 64-bit name, the exclusive or of the names of its nodes,
 set costs one pass over the nodes. The search exchanges all nodes of a wrong sign at once (block
 pivoting), and after `N_BLOCK_EXCHANGES` sets only the first of them, which ends for every positive
 definite C (Murty, Opsearch 11, 1974). `sets` is a `set_arrays.SetArrays`, `slot` the slot of a stored
-set. `contact_sets.ContactSets` is the NumPy twin.
+set.
 """
 
 from typing import NamedTuple

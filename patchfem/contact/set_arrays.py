@@ -101,6 +101,14 @@ class SetArrays(NamedTuple):
     counters: np.ndarray
 
 
+def _make_names(count: int) -> np.ndarray:
+    """Return integers (count,) that look random: the generator SplitMix64 (numpy.random takes long to import)."""
+    names = np.arange(1, count + 1, dtype=np.uint64) * np.uint64(0x9E3779B97F4A7C15)
+    names = (names ^ (names >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
+    names = (names ^ (names >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
+    return (names ^ (names >> np.uint64(31))).astype(np.int64)
+
+
 def make_set_arrays(compliance, x, opening, reference, in_contact, n_slots: int) -> SetArrays:
     """Return the arrays for a search for contact sets, in which no set is stored yet.
 
@@ -116,7 +124,7 @@ def make_set_arrays(compliance, x, opening, reference, in_contact, n_slots: int)
         Number of contact sets that can be stored.
     """
     m = x.size
-    node_names = np.random.default_rng(5).integers(-(2**63), 2**63, m, dtype=np.int64)
+    node_names = _make_names(m)
     return SetArrays(
         compliance.copy(),
         x.copy(),

@@ -10,14 +10,11 @@ shares no intermediate result with the solver.
 """
 
 from dataclasses import replace
-from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
 
-from ..core import Compliance, ContactState, NotConverged, Outcome, PatchfemError, frozen_array
-from ..elasticity.lapack import use_one_blas_thread
-from ..formatting import format_length
+from ..core import NotConverged
 from . import conjugate_gradients
 from .active_set import (
     OPENING_NOISE,
@@ -25,7 +22,6 @@ from .active_set import (
     SetSolution,
     find_rest_motion,
     guess_contact_set,
-    patch_problem,
     relative_violation,
     solve_primal,
     solve_primal_dual,
@@ -39,9 +35,9 @@ INDEFINITE_MESSAGE = (
     "contact.element_size, bring the stiffnesses of coating and substrate closer together, or check the "
     "cells of contact.mesh"
 )
-# Smallest load [N] or overlap [m] for which the products in the check of the solution do not
-# underflow
-MIN_LOAD = 1e-200
+MIN_TOTAL_FORCE = (
+    1e-200  # smallest total force [N] in a divisor; it keeps residuals of open pieces finite
+)
 
 
 class ContactSolution(NamedTuple):
@@ -67,14 +63,6 @@ class ContactSolution(NamedTuple):
     def theta(self) -> float:
         """Rotation [rad] about y in addition to the one that the gap of a patch contains."""
         return -float(self.motion[1]) if self.motion.size > 1 else 0.0
-
-
-class PlainSolution(NamedTuple):
-    """Contact solution of a patch as NumPy arrays, with the number of iterations."""
-
-    force: np.ndarray
-    motion: np.ndarray
-    n_iterations: int
 
 
 def _solve_by_fallbacks(compliance, problem: ContactProblem, max_iterations: int) -> tuple:
@@ -192,33 +180,6 @@ def solve(
     )
 
 
-def solve_forces(c, x, gap, target, start=None, spring: float = 0.0) -> PlainSolution:
-    """Solve the contact problem of a patch that is given as NumPy arrays.
-
-    Parameters
-    ----------
-    c : (m, m) ndarray
-        Compliance [m/N].
-    x, gap : (m,) ndarray
-        Positions [m] and gap [m].
-    target : (0,), (1,) or (2,) ndarray
-        Nothing with the approach contained in the gap, load [N], or load and moment [N m].
-    start : (m,) bool ndarray, optional
-        Contact set of a similar problem.
-    spring : float
-        Stiffness of the holder [N m/rad].
-
-    Returns
-    -------
-    PlainSolution
-    """
-    touch_approach = gap.min() if target.size else 0.0
-    problem = patch_problem(x, gap - touch_approach, *map(float, target), spring=spring)
-    solution = solve(StripCompliance(c), problem, start)
-    solution.motion[:1] += touch_approach
-    return PlainSolution(solution.force, solution.motion, solution.n_iterations)
-
-
 def compute_residuals(
     compliance: StripCompliance, problem: ContactProblem, solution: ContactSolution
 ) -> dict:
@@ -244,7 +205,7 @@ def compute_residuals(
     scale = np.abs(problem.gap) + np.abs(problem.motions) @ np.abs(solution.motion)
     scale += magnitudes.product(np.abs(force))
     relative_opening = opening / np.where(scale > 0, scale, 1.0)
-    load = max(force.sum(), MIN_LOAD)
+    load = max(force.sum(), MIN_TOTAL_FORCE)
     residuals = {
         "penetration": max(0.0, -relative_opening.min()),
         "tension": max(0.0, -force.min()) / load,
@@ -283,202 +244,6 @@ def compute_balances(problem: ContactProblem, solution) -> dict:
         scale = problem.target[0] * np.ptp(arm) + abs(spring_moment)
         out[name] = float(error / scale)
     return out
-
-
-def refuse_unsolvable(x, gap, load: float, moment: float | None, spring: float) -> None:
-    """Raise PatchfemError for a contact problem that has no solution.
-
-    Parameters
-    ----------
-    x, gap : (m,) ndarray
-        Positions [m] and gap [m], which must be finite.
-    load : float
-        Load [N], at least 0 and neither too small nor too large to compute with.
-    moment : float or None
-        Moment [N m] of a free rotation; its load line must lie within the patch unless a spring holds the piece.
-    spring : float
-        Stiffness of the holder [N m/rad], at least 0.
-    """
-    if not (0 <= load <= 1 / MIN_LOAD and np.isfinite(gap).all()):
-        raise PatchfemError(
-            f"contact.load: the load ({load:.6g} N) must be >= 0 and the gap finite"
-        )
-    if 0 < load < MIN_LOAD:
-        raise PatchfemError(
-            f"contact.load: {load:.3g} N is too small to compute with; give 0 (touching without load) "
-            f"or at least {MIN_LOAD:.0e} N"
-        )
-    if moment is None:
-        return
-    if not (np.isfinite(moment) and np.isfinite(spring) and spring >= 0):
-        raise PatchfemError(
-            f"contact.load_line: the moment ({moment:.6g} N m) must be finite and the spring of the "
-            f"holder ({spring:.6g} N m/rad) >= 0"
-        )
-    if load and spring == 0:
-        middle = (x[0] + x[-1]) / 2
-        half_length = np.ptp(x) / 2
-        refuse_tipping(moment / load, middle, half_length * (1 - 1e-13))
-
-
-def refuse_tipping(load_line: float, middle: float, half_length: float) -> None:
-    """Raise PatchfemError unless the line of action of the load passes through the patch.
-
-    Parameters
-    ----------
-    load_line, middle, half_length : float
-        Position of the load line [m] and extent of the patch [m].
-    """
-    if not abs(load_line - middle) < half_length:
-        raise PatchfemError(
-            f"contact.load_line: the load line lies {load_line:.6g} m from the middle, outside the "
-            f"half length {half_length:.6g} m: the piece tips over"
-        )
-
-
-def press(
-    pieces: Compliance,
-    gap: np.ndarray,
-    load: float,
-    moment: float | None = None,
-    rotation: float = 0.0,
-    start: np.ndarray | None = None,
-    spring: float = 0.0,
-) -> ContactState:
-    """Compute the static pressure between two pieces under a load.
-
-    The nodal forces f >= 0 and the openings w = g + theta x - delta + C f >= 0 satisfy f . w = 0, sum f = load and, with
-    a moment, sum f x = moment + spring * theta. `compute_residuals` checks this in every call, without any
-    intermediate result of the solver.
-
-    Parameters
-    ----------
-    pieces : Compliance
-    gap : (m,) ndarray
-        Gap [m] with everything that is prescribed.
-    load : float
-        Load [N] of all pairs; 0 gives the outcome no_contact.
-    moment : float, optional
-        Moment of the load about the middle [N m]: the upper piece is free to rotate from `rotation` on. Without it the
-        rotation is prescribed.
-    rotation : float
-        Rotation [rad] that is already contained in the gap.
-    start : (m,) bool ndarray, optional
-        Contact set of a similar problem.
-    spring : float
-        Stiffness [N m/rad] of the holder, unloaded at `rotation`.
-
-    Returns
-    -------
-    ContactState
-        Its normal stress is the nodal force over the nodal area.
-
-    Raises
-    ------
-    PatchfemError
-        For a moment that no pressure can carry, a load below zero or too small, or a gap that is not finite.
-    NotConverged
-        If a residual exceeds 1e-12.
-    """
-    refuse_unsolvable(pieces.interface.x, gap, load, moment, spring)
-    touch_approach = float(gap.min())
-    if load == 0:
-        return _open_interface(gap, touch_approach, rotation)
-    moment = None if moment is None else float(moment)
-    problem = patch_problem(pieces.interface.x, gap - touch_approach, float(load), moment, spring)
-    return _solve_and_check(pieces, problem, start, touch_approach, rotation)
-
-
-def press_to_approach(
-    pieces: Compliance,
-    gap: np.ndarray,
-    approach: float,
-    rotation: float = 0.0,
-    start: np.ndarray | None = None,
-) -> ContactState:
-    """Compute the static pressure between two pieces under a prescribed approach.
-
-    Parameters
-    ----------
-    pieces : Compliance
-    gap : (m,) ndarray
-        Gap [m] with the prescribed rotation.
-    approach : float
-        Approach [m]; if nothing touches, the outcome is no_contact.
-    rotation : float
-        Rotation [rad] that is already contained in the gap.
-    start : (m,) bool ndarray, optional
-        Contact set of a similar problem.
-
-    Returns
-    -------
-    ContactState
-
-    Raises
-    ------
-    PatchfemError
-        For values that are not finite, or an overlap too small to compute with.
-    NotConverged
-        If a residual exceeds 1e-12.
-    """
-    if not (np.isfinite(approach) and np.isfinite(gap).all()):
-        raise PatchfemError("contact.approach: the distance and the gap must be finite")
-    if approach <= gap.min():
-        return _open_interface(gap, approach, rotation)
-    if approach - gap.min() < MIN_LOAD:
-        raise PatchfemError(
-            f"contact.approach: an overlap of {format_length(approach - gap.min(), 3)} is too small to compute "
-            f"with; for pieces that touch without load give {gap.min():.6g} m"
-        )
-    problem = patch_problem(pieces.interface.x, gap - approach)
-    return _solve_and_check(pieces, problem, start, approach, rotation)
-
-
-def _open_interface(gap: np.ndarray, approach: float, rotation: float) -> ContactState:
-    """Return the ContactState of pieces that do not touch."""
-    return ContactState(
-        frozen_array(np.zeros(gap.size)),
-        frozen_array(gap - approach),
-        approach,
-        rotation,
-        0.0,
-        0.0,
-        Outcome.NO_CONTACT,
-        0,
-        MappingProxyType({}),
-    )
-
-
-def _solve_and_check(
-    pieces: Compliance, problem: ContactProblem, start, approach: float, rotation: float
-) -> ContactState:
-    """Solve a contact problem whose gap is measured from `approach` [m], and refuse it unless it is solved.
-
-    A large offset of the gap then costs no digits. NotConverged if a residual exceeds 1e-12.
-    """
-    x = pieces.interface.x
-    weight = pieces.interface.weight
-    compliance = StripCompliance(pieces.normal)
-    with use_one_blas_thread():
-        try:
-            solution = solve(compliance, problem, start)
-        except np.linalg.LinAlgError:
-            raise NotConverged(explain_singular_set(pieces.normal, problem)) from None
-        residuals = compute_residuals(compliance, problem, solution)
-        refuse_residuals(residuals, RESIDUAL_TOL)
-        force = solution.force
-        opening = problem.gap + solution.theta * x - solution.closing + pieces.normal @ force
-    return ContactState(
-        frozen_array(force / weight),
-        frozen_array(np.where(force > 0, 0.0, np.maximum(opening, 0.0))),
-        float(approach + solution.closing),
-        float(rotation + solution.theta),
-        float(force.sum()),
-        float(force @ x),
-        Outcome.DONE,
-        solution.n_iterations,
-        MappingProxyType(residuals),
-    )
 
 
 def explain_singular_set(c: np.ndarray, problem: ContactProblem) -> str:

@@ -3,34 +3,18 @@
 In: `core.ModalBasis`, a drive, a contact. Out: histories, events, energies. A module imports its own
 entry of this list and the entries before it:
 
-1. `ledger`           positions in the energy sums and samples of a march
-2. `modal_kernels`    motion of the modes over a step of a march, and its energies
-3. `dense_kernels`    small dense linear systems
-4. `doubling`         step of stiff modes by repeated doubling of a short step
-5. `propagator`       exact modal steps under any drive
-6. `checkpoint`       checkpoints of a long march on disk
-7. `periodicity`      schedule and error bound of the check for a periodic motion
-8. `integrated`       time histories of a run from its modal coordinates
-9. `cycles`           extremes, phasors and selected samples of the cycles of a march
-10. `curve_points`    adaptive points of a curve, denser where its curvature is larger
-11. `event_list`      log of the events of a run
-12. `periodic`        linear systems and Floquet multipliers of periodic motions
-13. `interfaces`      contacts of a march: solution of a step and update of their memory
-14. `march`           any law in time, under the path-mean forces of each step
-15. `harmonic`        steady motions by harmonic balance, branches and stability
-16. `limit_cycles`    limit cycles of modes with negative damping and friction
-17. `grooves`         interfaces of matched grooves, whose load climbs the flanks
+1. `integrated`       accelerations and phases of slip of a run
+2. `curve_points`     adaptive points of a curve, denser where its curvature is larger
+3. `event_list`       log of the events of a run
+4. `periodic`         linear systems and Floquet multipliers of periodic motions
+5. `harmonic`         steady motions by harmonic balance, branches and stability
+6. `limit_cycles`     limit cycles of modes with negative damping and friction
 
-Read `propagator` and `interfaces` first for steps of a march.
+Motion in time is computed by `hybrid` and `points`.
 """
 
 # Names that other folders use, by module.
 PUBLIC = {
-    "checkpoint": (
-        "CheckpointFiles",
-        "MAX_EARLY_SAMPLES",
-        "store_checkpoints",
-    ),
     "curve_points": ("sample_adaptively",),
     "event_list": (
         "DRIVE_CHANGE",
@@ -39,7 +23,6 @@ PUBLIC = {
         "STOP",
         "EventLog",
     ),
-    "grooves.climbing": ("with_shear_modes",),
     "harmonic.backbone": ("FreeBalance",),
     "harmonic.balance": (
         "find_cycle_energies",
@@ -61,12 +44,6 @@ PUBLIC = {
         "Interlock",
         "Spring",
         "evaluate_series",
-    ),
-    "harmonic.orbits": (
-        "MAX_CYCLES",
-        "estimate_multipliers",
-        "march_cycle",
-        "march_to_periodic",
     ),
     "harmonic.point": (
         "find_peak",
@@ -92,43 +69,5 @@ PUBLIC = {
         "find_relay_cycles",
         "find_unstable_modes",
         "trace_relay_backbone",
-    ),
-    "march.capacity": (
-        "copy_state",
-        "enlarge_list",
-        "is_full",
-        "list_bytes",
-    ),
-    "march.faces": ("STEP_TOL",),
-    "march.joints": (
-        "JointsModel",
-        "make_cubic_spring",
-        "make_interlocking_spring",
-    ),
-    "march.march": (
-        "start_run",
-        "warm_up",
-    ),
-    "march.models": (
-        "ContactModel",
-        "bond_list_model",
-        "coulomb_model",
-        "element_model",
-        "frictionless_model",
-        "jenkins_model",
-        "load_instances",
-        "lower_pressure_fields",
-        "point_lists_model",
-        "points_model",
-    ),
-    "march.varying_load": (
-        "LawKind",
-        "choose_shear_modes",
-        "make_bond_lists_law",
-        "make_bonds_law",
-        "make_contact_sets",
-        "make_coulomb_law",
-        "make_elastic_plastic_law",
-        "make_tanh_law",
     ),
 }

@@ -15,10 +15,10 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
+from scipy.linalg import expm
 from scipy.optimize import brentq
 
 from ..core import ModalBasis, NotConverged
-from . import propagator
 from .harmonic.backbone import FreeBalance, FreeMotion, trace_free_motions
 from .harmonic.forces import LawGroup
 from .harmonic.harmonic import pack_harmonics
@@ -229,10 +229,14 @@ def _solve_damping(
 
 def _free_motion_matrices(modes: ModalBasis, t) -> np.ndarray:
     """Return the transition matrices (k, 2n, 2n) of the modal state (z, z') over time spans (k,)."""
-    blocks = propagator.free_motion(modes, t)
-    if modes.damping is None:
-        blocks = [part[..., None] * np.eye(modes.omega.size) for part in blocks]
-    return np.block([[blocks[0], blocks[1]], [blocks[2], blocks[3]]])
+    times = np.asarray(t, float)
+    n = modes.omega.size
+    # Velocities are divided by `scale`, so that all entries of the matrix have a similar size.
+    scale = max(float(modes.omega.max()), 1 / float(times.max()))
+    stiffness = -np.diag(modes.omega**2) / scale
+    rates = np.block([[np.zeros((n, n)), scale * np.eye(n)], [stiffness, -modes.damping_matrix]])
+    size = np.repeat([1.0, scale], n)
+    return expm(rates * times[:, None, None]) * (size[:, None] / size)
 
 
 def _reversal_speed_ratios(modes: ModalBasis, row, force: float, half_periods) -> np.ndarray:

@@ -2,8 +2,8 @@
 
 In: increments of relative displacement and pressure. Out: path-mean traction, dissipated energy, and the state after
 the step (`protocol`). `laws/` has one law per file, `bonds/` the sum over bonds of eq. 2.17 and its engines. Files named
-*kernels are compiled and have their NumPy form beside them. `grooves` has matched grooves, whose flanks the load climbs.
-`path_work` computes the friction work of samples. Read `protocol` first, then `laws/elastic_plastic`.
+*kernels are compiled: those of `laws/` are for the harmonic balance. `grooves` has matched grooves, whose flanks the load
+climbs. `path_work` computes the friction work of samples. Read `protocol` first, then `laws/elastic_plastic`.
 """
 
 # Names that other folders use, by module
@@ -13,20 +13,10 @@ PUBLIC = {
         "RequestedEngine",
         "choose_engine",
     ),
-    "bonds.list_forms_kernels": (
-        "FORM_MOMENTS",
-        "FORM_POWER",
-        "FORM_REPORT_GROWING",
-    ),
-    "bonds.list_kernels": (
-        "list_force",
-        "list_mean",
-        "list_slope",
-        "list_step",
-    ),
     "bonds.list_numbers": (
         "MAX_DAMAGE",
         "MAX_STRIPS_PER_LENGTH",
+        "enlarge_lists",
         "gamma_table",
         "law_numbers",
         "list_capacity",
@@ -35,30 +25,36 @@ PUBLIC = {
         "sum_form",
     ),
     "bonds.list_rows_kernels": (
-        "PATH",
+        "FORM_GROWING",
+        "FORM_STRETCH",
         "LAW",
         "N_ROWS",
         "STATUS",
     ),
+    "bonds.list_step_kernels": (
+        "break_bonds",
+        "list_step",
+    ),
     "bonds.parameters": (
         "Bonds",
         "MAX_LIST_SECONDS",
+        "growth_numbers",
         "growth_path_ratio",
     ),
     "bonds.point_kernels": (
         "MAX_SHORT_PATH",
-        "bond_end_stretch",
         "bond_mean",
         "bond_step",
-        "elastic_bond_mean",
-        "elastic_bond_step",
         "grow",
         "press_point",
         "short_bond_mean",
         "short_bond_step",
     ),
-    "bonds.quadrature": ("Quadrature",),
-    "bonds.recursion": ("FirstOrderBonds",),
+    "bonds.points": (
+        "FirstOrderBonds",
+        "ListedBonds",
+    ),
+    "bonds.points_kernels": ("point_list",),
     "bonds.spread": ("carried_fraction",),
     "bonds.temperature": ("surface_temperature_rise",),
     "flags_kernels": (
@@ -67,35 +63,18 @@ PUBLIC = {
     ),
     "grooves": ("Grooves",),
     "laws.coulomb": ("Coulomb",),
-    "laws.coulomb_kernels": ("solve_coulomb_step",),
     "laws.elastic_plastic": (
         "masing_loop",
         "parallel_element",
     ),
-    "laws.elastic_plastic_kernels": (
-        "press_springs",
-        "spring_end",
-        "spring_mean",
-        "spring_step",
-        "update_memory",
-    ),
     "laws.iwan": ("max_yield_displacement",),
     "laws.lugre": ("LuGre",),
-    "laws.stretch": (
-        "growth_numbers",
-        "points_element",
-        "unpack_bonds",
-    ),
+    "laws.stretch": ("points_element",),
     "laws.stretch_kernels": ("relax_stretch",),
-    "laws.tanh": ("TanhLaw",),
     "path_work": ("sampled_work",),
     "protocol": (
         "Element",
         "Step",
-    ),
-    "protocol_kernels": (
-        "Reading",
-        "step_bond_length",
     ),
     "record": (
         "make_law",

@@ -8,9 +8,12 @@ FASTMATH_FLAGS = {"reassoc", "contract", "arcp"}
 NJIT_KERNEL = {"error_model": "numpy", "fastmath": FASTMATH_FLAGS, **NJIT_NO_REFCOUNT}
 # The same options for a kernel that is inlined into its callers, so that loops over cases vectorize
 NJIT_INLINE = NJIT_KERNEL | {"forceinline": True}
+# The same options for a kernel that stays a call in callers that are inlined themselves
+NJIT_CALL = NJIT_KERNEL | {"forceinline": False}
 
 __all__ = [
     "FASTMATH_FLAGS",
+    "NJIT_CALL",
     "NJIT_INLINE",
     "NJIT_INTERNAL",
     "NJIT_KERNEL",

@@ -19,6 +19,8 @@ from math import inf, pi
 
 import numpy as np
 
+from ..exceptions import PatchfemError
+
 # Largest product of friction coefficient and slope for which the friction loss is computed as a
 # power series; the closed form suffers from cancellation there
 MAX_SERIES_SLOPE = 0.1
@@ -50,6 +52,30 @@ class Grooves:
     def max_slope(self) -> float:
         """Largest slope A k of the flanks [1]."""
         return self.amplitude * self.wave_number
+
+    def describe_lift(self, time: float) -> str:
+        """Return the sentence on a lifted mass that leaves the grooves at a time [s]."""
+        return (
+            f"the lifted mass of {self.lifted_mass:.3g} kg leaves the grooves at {time:.6g} s: the inertia of this "
+            f"mass takes all of the load; lower {self.key}.lifted_mass or the drive, or raise the load"
+        )
+
+    def check_lifted_mass(self, static: float, sliding_mass: float) -> None:
+        """Raise PatchfemError if friction due to the lifted mass exceeds the inertia of the sliding mass [kg].
+
+        That is the case where 1 + m s t (t - mu)/(1 + mu t) <= 0 on some flank, with the acceleration s of the relative
+        displacement per newton [1/kg]; `static` is the coefficient of friction mu.
+        """
+        friction_mass = -self.lifted_mass * self.min_mass_ratio(static)
+        if friction_mass < sliding_mass:
+            return
+        raise PatchfemError(
+            f"a lifted mass of {self.lifted_mass:.6g} kg presses so hard on the downward flank that "
+            f"friction exceeds the inertia of the sliding mass of {sliding_mass:.6g} kg, and the motion is then "
+            "not determined; the lifted mass must be below "
+            f"{sliding_mass / -self.min_mass_ratio(static):.6g} kg",
+            f"{self.key}.lifted_mass",
+        )
 
     def after_wear(self, depth: float, upper_share: float) -> "Grooves | None":
         """Return the grooves after wear of both pieces, or None if they have become flat.

@@ -84,14 +84,13 @@ class LastTraction:
 class Element(NamedTuple):
     """Friction law of one contact in the form that the compiled solvers take.
 
-    - kernels: module of the compiled functions in this package
+    - kernels: module of the compiled functions for the harmonic balance; "" for a law that needs none
     - numbers, memory: parameters (k,), of which the first is reserved for the engines, and initial memory (l,)
     - limit: largest force [N], or a typical force if there is no largest
     - length: relative displacement [m] over which the law stretches before it slips; 0 without a stretch
     - is_bounded: whether no force exceeds the limit
-    - form: layout of the memory, for engines that read it: "parallel" for parallel elements, "points" for points with
-      bonds, "places" for points with bonds under the pressure of the lower piece, "speed" for no memory, "flow" for a
-      single number, or ""
+    - form: "rigid" for a law that sticks rigidly, "parallel" for parallel elastic-plastic elements, "points" for points
+      with bonds, "speed" for a function of the velocity, "flow" for a law with one state variable
     """
 
     kernels: str

@@ -16,7 +16,7 @@ from .event_kernels import (
     hold_or_release,
     start_directions,
 )
-from .motion_kernels import find_integrals, look, project
+from .motion_kernels import find_integrals, find_rates, look, project
 from .records import (
     N_FACE_INTEGRALS,
     Clock,
@@ -34,7 +34,7 @@ from .records import (
     Whole,
     Window,
 )
-from .step_kernels import CYCLE, N_STAGES, SCALE, WINDOW, read_curve, step_factor, take_step
+from .step_kernels import CYCLE, N_STAGES, RATES, SCALE, WINDOW, read_curve, step_factor, take_step
 from .window_kernels import (
     add_output,
     find_output,
@@ -251,7 +251,8 @@ def advance(rig, state, record, t_end, cycle):
                 return Status.LEAVES_GROOVES
             number = int(clock[Clock.N_EVENTS]) - 1
             if number < record.events.shape[0]:
-                write_directions(state, record.events[number])
+                find_rates(rig, state, clock[Clock.TIME], state.y, state.rows[RATES])
+                write_directions(rig, state, record.events[number])
             if rig.settings[Setting.HAS_RIGID] > 0:
                 write_event(rig, state, record, face, Margin.AFTER)
         elif h == clock[Clock.STEP] or h == longest:

@@ -306,7 +306,7 @@ class Record(NamedTuple):
     - whole (W, 9), faces (W, M, 19): measures of the windows, see `Whole` and `Window`
     - samples (S, m), events (E, m): time, state y, forces, loads and directions of the interfaces, interface and margin
       of an event; the first column of the samples is given. Force and load of an event are those before it, the
-      directions those after it; a rigid law has a second row, `Margin.AFTER`, with the force after it
+      directions of slip those after it; a rigid law has a second row, `Margin.AFTER`, with the force after it
     """
 
     cycles: np.ndarray

@@ -22,6 +22,7 @@ from .records import (
     N_FACE_INTEGRALS,
     Clock,
     Cycle,
+    Face,
     Memory,
     Mode,
     Piece,
@@ -477,15 +478,17 @@ def write_row(rig, state, t, y, row):
         point = look(rig, state, i, t, y)
         row[1 + y.size + i] = state.memory[i, Memory.FORCE]
         row[1 + y.size + n_faces + i] = max(point.load, 0.0)
-    write_directions(state, row)
+    write_directions(rig, state, row)
 
 
 @njit(**NJIT_KERNEL)
-def write_directions(state, row):
-    """Write the directions of the interfaces into a sample.
+def write_directions(rig, state, row):
+    """Write the directions in which the interfaces slip, after an evaluation of their laws, into a sample.
 
     Parameters
     ----------
+    rig : Rig
+        Arrays of the rig.
     state : State
         Motion.
     row : (m,) array
@@ -493,7 +496,11 @@ def write_directions(state, row):
     """
     n_faces = state.memory.shape[0]
     for i in range(n_faces):
-        row[1 + state.y.size + 2 * n_faces + i] = state.memory[i, Memory.DIRECTION]
+        # A rigid law keeps its direction while it slips; other laws slip with the irreversible part of the velocity.
+        direction = state.memory[i, Memory.DIRECTION]
+        if rig.faces[i, Face.RIGID] == 0:
+            direction = np.sign(state.memory[i, Memory.SLIP_RATE])
+        row[1 + state.y.size + 2 * n_faces + i] = direction
 
 
 @njit(**NJIT_KERNEL)

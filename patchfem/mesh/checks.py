@@ -23,7 +23,7 @@ EDGE_TAGS = {"upper_interface": 11, "lower_interface": 12, "upper_far": 13, "low
 
 
 class TaggedBlock(NamedTuple):
-    """Cells (t, k) of one element, named as in meshio, and the tag (t,) of each."""
+    """Cells, lines or vertices (t, k) of one kind, named as in meshio, and the tag (t,) of each."""
 
     kind: str
     cells: np.ndarray
@@ -34,15 +34,25 @@ class TaggedMesh(NamedTuple):
     """Mesh with named groups of cells and edges, as read from a file.
 
     - ``points``: (N, 2) or (N, 3) [m]
-    - ``blocks``: list of TaggedBlock
-    - ``nodes``: node numbers by the tag of an edge
+    - ``blocks``: list of TaggedBlock; lines and vertices tag edges
     - ``tag_help``: how files of this format contain tags, for messages
     """
 
     points: np.ndarray
     blocks: list
-    nodes: dict
     tag_help: str
+
+    def select(self, kinds, *tags: str) -> list[TaggedBlock]:
+        """Return the members of the blocks of given kinds, or of other kinds than the plane elements, that have a tag.
+
+        kinds: `ELEMENTS`, or None for lines and vertices.
+        """
+        out = []
+        for kind, cells, names in self.blocks:
+            is_here = np.isin(names, tags) & ((kind in ELEMENTS) == (kinds is ELEMENTS))
+            if is_here.any():
+                out.append(TaggedBlock(kind, cells[is_here], names[is_here]))
+        return out
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -78,13 +88,21 @@ def build_pair(mesh: TaggedMesh, source) -> PairMesh:
         _check_numbers(mesh)
         lower = _build_piece(mesh, "lower")
         upper = _build_piece(mesh, "upper")
-        _check_shared_nodes(mesh)
+        nodes = []
+        for side in ("lower", "upper"):
+            blocks = mesh.select(ELEMENTS, f"{side}_substrate", f"{side}_coating")
+            nodes.append(np.concatenate([block.cells.ravel() for block in blocks]))
+        n_shared = np.intersect1d(*nodes).size
+        if n_shared:
+            raise PatchfemError(
+                f"the two pieces share {n_shared} nodes; each piece needs its own interface nodes"
+            )
         distance = np.abs(lower.x[[0, -1]] - upper.x[[0, -1]]).max()
         if distance > LENGTH_TOL * lower.length:
-            fault = f"lengths {lower.length:.9g} and {upper.length:.9g} m, with ends up to {distance:.6g} m apart"
             raise PatchfemError(
-                f"lower_interface and upper_interface do not match ({fault}); let both interfaces "
-                "begin and end at the same x (the nodes between may differ)"
+                f"lower_interface and upper_interface do not match (lengths {lower.length:.9g} and {upper.length:.9g} m, "
+                f"with ends up to {distance:.6g} m apart); let both interfaces begin and end at the same x (the nodes "
+                "between may differ)"
             )
     except PatchfemError as error:
         raise PatchfemError(f"{source}: {error}") from None
@@ -96,14 +114,18 @@ def build_pair(mesh: TaggedMesh, source) -> PairMesh:
 
 def _check_tags(mesh: TaggedMesh) -> None:
     """Raise PatchfemError if a required tag is missing or a cell has an unknown tag."""
-    names = {name for block in mesh.blocks for name in np.unique(block.names).tolist()}
-    missing = {"upper_substrate", "lower_substrate"} - names
-    missing |= {edge for edge in EDGE_TAGS if not len(mesh.nodes.get(edge, ()))}
+    missing = [tag for tag in EDGE_TAGS if not mesh.select(None, tag)]
+    missing += [
+        tag for tag in ("lower_substrate", "upper_substrate") if not mesh.select(ELEMENTS, tag)
+    ]
     if missing:
         raise PatchfemError(
             f"no cells or nodes are tagged {', '.join(sorted(missing))} (tags of this format: {mesh.tag_help})"
         )
-    unknown = names - set(CELL_TAGS)
+    unknown = set()
+    for block in mesh.blocks:
+        if block.kind in ELEMENTS:
+            unknown |= set(np.unique(block.names).tolist()) - set(CELL_TAGS)
     if unknown:
         tag_list = ", ".join(sorted(name or "no tag" for name in unknown)[:4])
         raise PatchfemError(
@@ -114,92 +136,67 @@ def _check_tags(mesh: TaggedMesh) -> None:
 def _check_numbers(mesh: TaggedMesh) -> None:
     """Raise PatchfemError unless the cells refer to existing nodes and all nodes lie in a plane."""
     n_points = len(mesh.points)
-    groups = [block.cells for block in mesh.blocks]
-    for group in (*groups, *(mesh.nodes[edge] for edge in EDGE_TAGS)):
-        if group.size and (group.min() < 0 or group.max() >= n_points):
-            wrong_node = group.min() if group.min() < 0 else group.max()
-            raise PatchfemError(
-                f"a cell names node {int(wrong_node)}, but the file has {n_points} nodes"
-            )
-    if not np.isfinite(mesh.points).all():
+    nodes = np.concatenate([block.cells.ravel() for block in mesh.blocks])
+    if nodes.min() < 0 or nodes.max() >= n_points:
+        wrong_node = nodes.min() if nodes.min() < 0 else nodes.max()
+        raise PatchfemError(
+            f"a cell names node {int(wrong_node)}, but the file has {n_points} nodes"
+        )
+    used_points = mesh.points[nodes]
+    # Squares of larger coordinates overflow.
+    if not np.abs(used_points).max() < 1e150:
         raise PatchfemError("a node has a coordinate that is not finite")
-    used_points = mesh.points[np.unique(np.concatenate([group.ravel() for group in groups]))]
     span = np.ptp(used_points, axis=0)
     if span.size > 2 and span[2] > LENGTH_TOL * span[:2].max():
         raise PatchfemError(
             f"the mesh is not plane: its z values span {span[2]:.6g} m; draw the mesh in x and y"
         )
-    if not np.abs(used_points[:, :2]).max() < 1e150:  # squares of larger numbers overflow
-        raise PatchfemError("a node lies beyond 1e150 m")
-
-
-def _select_cells(mesh: TaggedMesh, side: str) -> tuple[dict, np.ndarray]:
-    """Return the cells of a piece by the names of their elements, and whether each belongs to the coating."""
-    blocks = {}
-    is_coating = []
-    for kind in dict.fromkeys(block.kind for block in mesh.blocks):
-        cells = np.concatenate([block.cells for block in mesh.blocks if block.kind == kind])
-        names = np.concatenate([block.names for block in mesh.blocks if block.kind == kind])
-        is_here = np.isin(names, (f"{side}_substrate", f"{side}_coating"))
-        if is_here.any():
-            blocks[kind] = cells[is_here]
-            is_coating.append(names[is_here] == f"{side}_coating")
-    return blocks, np.concatenate(is_coating)
-
-
-def _check_shared_nodes(mesh: TaggedMesh) -> None:
-    """Raise PatchfemError if a node belongs to both pieces."""
-    nodes = []
-    for side in ("lower", "upper"):
-        blocks, _ = _select_cells(mesh, side)
-        nodes.append(np.concatenate([cells.ravel() for cells in blocks.values()]))
-    n_shared = np.intersect1d(*nodes).size
-    if n_shared:
-        raise PatchfemError(
-            f"the two pieces share {n_shared} nodes; each piece needs its own interface nodes"
-        )
 
 
 def _build_piece(mesh: TaggedMesh, side: str) -> PieceMesh:
     """Build a piece from its cells and their nodes, with y converted to depth, and check it."""
-    blocks, is_coating = _select_cells(mesh, side)
-    used = np.unique(np.concatenate([cells.ravel() for cells in blocks.values()]))
+    tagged = mesh.select(ELEMENTS, f"{side}_substrate", f"{side}_coating")
+    used = np.unique(np.concatenate([block.cells.ravel() for block in tagged]))
     points = mesh.points[used, :2] * [1.0, -1.0 if side == "lower" else 1.0]
-    blocks = {
-        kind: _turn_counterclockwise(points, np.searchsorted(used, cells), kind)
-        for kind, cells in blocks.items()
-    }
+    blocks = {}
+    is_coating = []
+    for kind in dict.fromkeys(block.kind for block in tagged):
+        parts = [block for block in tagged if block.kind == kind]
+        cells = np.searchsorted(used, np.concatenate([block.cells for block in parts]))
+        blocks[kind] = _turn_counterclockwise(points, cells, kind)
+        is_coating += [block.names == f"{side}_coating" for block in parts]
     if len({ELEMENTS[kind].is_quadratic for kind in blocks}) > 1:
         raise PatchfemError(
             f"the {side} piece has elements of first and of second order, which do not fit together"
         )
 
-    ends = {}
-    for name in ("interface", "far"):
-        nodes = np.unique(mesh.nodes[f"{side}_{name}"])
+    edges = find_edges(blocks, len(points))
+    ends = []
+    for name in (f"{side}_interface", f"{side}_far"):
+        nodes = np.unique(
+            np.concatenate([block.cells.ravel() for block in mesh.select(None, name)])
+        )
         n_strange = int((~np.isin(nodes, used)).sum())
         if n_strange:
             raise PatchfemError(
-                f"{side}_{name} contains {n_strange} nodes that belong to no cell of the {side} piece"
+                f"{name} contains {n_strange} nodes that belong to no cell of the {side} piece"
             )
-        ends[name] = np.searchsorted(used, nodes)
-    # A node in the middle of a tagged edge of second order belongs to the tag.
-    edges = find_edges(blocks, len(points))
-    for name, nodes in ends.items():
+        nodes = np.searchsorted(used, nodes)
+        # A node in the middle of a tagged edge of second order belongs to the tag.
         is_tagged = np.isin(edges.ends, nodes).all(axis=1) & edges.is_border & (edges.middles >= 0)
-        ends[name] = np.union1d(nodes, edges.middles[is_tagged])
-    interface = ends["interface"]
+        ends.append(np.union1d(nodes, edges.middles[is_tagged]))
+    interface, far = ends
     interface = interface[np.argsort(points[interface, 0], kind="stable")]
     _check_interface(points, interface, side)
     if np.abs(points[interface, 1]).max() <= LENGTH_TOL * np.ptp(points[interface, 0]):
         points[interface, 1] = 0.0
     np.maximum(points[:, 1], 0.0, out=points[:, 1])
 
-    if ends["far"].size < 2 or np.isin(ends["far"], interface).any():
+    if far.size < 2 or np.isin(far, interface).any():
         raise PatchfemError(
             f"{side}_far must contain two nodes or more, none of them at the interface"
         )
-    piece = PieceMesh(points, blocks, is_coating, interface, ends["far"])
+    piece = PieceMesh(points, blocks, np.concatenate(is_coating), interface, far)
     _check_connections(piece, side)
     return piece
 
@@ -249,18 +246,11 @@ def _check_interface(points, nodes, side: str) -> None:
     shortest = int(np.argmin(cells))
     if cells[shortest] <= tolerance and np.ptp(x) > 0:
         raise PatchfemError(f"{name} has two nodes at x = {x[shortest]:.6g} m; merge these nodes")
-    is_flat = np.abs(y) <= tolerance
     slope = np.diff(y) / np.maximum(cells, 1e-300)
-    bend = np.diff(slope)
-    is_wrong = np.abs(slope) > MAX_SLOPE
-    is_wrong[1:] |= bend < -1e-6 - 4 * tolerance / max(cells.min(), tolerance)
-    if not is_flat.any() and not is_wrong.any():
-        raise PatchfemError(
-            f"no node of {name} lies on y = 0, where rounded faces touch; the nearest "
-            f"node is {abs(y).min():.6g} m away"
-        )
-    if is_wrong.any() or not is_flat.any():
-        node = int(np.argmax(is_wrong)) if is_flat.any() else int(np.argmax(np.abs(y)))
+    is_wrong = np.append(np.abs(slope) > MAX_SLOPE, np.abs(y).min() > tolerance)
+    is_wrong[1:-1] |= np.diff(slope) < -1e-6 - 4 * tolerance / max(cells.min(), tolerance)
+    if is_wrong.any():
+        node = int(np.argmax(is_wrong))
         raise PatchfemError(
             f"{name} is not the straight line y = 0 (rounded edges may reach a slope of "
             f"{MAX_SLOPE:g}): the node at x = {x[node]:.6g} m lies {abs(y[node]):.6g} m away "
@@ -275,14 +265,9 @@ def _check_interface(points, nodes, side: str) -> None:
 
 def _check_connections(mesh: PieceMesh, side: str) -> None:
     """Raise PatchfemError unless the cells of a piece are connected through common edges."""
-    close_pairs = cKDTree(mesh.points).query_pairs(LENGTH_TOL * mesh.length, output_type="ndarray")
-    if len(close_pairs):
-        x, y = mesh.points[close_pairs[0, 0]]
-        raise PatchfemError(
-            f"{len(close_pairs)} pairs of nodes of the {side} piece coincide, the first at x = "
-            f"{x:.6g} m, {y:.6g} m from the interface; merge these nodes"
-        )
     edges = mesh.edges
+    border = edges.ends[edges.is_border]
+    _check_touching_nodes(mesh, border, side)
     if len(np.unique(edges.ends, axis=0)) < len(edges.ends):
         raise PatchfemError(f"cells of the {side} piece overlap")
     n_cells = mesh.is_coating.size
@@ -291,9 +276,6 @@ def _check_connections(mesh: PieceMesh, side: str) -> None:
     n_parts, _ = connected_components(links @ links.T, directed=False)
     if n_parts > 1:
         raise PatchfemError(f"the {side} piece falls into {n_parts} parts that share no edge")
-    border = edges.ends[edges.is_border]
-    _check_hanging_nodes(mesh, border, side)
-
     on_border = np.concatenate([border.ravel(), edges.middles[edges.is_border]])
     n_inside = np.setdiff1d(mesh.far, on_border).size
     if n_inside:
@@ -313,24 +295,23 @@ def _check_connections(mesh: PieceMesh, side: str) -> None:
         )
 
 
-def _check_hanging_nodes(mesh: PieceMesh, border, side: str) -> None:
-    """Raise PatchfemError if a boundary node lies inside a boundary edge (e, 2)."""
+def _check_touching_nodes(mesh: PieceMesh, border, side: str) -> None:
+    """Raise PatchfemError if a boundary node lies on a boundary edge (e, 2) of which it is no end."""
     nodes = np.unique(border)
     begin = mesh.points[border[:, 0]]
     along = mesh.points[border[:, 1]] - begin
     length = np.hypot(*along.T)
     tree = cKDTree(mesh.points[nodes])
-    nearby_nodes = tree.query_ball_point(begin + along / 2, length / 2 * (1 - 1e-6))
+    nearby_nodes = tree.query_ball_point(begin + along / 2, length / 2 * (1 + 1e-9))
     edge = np.repeat(np.arange(len(border)), [len(found) for found in nearby_nodes])
-    if edge.size == 0:
-        return
-    point = mesh.points[nodes[np.concatenate([*nearby_nodes]).astype(int)]]
-    offset = point - begin[edge]
+    node = nodes[np.concatenate(nearby_nodes).astype(int)]
+    offset = mesh.points[node] - begin[edge]
     area = along[edge, 0] * offset[:, 1] - along[edge, 1] * offset[:, 0]
-    distance = np.abs(area) / length[edge]
-    if distance.min() <= LENGTH_TOL * mesh.length:
-        x, y = point[np.argmin(distance)]
+    is_touching = np.abs(area) <= LENGTH_TOL * mesh.length * length[edge]
+    is_touching &= (border[edge] != node[:, None]).all(axis=1)
+    if is_touching.any():
+        x, y = mesh.points[node[np.argmax(is_touching)]]
         raise PatchfemError(
-            f"cells of the {side} piece do not meet edge to edge: a node lies inside an edge "
-            f"at x = {x:.6g} m, {y:.6g} m from the interface"
+            f"cells of the {side} piece do not meet edge to edge: a node at x = {x:.6g} m, {y:.6g} m from the interface, "
+            "lies inside an edge of another cell or on another node; merge nodes that coincide"
         )

@@ -183,10 +183,9 @@ def _read_tags(path: Path, mesh) -> _Tags:
 
 
 def _convert_mesh(path: Path, mesh) -> TaggedMesh:
-    """Convert a meshio mesh: name its cells, and collect the nodes of its lines by their tags."""
+    """Convert a meshio mesh: name its cells and lines by their tags."""
     tags = _read_tags(path, mesh)
     blocks = []
-    nodes = {}
     for block, codes in zip(mesh.cells, tags.codes or [None] * len(mesh.cells)):
         if block.type == "vertex":
             continue
@@ -196,20 +195,13 @@ def _convert_mesh(path: Path, mesh) -> TaggedMesh:
             )
         dimension = 1 if block.type in LINES else 2
         codes = np.zeros(len(block.data), int) if codes is None else np.ravel(codes)
-        codes, number = np.unique(codes, return_inverse=True)
         names = [
             tags.names.get((dimension, code), f"tag {code}" if code else "")
             for code in map(int, codes)
         ]
-        names = np.array(names, str)[number]
         cells = np.asarray(block.data, np.int64)
-        if dimension == 2:
-            blocks.append(TaggedBlock(block.type, cells, names))
-            continue
-        for name in np.unique(names).tolist():
-            known_nodes = nodes.get(name, np.empty(0, np.int64))
-            nodes[name] = np.append(known_nodes, cells[names == name].ravel())
-    return TaggedMesh(np.asarray(mesh.points, float), blocks, nodes, tags.tag_help)
+        blocks.append(TaggedBlock(block.type, cells, np.array(names, str)))
+    return TaggedMesh(np.asarray(mesh.points, float), blocks, tags.tag_help)
 
 
 def _read_with_meshio(path: Path):

@@ -20,6 +20,9 @@ CHILDREN = {
     3: ((0, 3, 5), (3, 1, 4), (5, 4, 2), (3, 4, 5)),
     4: ((0, 4, 8, 7), (4, 1, 5, 8), (8, 5, 2, 6), (7, 8, 6, 3)),
 }
+LINEAR_KINDS = {3: "triangle", 4: "quad"}
+# Elements into whose nodes the cells of first order are divided
+SECOND_ORDER = {"triangle": "triangle6", "quad": "quad9"}
 
 
 class CellEdges(NamedTuple):
@@ -136,34 +139,26 @@ class PieceMesh:
 
     def refine(self) -> "PieceMesh":
         """Return the piece after every edge is halved and every cell is split into four of the same order."""
-        edges = self.edges
         points = self.points
+        blocks = self.blocks
         tagged = [np.isin(np.arange(len(points)), nodes) for nodes in (self.interface, self.far)]
-        middles = edges.middles
         if not self.is_quadratic:
-            points, middles, tagged = _add_middles(points, edges, tagged)
+            points, blocks, tagged = raise_order(points, blocks, tagged)
 
-        # Every block is split by its corners, the middles of its edges and, for quadrilaterals, its centre.
+        # Every cell is split by its corners, the middles of its edges and, for quadrilaterals, its centre.
         children = {}
-        n_edges = 0
-        for kind, cells in self.blocks.items():
-            element = ELEMENTS[kind]
-            n = element.n_corners
-            block_middles = middles[n_edges : n_edges + n * len(cells)].reshape(-1, n)
-            n_edges += n * len(cells)
-            centres = np.arange(len(cells)) + len(points)
-            if n == 4 and kind == "quad9":
-                centres = cells[:, 8]
-            elif n == 4:
-                shape = element.evaluate(element.centre).values[0]
-                points = np.concatenate(
-                    [points, np.tensordot(self.points[cells], shape, ([1], [0]))]
-                )
-            nodes = np.concatenate([cells[:, :n], block_middles, centres[:, None]], axis=1)
-            children[kind] = nodes[:, CHILDREN[n]].reshape(-1, n)
-        tagged = [np.append(part, np.zeros(len(points) - part.size, bool)) for part in tagged]
+        for kind, cells in blocks.items():
+            n = ELEMENTS[kind].n_corners
+            nodes = cells
+            if kind == "quad8":
+                shape = ELEMENTS[kind].evaluate(ELEMENTS[kind].centre).values[0]
+                nodes = np.column_stack([cells, len(points) + np.arange(len(cells))])
+                points = np.concatenate([points, np.tensordot(points[cells], shape, ([1], [0]))])
+            children[LINEAR_KINDS[n]] = nodes[:, CHILDREN[n]].reshape(-1, n)
+        tagged = _tag_inner_points(tagged, len(points))
         if self.is_quadratic:
-            points, children, tagged = _raise_order(points, children, tagged)
+            kinds = {LINEAR_KINDS[ELEMENTS[kind].n_corners]: kind for kind in self.blocks}
+            points, children, tagged = raise_order(points, children, tagged, kinds)
 
         interface, far = map(np.flatnonzero, tagged)
         interface = interface[np.argsort(points[interface, 0], kind="stable")]
@@ -192,37 +187,49 @@ def find_edges(blocks: dict, n_points: int) -> CellEdges:
     return CellEdges(ends, np.concatenate(owners), np.concatenate(middles), twin, counts[twin] == 1)
 
 
-def _add_middles(points, edges: CellEdges, tagged: list) -> tuple[np.ndarray, np.ndarray, list]:
-    """Add a node in the middle of every edge; on the border it has the tags that both ends of the edge have.
+def _tag_inner_points(tagged: list, n_points: int) -> list:
+    """Return whether each of `n_points` has each tag; points beyond the known ones are inside and have none."""
+    return [np.append(part, np.zeros(n_points - part.size, bool)) for part in tagged]
 
-    Returns the points, the numbers of the new nodes (e,), and whether each point has each tag.
+
+def raise_order(
+    points, blocks: dict, tagged: list, kinds: dict = SECOND_ORDER
+) -> tuple[np.ndarray, dict, list]:
+    """Add the nodes of elements of second order to cells of first order.
+
+    A node in the middle of an edge on the border has the tags that both ends of the edge have.
+
+    Parameters
+    ----------
+    points : (N, 2) ndarray
+    blocks : dict
+        Cells (t, n) by the name of their element.
+    tagged : list of (N,) bool ndarray
+        Whether each point has each tag.
+    kinds : dict
+        Elements of second order by those of first order.
+
+    Returns
+    -------
+    points, blocks, tagged
     """
+    edges = find_edges(blocks, len(points))
     _, first = np.unique(edges.twin, return_index=True)
     ends = edges.ends[first]
-    new_points = points[ends].mean(axis=1)
+    middles = len(points) + edges.twin
     tagged = [np.append(part, part[ends].all(axis=1) & edges.is_border[first]) for part in tagged]
-    return np.concatenate([points, new_points]), len(points) + edges.twin, tagged
-
-
-def _raise_order(points, blocks: dict, tagged: list) -> tuple[np.ndarray, dict, list]:
-    """Add the nodes of elements of second order to their corners (t, n)."""
-    edges = find_edges({kind: cells for kind, cells in blocks.items()}, len(points))
-    points, middles, tagged = _add_middles(points, edges, tagged)
     out = {}
     n_edges = 0
+    corner_points = points
+    points = np.concatenate([points, points[ends].mean(axis=1)])
     for kind, corners in blocks.items():
-        n = corners.shape[1]
-        nodes = [corners, middles[n_edges : n_edges + corners.size].reshape(-1, n)]
+        nodes = [corners, middles[n_edges : n_edges + corners.size].reshape(corners.shape)]
         n_edges += corners.size
-        if kind == "quad9":
+        if kinds[kind] == "quad9":
             nodes.append(len(points) + np.arange(len(corners))[:, None])
-            points = np.concatenate([points, points[corners].mean(axis=1)])
-        out[kind] = np.concatenate(nodes, axis=1)
-    return (
-        points,
-        out,
-        [np.append(part, np.zeros(len(points) - part.size, bool)) for part in tagged],
-    )
+            points = np.concatenate([points, corner_points[corners].mean(axis=1)])
+        out[kinds[kind]] = np.concatenate(nodes, axis=1)
+    return points, out, _tag_inner_points(tagged, len(points))
 
 
 def signed_areas(corners) -> np.ndarray:

@@ -137,7 +137,7 @@ def _filter_waviness(trace: Profile, cutoff: float) -> Profile:
     n_samples = int(np.ceil(SAMPLES_PER_CUTOFF * samples.length / cutoff)) + 1
     x = np.linspace(samples.x[0], samples.x[-1], max(samples.x.size, n_samples))
     samples_per_cutoff = cutoff * (x.size - 1) / samples.length
-    line = mean_line(np.interp(x, samples.x, samples.z), samples_per_cutoff, tilted=True)
+    line = mean_line(np.interp(x, samples.x, samples.z), samples_per_cutoff)
     return replace(trace, x=frozen_array(x), z=frozen_array(line), notes=())
 
 

@@ -1,13 +1,16 @@
 """Steps of order 2 from return maps: motion of many contact points, and sweeps over many cases.
 
-For what has no smooth regimes between few events: patches whose pressure changes with the motion, many nodes in partial
-slip, laws that are much faster than the drive; and, with one point, for hundreds of cases.
+For what has no smooth regimes between few events: patches whose pressure changes with the motion, lists of bonds, many
+nodes in partial slip, laws that are much faster than the drive; and, with one point, for hundreds of cases.
 
 1. `return_maps_kernels`  force, tangent and state of each law after a step of slide
 2. `laws`                 numbers and first memory of the laws from their keys
 3. `case_rows`, `case_kernels`, `cases`  many cases of one mode and one point with their measures
-4. `contacts`             points of a rig from elements, bonds, patches and varying loads
-5. `march_rows`, `march_kernels`, `march`  modes with many points: `march.march` returns a `march.Motion`
+4. `contacts`             points of a rig or a bench: elements, bonds, patches, varying loads, grooves
+5. `march_rows`, `lists_kernels`, `flanks_kernels`, `march_kernels`  steps of modes with many points
+6. `checkpoint`, `time_march`  march over the cycles of a drive, with its record; its state on disk
+7. `slides`               points along a prescribed slide
+8. `orbits`               periodic motions by marching, and their multipliers
 
 A law is a number in `return_maps_kernels.Law` with a branch in each of five functions. Read `return_maps_kernels` first.
 """
@@ -16,7 +19,22 @@ A law is a number in `return_maps_kernels.Law` with a branch in each of five fun
 PUBLIC = {
     "case_rows": ("SAME_CYCLE", "Cases", "Number"),
     "cases": ("CaseMarch", "list_parameters", "march_cases"),
-    "contacts": ("Contact",),
+    "checkpoint": ("CheckpointFiles", "MAX_EARLY_SAMPLES", "store_checkpoints"),
+    "contacts": (
+        "BondSum",
+        "Contact",
+        "add_springs",
+        "make_bond_contact",
+        "make_contact",
+        "make_cubic_spring",
+        "make_flank_contact",
+        "make_interlocking_spring",
+        "make_parallel_contact",
+        "make_pressed_contact",
+        "with_elements",
+    ),
     "laws": ("make_point_law",),
-    "march": ("Motion",),
+    "time_march": ("March", "Motion", "Snapshot", "count_list_bytes", "load_kernels", "march"),
+    "orbits": ("MAX_CYCLES", "estimate_multipliers", "march_cycle", "march_to_periodic"),
+    "slides": ("SlideMotion", "follow"),
 }

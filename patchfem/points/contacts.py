@@ -1,16 +1,32 @@
-"""Contact points of a rig with their laws, from elements, bonds, patches and varying loads."""
+"""Contact points of a rig or a bench with their laws: elements, bonds, patches under changing loads, flanks of grooves."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from ..contact.contact_sets import ContactSets
+from ..friction.bonds.parameters import Bonds
+from ..friction.grooves import Grooves
 from ..friction.protocol import Element
-from .laws import N_MEMORY, N_NUMBERS, PointLaw, make_bonds, make_coulomb, make_jenkins, make_tanh
-from .return_maps_kernels import Law
+from .law_rows import Law
+from .laws import (
+    N_MEMORY,
+    N_NUMBERS,
+    PointLaw,
+    make_bonds,
+    make_coulomb,
+    make_cubic,
+    make_interlocking,
+    make_jenkins,
+    make_list,
+    make_tanh,
+)
+from .march_rows import LOWER
 
-RESULTANT = -1  # node of a point whose load is a fraction of the resultant
-# Law and rows of numbers of the elements of a single number of memory, by the module of their kernels
+if TYPE_CHECKING:
+    from ..contact.contact_sets import ContactSets
+
+# Law of the elements of a single number of memory, by the module of their kernels
 FLOW_LAWS = {
     "friction.laws.tanh_kernels": Law.TANH,
     "friction.laws.bouc_wen_kernels": Law.BOUC_WEN,
@@ -18,23 +34,39 @@ FLOW_LAWS = {
 }
 
 
+class BondSum(NamedTuple):
+    """Settings of the sum over a list of bonds.
+
+    - bonds: law
+    - reach: cut-off in bond lengths
+    - merge: widest merged strip in bond lengths at zero age; 0 merges nothing
+    """
+
+    bonds: Bonds
+    reach: float
+    merge: float
+
+
 @dataclass(frozen=True, eq=False)
 class PointSet:
     """Points that act on one port.
 
-    - laws: law of each point
+    - laws: law of each point under its load at the start
     - row (n,): displacement of the port per modal coordinate
-    - nodes (m,): node whose normal force is the load of a point under a varying load, else RESULTANT
-    - shapes (r, m), stiffness (r,): shear coordinates of the pieces, see `march_rows.Points`
+    - nodes (m,): node whose normal force is the load of a point, RESULTANT or LOWER
+    - shear: slip.shear_modes.ShearModes of pieces that deform, or None
     - is_spring: whether the point is a spring
+    - shares (m,): load [N] of a point at the relative pressure 1 of the lower piece, with LOWER
+    - places (m,): positions of the points [m], with LOWER
     """
 
     laws: list[PointLaw]
     row: np.ndarray
     nodes: np.ndarray | None = None
-    shapes: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
-    stiffness: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    shear: object = None
     is_spring: bool = False
+    shares: np.ndarray | None = None
+    places: np.ndarray | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,18 +74,51 @@ class Contact:
     """Interfaces and springs of a rig with the load of the first interface.
 
     - point_sets: interfaces, then springs
+    - limit: friction limit of all interfaces [N], or another force by which residuals are measured
+    - length: elastic length of the first interface [m]
     - sets: contact sets of a patch whose pressure changes with heave and pitch
     - heave, pitch (n,): motions of the holder per modal coordinate, with `sets`
     - load: function of times (k,) [s] that returns a prescribed load [N]
-    - preload: load at the start [N], with `sets` or `load`
+    - preload: load at the start [N], with `sets`, `load` or `grooves`
+    - bond_sum: sum over the bonds of points with lists
+    - pressure (2, k): positions [m] and relative pressures of the lower piece
+    - grooves: grooves whose flanks the first interface climbs
+    - elements: slip.shear_modes.JenkinsSet whose elements are the points, or None
     """
 
     point_sets: list[PointSet]
-    sets: ContactSets | None = None
+    limit: float = 0.0
+    length: float = 0.0
+    sets: "ContactSets | None" = None
     heave: np.ndarray | None = None
     pitch: np.ndarray | None = None
     load: object = None
     preload: float = 1.0
+    bond_sum: BondSum | None = None
+    pressure: np.ndarray | None = None
+    grooves: Grooves | None = None
+    elements: object = None
+
+    @property
+    def set_valued(self) -> bool:
+        """Whether the first interface sticks rigidly."""
+        return bool(self.point_sets) and _get_law(self.point_sets[0]) == Law.COULOMB
+
+    @property
+    def reduction(self):
+        """Shear modes or elements to which a patch was reduced, or None."""
+        return self.elements or (self.point_sets[0].shear if self.point_sets else None)
+
+    @property
+    def has_loads(self) -> bool:
+        """Whether the loads of points change."""
+        parts = (self.sets, self.load, self.pressure, self.grooves)
+        return any(part is not None for part in parts)
+
+
+def _get_law(points: PointSet) -> float:
+    """Return the number of the law of the first point."""
+    return points.laws[0].numbers[0]
 
 
 def convert_element(element: Element) -> list[PointLaw]:
@@ -62,68 +127,192 @@ def convert_element(element: Element) -> list[PointLaw]:
     Parallel elements become one point each, bonds at points of equal slide a single point.
     """
     numbers = element.numbers
-    if not element.kernels:
+    if element.form == "rigid":
         return [make_coulomb(numbers[1], numbers[2])]
     if element.form == "parallel":
         count = int(numbers[1])
         pairs = zip(numbers[2 : 2 + count], numbers[2 + count : 2 + 2 * count])
         return [make_jenkins(stiffness * length, length) for stiffness, length in pairs]
+    rows = np.zeros(N_NUMBERS)
+    memory = np.zeros(N_MEMORY)
     if element.form == "points":
-        rows = np.zeros(N_NUMBERS)
         # Points of equal slide and a density of 1 per load are one point.
-        rows[:10] = (
-            Law.BONDS,
-            numbers[1] * numbers[2],
-            numbers[2],
-            *numbers[3:9],
-            element.memory[1],
-        )
-        memory = np.zeros(N_MEMORY)
+        limit = numbers[1] * numbers[2]
+        rows[:9] = (Law.BONDS, limit, numbers[2], *numbers[3:8], element.memory[1])
         memory[:4] = element.memory[:4]
         return [PointLaw(rows, memory, 1.0)]
     if element.kernels in FLOW_LAWS:
-        rows = np.zeros(N_NUMBERS)
         rows[0] = FLOW_LAWS[element.kernels]
         rows[1 : numbers.size] = numbers[1:]
         if rows[0] == Law.TANH:
             rows[2] = 1 / numbers[2]
-        return [PointLaw(rows, np.zeros(N_MEMORY), 1.0)]
+        return [PointLaw(rows, memory, 1.0)]
     raise ValueError(f"law of {element.kernels} has no return map")
 
 
-def make_bond_points(bonds, force, shear, row) -> PointSet:
-    """Return points with bonds under constant normal forces (m,) [N], coupled by slip.shear_modes.ShearModes."""
-    laws = [make_bonds(bonds, load) for load in force]
-    return PointSet(laws, row, None, np.array(shear.shape.T), np.asarray(shear.stiffness, float))
+def make_contact(elements, rows, springs=(), scale: float = 0.0) -> Contact:
+    """Return interfaces under constant loads, and springs.
+
+    Parameters
+    ----------
+    elements : sequence of friction.protocol.Element
+        Law of each interface.
+    rows : (i, n) array
+        Slide of each interface per modal coordinate.
+    springs : sequence of PointSet
+    scale : float
+        Force by which residuals are measured where there is no friction [N].
+    """
+    point_sets = [PointSet(convert_element(one), row) for one, row in zip(elements, rows)]
+    limit = sum(one.limit for one in elements)
+    length = elements[0].length if elements else 0.0
+    return Contact([*point_sets, *springs], limit or scale, length)
 
 
-def make_pressed_points(law, force, shear, row) -> PointSet:
+def make_parallel_contact(stiffness, yield_slide, row, elements=None) -> Contact:
+    """Return parallel elastic-plastic elements on one interface.
+
+    Parameters
+    ----------
+    stiffness, yield_slide : (t,) array
+        Stiffnesses [N/m] and slides at which the elements yield [m].
+    row : (n,) array
+        Slide per modal coordinate.
+    elements : slip.shear_modes.JenkinsSet, optional
+        Elements of a patch.
+    """
+    limits = np.multiply(stiffness, yield_slide)
+    laws = [make_jenkins(limit, length) for limit, length in zip(limits, yield_slide)]
+    return Contact([PointSet(laws, row)], float(limits.sum()), elements=elements)
+
+
+def make_cubic_spring(stiffness: float, row) -> PointSet:
+    """Return a spring of the force stiffness q^3 [N/m3] on a port of displacement `row` (n,) per coordinate."""
+    return PointSet([make_cubic(stiffness)], row, is_spring=True)
+
+
+def make_interlocking_spring(stiffness: float, wavelength: float, row) -> PointSet:
+    """Return a spring of sinusoidal force, of a stiffness at rest [N/m], on a port of displacement `row` (n,)."""
+    return PointSet([make_interlocking(stiffness, wavelength)], row, is_spring=True)
+
+
+def make_bond_contact(
+    bonds: Bonds, force, row, shear=None, bond_sum: BondSum | None = None, lower=None
+) -> Contact:
+    """Return points of bonds.
+
+    Parameters
+    ----------
+    bonds : Bonds
+    force : (m,) array or float
+        Normal force of each point [N]; with `lower`, its area times the mean pressure.
+    row : (n,) array
+        Slide per modal coordinate.
+    shear : ShearModes, optional
+        Shear of the pieces, with the points in the order of `force`.
+    bond_sum : BondSum, optional
+        Sum over lists of bonds; without it the bonds have the closed form of the reading "stretch" and order 1.
+    lower : (2, k) array, optional
+        Positions [m] and relative pressures of a distribution that is fixed to the lower piece; the points are at these
+        positions.
+    """
+    loads = np.atleast_1d(np.asarray(force, float))
+    shares = places = nodes = pressure = None
+    now = loads
+    if lower is not None:
+        pressure = np.array(lower, float)
+        shares = loads
+        places = pressure[0]
+        now = loads * pressure[1]
+        nodes = np.full(loads.size, LOWER)
+    if bond_sum is None:
+        laws = [make_bonds(bonds, load) for load in now]
+    else:
+        laws = [make_list(bonds, load) for load in now]
+    points = PointSet(laws, row, nodes, shear, shares=shares, places=places)
+    limit = bonds.static * float(now.sum())
+    return Contact([points], limit, bonds.length, bond_sum=bond_sum, pressure=pressure)
+
+
+def make_pressed_contact(
+    law, force, row, shear=None, bond_sum: BondSum | None = None, **load
+) -> Contact:
     """Return the points of an interface under a load that changes.
 
     Parameters
     ----------
-    law : object
-        Friction keys `law`, `static`, `kinetic`, `reference_speed`, `bond_length`, or Bonds.
+    law : Bonds, or keys `law`, `static`, `kinetic`, `reference_speed`, `bond_length` of a table [friction]
+        Laws "coulomb" and "tanh" act on the resultant, others on every point.
     force : (m,) array or float
         Nodal forces of the preload [N], or the preload of a single point.
-    shear : ShearModes or None
-        Shear of the pieces.
     row : (n,) array
         Slide per modal coordinate.
+    shear : ShearModes, optional
+        Shear of the pieces at all nodes.
+    bond_sum : BondSum, optional
+        Sum over lists of bonds.
+    **load
+        Fields of Contact that describe the load.
     """
+    loads = np.atleast_1d(np.asarray(force, float))
     name = getattr(law, "law", "bonds")
+    nodes = None if np.ndim(force) == 0 else np.arange(loads.size)
+    length = 0.0
     if name in ("coulomb", "tanh"):
-        load = float(np.sum(force))
         kinetic = law.static if law.kinetic is None else law.kinetic
         make = make_coulomb if name == "coulomb" else make_tanh
-        second = kinetic if name == "coulomb" else law.reference_speed
-        return PointSet([make(law.static, second, load)], row)
-    loads = np.atleast_1d(np.asarray(force, float))
-    if name == "bonds":
+        laws = [
+            make(law.static, kinetic if name == "coulomb" else law.reference_speed, loads.sum())
+        ]
+        nodes = None
+    elif name != "bonds":
+        length = law.bond_length or 0.0
+        laws = [make_jenkins(law.static, length, load) for load in loads]
+    elif bond_sum is None:
+        length = law.length
         laws = [make_bonds(law, load) for load in loads]
     else:
-        laws = [make_jenkins(law.static, law.bond_length, load) for load in loads]
-    nodes = None if np.ndim(force) == 0 else np.arange(loads.size)
-    if shear is None:
-        return PointSet(laws, row, nodes)
-    return PointSet(laws, row, nodes, np.array(shear.shape.T), np.asarray(shear.stiffness, float))
+        length = law.length
+        laws = [make_list(law, load) for load in loads]
+    points = PointSet(laws, row, nodes, shear)
+    limit = (law.static or 1.0) * max(float(loads.sum()), 1e-9)
+    return Contact([points], limit, length, bond_sum=bond_sum, preload=float(loads.sum()), **load)
+
+
+def make_flank_contact(law, grooves: Grooves, load: float, row, shear=None, shares=None) -> Contact:
+    """Return the points of an interface that climbs the flanks of grooves.
+
+    Parameters
+    ----------
+    law : Bonds, or keys `law`, `static` and `bond_length` of a table [friction]
+    grooves : Grooves
+    load : float
+        Vertical load [N].
+    row : (n,) array
+        Slide per modal coordinate.
+    shear : ShearModes, optional
+        Shear of the pieces.
+    shares : (m,) array, optional
+        Fractions of the load on the points; default: a single point.
+    """
+    normal = load * float(np.hypot(1.0, grooves.slope(0.0)))
+    shares = np.ones(1) if shares is None else np.asarray(shares, float)
+    is_bonds = isinstance(law, Bonds)
+    length = law.length if is_bonds else law.bond_length
+    if is_bonds:
+        laws = [make_bonds(law, normal * share) for share in shares]
+    else:
+        laws = [make_jenkins(law.static, length, normal * share) for share in shares]
+    points = PointSet(laws, row, None, shear)
+    limit = grooves.max_force(load, law.static)
+    return Contact([points], limit, length, preload=load, grooves=grooves)
+
+
+def add_springs(contact: Contact, springs: list[PointSet]) -> Contact:
+    """Return a contact with springs after its interfaces."""
+    return replace(contact, point_sets=[*contact.point_sets, *springs])
+
+
+def with_elements(contact: Contact, elements) -> Contact:
+    """Return a contact that knows the slip.shear_modes.JenkinsSet whose elements are its points."""
+    return replace(contact, elements=elements)

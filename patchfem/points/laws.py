@@ -4,14 +4,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..friction.bonds.parameters import Bonds
+from ..friction.bonds.parameters import Bonds, growth_numbers
 from ..friction.laws.iwan import max_yield_displacement
-from ..friction.laws.stretch import growth_numbers
-from .return_maps_kernels import Law, Masing
+from .law_rows import Law, Masing
 
 N_NUMBERS = 10  # rows of numbers of a point
 N_MEMORY = 6  # rows of memory of a point, without a stack of reversals
 REVERSALS = 48  # reversals that parallel sliders remember
+MIN_LENGTH = 1e-30  # length [m] in place of no length, by which a stiffness is divided
 MIN_LOAD = 1e-12  # load [N] in place of no load, to which a stiffness refers
 
 
@@ -44,7 +44,7 @@ def _pack(law: Law, numbers, memory=(), load=1.0, n_memory: int = N_MEMORY) -> P
 
 def make_jenkins(static: float, length: float, load: float = 1.0) -> PointLaw:
     """Return an elastic-plastic point (eq. 3.12) of friction coefficient `static` and length [m]."""
-    return _pack(Law.JENKINS, (static, length), (0.0, load), load)
+    return _pack(Law.JENKINS, (static, np.maximum(length, MIN_LENGTH)), (0.0, load), load)
 
 
 def make_coulomb(static: float, kinetic: float, load: float = 1.0) -> PointLaw:
@@ -61,6 +61,11 @@ def make_bonds(bonds: Bonds, load: float = 1.0) -> PointLaw:
     """Return a point with bonds of order 1 and reading = "stretch"."""
     numbers = (bonds.static, bonds.length, *growth_numbers(bonds), bonds.initial)
     return _pack(Law.BONDS, numbers, (bonds.length, bonds.initial * load), load)
+
+
+def make_list(bonds: Bonds, load: float) -> PointLaw:
+    """Return a point whose bonds are summed over a list, under a load [N]."""
+    return _pack(Law.LIST, (bonds.static, bonds.length), load=load)
 
 
 def make_cubic(stiffness: float) -> PointLaw:

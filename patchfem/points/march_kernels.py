@@ -5,24 +5,48 @@ Over a step the modes move exactly under a parabola of the drive and constant po
 
     F_p = sum over the points of port p of f(dq_p - shape . db, v_p),    kappa (b + db/2) = shapes^T f
 
-for the shear coordinates b of the pieces, by Newton's method. Normal contact acts on the ports of heave and pitch with
-the path mean of its piecewise linear forces. A changing load acts half before and half after the slide.
+for the shear coordinates b of the pieces. These are the conditions of the minimum of
 
-A rigid point slips under a given force, or its port is held at rest. A step in which the velocity of a port with
-friction changes its sign, or a rigid point is released, is halved up to the last level.
+    (dq - free)^T C^-1 (dq - free)/2 + sum of the work of the points + kappa (b db + db^2/4),
+
+which Newton's method with a line search finds; it is convex unless the force of a point falls with its slide. Normal
+contact acts on the ports of heave and pitch with the path mean of its piecewise linear forces. A changing load acts
+half before and half after the slide, and then the pieces relax while the ports rest: a mean over the step would leave
+them out of equilibrium, and reverse that in every step. Lists of bonds, whose forces jump, have a weight on the change
+of db instead. A port may climb flanks (`flanks_kernels`), and its displacement may be prescribed.
+
+A rigid point slips under a given force, or its port is held at rest. A step in which a slipping port would reverse, or a
+point at rest is released, is halved up to the last level.
 """
 
 import numpy as np
 
 from ..compiled.jit import njit
-from ..contact.press_kernels import compute_energy, find_set, press_state
-from ..contact.press_path_kernels import path_mean
 from ..contact.set_arrays import REFERENCE_LOAD, REFERENCE_MOMENT
 from ..friction.bonds.point_kernels import MAX_SHORT_PATH
-from ..friction.flags_kernels import NJIT_KERNEL
-from .march_rows import N_PORT_COLUMNS, Point, Port, Sample, Total
+from ..friction.flags_kernels import NJIT_CALL, NJIT_INLINE, NJIT_KERNEL
+from . import flanks_kernels as flanks
+from . import lists_kernels as lists
+from . import normal_kernels as normal
+from .law_rows import Law
+from .march_rows import (
+    DONE,
+    EXCEEDS_TRAVEL,
+    LEAVES_GROOVES,
+    LISTS_FULL,
+    LOWER,
+    N_PORT_COLUMNS,
+    NO_CONTACT_SET,
+    NOT_FINITE,
+    RESIDUAL,
+    Flank,
+    Point,
+    Port,
+    Sample,
+    Shear,
+    Total,
+)
 from .return_maps_kernels import (
-    Law,
     Step,
     advance,
     advance_bonds,
@@ -34,22 +58,26 @@ from .return_maps_kernels import (
     write_bond_means,
 )
 
-MAX_ITERATIONS = 80  # Newton iterations of a step
-MAX_LOADS = 40  # repetitions of a step for the loads that follow from its motion
-RESIDUAL = 1e-11  # residual of forces relative to the largest one
-LOAD_RESIDUAL = 1e-10  # change of the loads relative to the resultant
-SHEAR_DAMPING = (
-    0.25  # weight of the change of a shear increment, which damps oscillations of the pieces
+MAX_ITERATIONS = 200  # Newton iterations of a step
+STEADY_BONDS = (
+    1e-13  # relative distance of bonds from those of an endless slide that counts as none
 )
-DONE = 0
-EXCEEDS_TRAVEL = 1
-NOT_FINITE = 2
-NO_CONTACT_SET = 3
+LAST_STEP = 4e-6  # change of a slide in bond lengths, half the square of which is within RESIDUAL
+MAX_CUTS = 40  # trials of a line search
+MAX_OVERSHOOT = 0.5  # slope beyond the minimum of a line search, relative to that at its start
+MAX_STALLS = 4  # iterations that do not halve the smallest residual, after which a step ends
+# Largest residual of such a step relative to RESIDUAL, and that of lists, because sums over bonds jump by up to 1e-8
+STALLED = 1e3
+LISTS_STALLED = 1e5
+MAX_RELAXATIONS = 40  # Newton iterations of the pieces after a step
+MAX_LOADS = 60  # repetitions of a step for the loads that follow from its motion
+ROUND_OFF = 4e-16  # round-off error of an increment relative to its size
+LOAD_RESIDUAL = 1e-11  # change of the loads relative to the resultant
 
 
-@njit(**NJIT_KERNEL)
+@njit(**NJIT_CALL)
 def solve_linear(matrix, vector, n):
-    """Solve a dense system in place by Gaussian elimination with partial pivoting."""
+    """Solve a dense system in place by Gaussian elimination with partial pivoting; return whether it is regular."""
     for k in range(n):
         best = k
         for i in range(k + 1, n):
@@ -75,137 +103,260 @@ def solve_linear(matrix, vector, n):
     return True
 
 
-@njit(**NJIT_KERNEL)
-def move_freely(system, level, drive):
-    """Write the motion at the end of a step without interface forces, and that of the ports."""
+@njit(**NJIT_CALL)
+def subtract_shear(slides, shapes, increments):
+    """Subtract the displacements of the pieces from the slides (m,) of the points, four coordinates in one pass."""
+    r = increments.size
+    whole = r - r % 4
+    for k in range(0, whole, 4):
+        first = increments[k]
+        second = increments[k + 1]
+        third = increments[k + 2]
+        fourth = increments[k + 3]
+        for j in range(slides.size):
+            slides[j] -= (
+                shapes[k, j] * first
+                + shapes[k + 1, j] * second
+                + shapes[k + 2, j] * third
+                + shapes[k + 3, j] * fourth
+            )
+    for k in range(whole, r):
+        part = increments[k]
+        for j in range(slides.size):
+            slides[j] -= shapes[k, j] * part
+
+
+@njit(**NJIT_CALL)
+def sum_products(first, second):
+    """Return the sum of the products of the entries of two arrays."""
+    total = 0.0
+    for j in range(second.size):
+        total += first[j] * second[j]
+    return total
+
+
+@njit(**NJIT_CALL)
+def sum_triples(first, second, third):
+    """Return the sum of the products of the entries of three arrays."""
+    total = 0.0
+    for j in range(third.size):
+        total += first[j] * second[j] * third[j]
+    return total
+
+
+@njit(**NJIT_INLINE)
+def project(row, state):
+    """Return the displacement of a port."""
+    total = 0.0
+    for i in range(row.size):
+        total += row[i] * state[i]
+    return total
+
+
+@njit(**NJIT_INLINE)
+def move_freely(system, level, drive, row, fraction):
+    """Write the motion at the end of a step without interface forces, and that of the ports.
+
+    `row` and `fraction` are the time at the start in whole steps.
+    """
     response = system.structure.responses[level]
     state = system.state
     size = state.shape[1]
     n = size // 2
+    values = system.ports.values
+    path = system.structure.path
+    if path.size:
+        # The displacement of port 0 is prescribed, at a constant velocity in a step.
+        slope = path[row + 1] - path[row]
+        values[Port.SLIDE, 0] = path[row] + fraction * slope
+        values[Port.FREE, 0] = slope / (1 << level)
+        values[Port.VELOCITY, 0] = values[Port.FREE_VELOCITY, 0] = slope / system.options.step
+        return
     for i in range(size):
         total = response[i, size] * drive[0] + response[i, size + 1] * drive[1]
         total += response[i, size + 2] * drive[2]
         for k in range(size):
             total += response[i, k] * state[0, k]
         state[1, i] = total
-    ports = system.ports
-    for p in range(ports.rows.shape[0]):
-        slide = 0.0
-        velocity = 0.0
+    rows = system.ports.rows
+    for p in range(rows.shape[0]):
+        values[Port.SLIDE, p] = project(rows[p], state[0, :n])
+        values[Port.VELOCITY, p] = project(rows[p], state[0, n:])
+        values[Port.FREE_VELOCITY, p] = project(rows[p], state[1, n:])
         free = 0.0
-        free_velocity = 0.0
         for i in range(n):
-            row = ports.rows[p, i]
-            slide += row * state[0, i]
-            velocity += row * state[0, n + i]
-            free += row * (state[1, i] - state[0, i])
-            free_velocity += row * state[1, n + i]
-        ports.values[Port.SLIDE, p] = slide
-        ports.values[Port.VELOCITY, p] = velocity
-        ports.values[Port.FREE, p] = free
-        ports.values[Port.FREE_VELOCITY, p] = free_velocity
+            free += rows[p, i] * (state[1, i] - state[0, i])
+        values[Port.FREE, p] = free
 
 
-@njit(**NJIT_KERNEL)
+@njit(**NJIT_INLINE)
 def prepare_points(system, h):
-    """Copy the memory of the points and press them to the loads in the middle of the step."""
+    """Press the trial memory of the points to the loads in the middle of the step."""
     points = system.points
     values = points.values
-    for k in range(points.memory.shape[0]):
-        for j in range(points.port.size):
-            points.trial[k, j] = points.memory[k, j]
-    for j in range(points.port.size):
-        values[Point.LOAD, j] = 0.5 * (values[Point.START_LOAD, j] + values[Point.END_LOAD, j])
-    for j in range(points.port.size):
-        if values[Point.START_LOAD, j] != values[Point.END_LOAD, j]:
-            press(
-                points.numbers, points.trial, j, values[Point.START_LOAD, j], values[Point.LOAD, j]
-            )
-        v = system.ports.values[Port.VELOCITY, points.port[j]]
-        prepare(points.numbers, points.trial, j, Step(0.0, h, v, v, 0.0))
+    options = system.options
+    count = points.port.size
+    if options.has_loads or system.totals[Total.IS_DIRTY] > 0:
+        for k in range(points.memory.shape[0]):
+            for j in range(count):
+                points.trial[k, j] = points.memory[k, j]
+        system.totals[Total.IS_DIRTY] = 0.0
+    if options.has_loads:
+        for j in range(count):
+            start = values[Point.START_LOAD, j]
+            middle = 0.5 * (start + values[Point.END_LOAD, j])
+            values[Point.LOAD, j] = middle
+            if points.numbers[0, j] == Law.LIST:
+                lists.press_list(system.lists, j, middle)
+            elif start != middle and points.node[j] != LOWER:
+                press(points.numbers, points.trial, j, start, middle)
+        system.totals[Total.IS_DIRTY] = 1.0
+    if options.has_growth:
+        for j in range(count):
+            v = system.ports.values[Port.VELOCITY, points.port[j]]
+            prepare(points.numbers, points.trial, j, Step(0.0, h, v, v, 0.0))
 
 
-@njit(**NJIT_KERNEL)
-def write_system(system, level, h):
-    """Write residuals and Jacobian of the port forces and shear increments; return the size of the residual and of F."""
-    ports = system.ports
-    points = system.points
-    n_ports = ports.rows.shape[0]
-    n_shear = points.stiffness.size
-    compliance = ports.compliance[level]
-    matrix = ports.matrix
-    vector = ports.vector
-    values = points.values
-    matrix[:] = 0.0
-    vector[:] = 0.0
-
-    # Motion of the ports and slides of the points under the assumed forces.
-    for p in range(n_ports):
-        dq = ports.values[Port.FREE, p]
-        v = ports.values[Port.FREE_VELOCITY, p]
-        for k in range(n_ports):
-            dq -= compliance[0, p, k] * ports.values[Port.FORCE, k]
-            v -= compliance[1, p, k] * ports.values[Port.FORCE, k]
-        ports.values[Port.INCREMENT, p] = dq
-        ports.values[Port.END_VELOCITY, p] = v
-        vector[p] = -ports.values[Port.FORCE, p]
-        matrix[p, p] = -1.0
-    for j in range(points.port.size):
-        values[Point.SLIDE, j] = ports.values[Port.INCREMENT, points.port[j]]
-    for k in range(n_shear):
-        increment = points.shear[2, k]
-        for j in range(points.port.size):
-            values[Point.SLIDE, j] -= points.shapes[k, j] * increment
-
-    # Entry (p, k) of the Jacobian is -(df/dq C_pk + df/dv G_pk), summed over the points of port p.
-    for p in range(n_ports):
-        ports.values[Port.BY_SLIDE, p] = 0.0
-        ports.values[Port.BY_VELOCITY, p] = 0.0
-    write_forces(system, level, h)
-    for j in range(points.port.size):
-        p = points.port[j]
-        vector[p] += values[Point.FORCE, j]
-        ports.values[Port.BY_SLIDE, p] += values[Point.BY_SLIDE, j]
-        ports.values[Port.BY_VELOCITY, p] += values[Point.BY_VELOCITY, j]
-    for p in range(n_ports):
-        for k in range(n_ports):
-            matrix[p, k] -= ports.values[Port.BY_SLIDE, p] * compliance[0, p, k]
-            matrix[p, k] -= ports.values[Port.BY_VELOCITY, p] * compliance[1, p, k]
-    size = add_contact(system, level)
-    for p in range(n_ports):
-        size = max(size, abs(ports.values[Port.FORCE, p]))
-    add_shear(system, level, h)
-    hold_ports(system, level)
-    residual = 0.0
-    for p in range(vector.size):
-        residual = max(residual, abs(vector[p]))
-    return residual, size
-
-
-@njit(**NJIT_KERNEL)
+@njit(**NJIT_INLINE)
 def write_forces(system, level, h):
-    """Write the mean forces of the points and their slopes; those of rigid points at rest are not known here."""
+    """Write motion of ports and points under the assumed forces, and the mean forces of the laws with their slopes.
+
+    The forces of rigid points at rest are not known here.
+    """
     ports = system.ports
+    points = system.points
+    values = points.values
+    moves = ports.values
+    compliance = ports.compliance[level]
+    flank = system.flank
+    count = points.port.size
+    n_ports = moves.shape[1]
+    for p in range(n_ports):
+        dq = moves[Port.FREE, p]
+        v = moves[Port.FREE_VELOCITY, p]
+        for k in range(n_ports):
+            dq -= compliance[0, p, k] * moves[Port.FORCE, k]
+            v -= compliance[1, p, k] * moves[Port.FORCE, k]
+        moves[Port.INCREMENT, p] = dq
+        moves[Port.END_VELOCITY, p] = v
+    if flank.size:
+        flanks.climb(flank, moves[Port.SLIDE, 0], moves[Port.INCREMENT, 0], h)
+
+    # Slides of the points.
+    for p in range(n_ports):
+        slide = moves[Port.INCREMENT, p]
+        slide *= flank[Flank.RATIO] if flank.size and p == 0 else 1.0
+        for j in range(points.first[p], points.first[p + 1]):
+            values[Point.SLIDE, j] = slide
+    if points.stiffness.size:
+        subtract_shear(values[Point.SLIDE, :count], points.shapes, points.shear[Shear.TRIAL])
+
+    if not (system.options.is_plain and write_bond_forces(system)):
+        write_point_forces(system, level, h)
+    for p in range(n_ports):
+        force = 0.0
+        by_slide = 0.0
+        by_velocity = 0.0
+        for j in range(points.first[p], points.first[p + 1]):
+            force += values[Point.FORCE, j]
+            by_slide += values[Point.BY_SLIDE, j]
+            by_velocity += values[Point.BY_VELOCITY, j]
+        moves[Port.SUM, p] = force
+        moves[Port.BY_SLIDE, p] = by_slide
+        moves[Port.BY_VELOCITY, p] = by_velocity
+    if flank.size:
+        flank[Flank.TRIAL_FORCE] = moves[Port.SUM, 0]
+        ratio = flank[Flank.RATIO]
+        vertical = flank[Flank.TRIAL_VERTICAL] * flank[Flank.SLOPE]
+        stiffness = flanks.find_stiffness(flank, moves[Port.SLIDE, 0], moves[Port.INCREMENT, 0], h)
+        moves[Port.SUM, 0] = vertical + ratio * moves[Port.SUM, 0]
+        moves[Port.BY_SLIDE, 0] = stiffness + ratio * ratio * moves[Port.BY_SLIDE, 0]
+        moves[Port.BY_VELOCITY, 0] *= ratio
+    if system.structure.path.size:
+        moves[Port.FORCE, 0] = moves[Port.SUM, 0]
+
+
+@njit(**NJIT_CALL)
+def keep_sliding(values, count, direction):
+    """Return whether no point moves against a direction."""
+    least = 0.0
+    for j in range(count):
+        least = min(least, direction * values[Point.SLIDE, j])
+    return least == 0.0
+
+
+@njit(**NJIT_INLINE)
+def write_bond_forces(system):
+    """Write the mean forces of bonds that slide steadily or a short way, in loops that vectorise; else return False."""
     points = system.points
     values = points.values
     count = points.port.size
-    if points.numbers[0, 0] == Law.BONDS and points.stiffness.size > 0:
-        # Only points of one law share shear coordinates.
-        is_short = write_bond_means(
-            points.numbers,
-            points.trial,
-            values[Point.LOAD, :count],
-            values[Point.SLIDE, :count],
-            values[Point.FORCE, :count],
-            values[Point.BY_SLIDE, :count],
-        )
-        if is_short:
-            return
+    direction = system.totals[Total.SLIDES]
+    if direction != 0.0 and keep_sliding(values, count, direction):
+        for j in range(count):
+            values[Point.FORCE, j] = direction * points.numbers[1, j] * values[Point.LOAD, j]
+            values[Point.BY_SLIDE, j] = 0.0
+        return True
+    return write_bond_means(
+        points.numbers,
+        points.trial,
+        values[Point.LOAD, :count],
+        values[Point.SLIDE, :count],
+        values[Point.FORCE, :count],
+        values[Point.BY_SLIDE, :count],
+    )
+
+
+@njit(**NJIT_CALL)
+def advance_plain_bonds(system):
+    """Advance bonds of constant length whose slides are short, or that slide steadily; return whether they were."""
+    points = system.points
+    values = points.values
+    trial = points.trial
+    count = points.port.size
+    direction = system.totals[Total.SLIDES]
+    if direction != 0.0 and keep_sliding(values, count, direction):
+        return True
+    system.totals[Total.SLIDES] = 0.0
+    longest = 0.0
     for j in range(count):
-        p = points.port[j]
+        longest = max(longest, abs(values[Point.SLIDE, j]) - MAX_SHORT_PATH * trial[4, j])
+    if longest > 0.0:
+        return False
+    advance_bonds(trial, values[Point.LOAD, :count], values[Point.SLIDE, :count])
+    return True
+
+
+@njit(**NJIT_CALL)
+def find_steady_slide(system):
+    """Return the direction in which all bonds of constant length slide steadily, or 0."""
+    points = system.points
+    values = points.values
+    direction = 1.0 if points.trial[2, 0] > 0 else -1.0
+    for j in range(points.port.size):
+        load = values[Point.LOAD, j]
+        length = points.trial[4, j]
+        gap = abs(points.trial[1, j] - load) + abs(direction * points.trial[2, j] / length - load)
+        gap += 0.01 * abs(points.trial[3, j] / (length * length) - 2 * load)
+        if gap > STEADY_BONDS * load:
+            return 0.0
+    return direction
+
+
+@njit(**NJIT_INLINE)
+def write_point_forces(system, level, h):
+    """Write the mean forces of the points of any law, and their slopes."""
+    ports = system.ports
+    points = system.points
+    values = points.values
+    for j in range(points.port.size):
+        if points.numbers[0, j] == Law.LIST:
+            lists.write_list_mean(points.numbers, values, system.lists, j, h)
+            continue
         if find_rest_limit(points.numbers, points.trial, j, 1.0) < np.inf:
             values[Point.FORCE, j] = values[Point.BY_SLIDE, j] = values[Point.BY_VELOCITY, j] = 0.0
             continue
+        p = points.port[j]
         step = Step(
             values[Point.SLIDE, j],
             h,
@@ -219,144 +370,370 @@ def write_forces(system, level, h):
         values[Point.BY_VELOCITY, j] = mean.by_velocity
 
 
-@njit(**NJIT_KERNEL)
-def add_contact(system, level):
-    """Add the normal contact to the equations of heave and pitch; return the size of its forces."""
+@njit(**NJIT_INLINE)
+def write_residual(system, level, h):
+    """Write the residuals of port forces and shear coordinates; return the largest one relative to its tolerance."""
     ports = system.ports
-    contact = ports.contact
-    heave = int(contact[0])
-    if heave < 0:
-        return 0.0
-    pitch = int(contact[1])
-    out = contact[2:11]
-    increments = ports.values[Port.INCREMENT]
-    slides = ports.values[Port.SLIDE]
-    slot = int(system.totals[Total.SLOT])
-    path_mean(
-        system.sets, slot, slides[heave], slides[pitch], increments[heave], increments[pitch], out
-    )
-    for i in range(2):
-        p = heave if i == 0 else pitch
-        ports.vector[p] += out[i]
-        for k in range(ports.rows.shape[0]):
-            change = out[5 + 2 * i] * ports.compliance[level, 0, heave, k]
-            change += out[6 + 2 * i] * ports.compliance[level, 0, pitch, k]
-            ports.matrix[p, k] -= change
-    return abs(out[0])
+    points = system.points
+    moves = ports.values
+    vector = ports.vector
+    n_ports = moves.shape[1]
+    size = system.options.scale
+    heave = int(ports.contact[0])
+    for p in range(n_ports):
+        vector[p] = moves[Port.SUM, p] - moves[Port.FORCE, p]
+        size = max(size, abs(moves[Port.FORCE, p]))
+    if heave >= 0:
+        pitch = int(ports.contact[1])
+        increments = moves[Port.INCREMENT]
+        slides = moves[Port.SLIDE]
+        normal.path_mean(
+            system.sets,
+            int(system.totals[Total.SLOT]),
+            slides[heave],
+            slides[pitch],
+            increments[heave],
+            increments[pitch],
+            ports.contact[2:11],
+        )
+        vector[heave] += ports.contact[2]
+        vector[pitch] += ports.contact[3]
+        size = max(size, abs(ports.contact[2]))
+    if system.options.is_rigid:
+        for j in range(points.port.size):
+            if find_rest_limit(points.numbers, points.trial, j, 1.0) < np.inf:
+                p = points.port[j]
+                vector[p] = moves[Port.END_VELOCITY, p] / ports.compliance[level, 1, p, p]
+                vector[p] -= system.options.redundant * moves[Port.FORCE, p]
+    largest = 0.0
+    tolerance = RESIDUAL * size
+    for p in range(n_ports):
+        own = ports.compliance[level, 0, p, p]
+        noise = ROUND_OFF * abs(moves[Port.FREE, p]) / own if own > 0 else 0.0
+        # The normal contact loses no energy, so that its residuals would add up over the steps.
+        weight = 10.0 if p >= heave >= 0 else 1.0
+        if own > 0 or p != 0 or not system.structure.path.size:
+            largest = max(largest, weight * abs(vector[p]) / (tolerance + noise))
+
+    # kappa (b + db/2) = shapes^T f, with a damped change of db.
+    shear = points.shear
+    damping = system.options.damping
+    forces = points.values[Point.FORCE, : points.port.size]
+    for k in range(points.stiffness.size):
+        increment = shear[Shear.TRIAL, k]
+        change = increment - h * shear[Shear.LAST, k]
+        residual = points.stiffness[k] * (shear[Shear.VALUE, k] + 0.5 * increment)
+        residual += damping * points.stiffness[k] * change
+        residual -= sum_products(points.shapes[k], forces)
+        vector[n_ports + k] = residual
+        largest = max(largest, abs(residual) * shear[Shear.SCALE, k] / tolerance)
+    return largest
 
 
-@njit(**NJIT_KERNEL)
-def add_shear(system, level, h):
-    """Add the equations of the shear coordinates and their effect on the ports."""
+@njit(**NJIT_INLINE)
+def write_matrix(system, level):
+    """Write the Jacobian of the residuals.
+
+    Entry (p, k) of the ports is -(df/dq C_pk + df/dv G_pk), summed over the points of port p, less 1 on the diagonal.
+    """
+    ports = system.ports
+    points = system.points
+    moves = ports.values
+    matrix = ports.matrix
+    compliance = ports.compliance[level]
+    n_ports = moves.shape[1]
+    n_points = points.port.size
+    for p in range(n_ports):
+        for k in range(n_ports):
+            matrix[p, k] = -moves[Port.BY_SLIDE, p] * compliance[0, p, k]
+            matrix[p, k] -= moves[Port.BY_VELOCITY, p] * compliance[1, p, k]
+        matrix[p, p] -= 1.0
+        for k in range(points.stiffness.size):
+            matrix[p, n_ports + k] = 0.0
+    heave = int(ports.contact[0])
+    if heave >= 0:
+        pitch = int(ports.contact[1])
+        for i in range(2):
+            p = heave if i == 0 else pitch
+            for k in range(n_ports):
+                change = ports.contact[7 + 2 * i] * compliance[0, heave, k]
+                matrix[p, k] -= change + ports.contact[8 + 2 * i] * compliance[0, pitch, k]
+
+    # All points that share shear coordinates act on the port of the first one.
+    slopes = points.values[Point.BY_SLIDE, :n_points]
+    for k in range(points.stiffness.size):
+        row = n_ports + k
+        p = points.port[0]
+        ratio = system.flank[Flank.RATIO] if system.flank.size and p == 0 else 1.0
+        slope = sum_products(points.shapes[k], slopes)
+        for l in range(k + 1):
+            total = sum_triples(points.shapes[k], points.shapes[l], slopes)
+            matrix[row, n_ports + l] = matrix[n_ports + l, row] = total
+        matrix[row, row] += points.stiffness[k] * (0.5 + system.options.damping)
+        matrix[p, row] = -ratio * slope
+        for q in range(n_ports):
+            matrix[row, q] = ratio * slope * compliance[0, p, q]
+    if not system.options.is_rigid:
+        return
+    for j in range(n_points):
+        if find_rest_limit(points.numbers, points.trial, j, 1.0) < np.inf:
+            p = points.port[j]
+            matrix[p, :] = 0.0
+            for k in range(n_ports):
+                matrix[p, k] = -compliance[1, p, k] / compliance[1, p, p]
+            matrix[p, p] -= system.options.redundant
+
+
+@njit(**NJIT_INLINE)
+def find_descent(system, level):
+    """Return the slope of the potential along the present step, which subtracts `ports.step` from the unknowns."""
+    ports = system.ports
+    moves = ports.values
+    compliance = ports.compliance[level]
+    n_ports = moves.shape[1]
+    slope = 0.0
+    for p in range(n_ports):
+        change = 0.0
+        for k in range(n_ports):
+            change += compliance[0, p, k] * ports.step[k]
+        slope += ports.vector[p] * change
+    for k in range(system.points.stiffness.size):
+        slope -= ports.vector[n_ports + k] * ports.step[n_ports + k]
+    return slope
+
+
+@njit(**NJIT_INLINE)
+def find_step(system, level):
+    """Write Newton's step; return the slope of the potential along it, which is below 0, or 0 if there is no step.
+
+    If the potential rises along the step, because forces fall with the slide, the step is that without such slopes.
+    """
+    ports = system.ports
+    points = system.points
+    n = ports.vector.size
+    for attempt in range(2):
+        write_matrix(system, level)
+        for i in range(n):
+            ports.step[i] = ports.vector[i]
+        if solve_linear(ports.matrix, ports.step, n):
+            slope = find_descent(system, level)
+            if slope < 0.0:
+                return slope
+            if slope == 0.0 or attempt > 0 or not system.options.has_lists:
+                return slope
+        for p in range(ports.values.shape[1]):
+            ports.values[Port.BY_SLIDE, p] = 0.0
+        for j in range(points.port.size):
+            slope = max(points.values[Point.BY_SLIDE, j], 0.0)
+            points.values[Point.BY_SLIDE, j] = slope
+            ports.values[Port.BY_SLIDE, points.port[j]] += slope
+    return 0.0
+
+
+@njit(**NJIT_INLINE)
+def is_last_step(system, level):
+    """Return whether the present step changes the slide of every bond by less than LAST_STEP bond lengths."""
+    ports = system.ports
+    points = system.points
+    n_ports = ports.values.shape[1]
+    change = 0.0
+    for k in range(n_ports):
+        change += ports.compliance[level, 0, 0, k] * ports.step[k]
+    change = abs(change)
+    for k in range(points.stiffness.size):
+        change += points.shear[Shear.LARGEST, k] * abs(ports.step[n_ports + k])
+    return change <= LAST_STEP * points.trial[4, 0]
+
+
+@njit(**NJIT_INLINE)
+def finish_step(system, level):
+    """Take a step whose residual is known to be small; the forces of the points follow from their slopes."""
     ports = system.ports
     points = system.points
     values = points.values
-    n_ports = ports.rows.shape[0]
+    n_ports = ports.values.shape[1]
+    change = 0.0
+    for k in range(n_ports):
+        change += ports.compliance[level, 0, 0, k] * ports.step[k]
+    for p in range(n_ports):
+        for k in range(n_ports):
+            dq = ports.compliance[level, 0, p, k] * ports.step[k]
+            ports.values[Port.INCREMENT, p] += dq
+            v = ports.compliance[level, 1, p, k] * ports.step[k]
+            ports.values[Port.END_VELOCITY, p] += v
+        ports.values[Port.FORCE, p] -= ports.step[p]
+    count = points.port.size
+    for j in range(count):
+        values[Point.BY_VELOCITY, j] = change
     for k in range(points.stiffness.size):
-        row = n_ports + k
-        increment = points.shear[2, k]
-        change = increment - h * points.shear[1, k]
-        stiffness = points.stiffness[k]
-        residual = stiffness * (points.shear[0, k] + 0.5 * increment + SHEAR_DAMPING * change)
-        slope = 0.0
-        for j in range(points.port.size):
-            residual -= points.shapes[k, j] * values[Point.FORCE, j]
-            slope += points.shapes[k, j] * values[Point.BY_SLIDE, j]
-        ports.vector[row] = residual
-        for l in range(k + 1):
-            total = 0.0
-            for j in range(points.port.size):
-                total += points.shapes[k, j] * points.shapes[l, j] * values[Point.BY_SLIDE, j]
-            ports.matrix[row, n_ports + l] = ports.matrix[n_ports + l, row] = total
-        ports.matrix[row, row] += stiffness * (0.5 + SHEAR_DAMPING)
-
-        # All points that share shear coordinates act on the port of the first one.
-        p = points.port[0]
-        ports.matrix[p, row] = -slope
-        for q in range(n_ports):
-            ports.matrix[row, q] = slope * ports.compliance[level, 0, p, q]
+        part = ports.step[n_ports + k]
+        points.shear[Shear.TRIAL, k] -= part
+        for j in range(count):
+            values[Point.BY_VELOCITY, j] += points.shapes[k, j] * part
+    for j in range(count):
+        dq = values[Point.BY_VELOCITY, j]
+        values[Point.SLIDE, j] += dq
+        values[Point.FORCE, j] += values[Point.BY_SLIDE, j] * dq
+        values[Point.BY_VELOCITY, j] = 0.0
 
 
-@njit(**NJIT_KERNEL)
-def hold_ports(system, level):
-    """Replace the equations of the ports of rigid points at rest by v = 0 at the end of the step."""
+@njit(**NJIT_INLINE)
+def take_step(system, level, h, fraction):
+    """Subtract a fraction of the step from the unknowns at its start; return the relative residual."""
     ports = system.ports
-    points = system.points
-    for j in range(points.port.size):
-        if find_rest_limit(points.numbers, points.trial, j, 1.0) == np.inf:
-            continue
-        p = points.port[j]
-        mobility = ports.compliance[level, 1, p, p]
-        ports.vector[p] = ports.values[Port.END_VELOCITY, p] / mobility
-        ports.matrix[p, :] = 0.0
-        for k in range(ports.rows.shape[0]):
-            ports.matrix[p, k] = -ports.compliance[level, 1, p, k] / mobility
+    shear = system.points.shear
+    n_ports = ports.values.shape[1]
+    for p in range(n_ports):
+        ports.values[Port.FORCE, p] = ports.values[Port.BASE, p] - fraction * ports.step[p]
+    for k in range(system.points.stiffness.size):
+        shear[Shear.TRIAL, k] = shear[Shear.BASE, k] - fraction * ports.step[n_ports + k]
+    write_forces(system, level, h)
+    return write_residual(system, level, h)
 
 
-@njit(**NJIT_KERNEL)
+@njit(**NJIT_INLINE)
 def solve_forces(system, level, h):
     """Solve the port forces and shear increments by Newton's method; return whether it converged."""
     ports = system.ports
-    points = system.points
-    n_ports = ports.rows.shape[0]
-    n = ports.vector.size
-    last = np.inf
+    moves = ports.values
+    shear = system.points.shear
+    totals = system.totals
+    residual = np.inf
+    smallest = np.inf
+    n_stalls = 0
+    stalled = LISTS_STALLED if system.options.has_lists else STALLED
     for count in range(MAX_ITERATIONS):
-        residual, size = write_system(system, level, h)
-        if residual <= RESIDUAL * size or residual == 0.0:
+        if n_stalls >= MAX_STALLS and residual <= stalled:
             return True
-        system.totals[Total.ITERATIONS] += 1
-        system.totals[Total.WORST] = max(system.totals[Total.WORST], count)
-        # A law with corners may make Newton's method alternate; shorter steps end that.
-        fraction = 0.5 if residual > 0.9 * last and count > 8 else 1.0
-        last = residual
-        if not solve_linear(ports.matrix, ports.vector, n):
-            return False
-        for p in range(n_ports):
-            ports.values[Port.FORCE, p] -= fraction * ports.vector[p]
-        for k in range(n - n_ports):
-            points.shear[2, k] -= fraction * ports.vector[n_ports + k]
-    return residual <= 1e3 * RESIDUAL * size
+        for p in range(moves.shape[1]):
+            moves[Port.BASE, p] = moves[Port.FORCE, p]
+        for k in range(system.points.stiffness.size):
+            shear[Shear.BASE, k] = shear[Shear.TRIAL, k]
+        # The first pass evaluates the guess, so that the code of the laws appears only once.
+        descent = 0.0
+        if count > 0:
+            totals[Total.ITERATIONS] += 1
+            totals[Total.WORST] = max(totals[Total.WORST], count)
+            descent = -find_step(system, level)
+        else:
+            ports.step[:] = 0.0
+        if count > 0 and system.options.is_plain and is_last_step(system, level):
+            finish_step(system, level)
+            return True
+
+        # The line search ends where the potential no longer falls, or rises little.
+        low = 0.0
+        high = np.inf
+        fraction = 1.0
+        for _ in range(MAX_CUTS):
+            residual = take_step(system, level, h, fraction)
+            slope = find_descent(system, level)
+            if residual <= 1.0:
+                return True
+            if descent <= 0.0 or slope <= MAX_OVERSHOOT * descent:
+                break
+            high = fraction
+            fraction = max(0.1, descent / (slope + descent)) * fraction
+            if not low < fraction < high:
+                fraction = 0.5 * (low + high)
+        n_stalls = n_stalls + 1 if residual >= 0.5 * smallest else 0
+        smallest = min(smallest, residual)
+
+        # Between the sides of a jump of a force the equation has no better solution.
+        change = 0.0
+        size = 0.0
+        for p in range(moves.shape[1]):
+            size = max(size, abs(moves[Port.FREE, p]))
+            part = 0.0
+            for k in range(moves.shape[1]):
+                part += ports.compliance[level, 0, p, k] * ports.step[k]
+            change = max(change, abs(fraction * part))
+        if (
+            count > 0
+            and system.options.has_lists
+            and high < np.inf
+            and size > 0
+            and change <= ROUND_OFF * size
+            and system.points.stiffness.size == 0
+        ):
+            return True
+    return residual <= stalled
 
 
-@njit(**NJIT_KERNEL)
-def find_loads(system, row, fraction):
-    """Write the loads of the points at the end of a step; return their largest change, -1 without a contact set."""
+@njit(**NJIT_CALL)
+def interpolate_pressure(x, pattern):
+    """Return the relative pressure of the lower piece at x [m]; 0 outside its nodes."""
+    last = pattern.shape[1] - 1
+    if x < pattern[0, 0] or x > pattern[0, last]:
+        return 0.0
+    low = 0
+    high = last
+    while high - low > 1:
+        middle = (low + high) // 2
+        if pattern[0, middle] > x:
+            high = middle
+        else:
+            low = middle
+    part = (x - pattern[0, low]) / (pattern[0, high] - pattern[0, low])
+    return (1 - part) * pattern[1, low] + part * pattern[1, high]
+
+
+@njit(**NJIT_CALL)
+def find_loads(system, row, fraction, is_solved):
+    """Write the loads of the points at the end of a step; return their largest change, -1 without a contact set.
+
+    `row` and `fraction` are the time at the end of the step in whole steps; `is_solved` says whether the motion of the
+    step is known. The change is relative to the resultant, and 0 for loads that do not follow from the motion.
+    """
     ports = system.ports
     points = system.points
     loads = system.structure.loads
     values = points.values
     totals = system.totals
+    flank = system.flank
+    moves = ports.values
     heave = int(ports.contact[0])
-    if heave < 0 and loads.size == 0:
-        return 0.0
     resultant = 0.0
     if heave >= 0:
         pitch = int(ports.contact[1])
-        h = ports.values[Port.SLIDE, heave] + ports.values[Port.INCREMENT, heave]
-        t = ports.values[Port.SLIDE, pitch] + ports.values[Port.INCREMENT, pitch]
-        slot = find_set(system.sets, int(totals[Total.SLOT]), -h, t)
+        h = moves[Port.SLIDE, heave] + moves[Port.INCREMENT, heave]
+        t = moves[Port.SLIDE, pitch] + moves[Port.INCREMENT, pitch]
+        slot = normal.find_set(system.sets, int(totals[Total.SLOT]), -h, t)
         if slot < 0:
             return -1.0
-        press_state(system.sets, slot, -h, t, values[Point.NODE_FORCE, : system.sets.x.size])
+        normal.press_state(system.sets, slot, -h, t, values[Point.NODE_FORCE, : system.sets.x.size])
         resultant = max(
-            system.sets.reference[REFERENCE_LOAD] - compute_energy(system.sets, slot, h, t)[1], 0.0
+            system.sets.reference[REFERENCE_LOAD]
+            - normal.compute_energy(system.sets, slot, h, t)[1],
+            0.0,
         )
-    else:
+    elif flank.size:
+        if is_solved:
+            q = moves[Port.SLIDE, 0] + moves[Port.INCREMENT, 0]
+            flank[Flank.NORMAL] = flanks.find_normal(
+                flank, q, flank[Flank.TRIAL_FORCE], points.numbers[1, 0]
+            )
+        resultant = flank[Flank.NORMAL]
+    elif loads.size:
         resultant = loads[row] + fraction * (loads[row + 1] - loads[row])
     change = 0.0
+    total = 1e-300
     for j in range(points.port.size):
         if points.is_spring[j]:
             continue
         load = points.share[j] * resultant
         if points.node[j] >= 0:
             load = values[Point.NODE_FORCE, points.node[j]]
+        elif points.node[j] == LOWER:
+            x = points.place[j] + values[Point.TOTAL, j] + values[Point.SLIDE, j]
+            load = points.share[j] * interpolate_pressure(x, points.pressure)
         change = max(change, abs(load - values[Point.END_LOAD, j]))
         values[Point.END_LOAD, j] = load
-    return change / (resultant + 1e-300) if heave >= 0 else 0.0
+        total += load
+    return 0.0 if loads.size and heave < 0 else change / total
 
 
-@njit(**NJIT_KERNEL)
+@njit(**NJIT_INLINE)
 def write_trial(system, level):
     """Write the state at the end of the step under the port forces."""
     response = system.structure.responses[level]
@@ -364,32 +741,26 @@ def write_trial(system, level):
     ports = system.ports
     size = state.shape[1]
     n = size // 2
-    mass = system.structure.numbers[0]
     for i in range(size):
         state[2, i] = state[1, i]
     for k in range(n):
         force = 0.0
         for p in range(ports.rows.shape[0]):
             force -= ports.rows[p, k] * ports.values[Port.FORCE, p]
-        force /= mass
+        force /= system.options.mass
         for i in range(size):
             state[2, i] += response[i, size + 3 + k] * force
 
 
-@njit(**NJIT_KERNEL)
+@njit(**NJIT_CALL)
 def find_holds(system, state, drive):
-    """Write the forces of the ports at an instant that hold rigid points at rest, if there are any."""
+    """Write the forces of the ports at an instant that hold rigid points at rest."""
     ports = system.ports
     points = system.points
     structure = system.structure
     n = structure.modes.shape[1]
-    n_ports = ports.rows.shape[0]
     values = ports.values
-    is_held = False
-    for j in range(points.port.size):
-        is_held = is_held or find_rest_limit(points.numbers, points.memory, j, 1.0) < np.inf
-    if not is_held:
-        return
+    n_ports = values.shape[1]
     for p in range(n_ports):
         values[Port.HOLD, p] = 0.0
         ports.vector[p] = 1.0
@@ -397,25 +768,22 @@ def find_holds(system, state, drive):
         if find_rest_limit(points.numbers, points.memory, j, 1.0) < np.inf:
             ports.vector[points.port[j]] = 0.0
         else:
-            force = read(points.numbers, points.memory, j, points.values[Point.END_LOAD, j]).force
-            values[Port.HOLD, points.port[j]] += force
+            values[Port.HOLD, points.port[j]] += read_point(system, j).force
     heave = int(ports.contact[0])
     if heave >= 0:
-        energy = compute_energy(
-            system.sets,
-            int(system.totals[Total.SLOT]),
-            project(ports.rows[heave], state),
-            project(ports.rows[int(ports.contact[1])], state),
-        )
+        pitch = int(ports.contact[1])
+        h = project(ports.rows[heave], state[:n])
+        t = project(ports.rows[pitch], state[:n])
+        energy = normal.compute_energy(system.sets, int(system.totals[Total.SLOT]), h, t)
         values[Port.HOLD, heave] += energy[1]
-        values[Port.HOLD, int(ports.contact[1])] += energy[2]
+        values[Port.HOLD, pitch] += energy[2]
 
     # Ports at rest have no acceleration: grip . hold = acceleration without their forces.
     for p in range(n_ports):
-        free = ports.vector[p] > 0
+        is_free = ports.vector[p] > 0
         ports.matrix[p, :] = 0.0
         ports.matrix[p, p] = 1.0
-        if free:
+        if is_free:
             ports.vector[p] = values[Port.HOLD, p]
             continue
         total = 0.0
@@ -427,112 +795,239 @@ def find_holds(system, state, drive):
         ports.vector[p] = total
         for k in range(n_ports):
             ports.matrix[p, k] = ports.grip[p, k]
+        ports.matrix[p, p] *= 1 + system.options.redundant
     solve_linear(ports.matrix, ports.vector, n_ports)
     for p in range(n_ports):
         values[Port.HOLD, p] = ports.vector[p]
 
 
-@njit(**NJIT_KERNEL)
-def project(row, state):
-    """Return the displacement of a port."""
-    total = 0.0
-    for i in range(row.size):
-        total += row[i] * state[i]
-    return total
-
-
-@njit(**NJIT_KERNEL)
+@njit(**NJIT_CALL)
 def find_event(system, drive, is_shortest):
-    """Return whether the trial step contains an event; at the last level, change the regime of rigid points instead."""
+    """Return whether the trial step contains an event of a rigid point; at the last level, change its regime instead."""
     ports = system.ports
     points = system.points
     found = False
-    holds_needed = False
+    is_any_held = False
     for j in range(points.port.size):
-        p = points.port[j]
-        if points.is_spring[j]:
+        if points.numbers[0, j] != Law.COULOMB:
             continue
-        start = ports.values[Port.VELOCITY, p]
-        end = ports.values[Port.END_VELOCITY, p]
-        if points.numbers[0, j] == Law.COULOMB:
-            if points.memory[0, j] == 0:
-                holds_needed = True
-            elif points.memory[0, j] * end < 0:
-                found = True
-                if is_shortest:
-                    points.trial[0, j] = 0.0
-        elif start * end < 0 and not is_shortest:
+        direction = points.memory[0, j]
+        is_any_held = is_any_held or direction == 0
+        if direction * ports.values[Port.END_VELOCITY, points.port[j]] < 0:
             found = True
-        if found and not is_shortest:
-            return True
-    if holds_needed:
-        find_holds(system, system.state[2], drive)
-        for j in range(points.port.size):
-            limit = find_rest_limit(
-                points.numbers, points.memory, j, points.values[Point.END_LOAD, j]
-            )
-            hold = ports.values[Port.HOLD, points.port[j]]
-            if limit < np.inf and abs(hold) > limit:
-                found = True
-                if is_shortest:
-                    points.trial[0, j] = 1.0 if hold > 0 else -1.0
-    return found and not is_shortest
+            if is_shortest:
+                points.trial[0, j] = 0.0
+    if found and not is_shortest:
+        return True
+    if not is_any_held:
+        return False
+
+    # Of the points whose limit is exceeded, that with the largest ratio is released.
+    find_holds(system, system.state[2], drive)
+    worst = -1
+    largest = 1.0
+    for j in range(points.port.size):
+        limit = find_rest_limit(points.numbers, points.memory, j, points.values[Point.END_LOAD, j])
+        hold = abs(ports.values[Port.HOLD, points.port[j]])
+        if limit < np.inf and hold > largest * limit:
+            worst = j
+            largest = hold / limit if limit > 0 else np.inf
+    if worst < 0:
+        return False
+    if is_shortest:
+        points.trial[0, worst] = 1.0 if ports.values[Port.HOLD, points.port[worst]] > 0 else -1.0
+    return not is_shortest
 
 
-@njit(**NJIT_KERNEL)
+@njit(**NJIT_INLINE)
 def commit(system, h):
     """Advance memories, shear coordinates and loads after an accepted step; bring held ports to rest."""
     ports = system.ports
     points = system.points
     values = points.values
+    options = system.options
+    flank = system.flank
     count = points.port.size
-    has_bonds = points.numbers[0, 0] == Law.BONDS and points.stiffness.size > 0
-    has_bonds = has_bonds and points.numbers[3, 0] < 0
-    if has_bonds:
-        for j in range(count):
-            has_bonds = (
-                has_bonds and abs(values[Point.SLIDE, j]) <= MAX_SHORT_PATH * points.trial[4, j]
-            )
-    if has_bonds:
-        advance_bonds(points.trial, values[Point.LOAD, :count], values[Point.SLIDE, :count])
+    is_constant = options.is_plain and not options.has_growth
+    is_advanced = is_constant and advance_plain_bonds(system)
     for j in range(count):
+        values[Point.TOTAL, j] += values[Point.SLIDE, j]
+    for j in range(count if options.has_loads or not is_advanced else 0):
         p = points.port[j]
-        if not has_bonds:
-            step = Step(
-                values[Point.SLIDE, j],
-                h,
-                ports.values[Port.VELOCITY, p],
-                ports.values[Port.END_VELOCITY, p],
-                0.0,
-            )
+        slide = values[Point.SLIDE, j]
+        if points.numbers[0, j] == Law.LIST:
+            commit_list(system, j, h)
+        elif not is_advanced:
+            v0 = ports.values[Port.VELOCITY, p]
+            v1 = ports.values[Port.END_VELOCITY, p]
+            step = Step(slide, h, v0, v1, 0.0)
             advance(points.numbers, points.trial, j, values[Point.LOAD, j], step)
-        if values[Point.START_LOAD, j] != values[Point.END_LOAD, j]:
-            press(points.numbers, points.trial, j, values[Point.LOAD, j], values[Point.END_LOAD, j])
+        if options.has_loads:
+            if points.node[j] == LOWER:
+                # Bonds keep the pressure under which they formed until their point leaves the pressed area.
+                if points.numbers[0, j] == Law.BONDS and values[Point.END_LOAD, j] <= 0.0:
+                    points.trial[1, j] = points.trial[2, j] = points.trial[3, j] = 0.0
+            elif points.numbers[0, j] != Law.LIST:
+                press(
+                    points.numbers,
+                    points.trial,
+                    j,
+                    values[Point.LOAD, j],
+                    values[Point.END_LOAD, j],
+                )
             values[Point.START_LOAD, j] = values[Point.END_LOAD, j]
-    for j in range(count):
-        p = points.port[j]
-        if points.numbers[0, j] == Law.COULOMB:
-            # A port that was at rest before stays at its place.
-            was_held = points.memory[0, j] == 0 and points.trial[0, j] == 0
-            ports.values[Port.FREE, p] = ports.values[Port.INCREMENT, p] if was_held else 0.0
-    for k in range(points.memory.shape[0]):
+    if options.is_rigid:
         for j in range(count):
-            points.memory[k, j] = points.trial[k, j]
+            p = points.port[j]
+            if points.numbers[0, j] == Law.COULOMB:
+                # A port that was at rest before stays at its place.
+                was_held = points.memory[0, j] == 0 and points.trial[0, j] == 0
+                ports.values[Port.FREE, p] = ports.values[Port.INCREMENT, p] if was_held else 0.0
+                values[Point.TOTAL, j] -= ports.values[Port.FREE, p]
+    if system.totals[Total.SLIDES] == 0.0:
+        for k in range(points.memory.shape[0]):
+            for j in range(count):
+                points.memory[k, j] = points.trial[k, j]
+        if is_constant and not options.has_loads:
+            system.totals[Total.SLIDES] = find_steady_slide(system)
+    system.totals[Total.IS_DIRTY] = 0.0
+    shear = points.shear
     for k in range(points.stiffness.size):
-        points.shear[0, k] += points.shear[2, k]
-        points.shear[1, k] = points.shear[2, k] / h
+        shear[Shear.VALUE, k] += shear[Shear.TRIAL, k]
+        shear[Shear.FIRST, k] = shear[Shear.EARLIER, k]
+        shear[Shear.EARLIER, k] = shear[Shear.LAST, k]
+        shear[Shear.LAST, k] = shear[Shear.TRIAL, k] / h
+    if options.has_loads and not options.has_lists and points.stiffness.size:
+        relax_pieces(system)
     for i in range(system.state.shape[1]):
         system.state[0, i] = system.state[2, i]
     heave = int(ports.contact[0])
     if heave >= 0:
-        totals = system.totals
-        h = project(ports.rows[heave], system.state[0])
-        t = project(ports.rows[int(ports.contact[1])], system.state[0])
-        totals[Total.SLOT] = find_set(system.sets, int(totals[Total.SLOT]), -h, t)
-    rest_ports(system)
+        n = system.state.shape[1] // 2
+        up = project(ports.rows[heave], system.state[0, :n])
+        turn = project(ports.rows[int(ports.contact[1])], system.state[0, :n])
+        slot = normal.find_set(system.sets, int(system.totals[Total.SLOT]), -up, turn)
+        system.totals[Total.SLOT] = slot
+    if flank.size:
+        rise = 2 * flank[Flank.SLOPE] * ports.values[Port.INCREMENT, 0] / h
+        flank[Flank.RISE_SPEED] = rise - flank[Flank.RISE_SPEED]
+        flank[Flank.VERTICAL] = flank[Flank.TRIAL_VERTICAL]
+        if flank[Flank.LIFTED_MASS] > 0 and not flank[Flank.VERTICAL] > 0:
+            flank[Flank.HAS_LIFTED] = 1.0
+        flank[Flank.FORCE] = 0.0
+        for j in range(count):
+            flank[Flank.FORCE] += read_point(system, j).force
+    system.totals[Total.REST] = 0.0
+    if options.is_rigid:
+        before = find_modal_energy(system)
+        rest_ports(system)
+        system.totals[Total.REST] = find_modal_energy(system) - before
 
 
-@njit(**NJIT_KERNEL)
+@njit(**NJIT_CALL)
+def relax_pieces(system):
+    """Bring the pieces into equilibrium with the points while the ports rest; the points slide back and lose energy.
+
+    The increments db solve kappa (b + db) = shapes^T f with the forces f after the slides -shapes^T db, by Newton's
+    method. The force after a slide dq is d(dq mean)/d(dq) = mean + dq slope, and changes by about twice the slope.
+    """
+    points = system.points
+    ports = system.ports
+    values = points.values
+    shear = points.shear
+    r = points.stiffness.size
+    count = points.port.size
+    tolerance = RESIDUAL * system.options.scale
+    for j in range(count):
+        points.trial[4, j] = points.memory[0, j]
+    for k in range(r):
+        shear[Shear.TRIAL, k] = 0.0
+    for _ in range(MAX_RELAXATIONS):
+        for j in range(count):
+            values[Point.TRIAL_SLIDE, j] = 0.0
+        subtract_shear(values[Point.TRIAL_SLIDE, :count], points.shapes, shear[Shear.TRIAL])
+        largest = 0.0
+        for j in range(count):
+            step = Step(values[Point.TRIAL_SLIDE, j], 1.0, 0.0, 0.0, 0.0)
+            mean = mean_force(points.numbers, points.trial, j, values[Point.END_LOAD, j], step)
+            values[Point.TRIAL_FORCE, j] = mean.end
+            values[Point.BY_SLIDE, j] = 2 * mean.by_increment
+        for k in range(r):
+            residual = points.stiffness[k] * (shear[Shear.VALUE, k] + shear[Shear.TRIAL, k])
+            residual -= sum_products(points.shapes[k], values[Point.TRIAL_FORCE, :count])
+            ports.vector[k] = residual
+            largest = max(largest, abs(residual) * shear[Shear.SCALE, k])
+            for l in range(r):
+                ports.matrix[k, l] = sum_triples(
+                    points.shapes[k], points.shapes[l], values[Point.BY_SLIDE, :count]
+                )
+            ports.matrix[k, k] += points.stiffness[k]
+        if largest <= tolerance or not solve_linear(ports.matrix, ports.vector, r):
+            break
+        for k in range(r):
+            shear[Shear.TRIAL, k] -= ports.vector[k]
+    for j in range(count):
+        slide = values[Point.TRIAL_SLIDE, j]
+        values[Point.TOTAL, j] += slide
+        step = Step(slide, 0.0, 0.0, 0.0, 0.0)
+        advance(points.numbers, points.trial, j, values[Point.END_LOAD, j], step)
+    for k in range(points.memory.shape[0]):
+        for j in range(count):
+            points.memory[k, j] = points.trial[k, j]
+    for k in range(r):
+        shear[Shear.VALUE, k] += shear[Shear.TRIAL, k]
+
+
+@njit(**NJIT_INLINE)
+def commit_list(system, j, h):
+    """Advance the list of a point; without shear of the pieces it moves at the velocities of its port."""
+    points = system.points
+    values = points.values
+    speed = abs(values[Point.SLIDE, j]) / h
+    v0 = speed
+    v1 = speed
+    if points.stiffness.size == 0:
+        v0 = values[Point.SPEED, j]
+        v1 = system.ports.values[Port.END_VELOCITY, points.port[j]]
+        values[Point.SPEED, j] = v1
+    else:
+        values[Point.SPEED, j] = max(1.5 * speed - 0.5 * values[Point.LAST_SPEED, j], 0.0)
+        values[Point.LAST_SPEED, j] = speed
+    if not lists.advance_list(points.numbers, values, system.lists, j, v0, v1, h):
+        system.totals[Total.IS_FULL] = 1.0
+
+
+@njit(**NJIT_INLINE)
+def read_point(system, j):
+    """Return force, energy and stretch of a point under its load at the end of the last step."""
+    points = system.points
+    load = points.values[Point.END_LOAD, j]
+    if points.numbers[0, j] == Law.LIST:
+        return lists.read_list(points.numbers, system.lists, j, load)
+    return read(points.numbers, points.memory, j, load)
+
+
+@njit(cache=True, **NJIT_KERNEL)
+def read_points(system, forces, stretch):
+    """Write friction force [N] and elastic stretch [m] of all points (m,)."""
+    for j in range(system.points.port.size):
+        state = read_point(system, j)
+        forces[j] = state.force
+        stretch[j] = state.stretch
+
+
+@njit(**NJIT_CALL)
+def find_modal_energy(system):
+    """Return the energy of the modes [J]."""
+    state = system.state[0]
+    n = state.size // 2
+    energy = 0.0
+    for i in range(n):
+        energy += state[n + i] ** 2 + system.structure.modes[0, i] * state[i] ** 2
+    return 0.5 * system.options.mass * energy
+
+
+@njit(**NJIT_CALL)
 def rest_ports(system):
     """Bring the ports of rigid points at rest back to their places and to rest, by the smallest change of the modes.
 
@@ -561,131 +1056,208 @@ def rest_ports(system):
                     ports.vector[p] = project(ports.rows[p], state[n:])
                 for k in range(n_ports):
                     ports.matrix[p, k] = ports.grip[p, k]
+                ports.matrix[p, p] *= 1 + system.options.redundant
         solve_linear(ports.matrix, ports.vector, n_ports)
         for p in range(n_ports):
             for i in range(n):
-                change = ports.rows[p, i] * ports.vector[p] / system.structure.numbers[0]
+                change = ports.rows[p, i] * ports.vector[p] / system.options.mass
                 state[first + i] -= change
 
 
-@njit(**NJIT_KERNEL)
-def try_step(system, level, row, fraction, drive):
+@njit(**NJIT_INLINE)
+def try_step(system, level, row, begin, end, drive):
     """Advance by a step of a level; return False if it contains an event; without a contact set SLOT becomes -1.
 
-    `row` and `fraction` are the time at the end of the step in whole steps; `drive` is its parabola at the start.
+    `row`, `begin` and `end` are the number of the whole step and the fractions of it; `drive` is the parabola of the
+    drive at the start of this step.
     """
     points = system.points
+    shear = points.shear
+    values = points.values
+    options = system.options
+    totals = system.totals
     levels = system.structure.responses.shape[0]
-    h = system.structure.numbers[1] / (1 << level)
-    move_freely(system, level, drive)
+    h = options.step / (1 << level)
+    move_freely(system, level, drive, row, begin)
+
+    # Forces and increments of the pieces are extrapolated from the last steps by parabolas.
+    moves = system.ports.values
     for k in range(points.stiffness.size):
-        points.shear[2, k] = h * points.shear[1, k]
-    find_loads(system, row, fraction)
+        rate = 3 * (shear[Shear.LAST, k] - shear[Shear.EARLIER, k]) + shear[Shear.FIRST, k]
+        shear[Shear.TRIAL, k] = h * rate
+    if options.is_plain:
+        for p in range(moves.shape[1]):
+            force = moves[Port.FORCE, p]
+            moves[Port.FORCE, p] = 3 * (force - moves[Port.LAST, p]) + moves[Port.EARLIER, p]
+            moves[Port.EARLIER, p] = moves[Port.LAST, p]
+            moves[Port.LAST, p] = force
+    if options.has_lists:
+        for j in range(points.port.size):
+            values[Point.TRIAL_SLIDE, j] = np.nan
+            if points.stiffness.size == 0:
+                values[Point.SPEED, j] = system.ports.values[Port.VELOCITY, points.port[j]]
     is_solved = False
-    for _ in range(MAX_LOADS):
+    for count in range(MAX_LOADS):
+        if options.has_loads:
+            change = find_loads(system, row, end, count > 0)
+            if change < 0:
+                totals[Total.SLOT] = -1
+                return True
+            if count > 0 and change <= LOAD_RESIDUAL:
+                break
         prepare_points(system, h)
         is_solved = solve_forces(system, level, h)
-        change = find_loads(system, row, fraction)
-        if change < 0:
-            system.totals[Total.SLOT] = -1
-            return True
-        if change <= LOAD_RESIDUAL:
+        if not options.has_loads:
             break
     write_trial(system, level)
-    end = drive[0] + h * (drive[1] + 0.5 * h * drive[2])
-    if find_event(system, end, level == levels - 1):
+    is_shortest = level == levels - 1
+    if options.is_rigid and find_event(
+        system, drive[0] + h * (drive[1] + 0.5 * h * drive[2]), is_shortest
+    ):
+        totals[Total.IS_DIRTY] = 1.0
         return False
     if not is_solved:
-        system.totals[Total.UNSOLVED] += 1
+        if not is_shortest:
+            totals[Total.IS_DIRTY] = 1.0
+            return False
+        totals[Total.UNSOLVED] += 1
     for i in range(system.state.shape[1]):
         system.state[1, i] = system.state[0, i]
     commit(system, h)
-    add_energies(system, h, drive)
+    add_energies(system, level, drive)
     return True
 
 
-@njit(**NJIT_KERNEL)
-def add_energies(system, h, drive):
-    """Add the energies of a step from the state before it, in `state[1]`; integrals of velocities by Simpson's rule."""
+@njit(**NJIT_INLINE)
+def add_energies(system, level, drive):
+    """Add the energies of a step from the state before it, in `state[1]`."""
     structure = system.structure
     totals = system.totals
-    before = system.state[1]
+    ports = system.ports
+    inputs = structure.inputs
     after = system.state[0]
-    n = after.size // 2
-    mass = structure.numbers[0]
-    middle_drive = drive[0] + 0.5 * h * (drive[1] + 0.25 * h * drive[2])
-    end_drive = drive[0] + h * (drive[1] + 0.5 * h * drive[2])
-    work = 0.0
-    loss = 0.0
+    size = after.size
+    n = size // 2
+    mass = system.options.mass
     stored = 0.0
+    for i in range(size):
+        inputs[i] = system.state[1, i]
     for i in range(n):
-        start = before[n + i]
-        end = after[n + i]
-        middle = 1.5 * (after[i] - before[i]) / h - 0.25 * (start + end)
-        work -= structure.modes[1, i] * (
-            drive[0] * start + 4 * middle_drive * middle + end_drive * end
-        )
-        for k in range(n):
-            if structure.damping[i, k] != 0.0:
-                other = 1.5 * (after[k] - before[k]) / h - 0.25 * (before[n + k] + after[n + k])
-                squares = start * before[n + k] + 4 * middle * other + end * after[n + k]
-                loss += structure.damping[i, k] * squares
-        stored += end * end + structure.modes[0, i] * after[i] * after[i]
-    work *= mass * h / 6
+        stored += after[n + i] * after[n + i] + structure.modes[0, i] * after[i] * after[i]
+        force = 0.0
+        for p in range(ports.rows.shape[0]):
+            force -= ports.rows[p, i] * ports.values[Port.FORCE, p]
+        inputs[size + 3 + i] = force / mass
+    inputs[size] = drive[0]
+    inputs[size + 1] = drive[1]
+    inputs[size + 2] = drive[2]
+    work = 0.0
+    for i in range(3):
+        work += drive[i] * sum_products(structure.work[level, i], inputs)
+    loss = 0.0
+    for i in range(inputs.size):
+        loss += inputs[i] * sum_products(structure.loss[level, i], inputs)
     totals[Total.WORK_IN] += work
     totals[Total.POWER] += abs(work)
-    totals[Total.VISCOUS] += mass * h / 6 * loss
+    totals[Total.VISCOUS] += loss
     totals[Total.STORED] = max(totals[Total.STORED], 0.5 * mass * stored)
 
 
-@njit(**NJIT_KERNEL)
-def write_sample(system, drive, sample):
+@njit(**NJIT_CALL)
+def write_bond_sample(system, sample, first):
+    """Write force and slip of bonds on one port, and the sum of the weights of the points; return their energy."""
+    points = system.points
+    values = points.values
+    force = 0.0
+    energy = 0.0
+    slip = 0.0
+    total = 0.0
+    for j in range(points.port.size):
+        m = points.memory[1, j]
+        z = points.memory[2, j]
+        stiffness = points.numbers[1, j] / points.numbers[2, j]
+        weight = values[Point.END_LOAD, j] * points.numbers[1, j]
+        stretch = z / m if m > 0.0 else 0.0
+        force += stiffness * z
+        energy += 0.5 * stiffness * points.memory[3, j]
+        slip += weight * (values[Point.TOTAL, j] - stretch)
+        total += weight
+    sample[first] = force
+    sample[first + 1] = slip
+    system.ports.vector[0] = total
+    return energy
+
+
+@njit(**NJIT_INLINE)
+def write_sample(system, row, sample):
     """Write a sample of forces and energies at the present state."""
     ports = system.ports
     points = system.points
     totals = system.totals
+    structure = system.structure
+    flank = system.flank
     size = system.state.shape[1]
-    find_holds(system, system.state[0], drive)
+    n = size // 2
+    if system.options.is_rigid:
+        find_holds(system, system.state[0], structure.drive[row, 0])
     energy = 0.0
     first = size + Sample.PORTS
-    for p in range(ports.rows.shape[0]):
-        slide = project(ports.rows[p], system.state[0])
+    n_ports = ports.values.shape[1]
+    sample[size + Sample.SPRINGS] = 0.0
+    for p in range(n_ports):
+        slide = structure.path[row] if structure.path.size else 0.0
+        if n > 0:
+            slide = project(ports.rows[p], system.state[0, :n])
         ports.values[Port.SLIDE, p] = slide
         sample[first + N_PORT_COLUMNS * p] = 0.0
         sample[first + N_PORT_COLUMNS * p + 1] = 0.0
         ports.vector[p] = 0.0
     for k in range(points.stiffness.size):
-        energy += 0.5 * points.stiffness[k] * points.shear[0, k] ** 2
-    for j in range(points.port.size):
+        energy += 0.5 * points.stiffness[k] * points.shear[Shear.VALUE, k] ** 2
+    if system.options.is_plain:
+        energy += write_bond_sample(system, sample, first)
+    for j in range(0 if system.options.is_plain else points.port.size):
         p = points.port[j]
         load = points.values[Point.END_LOAD, j]
-        state = read(points.numbers, points.memory, j, load)
-        energy += state.energy
+        state = read_point(system, j)
         force = state.force
+        if points.is_spring[j]:
+            sample[size + Sample.SPRINGS] += state.energy
+            sample[first + N_PORT_COLUMNS * p] += force
+            continue
+        energy += state.energy
         if find_rest_limit(points.numbers, points.memory, j, 1.0) < np.inf:
             limit = find_rest_limit(points.numbers, points.memory, j, load)
             force = min(max(ports.values[Port.HOLD, p], -limit), limit)
-        if points.is_spring[j]:
-            continue
-        slide = ports.values[Port.SLIDE, p]
-        for k in range(points.stiffness.size):
-            slide -= points.shapes[k, j] * points.shear[0, k]
+        # The slip is a mean over the points, weighted by their friction limits.
         weight = load * points.numbers[1, j]
         sample[first + N_PORT_COLUMNS * p] += force
-        sample[first + N_PORT_COLUMNS * p + 1] += weight * (slide - state.stretch)
+        sample[first + N_PORT_COLUMNS * p + 1] += weight * (
+            points.values[Point.TOTAL, j] - state.stretch
+        )
         ports.vector[p] += weight
-    for p in range(ports.rows.shape[0]):
+    for p in range(n_ports):
         if ports.vector[p] > 0:
             sample[first + N_PORT_COLUMNS * p + 1] /= ports.vector[p]
         else:
             sample[first + N_PORT_COLUMNS * p + 1] = ports.values[Port.SLIDE, p]
+    sample[size + Sample.LOAD] = structure.loads[row] if structure.loads.size else 0.0
+    if flank.size:
+        q = ports.values[Port.SLIDE, 0]
+        t = flanks.find_slope(flank, q)
+        length = np.sqrt(1 + t * t)
+        energy += flanks.find_energy(flank, q)
+        # The points know the path along the flank; the slip is the displacement less the stretch along it.
+        stretch = points.values[Point.TOTAL, 0] - sample[first + 1]
+        sample[first + 1] = q - stretch / length
+        sample[first] = flank[Flank.VERTICAL] * t + sample[first] * length
+        sample[size + Sample.LOAD] = flank[Flank.VERTICAL]
     sample[size + Sample.ENERGY] = energy
     heave = int(ports.contact[0])
-    sample[size + Sample.LOAD] = system.structure.loads[0] if system.structure.loads.size else 0.0
     if heave >= 0:
         h = ports.values[Port.SLIDE, heave]
         t = ports.values[Port.SLIDE, int(ports.contact[1])]
-        contact = compute_energy(system.sets, int(totals[Total.SLOT]), h, t)
+        contact = normal.compute_energy(system.sets, int(totals[Total.SLOT]), h, t)
         reference = system.sets.reference
         sample[size + Sample.LOAD] = max(reference[REFERENCE_LOAD] - contact[1], 0.0)
         sample[size + Sample.MOMENT] = reference[REFERENCE_MOMENT] - contact[2]
@@ -695,15 +1267,15 @@ def write_sample(system, drive, sample):
 
 
 @njit(cache=True, **NJIT_KERNEL)
-def march(system, steps, stride, samples):
+def march(system, steps, samples):
     """March over a number of whole steps.
 
     Parameters
     ----------
     system : march_rows.System
         Changed in place.
-    steps, stride : int
-        Number of steps, and steps between samples with more than the motion.
+    steps : int
+        Number of steps.
     samples : (steps + 1, k) array
         Samples before each step and at the end; output.
 
@@ -716,26 +1288,24 @@ def march(system, steps, stride, samples):
     """
     structure = system.structure
     ports = system.ports
-    points = system.points
     size = system.state.shape[1]
     ticks = 1 << (structure.responses.shape[0] - 1)
-    h = structure.numbers[1]
+    h = system.options.step
     level = 0
     for i in range(steps + 1):
-        if i % stride == 0 or i == steps:
-            write_sample(system, structure.drive[i, 0], samples[i])
+        write_sample(system, i, samples[i])
         for k in range(size):
             samples[i, k] = system.state[0, k]
-        if structure.loads.size:
-            samples[i, size + Sample.LOAD] = structure.loads[i]
         output = project(structure.modes[2], system.state[0])
-        if not abs(output) <= structure.numbers[2]:
+        if not abs(output) <= system.options.travel:
             return i, EXCEEDS_TRAVEL if output == output else NOT_FINITE
+        if system.flank.size and system.flank[Flank.HAS_LIFTED] > 0:
+            return i, LEAVES_GROOVES
         if i == steps:
             break
 
         first_column = size + Sample.PORTS + 2
-        for p in range(ports.rows.shape[0]):
+        for p in range(ports.values.shape[1]):
             samples[i, first_column + N_PORT_COLUMNS * p] = 0.0
         work = 0.0
         tick = 0
@@ -748,26 +1318,44 @@ def march(system, steps, stride, samples):
                 coefficients[1] + tau * coefficients[2],
                 coefficients[2],
             )
-            if not try_step(system, level, i, (tick + part) / ticks, drive):
+            if not try_step(system, level, i, tick / ticks, (tick + part) / ticks, drive):
                 level += 1
                 continue
             if system.totals[Total.SLOT] < 0:
                 return i, NO_CONTACT_SET
+            if system.totals[Total.IS_FULL] > 0:
+                return i, LISTS_FULL
 
             # Mean forces and work of the friction in the whole step.
-            for j in range(points.port.size):
-                if not points.is_spring[j]:
-                    p = points.port[j]
-                    force = points.values[Point.FORCE, j]
-                    slide = ports.values[Port.INCREMENT, p]
-                    if points.numbers[0, j] == Law.COULOMB:
-                        force = ports.values[Port.FORCE, p]
-                        slide -= ports.values[Port.FREE, p]
-                    work += force * slide
-                    samples[i, first_column + N_PORT_COLUMNS * p] += force * part / ticks
+            work += add_work(system, samples[i], first_column, part / ticks)
             tick += part
             if level > 0 and tick % (2 * part) == 0:
                 level -= 1
         samples[i, size + Sample.WORK] = work
         system.totals[Total.FRICTION] += work
     return steps, DONE
+
+
+@njit(**NJIT_INLINE)
+def add_work(system, sample, first_column, part):
+    """Add the mean forces of a part of a step to a sample; return the friction work of this part [J]."""
+    ports = system.ports
+    points = system.points
+    work = -system.totals[Total.REST]
+    for j in range(points.port.size):
+        if points.is_spring[j]:
+            continue
+        p = points.port[j]
+        force = points.values[Point.FORCE, j]
+        slide = ports.values[Port.INCREMENT, p]
+        if points.numbers[0, j] == Law.COULOMB:
+            force = ports.values[Port.FORCE, p]
+        if system.flank.size and p == 0:
+            force *= system.flank[Flank.RATIO]
+        work += force * slide
+        sample[first_column + N_PORT_COLUMNS * p] += force * part
+    if system.flank.size:
+        force = system.flank[Flank.TRIAL_VERTICAL] * system.flank[Flank.SLOPE]
+        work += force * ports.values[Port.INCREMENT, 0]
+        sample[first_column] += force * part
+    return work

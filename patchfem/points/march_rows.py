@@ -6,12 +6,30 @@ from typing import NamedTuple
 import numpy as np
 
 from ..contact.set_arrays import SetArrays
+from ..friction.bonds.list_rows_kernels import BondLists
+
+# Statuses of a march
+DONE = 0
+EXCEEDS_TRAVEL = 1
+NOT_FINITE = 2
+NO_CONTACT_SET = 3
+LISTS_FULL = 4
+LEAVES_GROOVES = 5
+RESULTANT = -1  # node of a point whose load is a fraction of the resultant
+LOWER = -2  # node of a point whose load is the pressure of the lower piece at its place
+RESIDUAL = 1e-12
 
 
 class Point(IntEnum):
     """Rows of `Points.values`.
 
-    Load at start, middle and end of a step [N], slide, mean force and its slopes, forces of the nodes.
+    - START_LOAD, LOAD, END_LOAD: load at start, middle and end of a step [N]
+    - SLIDE, FORCE: slide in the step [m] and its path-mean force [N]
+    - BY_SLIDE, BY_VELOCITY: derivatives of this force by the slide [N/m] and by the velocity at the end [N s/m]
+    - NODE_FORCE: normal forces of the nodes of a patch [N]
+    - TOTAL: slide since the start [m]
+    - TRIAL_SLIDE, TRIAL_FORCE: slide [m] and force [N] of the last trial of a list of bonds
+    - SPEED, LAST_SPEED: extrapolated speed [m/s] of the next step, and speed of the last one
     """
 
     START_LOAD = 0
@@ -22,13 +40,24 @@ class Point(IntEnum):
     BY_SLIDE = 5
     BY_VELOCITY = 6
     NODE_FORCE = 7
+    TOTAL = 8
+    TRIAL_SLIDE = 9
+    TRIAL_FORCE = 10
+    SPEED = 11
+    LAST_SPEED = 12
 
 
 class Port(IntEnum):
     """Rows of `Ports.values`.
 
-    Slide and velocity at the start, increment and velocity at the end without forces, mean force, velocity at the end,
-    force that holds the port at rest, increment, sums of the slopes of the points.
+    - SLIDE, VELOCITY: at the start of a step [m], [m/s]
+    - FREE, FREE_VELOCITY: increment and velocity at the end without forces [m], [m/s]
+    - FORCE: mean force of the step [N]
+    - END_VELOCITY, INCREMENT: velocity at the end [m/s] and increment [m] under the assumed forces
+    - HOLD: force that holds the port at rest [N]
+    - SUM, BY_SLIDE, BY_VELOCITY: sums over the points of the port of their forces and of the slopes
+    - BASE: force from which a line search starts [N]
+    - LAST, EARLIER: mean forces of the last step and of the step before it [N]
     """
 
     SLIDE = 0
@@ -39,16 +68,74 @@ class Port(IntEnum):
     END_VELOCITY = 5
     HOLD = 6
     INCREMENT = 7
-    BY_SLIDE = 8
-    BY_VELOCITY = 9
+    SUM = 8
+    BY_SLIDE = 9
+    BY_VELOCITY = 10
+    BASE = 11
+    LAST = 12
+    EARLIER = 13
+
+
+class Shear(IntEnum):
+    """Rows of `Points.shear`.
+
+    - VALUE: coordinates [m]
+    - LAST, EARLIER, FIRST: their mean rates in the last three steps [m/s], the last one first
+    - TRIAL, BASE: increments of a trial step, and those from which a line search starts [m]
+    - SCALE: factor that makes the residuals of the coordinates comparable with forces
+    - LARGEST: largest slide of a point per coordinate
+    """
+
+    VALUE = 0
+    LAST = 1
+    EARLIER = 2
+    FIRST = 3
+    TRIAL = 4
+    BASE = 5
+    SCALE = 6
+    LARGEST = 7
+
+
+class Flank(IntEnum):
+    """Entries of `System.flank`: grooves whose flanks port 0 climbs.
+
+    - LOAD [N], WAVE_NUMBER [rad/m], AMPLITUDE [m], PHASE [rad], LIFTED_MASS [kg]: geometry and load
+    - RISE_SPEED [m/s], VERTICAL [N], FORCE [N], NORMAL [N]: vertical speed of the lifted mass, mean vertical force of
+      the last step, force along the flank and normal force at its end
+    - SLOPE, RATIO: mean height and path along the flank per increment of a trial step [1]
+    - TRIAL_VERTICAL, TRIAL_FORCE: mean vertical force and mean force along the flank of a trial step [N]
+    - HAS_LIFTED: 1 after the vertical force has vanished
+    """
+
+    LOAD = 0
+    WAVE_NUMBER = 1
+    AMPLITUDE = 2
+    PHASE = 3
+    LIFTED_MASS = 4
+    RISE_SPEED = 5
+    VERTICAL = 6
+    FORCE = 7
+    NORMAL = 8
+    SLOPE = 9
+    RATIO = 10
+    TRIAL_VERTICAL = 11
+    TRIAL_FORCE = 12
+    HAS_LIFTED = 13
 
 
 class Total(IntEnum):
     """Entries of `System.totals`.
 
-    Work of the drive, its magnitude, viscous loss, friction work and energy created since the start [J]; largest stored
-    energy [J], numbers of Newton iterations and of steps that did not converge, slot of the contact set, normal load
-    [N], moment [N m] and energy [J] of the preloaded contact relative to its reference.
+    - WORK_IN, POWER, VISCOUS, FRICTION: work of the drive, its magnitude, viscous loss and friction work since the start
+      [J]
+    - STORED: largest stored energy [J]
+    - ITERATIONS, WORST, UNSOLVED: numbers of Newton iterations, largest one of a step, and number of steps that did not
+      converge
+    - SLOT: slot of the contact set, -1 if none is found
+    - IS_FULL: 1 if a list of bonds is full
+    - IS_DIRTY: 1 if the trial memory differs from the memory
+    - SLIDES: direction in which all bonds slide steadily, so that their force does not change; 0 if they do not
+    - REST: energy that the modes gained as ports at rest were brought back in the last step [J]
     """
 
     WORK_IN = 0
@@ -60,16 +147,20 @@ class Total(IntEnum):
     WORST = 6
     UNSOLVED = 7
     SLOT = 8
-    LOAD = 9
-    MOMENT = 10
-    CONTACT_ENERGY = 11
+    IS_FULL = 9
+    IS_DIRTY = 10
+    SLIDES = 11
+    REST = 12
 
 
 class Sample(IntEnum):
     """Columns of a sample after 2 n modal coordinates and velocities.
 
-    Energy of laws and pieces [J], friction work of the following step [J], load, moment and energy of the contact, heave
-    [m], pitch [rad], then FORCE, SLIP and MEAN of every port in turn.
+    - ENERGY: energy of friction laws, pieces and grooves [J]
+    - WORK: friction work of the following step [J]
+    - LOAD, MOMENT, CONTACT_ENERGY, HEAVE, PITCH: of the normal contact [N], [N m], [J], [m], [rad]
+    - SPRINGS: energy of the springs [J]
+    - PORTS: first column of FORCE, SLIP and MEAN of every port in turn
     """
 
     ENERGY = 0
@@ -79,7 +170,8 @@ class Sample(IntEnum):
     CONTACT_ENERGY = 4
     HEAVE = 5
     PITCH = 6
-    PORTS = 7
+    SPRINGS = 7
+    PORTS = 8
 
 
 N_PORT_COLUMNS = 3  # force, slip and mean force of the following step
@@ -88,17 +180,21 @@ N_PORT_COLUMNS = 3  # force, slip and mean force of the following step
 class Points(NamedTuple):
     """Points with laws; m points, r shear coordinates of the pieces.
 
-    - port (m,): port on which the point acts
-    - node (m,): node whose force is the load of the point; -1 for a fraction `share` of the resultant
-    - share (m,): fraction of the resultant, or the load [N] where it is constant
+    - port (m,), first (P + 1,): port on which the point acts, and first point of each port
+    - node (m,): node whose force is the load of the point; -1 for a fraction `share` of the resultant, -2 for `share`
+      times the pressure of the lower piece at the place of the point
+    - share (m,): fraction of the resultant, factor of the pressure, or the load [N] where it is constant
     - numbers (k, m), memory, trial (l, m): see `return_maps_kernels`
-    - values (8, m or number of nodes): see `Point`
+    - values (13, m or number of nodes): see `Point`
     - shapes (r, m), stiffness (r,): slide of the points per coordinate, and stiffness [N/m] of the coordinates
-    - shear (3, r): coordinates, their last increment per time, and trial increment
+    - shear (8, r): see `Shear`
     - is_spring (m,): whether the point is a spring, whose work is not friction
+    - place (m,): position of the point at rest [m]
+    - pressure (2, k): positions [m] and relative pressures of the lower piece, or (2, 0)
     """
 
     port: np.ndarray
+    first: np.ndarray
     node: np.ndarray
     share: np.ndarray
     numbers: np.ndarray
@@ -109,6 +205,8 @@ class Points(NamedTuple):
     stiffness: np.ndarray
     shear: np.ndarray
     is_spring: np.ndarray
+    place: np.ndarray
+    pressure: np.ndarray
 
 
 class Ports(NamedTuple):
@@ -117,8 +215,8 @@ class Ports(NamedTuple):
     - rows (P, n): displacement of the ports per coordinate
     - compliance (levels, 2, P, P): decrease of displacement and velocity per constant force in a step
     - grip (P, P): decrease of the acceleration per force [1/kg]
-    - values (10, P): see `Port`
-    - matrix (P + r, P + r), vector (P + r,): Newton system
+    - values (14, P): see `Port`
+    - matrix (P + r, P + r), vector, step (P + r,): Newton system and its solution
     - contact (11,): press workspace: numbers of the heave and pitch ports (-1 for none) and the results of `path_mean`
     """
 
@@ -128,26 +226,59 @@ class Ports(NamedTuple):
     values: np.ndarray
     matrix: np.ndarray
     vector: np.ndarray
+    step: np.ndarray
     contact: np.ndarray
 
 
 class Structure(NamedTuple):
     """Modes in steps of several lengths.
 
-    - responses (levels, 2 n, 3 n + 3): motion at the end of a step per state, parabola of the drive and constant modal force
+    - responses (levels, 2 n, N): motion at the end of a step per state, parabola of the drive and constant modal force over
+      mass, N = 3 n + 3
+    - loss (levels, N, N), work (levels, 3, N): viscous loss [J] as a quadratic form of these inputs, and work of the drive
+      as a bilinear form of the parabola and the inputs
     - modes (3, n): squared frequencies, participations of drive and output
     - damping (n, n): [1/s]
     - drive (s, 3): value, slope and second derivative of the drive at the start of every step
     - loads (s + 1,): prescribed load [N] at the steps, or (0,)
-    - numbers (3,): mass [kg], step [s], largest output [m]
+    - path (s + 1,): prescribed displacement [m] of port 0 at the steps, or (0,)
+    - inputs (N,): workspace
     """
 
     responses: np.ndarray
+    loss: np.ndarray
+    work: np.ndarray
     modes: np.ndarray
     damping: np.ndarray
     drive: np.ndarray
     loads: np.ndarray
-    numbers: np.ndarray
+    path: np.ndarray
+    inputs: np.ndarray
+
+
+class Options(NamedTuple):
+    """Numbers of a march.
+
+    - mass [kg], step [s], travel [m]: modal mass, duration of a step, largest output
+    - scale: force [N] to whose 1e-11 part a step is solved
+    - damping: weight of the change of a shear increment
+    - redundant: compliance of a port at rest relative to its own, which determines the forces of more ports than modes
+    - is_rigid, has_lists, has_loads, has_growth: 1 if points are rigid, have lists of bonds, loads that change, or
+      bonds that grow
+    - is_plain: 1 if all points are bonds on one port
+    """
+
+    mass: float
+    step: float
+    travel: float
+    scale: float
+    damping: float
+    redundant: float
+    is_rigid: int
+    has_lists: int
+    has_loads: int
+    has_growth: int
+    is_plain: int
 
 
 class System(NamedTuple):
@@ -156,6 +287,9 @@ class System(NamedTuple):
     structure: Structure
     ports: Ports
     points: Points
+    lists: BondLists
+    flank: np.ndarray
     sets: SetArrays
     state: np.ndarray
     totals: np.ndarray
+    options: Options

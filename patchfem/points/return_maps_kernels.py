@@ -21,13 +21,13 @@ JENKINS       mu, length [m]                                       force/mu, spr
 MASING        F_S, phi_max [m], chi + 1, beta                      see `Masing`
 BOUC_WEN      mu, length [m], exponent n, shape s                  z
 LUGRE         stiffness, kinetic, static, v_s, sigma_1, sigma_2    stretch [m], force
-BONDS         mu, eps_0 [m], growth (6) (eq. 2.10), m_0            eps, m, z, s2, eps in the middle of the step
+BONDS         mu, eps_0 [m], growth (5) (eq. 2.10), m_0            eps, m, z, s2, eps in the middle of the step
 CUBIC         k_3 [N/m3]                                           slide [m]
 INTERLOCK     k [N/m], wavelength [m]                              slide [m]
+LIST          mu, length [m]                                       see `lists_kernels`
 ============= ==================================================== =================================================
 """
 
-from enum import IntEnum
 from math import exp, inf, log1p, sin, sqrt, tanh
 from typing import NamedTuple
 
@@ -42,49 +42,18 @@ from ..friction.bonds.point_kernels import (
     short_bond_mean,
     short_bond_step,
 )
-from ..friction.flags_kernels import NJIT_KERNEL
+from ..friction.flags_kernels import NJIT_CALL, NJIT_KERNEL
+from .law_rows import Law, Masing
 
 SMALL_RATE = 1e-4  # rate times step below which series replace exponentials
 LIMIT_FRACTION = 1e-9  # smallest Stribeck limit relative to the static one, because z divides by it
-PIECE = (
-    0.25  # longest piece of a path in relaxation lengths that the Bouc-Wen law integrates at once
-)
+# Longest piece of a path in relaxation lengths that the Bouc-Wen law integrates at once.
+PIECE = 0.03125
 NEARLY_SATURATED = (
     1e-3  # distance of z from 1 below which any exponent of the Bouc-Wen law has a closed form
 )
 SATURATED = 1e-14  # distance of |z| from 1 that is round-off
 DIFFERENCE = 1e-6  # relative increment of the numerical tangent of the LuGre law
-
-
-class Law(IntEnum):
-    """Number of a friction law or spring in row 0 of `numbers`."""
-
-    COULOMB = 0
-    TANH = 1
-    JENKINS = 2
-    MASING = 3
-    BOUC_WEN = 4
-    LUGRE = 5
-    BONDS = 6
-    CUBIC = 7
-    INTERLOCK = 8
-
-
-class Masing(IntEnum):
-    """Rows of the memory of parallel sliders, which follow Masing's rules.
-
-    Displacement [m], force [N], direction, number of reversals on the stack, 1 until the sliders have slipped as a
-    whole and -1 then, stored energy [J], mean stretch [m], then displacement and force of each reversal.
-    """
-
-    SLIDE = 0
-    FORCE = 1
-    DIRECTION = 2
-    COUNT = 3
-    VIRGIN = 4
-    ENERGY = 5
-    STRETCH = 6
-    STACK = 7
 
 
 class Step(NamedTuple):
@@ -127,7 +96,7 @@ class Relaxed(NamedTuple):
     mean: float
 
 
-@njit(**NJIT_KERNEL)
+@njit(**NJIT_CALL)
 def mean_force(numbers, memory, j, load, step):
     """Return the `MeanForce` of point j under a load over a `Step`; a COULOMB point has to slip."""
     law = numbers[0, j]
@@ -194,7 +163,7 @@ def _stretch(start, move, limit):
     return Relaxed(elastic, elastic * (start + end) * 0.5 + (1 - elastic) * end)
 
 
-@njit(**NJIT_KERNEL)
+@njit(**NJIT_CALL)
 def _mean_tanh(limit, speed, step):
     """Return the mean of f(v) = limit tanh(v/speed) over a step.
 
@@ -234,7 +203,7 @@ def _mean_tanh(limit, speed, step):
     return MeanForce(force, 0.0, tangent, limit * first, force - trapezoid)
 
 
-@njit(**NJIT_KERNEL)
+@njit(**NJIT_CALL)
 def _mean_lugre(numbers, stretch, j, load, step):
     """Return the stretch after a step, and the mean force of the LuGre law.
 
@@ -261,7 +230,7 @@ def _mean_lugre(numbers, stretch, j, load, step):
     return Relaxed(z, load * (numbers[1, j] * mean + damping))
 
 
-@njit(**NJIT_KERNEL)
+@njit(**NJIT_CALL)
 def _lugre_force(numbers, j, load, stretch, velocity):
     """Return the force of the LuGre law at a stretch and a velocity."""
     limit = _stribeck_limit(numbers, j, velocity)
@@ -277,7 +246,7 @@ def _stribeck_limit(numbers, j, velocity):
     return max(numbers[2, j] + rise, LIMIT_FRACTION * numbers[3, j])
 
 
-@njit(**NJIT_KERNEL)
+@njit(**NJIT_CALL)
 def _mean_spring(numbers, slide, j, dq):
     """Return the mean force over dq and its slope of a cubic or interlocking spring."""
     end = slide + dq
@@ -294,7 +263,7 @@ def _mean_spring(numbers, slide, j, dq):
     return force, (numbers[1, j] / turn * sin(turn * end) - force) / dq
 
 
-@njit(**NJIT_KERNEL)
+@njit(**NJIT_CALL)
 def _walk_bouc_wen(numbers, z, j, load, dq):
     """Return force and path-mean force of the Bouc-Wen law, whose z is advanced by Runge-Kutta steps.
 
@@ -371,7 +340,7 @@ def _first_loading(numbers, j, x):
     return Relaxed(force, area + numbers[1, j] * max(x - phi, 0.0))
 
 
-@njit(**NJIT_KERNEL)
+@njit(**NJIT_CALL)
 def _walk(numbers, memory, j, dq, commits):
     """Return force and mean force of parallel sliders over dq by Masing's and Madelung's rules.
 
@@ -448,7 +417,7 @@ def _walk(numbers, memory, j, dq, commits):
     return Relaxed(force, direction * area / abs(dq) if dq != 0 else force)
 
 
-@njit(**NJIT_KERNEL)
+@njit(**NJIT_CALL)
 def prepare(numbers, memory, j, step):
     """Set the bond length in the middle of a step from the velocity at its start (Strang splitting)."""
     if numbers[0, j] == Law.BONDS:
@@ -457,10 +426,10 @@ def prepare(numbers, memory, j, step):
             return
         half = 0.5 * step.duration
         v = step.start_velocity
-        memory[4, j] = grow(memory[0, j], v, v, abs(v) * half, half, numbers[3:9, j])[0]
+        memory[4, j] = grow(memory[0, j], v, v, abs(v) * half, half, numbers[3:8, j])[0]
 
 
-@njit(**NJIT_KERNEL)
+@njit(**NJIT_CALL)
 def advance(numbers, memory, j, load, step):
     """Advance the memory of point j under a load over a `Step`."""
     law = numbers[0, j]
@@ -482,7 +451,7 @@ def advance(numbers, memory, j, load, step):
         if numbers[3, j] >= 0:
             v0 = step.start_velocity
             v1 = step.end_velocity
-            memory[0, j] = grow(memory[0, j], v0, v1, abs(dq), step.duration, numbers[3:9, j])[0]
+            memory[0, j] = grow(memory[0, j], v0, v1, abs(dq), step.duration, numbers[3:8, j])[0]
     elif law == Law.TANH:
         memory[0, j] = numbers[1, j] * load * tanh(step.end_velocity / numbers[2, j])
     elif law == Law.LUGRE:
@@ -496,7 +465,7 @@ def advance(numbers, memory, j, load, step):
         memory[0, j] += dq
 
 
-@njit(**NJIT_KERNEL)
+@njit(**NJIT_CALL)
 def read(numbers, memory, j, load):
     """Return the `PointState` of point j under a load; a COULOMB point has the force of its slip."""
     law = numbers[0, j]
@@ -557,7 +526,7 @@ def slip_since_zero(numbers, memory, j, load, velocity):
     return slip if stretch > 0 else -slip
 
 
-@njit(**NJIT_KERNEL)
+@njit(**NJIT_CALL)
 def press(numbers, memory, j, before, after):
     """Change the load of point j at rest: elastic forces are cut at the new limit, new bonds form."""
     law = numbers[0, j]
@@ -569,13 +538,13 @@ def press(numbers, memory, j, before, after):
     elif law == Law.BONDS:
         bonds = memory[1, j], memory[2, j], memory[3, j]
         memory[1, j], memory[2, j], memory[3, j] = press_point(
-            bonds, before, after, numbers[9, j], numbers[2, j]
+            bonds, before, after, numbers[8, j], numbers[2, j]
         )
     elif law == Law.TANH:
         memory[0, j] *= after / before if before > 0 else 0.0
 
 
-@njit(**NJIT_KERNEL)
+@njit(**NJIT_CALL)
 def write_bond_means(numbers, memory, loads, slides, forces, slopes):
     """Write mean forces (m,) and slopes of points with bonds, in a loop that vectorises; return False for long slides."""
     for j in range(slides.size):
@@ -589,7 +558,7 @@ def write_bond_means(numbers, memory, loads, slides, forces, slopes):
     return True
 
 
-@njit(**NJIT_KERNEL)
+@njit(**NJIT_CALL)
 def advance_bonds(memory, loads, slides):
     """Advance points with bonds of constant length after short slides (m,)."""
     for j in range(slides.size):

@@ -13,9 +13,9 @@ from typing import NamedTuple
 import numpy as np
 
 from ..core import Measure, NotConverged, Outcome
-from ..dynamics import checkpoint
 from ..model.model import Model
 from ..model.source import locate_errors
+from ..points import checkpoint
 from . import joint, memory
 from .accuracy_warnings import AccuracyContext, tolerance_warnings
 from .balances import mark_unbalanced

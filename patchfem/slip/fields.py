@@ -44,30 +44,29 @@ def element_fields(patch, elements, states, length: float) -> ShearFields:
     return ShearFields(traction, local_slip)
 
 
-def point_fields(patch, law: Bonds, shear, states) -> ShearFields:
-    """Compute traction and slip at the nodes of a patch from the states of its bond points.
+def point_fields(patch, shear, snapshots) -> ShearFields:
+    """Compute traction and slip at the nodes of a patch from the states of its contact points.
 
     Parameters
     ----------
     patch : Patch
         The pressed patch.
-    law : Bonds
     shear : ShearModes or None
-    states : sequence
-        f pairs of relative displacement [m] and bonds (5, a): m, z, s2, local displacement [m] and play of each point.
+        Shear of the pieces; None if every node is a point.
+    snapshots : sequence of points.time_march.Snapshot
 
     Returns
     -------
     ShearFields
     """
     index = np.arange(patch.x.size) if shear is None else shear.points
-    traction = np.zeros((len(states), patch.x.size))
+    weight = patch.pieces.interface.weight[index]
+    traction = np.zeros((len(snapshots), patch.x.size))
     local_slip = np.zeros_like(traction)
-    for i, (rel_disp, bonds) in enumerate(states):
-        traction[i, index] = law.static / law.length * bonds[1]
-        local_slip[i] = rel_disp
-        stretch = np.divide(bonds[1], bonds[0], out=np.zeros(index.size), where=bonds[0] > 0)
-        local_slip[i, index] = bonds[3] - stretch
+    for i, one in enumerate(snapshots):
+        traction[i, index] = one.forces / weight
+        local_slip[i] = one.slide
+        local_slip[i, index] -= one.stretch + one.bend
     return ShearFields(traction, local_slip)
 
 

@@ -11,7 +11,6 @@ PUBLIC = {
     "compare.records": (
         "Comparison",
         "Finding",
-        "ScanMaps",
         "Track",
     ),
     "files.read": (

@@ -1,11 +1,11 @@
-"""Areal scan of heights on a rectangular raster: its rows and columns, and its levelling."""
+"""Areal scan of heights on a rectangular raster, and its levelling."""
 
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ..core import PatchfemError, frozen_array
-from .profile import Profile, robust_deviation
+from .profile import robust_deviation
 
 SPIKE_THRESHOLDS = (10.0, 40.0, 160.0)  # |height - median of 5 x 5| in standard deviations
 MAX_SPIKE_POINTS = 12  # number of points of a spike; a larger group is a feature of the surface
@@ -32,24 +32,6 @@ class Areal:
     def missing(self) -> np.ndarray:
         """Mask (m, n) of the points that have no measured height."""
         return np.isnan(self.z)
-
-    def row(self, k: int) -> Profile:
-        """Return the trace along x at y[k]."""
-        return self._trace(self.x, self.z, k, "row")
-
-    def column(self, k: int) -> Profile:
-        """Return the trace along y at x[k]."""
-        return self._trace(self.y, self.z.T, k, "column")
-
-    def _trace(self, places, heights, k: int, name: str) -> Profile:
-        count = len(heights)
-        if not -count <= k < count:
-            raise PatchfemError(
-                f"{self.source}: no {name} {k}; the scan has {count} of them, counted from 0"
-            )
-        return Profile(
-            frozen_array(places), frozen_array(heights[k]), f"{self.source}, {name} {k}", self.notes
-        )
 
 
 def fill_nearest(z) -> np.ndarray:
@@ -84,48 +66,21 @@ def find_scan_spikes(scan: Areal) -> np.ndarray:
 
 
 def level_plane(scan: Areal) -> Areal:
-    """Subtract the least-squares plane of the measured heights of a scan."""
-    return level(scan, 1)
+    """Subtract the least-squares plane of the measured heights of a scan.
 
-
-def level(scan: Areal, degree: int) -> Areal:
-    """Subtract the least-squares polynomial in x and y, of a given total degree, from a scan.
-
-    Raises PatchfemError if the measured heights do not determine it, such as all of them in one
-    line.
+    Raises PatchfemError if the measured heights do not determine it, such as all of them in one line.
     """
     known = ~scan.missing
-    count = int(known.sum())
-    along_x, along_y = (
-        np.polynomial.legendre.legvander(_reduce_axis(axis), degree) for axis in (scan.x, scan.y)
-    )
-    powers = np.arange(degree + 1)
-    # Exponents of y along the rows, of x along the columns.
-    is_term = np.add.outer(powers, powers) <= degree
-    products = (along_x[:, :, None] * along_x[:, None, :]).reshape(scan.x.size, -1)
-    sums = (known.astype(float) @ products).reshape(-1, degree + 1, degree + 1)
-    normal = np.einsum("mik,mj,ml->jilk", sums, along_y, along_y, optimize=True)[is_term][
-        :, is_term
-    ]
-    rank = np.linalg.matrix_rank(normal / max(count, 1), tol=RANK_TOL, hermitian=True)
-    if count < len(normal) or rank < len(normal):
-        if degree == 1:
-            raise PatchfemError(
-                f"{scan.source}: {count} heights, which all lie on one straight line; a plane "
-                "needs three points that do not"
-            )
+    # Positions from -1 to 1 give well-conditioned normal equations.
+    x, y = (2 * (axis - axis[0]) / (axis[-1] - axis[0]) - 1 for axis in (scan.x, scan.y))
+    plane = np.array([np.broadcast_to(part, known.shape) for part in (1.0, x, y[:, None])])
+    base = plane[:, known]
+    normal = base @ base.T
+    if np.linalg.matrix_rank(normal / max(known.sum(), 1), tol=RANK_TOL, hermitian=True) < 3:
         raise PatchfemError(
-            f"{scan.source}: {count} heights do not determine a polynomial of degree {degree}; use "
-            "a lower degree"
+            f"{scan.source}: {known.sum()} heights, which all lie on one straight line; a plane needs "
+            "three points that do not"
         )
-    mean = scan.z[known].mean()
-    right = along_y.T @ np.where(known, scan.z - mean, 0.0) @ along_x
-    factors = np.zeros(is_term.shape)
-    factors[is_term] = np.linalg.solve(normal, right[is_term])
-    return replace(scan, z=frozen_array(scan.z - (mean + along_y @ factors @ along_x.T)))
-
-
-def _reduce_axis(axis) -> np.ndarray:
-    """Scale the positions along an axis to the interval [-1, 1]."""
-    half = (axis[-1] - axis[0]) / 2
-    return (axis - (axis[0] + axis[-1]) / 2) / (half if half > 0 else 1.0)
+    z = scan.z - scan.z[known].mean()
+    factors = np.linalg.solve(normal, base @ z[known])
+    return replace(scan, z=frozen_array(z - np.tensordot(factors, plane, 1)))

@@ -148,7 +148,7 @@ def _draw(path: Path, rows: list, parts) -> None:
         axis.set(
             xlabel="rest [s]",
             ylabel="friction over μₛ N",
-            title="Breakaway after a rest",
+            title="Peak after a rest",
             ylim=(0.45, 1.05),
         )
         axis.legend()

@@ -163,13 +163,11 @@ def reversal_force(back, length, order=1.0, reading="stretch", limit=1.0):
     return limit * (np.exp(-2 * x) - gammainc(order + 1, x) - old)
 
 
-def stretch_loop(amplitude, length, limit=1.0, breakaway=0.0):
-    """Return area [J] and end force [N] of the steady loop of the stretch reading (p = 1).
+def stretch_loop(amplitude, length, limit=1.0):
+    """Return area [J] and end force [N] of the steady loop of the stretch reading (p = 1), which is Dahl's loop.
 
-    The bond length is constant. With x = amplitude/length > b, E = exp(-2 (x - b)) and z = (1 - (1 - 2 b) E)/(1 + E) the
-    force is limit z and the area 4 limit length (x - b + b^2 - b z - (1 + z - 2 b)(1 - E)/2). b = 0 gives Dahl's loop,
-    4 limit (amplitude - length tanh x). Up to x = b the loop is a line without area, with the force limit x of a slide
-    from rest. ValueError unless amplitude and length are positive and 0 <= breakaway <= 1.
+    The bond length is constant. With x = amplitude/length they are 4 limit (amplitude - length tanh x) and limit tanh x.
+    ValueError unless amplitude and length are positive.
 
     Parameters
     ----------
@@ -177,39 +175,24 @@ def stretch_loop(amplitude, length, limit=1.0, breakaway=0.0):
         [m]
     limit : float
         mu_s N [N].
-    breakaway : float
-        Fraction b of the length that stretches without damage.
     """
     require_positive(amplitude=amplitude, length=length)
-    if not 0 <= breakaway <= 1:
-        raise ValueError(f"breakaway must be in [0, 1], got {breakaway}")
-    x = np.asarray(amplitude, float) / length
-    b = breakaway
-    e = np.exp(-2 * np.maximum(x - b, 0.0))
-    z = (1 - (1 - 2 * b) * e) / (1 + e)
-    area = 4 * limit * length * (x - b + b * b - b * z - (1 + z - 2 * b) * (1 - e) / 2)
-    return np.where(x > b, area, 0.0)[()], limit * np.where(x > b, z, x)[()]
+    end = np.tanh(np.asarray(amplitude, float) / length)
+    return 4 * limit * (amplitude - length * end), limit * end
 
 
-def dither_drift(low, high, breakaway=0.0):
+def dither_drift(low, high):
     """Return the slide per cycle, in bond lengths, that a dithered force leaves in the stretch reading.
 
-    p = 1, constant bond length and load. The drift is 0 where high - low <= 2 b. Up: the elastic range, then
-    ln((1 - low - 2 b)/(1 - high)); down: the range, then ln((1 + high - 2 b)/(1 + low)).
+    p = 1, constant bond length and load. The force rises along ln((1 - low)/(1 - high)) and falls along
+    ln((1 + high)/(1 + low)).
 
     Parameters
     ----------
     low, high : float
         Ends of the force / mu_s N, -1 < low < high < 1.
-    breakaway : float
-        Fraction b of the length that stretches without damage.
     """
-    if high - low <= 2 * breakaway * (1 + 1e-12):
-        return 0.0
-    return float(
-        np.log((1 - low - 2 * breakaway) / (1 - high))
-        - np.log((1 + high - 2 * breakaway) / (1 + low))
-    )
+    return float(np.log((1 - low) / (1 - high)) - np.log((1 + high) / (1 + low)))
 
 
 def jenkins_loop(amplitude, length, limit=1.0):

@@ -1,4 +1,4 @@
-"""The laws of the drift study as objects: bond laws of every order and elastic range, Iwan's elements, closed forms."""
+"""The laws of the drift study as objects: bond laws of every order, Iwan's elements, closed forms."""
 
 import sys
 from pathlib import Path
@@ -11,13 +11,12 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "friction_ladder"))
 import ladder_cycles as ladder
 import today
 
-from patchfem.friction import FirstOrderBonds, Quadrature, Step
+from patchfem.friction import FirstOrderBonds, ListedBonds, Step
 from patchfem.friction.laws.elastic_plastic import ElasticPlastic
 
 LENGTH = ladder.LENGTH  # [m] bond length
 PERIOD = 1 / ladder.HERTZ  # [s] duration of a cycle
 CREEP = 1e-3  # [m/s] reference speed of the law tanh
-SHARES = (0.0, 0.1, 0.3, 0.5)  # breakaway force / friction limit
 CASES = {
     "force .5+-.1": ((0.6, 0.4), (1.0, 1.0)),
     "force .5+-.3": ((0.8, 0.2), (1.0, 1.0)),
@@ -61,7 +60,7 @@ class Row(NamedTuple):
     last: float | None
 
 
-def engines(growth: bool, orders=(0.0, 0.5, 1.0, 2.0), shares=SHARES) -> dict:
+def engines(growth: bool, orders=(0.0, 0.5, 1.0, 2.0)) -> dict:
     """Return {name: law} of the bond laws.
 
     Order 0 starts without bonds, because with fully grown bonds it would be a Coulomb jump.
@@ -69,14 +68,11 @@ def engines(growth: bool, orders=(0.0, 0.5, 1.0, 2.0), shares=SHARES) -> dict:
     more, tail = (ladder.GROWTH, ", growing") if growth else ({}, "")
     out = {}
     for p in orders:
-        for b in shares:
-            law = ladder.bonds(order=p, breakaway=b, initial=float(p > 0), **more)
-            out[f"stretch p = {p:g}, b = {b:g}{tail}"] = (
-                FirstOrderBonds(law) if p == 1 else Quadrature(law, 1e-9)
-            )
+        law = ladder.bonds(order=p, initial=float(p > 0), **more)
+        out[f"stretch p = {p:g}{tail}"] = FirstOrderBonds(law) if p == 1 else ListedBonds(law)
     for p in (0.0, 1.0):
         law = ladder.bonds(order=p, reading="report", initial=p, **more)
-        out[f"report p = {p:g}{tail}"] = Quadrature(law, 1e-9)
+        out[f"report p = {p:g}{tail}"] = ListedBonds(law)
     return out
 
 

@@ -4,13 +4,7 @@ The force is held at .5 +- .1, .5 +- .3 and .3 +- .3 of mu_s N, the load at N +-
 the pace of 143 Hz; README.md beside this file has every law and case. At .5 +- .1 the constant stretch p = 1, which is
 Dahl's law, creeps by .272 bond lengths per cycle for ever, tanh with v_0 = 1 mm/s by 1.93 and Bouc-Wen (n = 2) by
 .0695. Coulomb, elastic-plastic and Iwan close every loop and do not creep. The law as printed locks up: .098, .030,
-.006, .0014 after 2, 3, 6, 12 cycles for p = 1, with energy out of nothing. An elastic range b (`breakaway`) of half the
-swing of the force in shares of mu_s N stops the drift from the second cycle on; with growth it must be eps_0/eps_k
-times as long.
-
-What the elastic range costs against b = 0: from A = 3 on the loop is b (1 - b) bond lengths narrower, below A = b it
-has no area. b = .1 costs 3 % of 4 A mu_s N at A = 3 and less than 1 % from A = 12.5 on. So b = 0, the law as it stands,
-is the default, and b > 0 serves where a mean force and a dither act together and the mean position matters.
+.006, .0014 after 2, 3, 6, 12 cycles for p = 1, with energy out of nothing.
 
 Run: python studies/drift/drift_table.py [--full]      (without growing bonds; --full: with them)
 """
@@ -18,18 +12,14 @@ Run: python studies/drift/drift_table.py [--full]      (without growing bonds; -
 import sys
 from pathlib import Path
 
-import numpy as np
-
 sys.path.insert(0, str(Path(__file__).parent))
 from drift_laws import (
     CASES,
     LENGTH,
     PERIOD,
-    SHARES,
     Row,
     closed_form_rows,
     engines,
-    ladder,
     laws_without_bonds,
 )
 from force_control import OutOfReach, slides
@@ -46,26 +36,6 @@ def row(name: str, engine, case: str, cycles: int = CYCLES) -> Row:
     except OutOfReach:
         return Row(name, case, None, None)
     return Row(name, case, float(ends[1] - ends[0]), float(ends[-1] - ends[-2]))
-
-
-def breakaway_cost(amplitudes=ladder.AMPLITUDES, shares=SHARES) -> dict:
-    """Return the errors of a law with an elastic range against Dahl's law.
-
-    They are {(b, A/eps_0): (area error over 4 A mu_s N, rms force error)}.
-    """
-    out = {}
-    for amplitude in amplitudes:
-        dahl = ladder.last_cycle(ladder.points(ladder.bonds()), amplitude)
-        for b in shares:
-            out[b, amplitude] = ladder.error(
-                ladder.last_cycle(ladder.points(ladder.bonds(breakaway=b)), amplitude), dahl
-            )
-    return out
-
-
-def virgin_gap(share: float) -> float:
-    """Return the largest excess of the virgin curve over 1 - exp(-x), which is at x = b, where the damage begins."""
-    return share + np.expm1(-share)
 
 
 def main(laws=None, cases=tuple(CASES), growing: bool = True) -> dict:
@@ -102,13 +72,3 @@ def _cell(found) -> str:
 
 if __name__ == "__main__":
     main(growing="--full" in sys.argv[1:])
-    print("\nbreakaway b against b = 0: area over 4 A mu_s N (rms force), virgin curve")
-    cost = breakaway_cost()
-    for b in SHARES:
-        print(
-            f"b = {b:3}: "
-            + "  ".join(
-                f"A {a:g}: {cost[b, a][0]:+.4f} ({cost[b, a][1]:.4f})" for a in ladder.AMPLITUDES
-            )
-            + f"  virgin {virgin_gap(b):.4f}"
-        )

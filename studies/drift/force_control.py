@@ -3,8 +3,6 @@
 import numpy as np
 from scipy.optimize import brentq
 
-from patchfem.friction import Quadrature
-
 
 class OutOfReach(ArithmeticError):
     """Raised if no slide of up to 50 bond lengths brings the law to the force."""
@@ -35,9 +33,6 @@ def slide_to_traction(
     """
 
     def after(dq):
-        # the sum over the bonds is computed once, not at every Gauss point of the increment
-        if isinstance(engine, Quadrature):
-            return engine.advance(state, dq, sigma, sigma, dt)
         return engine.step(state, dq, sigma, sigma, dt).state
 
     def miss(dq):

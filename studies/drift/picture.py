@@ -1,5 +1,5 @@
-"""How far does a block creep under a dither, and what does an elastic range cost? `drift.svg`: drift per cycle about
-half the limit against the dither (lines: closed form; dashed: growing bond length), and loop area against amplitude.
+"""How far does a block creep under a dither? `drift.svg`: drift per cycle about half the limit against the dither (line:
+closed form; dashed: growing bond length), and loop area against amplitude.
 
 Run: python studies/drift/picture.py
 """
@@ -11,24 +11,23 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parent))
 sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
-from drawing import BLUE, GREY, ORANGE, drawing
-from drift_laws import LENGTH, PERIOD, SHARES, ladder
+from drawing import BLUE, GREY, drawing
+from drift_laws import LENGTH, PERIOD, ladder
 from force_control import OutOfReach, drift
 from friction_forms import dither_drift, stretch_loop
 
 from patchfem.friction import FirstOrderBonds
 
 FOLDER = Path(__file__).parent
-COLOURS = (BLUE, "#4f9bd9", "#e0975f", ORANGE)
-MARCHED_SHARES = (0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.35, 0.4)
+MARCHED_SWINGS = (0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.35, 0.4)
 
 
-def growing(share: float, swing: float) -> float:
+def growing(swing: float) -> float:
     """Return the drift per cycle [bond lengths] at a force of .5 +- swing with growing bonds.
 
     NaN if the block slides away.
     """
-    engine = FirstOrderBonds(ladder.bonds(breakaway=share, **ladder.GROWTH))
+    engine = FirstOrderBonds(ladder.bonds(**ladder.GROWTH))
     try:
         return (
             drift(engine, (0.5 + swing, 0.5 - swing), (1.0, 1.0), 4, period=PERIOD, length=LENGTH)
@@ -38,33 +37,26 @@ def growing(share: float, swing: float) -> float:
         return np.nan
 
 
-def main(path: Path = FOLDER / "drift.svg", marched=MARCHED_SHARES) -> Path:
+def main(path: Path = FOLDER / "drift.svg", marched=MARCHED_SWINGS) -> Path:
     """Draw both panels, and return the path of the file."""
     swing = np.linspace(0, 0.4, 401)
     amplitude = 10.0 ** np.linspace(-1, 1.5, 200)
     with drawing(path, (9.6, 3.4), 1, 2) as (_, (left, right)):
-        for colour, b in zip(COLOURS, SHARES):
-            left.plot(
-                swing,
-                [dither_drift(0.5 - s, 0.5 + s, b) for s in swing],
-                color=colour,
-                label=f"b = {b:g}",
-            )
-            left.plot(
-                marched,
-                [growing(b, s) for s in marched],
-                "o--",
-                ms=3,
-                lw=0.8,
-                color=colour,
-                label="marched, growing bonds" if b == SHARES[0] else None,
-            )
-            right.semilogx(
-                amplitude,
-                stretch_loop(amplitude, 1.0, 1.0, b)[0] / (4 * amplitude),
-                color=colour,
-                label=f"b = {b:g}",
-            )
+        left.plot(
+            swing, [dither_drift(0.5 - s, 0.5 + s) for s in swing], color=BLUE, label="closed form"
+        )
+        left.plot(
+            marched,
+            [growing(s) for s in marched],
+            "o--",
+            ms=3,
+            lw=0.8,
+            color=BLUE,
+            label="marched, growing bonds",
+        )
+        right.semilogx(
+            amplitude, stretch_loop(amplitude, 1.0)[0] / (4 * amplitude), color=BLUE, label="p = 1"
+        )
         right.semilogx(
             amplitude,
             np.maximum(amplitude - 1, 0) / amplitude,
@@ -79,7 +71,7 @@ def main(path: Path = FOLDER / "drift.svg", marched=MARCHED_SHARES) -> Path:
             ylim=(-0.03, 1.6),
         )
         right.set(xlabel="amplitude [bond lengths]", ylabel="loop area / 4 A μs N", ylim=(0, 1))
-        left.legend(title="elastic range", alignment="left")
+        left.legend()
         right.legend()
     return path
 

@@ -12,11 +12,11 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parent))
 import today
 
-from patchfem.dynamics import bond_list_model, jenkins_model, load_instances, points_model
-from patchfem.friction import Bonds, list_mean, list_step
-from patchfem.friction.bonds.quadrature import cutoff_age
-
-loop_kernels = load_instances()
+from patchfem.friction import Bonds
+from patchfem.friction.bonds.list_numbers import cutoff_age
+from patchfem.points.contacts import BondSum, Contact, PointSet, make_bond_contact
+from patchfem.points.laws import make_jenkins
+from patchfem.points.slides import follow
 
 HERTZ = 143.0  # [Hz] frequency of the loops
 LENGTH = 2e-6  # [m] bond length
@@ -49,17 +49,13 @@ def _harmonic(amplitude: float, steps: int = STEPS, path: float = 20.0) -> np.nd
     return amplitude * np.sin(2 * np.pi * np.arange(cycles * steps + 1) / steps)
 
 
-def last_cycle(model, amplitude: float, steps: int = STEPS) -> Cycle:
-    """Return the last cycle of a law whose lengths are in metres and whose friction limit is 1."""
+def last_cycle(contact: Contact, amplitude: float, steps: int = STEPS) -> Cycle:
+    """Return the last cycle of points whose lengths are in metres and whose friction limit is 1."""
     path = LENGTH * _harmonic(amplitude, steps)
-    contact = model.allocate_contact()
-    forces = np.zeros((path.size, 3))
-    energies = np.zeros((path.size, 2))
-    if loop_kernels.follow_path(
-        path, 1 / (HERTZ * steps), model.kind, contact, 1e-11, energies, forces
-    ):
+    motion = follow(contact, np.arange(path.size) / (HERTZ * steps), path)
+    if motion.n_unsolved:
         raise ArithmeticError("a step did not converge")
-    return Cycle(np.diff(path)[-steps:] / LENGTH, forces[-steps - 1 : -1, 1])
+    return Cycle(np.diff(path)[-steps:] / LENGTH, motion.mean[-steps:])
 
 
 def bonds(share: float = 1.0, **more) -> Bonds:
@@ -67,8 +63,9 @@ def bonds(share: float = 1.0, **more) -> Bonds:
     return Bonds(share, share * LENGTH, **more)
 
 
-def points(law: Bonds):
-    return points_model(law, [1.0], [1.0])
+def points(law: Bonds) -> Contact:
+    """Return a point of a law under 1 N."""
+    return make_bond_contact(law, 1.0, np.ones(1))
 
 
 def at_once() -> Bonds:
@@ -83,8 +80,7 @@ def at_once() -> Bonds:
 def printed_law_cycle(amplitude: float, order: float, steps: int, **growth) -> Cycle:
     """Compute the last cycle of the law as printed, in which every bond has its own length.
 
-    The compiled list is merged to 0.01 bond lengths, an error of 1e-4 of the limit. Means of steps are computed in the
-    last cycle only.
+    The list is merged to 0.01 bond lengths, an error of 1e-4 of the limit.
 
     Parameters
     ----------
@@ -97,16 +93,9 @@ def printed_law_cycle(amplitude: float, order: float, steps: int, **growth) -> C
         Growth of the bond length.
     """
     law = bonds(order=order, reading="report", **growth)
-    c = bond_list_model(law, 1.0, cutoff_age(order, 1e-5), 0.01).allocate_contact()
-    path = LENGTH * _harmonic(amplitude, steps)
-    dt = 1 / (HERTZ * steps)
-    force = []
-    for i, dq in enumerate(np.diff(path)):
-        if i >= path.size - 1 - steps:
-            force.append(list_mean(dq, c, dq / dt, dt))
-        if not list_step(dq, c, dq / dt, dq / dt, dt):
-            raise ArithmeticError("the bond list is full")
-    return Cycle(np.diff(path)[-steps:] / LENGTH, np.array(force))
+    bond_sum = BondSum(law, cutoff_age(order, 1e-5), 0.01)
+    contact = make_bond_contact(law, 1.0, np.ones(1), bond_sum=bond_sum)
+    return last_cycle(contact, amplitude, steps)
 
 
 def error(found: Cycle, wanted: Cycle) -> tuple:
@@ -124,14 +113,20 @@ def coulomb(like: Cycle, limit: float = 1.0) -> Cycle:
     return Cycle(like.dq, limit * np.sign(like.dq))
 
 
+def make_sliders(limits, lengths) -> Contact:
+    """Return parallel Jenkins elements of friction limits [N] that yield at given slides [m]."""
+    laws = [make_jenkins(float(limit), float(length)) for limit, length in zip(limits, lengths)]
+    return Contact([PointSet(laws, np.ones(1))], float(np.sum(limits)), LENGTH)
+
+
 def elastic_plastic(amplitude: float, share: float = 1.0) -> Cycle:
     """Return one Jenkins element with the stiffness mu_s N/eps_0 and the limit share mu_s N."""
-    return last_cycle(jenkins_model([1 / LENGTH], [share * LENGTH]), amplitude)
+    return last_cycle(make_sliders([share], [share * LENGTH]), amplitude)
 
 
 def iwan(amplitude: float, count: int, scale: float = 1.0) -> Cycle:
     stiffness, limit = today.iwan_elements(count, scale)
-    return last_cycle(jenkins_model(stiffness / LENGTH, limit * LENGTH), amplitude)
+    return last_cycle(make_sliders(stiffness * limit, limit * LENGTH), amplitude)
 
 
 def bouc_wen(amplitude: float, power: float) -> Cycle:

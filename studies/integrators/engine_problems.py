@@ -12,11 +12,11 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
 import problems
 
 from patchfem.core import InitialState, ModalBasis
-from patchfem.dynamics.march import march as marching
-from patchfem.dynamics.march import models
+from patchfem.friction import Coulomb
 from patchfem.model import build
+from patchfem.points import contacts, time_march
 from patchfem.runs import choose_numerics, solve_with_coarser
-from patchfem.runs.rig.interface import make_single_contact
+from patchfem.runs.rig.interface import make_single_law
 from patchfem.scene import scene
 from patchfem.structure import make_release
 
@@ -118,12 +118,12 @@ def problem(name: str) -> Problem:
     )
     modes = model.rig.modes
     drive = model.rig.drive.signal
-    contact = make_single_contact(
+    element = make_single_law(
         model,
         choose_numerics(model),
         solve_with_coarser(model.patch, model.accuracy.tolerance, False)[0],
-    )
-    k, y = contact.element.numbers[2:].reshape(2, -1)
+    ).element
+    k, y = element.numbers[2:].reshape(2, -1)
     numbers = {
         "omega": modes.omega,
         "zeta": modes.zeta,
@@ -139,7 +139,7 @@ def problem(name: str) -> Problem:
         name,
         modes,
         drive,
-        contact.limit,
+        element.limit,
         20,
         {
             key: value.tolist() if isinstance(value, np.ndarray) else value
@@ -161,12 +161,12 @@ def exact(one: Problem, _) -> np.ndarray:
 
 def march(one: Problem, steps: int) -> np.ndarray:
     """Integrate by time stepping with `steps` per cycle."""
-    model = (
-        models.coulomb_model(one.limit, one.limit)
-        if one.elements is None
-        else models.jenkins_model(*one.elements)
-    )
-    found = marching.march(
-        one.modes, one.drive, model, one.cycles, steps, one.last, start=one.start
+    if one.elements is None:
+        element = Coulomb(one.limit, one.limit).element(1.0)
+        contact = contacts.make_contact([element], one.modes.interfaces)
+    else:
+        contact = contacts.make_parallel_contact(*one.elements, one.modes.slide)
+    found = time_march.march(
+        one.modes, one.drive, contact, one.cycles, steps, window=one.last, start=one.start
     )
     return found.window.slide[:: steps // POINTS][1:]

@@ -1,17 +1,19 @@
 """How much time does each engine need for how small an error?
 
-Largest error of the slide over the last 5 of 60 (block) or 20 cycles, CPU time of one core of an EPYC, least of 3 turns
-of everybody (the march once, later, on a busier machine). Where friction is Coulomb's and the drive a sine, the event
-engines are exact: compiled for one mode in 0.41 ms (block), for any modes in plain Python in 15 ms; for 1e-6 DOP853
-with events takes 330 times as long as the first, CVODE with its root finder 180 times, the march, which finds stops and
-releases inside its steps, less than 39 times (200 steps a cycle), and Siconos (theta = 1/2) 730 times as long for 1e-4.
-On the two masses of Fig 16 plain Python takes 7 ms, DOP853 and CVODE for 1e-6 4.8 and 4.7 times as long, Siconos 25
-times for 1e-4. (The event engine of any modes is the truth of both, drawn at 1e-13; that of one mode agrees to 1e-13,
-DOP853 at 1e-12 to 3e-12 and 4e-11.)
+The figures of the event engines are of 1.4: exact and in plain Python. The engine of 1.5 moves in steps of order 8.
 
-On a patch that slips part by part (41 parallel elements, two modes) there is no closed form: the march needs 8 ms for
-5e-3 and 27 ms for 1e-4; CVODE takes 18 times as long for 1e-2 and 8 times for 1e-4, DOP853 20 times for 1e-4. The march
-is of second order, so that CVODE overtakes it beyond 1e-7; the two agree to 2e-8. Peers must be told a longest step:
+Largest error of the slide over the last 5 of 60 (block) or 20 cycles, CPU time of one core of an EPYC, least of 3 turns
+of everybody (the march later, on a machine where it took twice as long as alone). Where friction is Coulomb's and the
+drive a sine, the event engines are exact: compiled for one mode in 0.41 ms (block), for any modes in plain Python in 15
+ms; for 1e-6 DOP853 with events takes 330 times as long as the first, CVODE with its root finder 180 times, the march,
+which halves the steps with stops and releases, less than 100 times (100 steps a cycle), and Siconos (theta = 1/2) 730
+times as long for 1e-4. On the two masses of Fig 16 plain Python takes 7 ms, DOP853 and CVODE for 1e-6 4.8 and 4.7 times
+as long, Siconos 25 times for 1e-4. (The event engine of any modes is the truth of both, drawn at 1e-13; that of one
+mode agrees to 1e-13, DOP853 at 1e-12 to 3e-12 and 4e-11.)
+
+On a patch that slips part by part (41 parallel elements, two modes) there is no closed form: the march needs 51 ms for
+5e-3 and .3 s for 1e-4; CVODE takes 3 times as long for 1e-2 and .7 times for 1e-4, DOP853 1.8 times for 1e-4. The march
+is of second order, so that CVODE overtakes it beyond 1e-3; the two agree to 2e-8. Peers must be told a longest step:
 with 1/8 of a cycle DOP853 passes over 14 of the 202 reversals of the patch without a word and is 3 % wrong still at a
 tolerance of 1e-9; without one it finds 4 of the 240 events of the block.
 

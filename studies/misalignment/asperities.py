@@ -18,8 +18,14 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
 from halfspace import press_periodic, wave_numbers
 
 from patchfem.closed_forms import contact as exact
-from patchfem.contact import HertzAsperities
-from patchfem.contact.unilateral import solve_forces
+from patchfem.contact import (
+    HertzAsperities,
+    Holder,
+    StripCompliance,
+    StripLayout,
+    StripModel,
+    press_strips,
+)
 
 CARBIDE = (250e9, 0.24)  # Young's modulus [Pa] and Poisson's ratio in rig.toml
 TITANIUM = (121e9, 0.32)  # Young's modulus [Pa] and Poisson's ratio in rig.toml
@@ -144,14 +150,14 @@ def one_each(depth, round_peaks: bool = False, coat: tuple = CARBIDE, mean: floa
         c = between_ridges(count, coat)[(number[:, None] - number) % count]
     force = np.full(count, mean * cell)
     last = 0.0
-    total = np.array([mean * cell * count])
+    layout = StripLayout(number.astype(float), np.ones(count), np.zeros(1))
+    holder = Holder(mean * cell * count)
     # secant iteration of the force on each peak; each iteration reduces the error to a third or less
     while np.abs(force - last).max() > 1e-11 * force.max():
         last = force
         soft = np.maximum(force, 1e-9 * force.max())
-        force = solve_forces(
-            c + np.diag(own(soft, modulus)[0] / soft), number.astype(float), depth, total
-        )[0]
+        compliance = StripCompliance(c + np.diag(own(soft, modulus)[0] / soft))
+        force = press_strips(StripModel(compliance, layout), depth, holder).force[0]
     live = np.flatnonzero(force > 0)
     tangent = c[np.ix_(live, live)] + np.diag(own(force[live], modulus)[1])
     return float(np.linalg.solve(tangent, np.ones(live.size)).sum() / (count * cell)), force

@@ -39,7 +39,7 @@ def case(roll: float, count: int, skin: str = "bare") -> dict:
     """Return {name: Measure} of pieces in strips under a roll [rad], with `yaw` [N m], the moment of sliding friction."""
     three = [solve_patch_contact(rolled_pieces(roll, count, skin), tilted.pair(k)) for k in (1, 0)]
     return tilted.estimate_static_measures(*three) | {
-        "yaw": abs(three[0].strips.yaw_moment(FRICTION))
+        "yaw": FRICTION * abs(three[0].strips.roll_moment)
     }
 
 

@@ -37,9 +37,14 @@ import tilted
 from asperities import MEAN
 
 from patchfem.closed_forms import contact as exact
-from patchfem.contact import press
-from patchfem.core import frozen_array
-from patchfem.runs.patch.press import add_linear_skin_compliance
+from patchfem.contact import (
+    Holder,
+    LinearAsperities,
+    StripCompliance,
+    StripLayout,
+    StripModel,
+    press_strips,
+)
 
 SCATTERS = (0.0, 10e-9, 50e-9, 0.2e-6, 1e-6, 5e-6)
 SHAPES = ("uniform", "gaussian")
@@ -49,16 +54,13 @@ STIFFNESSES = (1e15, 4.5e14, 1e14, 2.7e13, 1e13, 1e12, 5e11)
 def opening(stiffness: float | None, halvings: int = 2) -> float:
     """Return the tilt [rad] at which the rig's pieces begin to open with a linear layer [Pa/m], or None without a layer."""
     pieces = tilted.pair(halvings).compliance
-    if stiffness is not None:
-        part = tilted.case(0.0, "linear").interface.skin.model_copy(
-            update={"normal_stiffness": stiffness}
-        )
-        pieces = add_linear_skin_compliance(part, pieces)
-    load = tilted.case(0.0).loading.load
     x = pieces.interface.x
-    flat = np.zeros(pieces.interface.x.size)
+    layer = None if stiffness is None else LinearAsperities(stiffness)
+    layout = StripLayout(x, pieces.interface.weight, np.zeros(1))
+    model = StripModel(StripCompliance(pieces.normal), layout, layer)
+    holder = Holder(tilted.case(0.0).loading.load)
     # at both tilts the whole length is in contact
-    even, turn = (press(pieces, frozen_array(flat + by * x), load).sigma_n for by in (0.0, 1e-7))
+    even, turn = (press_strips(model, by * x, holder).pressure[0] for by in (0.0, 1e-7))
     return float(1e-7 * (even / np.maximum(even - turn, 1e-300)).min())
 
 

@@ -29,8 +29,8 @@ from report_methods import solve_euler
 from study_text import read_answer
 
 import patchfem as pf
-from patchfem.dynamics.cycles import find_hermite_extremes
 from patchfem.model import build
+from patchfem.points.time_march import find_extremes
 from patchfem.scene import load as load_scene
 
 FOLDER = Path(__file__).parent
@@ -99,9 +99,8 @@ def _by_euler(steps: int, period: float) -> Motion:
     )
     last = slice(-steps - 1, None)
     displacement = motion.z[last] @ rig.modes.output
-    low, high = find_hermite_extremes(
-        displacement, motion.v[last] @ rig.modes.output, period / steps
-    )
+    velocity = motion.v[last] @ rig.modes.output
+    ((low, high),) = find_extremes(displacement[None], velocity[None], period / steps)
     frame = motion.z[last] @ rig.modes.slide - displacement
     return Motion(
         motion.time[last] - 7 * period,

@@ -160,7 +160,7 @@ ITEMS = (
         "the path of a point, and the distance that the point has covered since a bond formed",
         LOOP,
         "",
-        "tests/friction/bonds/test_quadrature.py",
+        "tests/friction/bonds/test_list_sums.py",
         "works",
     ),
     Item(
@@ -192,7 +192,7 @@ ITEMS = (
         "the nonlocal law on pieces that deform in shear",
         RIG,
         "studies/rig/readings.py",
-        "tests/dynamics/march/test_shear_lists.py",
+        "tests/points/test_march_bonds.py",
         "works",
     ),
     Item(
@@ -200,7 +200,7 @@ ITEMS = (
         "the law uses the normal stress at the place where a bond formed",
         LOOP,
         "",
-        "tests/dynamics/march/test_shear_lists.py",
+        "tests/points/test_march_bonds.py",
         "works",
     ),
     Item(
@@ -208,7 +208,7 @@ ITEMS = (
         "at constant speed the nonlocal law becomes a local law",
         LOOP,
         "studies/bench/stribeck.py",
-        "tests/friction/bonds/test_quadrature.py",
+        "tests/friction/bonds/test_list_sums.py",
         "works",
     ),
     Item(

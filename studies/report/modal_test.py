@@ -11,8 +11,7 @@ from scipy import signal
 from scipy.optimize import least_squares
 
 import patchfem as pf
-from patchfem.dynamics import warm_up
-from patchfem.dynamics.march.march import march
+from patchfem.points.time_march import march
 from patchfem.runs import choose_numerics, solve_with_coarser
 from patchfem.runs.rig.interface import make_contact
 from patchfem.structure.drives import RecordedDrive
@@ -85,8 +84,7 @@ def march_samples(scene, drive=None, steps: int = STEPS, seconds: float | None =
     contact = make_contact(model, choose_numerics(model), patch)
     # 1e-6 compensates round-off, so that a whole number of cycles is not reduced by one
     cycles = int((seconds or drive.duration) / drive.period + 1e-6)
-    warm_up(modes, drive, contact)
-    return march(modes, drive, contact, cycles, steps, cycles).window
+    return march(modes, drive, contact, cycles, steps, window=cycles).window
 
 
 def run_random_test(scene, seconds: float, rms: float, seed: int = 1) -> Test:

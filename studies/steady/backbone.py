@@ -27,7 +27,7 @@ from patchfem.dynamics.harmonic.branch import find_backbone
 from patchfem.model import build
 from patchfem.runs import choose_numerics, solve_with_coarser
 from patchfem.runs import run as runner
-from patchfem.runs.rig.interface import make_single_contact
+from patchfem.runs.rig.interface import make_single_law
 from patchfem.scene import scene
 
 FOLDER = Path(__file__).parent
@@ -94,9 +94,9 @@ def case(name: str, shares=SHARES, steps: int = 4000) -> Row:
         if model.patch is not None
         else None
     )
-    contact = make_single_contact(model, choose_numerics(model), patch)
+    element = make_single_law(model, choose_numerics(model), patch).element
     amplitude = size * np.asarray(shares)
-    free = [find_backbone(modes, contact, amplitude, harmonics=h) for h in (1, 9)]
+    free = [find_backbone(modes, element, amplitude, harmonics=h) for h in (1, 9)]
     w = modes.omega[0]
     zeta = modes.zeta[0]
     stiffness, area = np.array([loop(text, float(a), steps) for a in amplitude]).T

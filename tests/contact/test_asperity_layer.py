@@ -7,6 +7,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from pieces import LENGTH, LOAD, WIDTH, draw_gap, make_coated_pair
+from pressed import press
 from scipy.integrate import quad
 from scipy.stats import norm
 from skins import layer_stiffness, press_layer, stretch_law
@@ -15,7 +16,6 @@ from patchfem.contact import (
     ExponentialAsperities,
     HertzAsperities,
     LinearAsperities,
-    press,
 )
 from patchfem.contact.asperity_laws import peak_integral
 from patchfem.core import PatchfemError

@@ -7,8 +7,8 @@ from functools import cache
 import numpy as np
 import pytest
 from pieces import TITANIUM, make_bare_layers, make_compliance, make_refined_grid
+from pressed import press
 
-from patchfem.contact import press
 from patchfem.contact.gaps import crown
 
 HALF_WIDTH = 0.1e-3  # half-width of the contact [m]

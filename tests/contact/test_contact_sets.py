@@ -7,11 +7,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from pieces import LOAD, draw_gap, make_coated_pair
+from pressed import press, solve_forces
 
 from patchfem.compiled import load
-from patchfem.contact import N_BUILT, ContactSets, hash_set, press
-from patchfem.contact.set_arrays import N_STORED
-from patchfem.contact.unilateral import solve_forces
+from patchfem.contact import ContactSets, hash_set
+from patchfem.contact.set_arrays import N_BUILT, N_STORED
 
 PRESS = load("contact.press_kernels")
 
@@ -30,7 +30,7 @@ def make_crowned_sets(cells: int = 40, radius: float = 50.0) -> tuple:
 def make_search_arrays(sets, memory_limit: float = 64e6) -> tuple:
     """Return the arrays of the search and the slot of the reference set."""
     arrays = sets.make_arrays(memory_limit)
-    return arrays, PRESS.build_first_set(arrays, hash_set(arrays, sets.reference.in_contact))
+    return arrays, PRESS.build_first_set(arrays, hash_set(arrays, sets.in_contact))
 
 
 def solve_at_motion(sets, d: float, t: float) -> np.ndarray:

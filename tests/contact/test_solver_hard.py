@@ -10,13 +10,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from pieces import LENGTH, LOAD, WIDTH, draw_gap, make_coated_pair
+from pressed import press, press_to_approach
 
 from patchfem.contact import (
     RESIDUAL_TOL,
     StripCompliance,
     patch_problem,
-    press,
-    press_to_approach,
 )
 from patchfem.contact.active_set import solve_primal_dual
 from patchfem.contact.gaps import crown, tilt

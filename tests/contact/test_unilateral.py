@@ -15,10 +15,9 @@ from pieces import (
     make_coated_pair,
     make_compliance,
 )
+from pressed import press, solve_forces
 
-from patchfem.contact import press
 from patchfem.contact.gaps import tilt
-from patchfem.contact.unilateral import solve_forces
 from patchfem.mesh import graded_grid
 
 

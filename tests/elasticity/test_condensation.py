@@ -31,7 +31,7 @@ from patchfem.elasticity import (
 )
 from patchfem.elasticity.elasticity import hooke
 from patchfem.mesh import graded_grid
-from patchfem.mesh.pieces import PieceMesh, _raise_order
+from patchfem.mesh.pieces import PieceMesh, raise_order
 
 GRID = graded_grid(2e-3, 1e-3, 2.5e-4, 1e-4)
 FORMS = {
@@ -46,11 +46,12 @@ FORMS = {
 def make_mesh(kind: str, grid=GRID) -> PieceMesh:
     """Return the grid as a mesh of one kind of elements with random numbers of its nodes."""
     mesh = mesh_of_grid(grid, 1.0 if kind.startswith("triangle") else 0.0, seed=3)
-    corners = dict(zip([kind], mesh.blocks.values(), strict=True))
     if kind in ("triangle", "quad"):
-        return PieceMesh(mesh.points, corners, mesh.is_coating, mesh.interface, mesh.far)
+        return PieceMesh(mesh.points, mesh.blocks, mesh.is_coating, mesh.interface, mesh.far)
     tagged = [np.isin(np.arange(len(mesh.points)), part) for part in (mesh.interface, mesh.far)]
-    points, blocks, (on_interface, is_far) = _raise_order(mesh.points, corners, tagged)
+    points, blocks, (on_interface, is_far) = raise_order(
+        mesh.points, mesh.blocks, tagged, dict.fromkeys(mesh.blocks, kind)
+    )
     interface = np.flatnonzero(on_interface)
     interface = interface[np.argsort(points[interface, 0])]
     return PieceMesh(points, blocks, mesh.is_coating, interface, np.flatnonzero(is_far))

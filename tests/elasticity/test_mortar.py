@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from any_mesh_cases import mesh_of_grid
 from pieces import HEIGHT, LENGTH, TITANIUM, make_bare_layers, make_refined_grid
+from pressed import press
 
-from patchfem.contact import press
 from patchfem.contact.gaps import crown
 from patchfem.core import Compliance, Interface
 from patchfem.elasticity import PieceInterface, elasticity, mortar, recovery

@@ -4,9 +4,12 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from march_paths import follow_path
 
+from patchfem import compiled
 from patchfem.friction import parallel_element
-from patchfem.friction.laws import elastic_plastic_kernels
+from patchfem.points.contacts import make_contact
+from patchfem.points.laws import make_jenkins
 
 # ---- parallel elements
 
@@ -28,46 +31,34 @@ def advance_jenkins(dq, stretch, stiffness, limit):
 
 @pytest.mark.parametrize("seed", [1])
 def test_exact_parallel_elements_agree_with_numpy(seed):
-    """Force, slope, memory and dissipation of parallel elastic-plastic elements agree with the NumPy version."""
+    """Mean forces, forces, losses and stored energies of parallel elements agree with the NumPy version."""
     rng = np.random.default_rng(seed)
     stiffness = rng.uniform(0.1, 3, 29)
     limit = rng.uniform(0.05, 2, 29)
-    element = parallel_element(stiffness, limit)
-    numbers = element.numbers[None]
-    memory = element.memory[None].copy()
-    stretch = memory[0, 3:]
-    sums = memory[0, :3]
-    for dq in rng.normal(0, 1, 60) * 10.0 ** rng.uniform(-3, 1, 60):
-        expected, new, loss = advance_jenkins(dq, stretch, stiffness, limit)
-        force, slope = elastic_plastic_kernels.mean_force(numbers[0], memory[0], 0.0, dq, 0.0, 1.0)
-        h = 1e-6 * abs(dq)
-        ahead, behind = (advance_jenkins(dq + s * h, stretch, stiffness, limit)[0] for s in (1, -1))
-        assert force == pytest.approx(expected, abs=1e-12)
-        assert slope == pytest.approx((ahead - behind) / (2 * h), rel=1e-4, abs=1e-6)
-        dissipated = elastic_plastic_kernels.update_memory(
-            numbers[0], memory[0], dq, force, 0.0, 0.0, 1.0, 0.0
-        )
-        limits = stiffness * limit
-        assert sums == pytest.approx(
-            [stiffness @ new, stiffness @ new**2 / 2, limits @ new / limits.sum()], abs=1e-12
-        )
-        assert elastic_plastic_kernels.read_memory(numbers[0], memory[0], dq, 0.0) == (
-            sums[0],
-            sums[1],
-            dq - sums[2],
-        )
-        assert stretch == pytest.approx(new, abs=1e-15) and dissipated == pytest.approx(
-            loss, abs=1e-11
-        )
-        assert dissipated >= -1e-15
+    contact = make_contact([parallel_element(stiffness, limit)], np.ones((1, 1)))
+    increments = rng.normal(0, 1, 60) * 10.0 ** rng.uniform(-3, 1, 60)
+    found = follow_path(contact, np.cumsum([0.0, *increments]))
+    assert found.n_unsolved == 0
+    stretch = np.zeros(29)
+    for i, dq in enumerate(increments):
+        mean, stretch, loss = advance_jenkins(dq, stretch, stiffness, limit)
+        assert found.forces[i, 1] == pytest.approx(mean, abs=1e-11)
+        assert found.forces[i + 1, 0] == pytest.approx(stiffness @ stretch, abs=1e-11)
+        assert found.energies[i, 0] == pytest.approx(loss, abs=1e-10)
+        assert found.energies[i, 0] >= -1e-12
+        assert found.energies[i + 1, 1] == pytest.approx(stiffness @ stretch**2 / 2, abs=1e-11)
 
 
 def test_exact_tiny_step_has_accurate_force():
     """The mean force of a step of 1e-12 of the stretch is exact to rounding, without cancellation."""
-    numbers = parallel_element(np.full(4, 3.0), np.full(4, 1.0)).numbers[None]
-    memory = np.array([[0, 0, 0, 0.3, -0.7, 0.9, 0.1]])
-    for dq in (1e-12, -1e-13, 1e-300, 0.0):
-        force, slope = elastic_plastic_kernels.mean_force(numbers[0], memory[0], 0.0, dq, 0.0, 1.0)
-        assert force == pytest.approx(3 * (0.6 + 2 * dq), rel=1e-14) and slope == pytest.approx(
-            6.0, rel=1e-6
-        )
+    point = make_jenkins(3.0, 1.0)
+    kernels = compiled.load("points.return_maps_kernels")
+    for stretch in (0.3, -0.7, 0.1):
+        # The memory is the force over mu, and the load that stretches.
+        memory = np.array(point.memory)[:, None]
+        memory[0] = stretch
+        for dq in (1e-12, -1e-13, 1e-300, 0.0):
+            step = kernels.Step(dq, 1.0, 0.0, 0.0, 0.0)
+            force, slope = kernels.mean_force(point.numbers[:, None], memory, 0, 1.0, step)[:2]
+            assert force == pytest.approx(3 * (stretch + dq / 2), rel=1e-14)
+            assert slope == pytest.approx(1.5, rel=1e-6)

@@ -10,7 +10,6 @@ from scipy.integrate import solve_ivp
 from scipy.special import ellipk
 
 from patchfem.core import PatchfemError
-from patchfem.dynamics.grooves.climbing import check_lifted_mass
 from patchfem.friction import Grooves
 from patchfem.hybrid import cases, drives, runs
 from patchfem.hybrid.laws import grooves as rigid
@@ -114,7 +113,7 @@ def test_exact_breakaway_at_force_limits_of_flank(position):
 def test_refuses_too_large_lifted_mass():
     """A lifted mass that exceeds the inertia of the mode is refused, with its largest permitted value."""
     with pytest.raises(PatchfemError, match=r"must be below [\d.]+ kg"):
-        check_lifted_mass(Grooves(80e-6, 8e-6, 0.0, 100.0), 0.6, make_modes(900.0))
+        Grooves(80e-6, 8e-6, 0.0, 100.0).check_lifted_mass(0.6, 1.0)
 
 
 @pytest.mark.parametrize("seed", [1, 0, 6, 9])

@@ -177,14 +177,17 @@ INVALID_CHANGES = {
     ),
     "double node": (
         lambda m: duplicate_node(m, m.quads[20, 0], 20),
-        "coincide, the first at .*merge",
+        "on another node; merge nodes that coincide",
     ),
     "double interface node": (
         lambda m: split_interface_node(m, find_interface_node(m)),
         "upper_interface has two nodes at x = .*; merge",
     ),
-    "loose coating": (separate_coating, "9 pairs of nodes of the upper piece coincide"),
-    "hanging node": (add_hanging_node, "do not meet edge to edge: a node lies"),
+    "loose coating": (separate_coating, "on another node; merge nodes that coincide"),
+    "hanging node": (
+        add_hanging_node,
+        "do not meet edge to edge: a node at x = .* lies inside an edge",
+    ),
     "shared nodes": (share_interface_nodes, "the two pieces share 9 nodes"),
     "steep edge": (chamfer_upper_ends, "rounded edges may reach a slope of 0.1\\): the node"),
     "across": (

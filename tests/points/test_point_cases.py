@@ -81,7 +81,7 @@ def test_cases_agree_with_the_march_of_points():
     """The march of many points has the same amplitude and friction work per cycle, by another step."""
     law = make_laws()["elastic-plastic"]
     contact = Contact([PointSet([law], np.ones(1))])
-    motion = march.march(MODES, DRIVE, contact, 60, 800)
+    motion = march(MODES, DRIVE, contact, 60, 800)
     values = cases.march_cases(make(law, cycles=60), 512).values
     low, high = motion.extremes[-1]
     # Both are the last of 60 cycles; the window of the cases has six.

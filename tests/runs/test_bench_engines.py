@@ -61,11 +61,15 @@ def format_sum_law(reading, order, growth):
 
 
 def run_both_ways(model, steps, patch=None, frames=0):
-    """Return the results of the compiled engine and of the law stepped in NumPy."""
+    """Return the results of the compiled engine and of the law as an object, whose list keeps all bonds."""
     time, slide = model.slide.samples(steps)[:2]
-    return bench.run_bench(model, patch, steps, frames), slide_step_by_step(
-        SlideTask(model, patch, time, slide, frames)
-    )
+    compiled = bench.run_bench(model, patch, steps, frames)
+    choice = compiled.engine.choice
+    if choice is not None:
+        choice = replace(choice, tail=0.0, merge=0.0)
+    engine = replace(compiled.engine, choice=choice)
+    stepped = slide_step_by_step(SlideTask(model, patch, time, slide, frames, engine))
+    return compiled, stepped
 
 
 # ---- compiled engines and their NumPy versions

@@ -14,8 +14,8 @@ import pytest
 from scene_texts import COATED, DRIVE, MODE, SLIDE, get_only_mistake
 
 from patchfem import SceneError
-from patchfem.dynamics.march import march
 from patchfem.effects import LAWS
+from patchfem.points import time_march
 from patchfem.runs.run import run
 from patchfem.scene import loads
 
@@ -119,7 +119,7 @@ class TimeLoopReached(Exception):
     """Exception of a march that is ready to start its time loop."""
 
 
-def raise_time_loop_reached(*_):
+def raise_time_loop_reached(*_, **__):
     """Raise TimeLoopReached in place of the preparation of a time loop."""
     raise TimeLoopReached
 
@@ -185,7 +185,7 @@ def assert_combinations_run(name: str, law: str, every: int) -> None:
 @pytest.fixture
 def stop_at_time_loop(monkeypatch):
     """Stop a march where its time loop would begin."""
-    monkeypatch.setattr(march, "warm_up", raise_time_loop_reached)
+    monkeypatch.setattr(time_march, "march", raise_time_loop_reached)
 
 
 @pytest.mark.usefixtures("stop_at_time_loop")

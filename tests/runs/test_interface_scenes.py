@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 import xarray as xr
 from command_line import run_cli
-from march_paths import share_one_loop
 
 from patchfem.response import EVENT_KIND_NAMES
 from patchfem.runs.run import run
@@ -62,12 +61,6 @@ frequency = "0.1 Hz"
 cycles = 60
 """
 )
-
-
-@pytest.fixture(autouse=True)
-def use_one_loop(monkeypatch):
-    """Let all marches share one compiled time loop."""
-    share_one_loop(monkeypatch)
 
 
 @pytest.fixture(scope="module")

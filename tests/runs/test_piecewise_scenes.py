@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import pytest
-from march_paths import share_one_loop
 from support.scene_texts import (
     COATED,
     COULOMB,
@@ -97,9 +96,8 @@ def test_exact_two_modes_and_release_agree_with_march():
     assert exact.outcome == march.outcome
 
 
-def test_exact_two_interfaces_agree_with_march(monkeypatch):
+def test_exact_two_interfaces_agree_with_march():
     """The exact engine agrees with the march for two interfaces between masses."""
-    share_one_loop(monkeypatch)
     exact, march = run_exact_and_march(PAIR + FORCED, "accuracy.tolerance=1e-4")
     assert list_differences(exact, march) == []
     assert (

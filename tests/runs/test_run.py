@@ -306,17 +306,18 @@ def test_refuses_too_long_run_and_unwritable_folder(write_scene, tmp_path):
 
 def test_exact_unconverged_run_is_written_and_marked(write_scene, tmp_path, monkeypatch):
     """A run with a step that did not converge is written with the outcome not_converged and without errors."""
-    from patchfem.dynamics.march import march as marching
+    from patchfem.points.march_rows import Total
+    from patchfem.points.time_march import March
 
     out = tmp_path / "out"
-    march_steps = marching.Run._march_steps
+    advance = March.advance
 
-    def march_steps_with_fault(self, count, rows):  # One step is recorded as not converged.
-        run_case = march_steps(self, count, rows)
-        self.ledger[7] += 1
-        return run_case
+    def advance_with_fault(self, count):  # One step is recorded as not converged.
+        samples = advance(self, count)
+        self.system.totals[Total.UNSOLVED] += 1
+        return samples
 
-    monkeypatch.setattr(marching.Run, "_march_steps", march_steps_with_fault)
+    monkeypatch.setattr(March, "advance", advance_with_fault)
     answer = run_cli(
         "run", write_scene(SCENES["rig patch"]), "-o", out, "-q", "--set", "drive.cycles=5"
     )

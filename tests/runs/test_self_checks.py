@@ -9,8 +9,8 @@ from self_checks.evidence import Evidence
 
 import patchfem as pf
 from patchfem.core import Outcome
-from patchfem.dynamics.march import march
 from patchfem.model import structure
+from patchfem.points import time_march
 from patchfem.response import rows
 from patchfem.runs.bench import bench
 
@@ -152,8 +152,8 @@ def test_always_wrong_numbers_are_detected(monkeypatch, owner, name, fault, scen
     ("owner", "name", "fault", "scene", "warning"),
     [
         (  # the warning names no key, because no setting is a remedy
-            march.Run,
-            "energy_balance",
+            time_march.March,
+            "find_ledger",
             lambda balance: balance | {"friction": (1 + 1e-6) * balance["friction"]},
             SCENES["march"].replace("8 g", "8.1 g"),
             "energy balance of engine march(?!.*accuracy\\.).*has an error.*the limit of 1e-8"

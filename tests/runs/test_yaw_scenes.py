@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from march_paths import share_one_loop
 from scene_texts import DRIVE, MODE, PIECE, list_mistakes
 
 from patchfem import load
@@ -39,19 +38,13 @@ method = "{method}"
 )
 
 
-@pytest.fixture
-def one_loop(monkeypatch):
-    """Let all marches share one compiled time loop."""
-    share_one_loop(monkeypatch)
-
-
 def run_with_measures(law="coulomb", keys="", yaw="30 rad/m", roll="0.01 mrad", method="auto"):
     """Return the result of a scene and its measures."""
     result = run(load(TEXT.format(law=law, keys=keys, yaw=yaw, roll=roll, method=method)))
     return result, result.measures
 
 
-def test_exact_yawing_strips_agree_between_engines(one_loop):
+def test_exact_yawing_strips_agree_between_engines():
     """For rolled strips with Coulomb's law the exact engine and the march agree within their
     errors; the yaw moment is sum y f of the friction forces."""
     result, exact = run_with_measures()
@@ -135,7 +128,7 @@ def run_sheared_strips(law, strips="", yaw="", method="march"):
 
 @pytest.mark.parametrize("law", ['"elastic-plastic"\nbond_length = "1 um"'])
 @pytest.mark.parametrize("method", ["march", "exact", "harmonic"])
-def test_exact_level_strips_with_shear_agree_with_patch(law, method, one_loop):
+def test_exact_level_strips_with_shear_agree_with_patch(law, method):
     """With four strips, each is four times as compliant and carries a quarter of the load: the
     measures agree with those of the patch."""
     patch_measures = run_sheared_strips(law, method=method).measures
@@ -159,7 +152,7 @@ def test_exact_level_strips_with_shear_agree_with_patch(law, method, one_loop):
 
 @FRICTION_LAWS
 @pytest.mark.parametrize("roll", ["0.2 mrad"])
-def test_exact_rolled_strips_with_shear_agree_with_separate_elements(law, roll, one_loop):
+def test_exact_rolled_strips_with_shear_agree_with_separate_elements(law, roll):
     """The friction force of each strip agrees with contact elements of the compliance 4 C_t
     computed here, under the displacement q - y yaw. The yaw moment is sum y f; at a roll of 0.2
     mrad some strips are not in contact."""

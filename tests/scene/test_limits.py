@@ -6,7 +6,17 @@ from itertools import islice, product
 from pathlib import Path
 
 import pytest
-from scene_texts import BENCH, LINEAR, PATCH, RIG, find_line, get_only_mistake, list_mistakes
+from scene_texts import (
+    BENCH,
+    FORCED,
+    LINEAR,
+    PAIR,
+    PATCH,
+    RIG,
+    find_line,
+    get_only_mistake,
+    list_mistakes,
+)
 
 from patchfem.scene import load, loads
 from patchfem.scene.scene import SceneError
@@ -74,6 +84,12 @@ REFUSED = [
         ],
         "accuracy.method",
         "'harmonic' with law 'coulomb', whose force jumps, and structure.bonded.wavelength",
+    ),
+    (
+        PAIR + FORCED,
+        [STEADY, "accuracy.harmonics=9"],
+        "accuracy.harmonics",
+        "with accuracy.method = 'harmonic' and other interfaces; leave `harmonics` out",
     ),
 ]
 PLAIN = [

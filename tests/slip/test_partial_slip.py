@@ -8,9 +8,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from pieces import LOAD, TILTS, draw_gap, make_coated_pair
+from pressed import press
 from slip_paths import draw_paths, jenkins_forces
 
-from patchfem.contact import press, tangential_stiffness
+from patchfem.contact import tangential_stiffness
 from patchfem.contact.gaps import crown, tilt
 from patchfem.core import PatchfemError
 from patchfem.slip import find_fewest_gauss_points, jenkins_set, scale_limits

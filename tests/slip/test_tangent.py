@@ -41,7 +41,7 @@ def test_exact_coupled_stiffness_agrees_with_schur_complement():
     schur = pieces.tangential[contact] - contact_coupling.T @ np.linalg.solve(
         pieces.normal[contact], contact_coupling
     )
-    stiffness = coupled_stiffness(pieces, coupling, active)
+    stiffness = coupled_stiffness(pieces.normal, pieces.tangential, coupling, active)
     assert stiffness == pytest.approx(np.linalg.solve(schur, ones).sum(), rel=1e-11)
     assert stiffness > (1 + 1e-6) * tangential_stiffness(pieces.tangential, active)
 
@@ -52,7 +52,10 @@ def test_exact_coupled_stiffness_in_limiting_cases():
     pair = make_coated_pair(60)
     no_coupling = 0 * pair.normal
     active = np.arange(pair.interface.x.size) < 40
-    assert coupled_stiffness(pair, no_coupling, active) == pytest.approx(
+    assert coupled_stiffness(pair.normal, pair.tangential, no_coupling, active) == pytest.approx(
         tangential_stiffness(pair.tangential, active), rel=1e-12
     )
-    assert coupled_stiffness(pair, no_coupling, 0 > np.ones(active.size)) == 0.0
+    assert (
+        coupled_stiffness(pair.normal, pair.tangential, no_coupling, ~np.ones(active.size, bool))
+        == 0.0
+    )

@@ -8,8 +8,8 @@ from scipy.integrate import quad
 
 from patchfem import SceneError, plan, run
 from patchfem.core import InitialState, Outcome, SineDrive
-from patchfem.dynamics import coulomb_model, jenkins_model
-from patchfem.dynamics.march.march import march
+from patchfem.points.contacts import make_contact, make_parallel_contact
+from patchfem.points.time_march import march
 from patchfem.scene import loads
 from patchfem.structure import make_release
 from patchfem.structure.drives import SweepDrive, make_levels, make_step
@@ -59,7 +59,8 @@ def test_exact_level_change_preserves_phase():
 
 def march_without_friction(modes, drive, cycles, steps=200, start=None):
     """Return a march of a basis under a drive without friction."""
-    return march(modes, drive, coulomb_model(0.0, 0.0), cycles, steps, window=1000, start=start)
+    contact = make_contact([], modes.interfaces[:0], (), 1.0)
+    return march(modes, drive, contact, cycles, steps, window=1000, start=start)
 
 
 def test_exact_step_response_agrees_with_closed_form():
@@ -99,7 +100,7 @@ def test_exact_release_response_and_energy_balance():
     marched = march(
         sdof_basis(),
         make_release(2 * np.pi / OMEGA),
-        jenkins_model([39.0 / 1e-6], [1e-6]),
+        make_parallel_contact([39.0 / 1e-6], [1e-6], np.ones(1)),
         60,
         100,
         start=InitialState(np.array([3e-4]), np.zeros(1)),

@@ -6,11 +6,10 @@ from patchfem.surface.areal import Areal
 from patchfem.surface.compare.records import (
     Comparison,
     Datum,
+    DepthMap,
     Evidence,
     Finding,
     Placement,
-    ScanMaps,
-    TraceCurves,
     Track,
     name_quantity,
     name_unknown,
@@ -139,7 +138,7 @@ def compare_traces(code: str = "worn", findings: dict | None = None, has_place=T
         evidence = Evidence(
             placement=Placement(place),
             datum=Datum(0.75, 10e-9, 0.0, 2.0, 5e-9),
-            curves=TraceCurves(x, before, before - depth, depth, noise, ~worn, worn, 0 * x > 1),
+            curves=DepthMap(x, before, before - depth, depth, noise, ~worn, worn, 0 * x > 1),
             roughness=roughness,
             cutoff=8e-5,
             removed=(2, 0),
@@ -181,8 +180,8 @@ def compare_scans(shape: tuple[int, int] = (900, 500)) -> Comparison:
         tracks=(Track(name_all(sizes), section=(x, depth[0], 0 * x + 2e-8), n_sections=y.size),),
         evidence=Evidence(
             placement=Placement(place, mirrored="x"),
-            curves=ScanMaps(
-                x, y, heights, heights - depth, depth, 0 * depth + 1e-8, ~worn, worn, depth < 0
+            curves=DepthMap(
+                x, heights, heights - depth, depth, 0 * depth + 1e-8, ~worn, worn, depth < 0, y
             ),
         ),
     )

@@ -5,7 +5,8 @@ from modal_bases import make_modal_basis
 from scipy.linalg import expm
 
 from patchfem.dynamics.harmonic.laws import FlowLaw, SpeedLaw
-from patchfem.friction import Bonds, LuGre, TanhLaw, points_element
+from patchfem.friction import Bonds, LuGre, points_element
+from patchfem.friction.laws.tanh import TanhLaw
 
 
 def make_speed_law(limit, speed):

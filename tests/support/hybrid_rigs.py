@@ -107,7 +107,7 @@ def _draw_face(rng, law: str, spec: dict, n: int, m: int, *, varies: bool) -> di
     elif law == "nonlocal":
         keys |= {
             "bond_length": length, "kinetic": mu * float(rng.uniform(0.6, 1.0)), "reading": "stretch", "order": 1,
-            "breakaway": 0.0, "initial_bonds": float(rng.choice([0.0, 1.0])), "rest_growth": None,
+            "initial_bonds": float(rng.choice([0.0, 1.0])), "rest_growth": None,
             "slip_growth": None, "rest_speed": None,
         }  # fmt: skip
         if rng.random() < 0.5:

@@ -4,7 +4,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from patchfem.dynamics.interfaces.arrays import BondList
 from patchfem.friction import (
     N_ROWS,
     STATUS,
@@ -14,10 +13,16 @@ from patchfem.friction import (
     make_path_state,
     make_status,
 )
-from patchfem.friction.bonds import list_kernels
-from patchfem.friction.bonds.quadrature import cutoff_age
+from patchfem.friction.bonds import list_kernels, list_step_kernels
+from patchfem.friction.bonds.list_numbers import cutoff_age
+from patchfem.friction.bonds.list_rows_kernels import STRIP, BondList
 
-for kernel in (list_kernels.list_mean, list_kernels.list_force, list_kernels.list_step):
+for kernel in (
+    list_kernels.list_mean,
+    list_kernels.sum_list,
+    list_kernels.total,
+    list_step_kernels.list_step,
+):
     if hasattr(kernel, "enable_caching"):  # Without compilation there is no cache to enable.
         # Only tests call these kernels from Python, so only here is their compiled code cached.
         kernel.enable_caching()
@@ -38,15 +43,12 @@ def make_empty_list(law, tail=0.0, merge=0.0, capacity=60_000):
     numbers = law_numbers(law, cutoff_age(law.order, tail) if tail else np.inf, merge)
     path_state = make_path_state(law)
     return BondList(
-        np.ones(1),
         np.zeros((N_ROWS, capacity)),
         path_state,
         make_status(capacity),
         numbers,
         gamma_table(law),
         growth_numbers(law),
-        np.zeros(2),
-        np.ones(1),
     )
 
 
@@ -58,7 +60,8 @@ def march_list(law, path, times=1.0, merge=0.0, tail=0.0, capacity=60_000):
     for dq, dt in zip(np.diff(path), np.broadcast_to(np.asarray(times, float), len(path) - 1)):
         v = dq / dt if dt > 0 else 0.0
         mean = list_kernels.list_mean(dq, bond_list, v, dt)
-        ahead = list_kernels.list_force(dq, bond_list, v, dt)
-        assert list_kernels.list_step(dq, bond_list, v, v, dt)
+        list_kernels.sum_list(1.0, dq, bond_list, v, dt)
+        ahead = list_kernels.total(STRIP.force, 0, bond_list)
+        assert list_step_kernels.list_step(dq, bond_list, v, v, dt)
         rows.append((mean, status[STATUS.force], ahead, status[STATUS.energy]))
     return ListHistory(*np.array(rows).T, status)

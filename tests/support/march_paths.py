@@ -1,30 +1,13 @@
-"""Modal basis with one mode, and the compiled march along a prescribed path."""
+"""A modal basis with one mode, and contact points along a prescribed path."""
+
+from typing import NamedTuple
 
 import numpy as np
 from modal_bases import make_modal_basis
 
-from patchfem.dynamics import STEP_TOL, JointsModel, element_model, load_instances
-from patchfem.friction import TanhLaw
+from patchfem.points.slides import follow
 
 OMEGA = 2 * np.pi * 143
-# Laws of the compiled loop of joints that most tests share.
-ALL = (
-    *(f"friction.laws.{law}_kernels" for law in ("coulomb", "elastic_plastic", "stretch", "tanh")),
-    "dynamics.interfaces.spring_kernels",
-)
-
-
-def share_one_loop(monkeypatch) -> None:
-    """Make joints of all laws march in the compiled loop that contains the laws of ALL."""
-    own_laws = JointsModel.laws.fget
-    monkeypatch.setattr(
-        JointsModel, "laws", property(lambda model: tuple(sorted({*ALL, *own_laws(model)})))
-    )
-
-
-def make_tanh_model(limit: float, speed: float):
-    """Return the ContactModel of friction limit tanh(v/speed), limit [N], speed [m/s]."""
-    return element_model(TanhLaw(limit, speed).element(1.0))
 
 
 def make_one_mode(omega, zeta, mass):
@@ -32,23 +15,25 @@ def make_one_mode(omega, zeta, mass):
     return make_modal_basis(omega, zeta, mass=mass)
 
 
-def follow_path(model, path, dt=0.3):
-    """March a model along a prescribed path with loops.follow_path.
+class Path(NamedTuple):
+    """Forces (k, 3): at the samples, means of the steps, slip; energies (k, 2): lost in a step, stored; steps without
+    solution; the SlideMotion."""
 
-    Returns (force at the samples, step means, slip), (dissipated, stored), unconverged steps,
-    contact.
-    """
-    loops = load_instances()
-    contact = model.allocate_contact()
-    energies = np.zeros((path.size, 2))
+    forces: np.ndarray
+    energies: np.ndarray
+    n_unsolved: int
+    motion: object
+
+
+def follow_path(contact, path, dt=0.3, frames=()) -> Path:
+    """Move contact points along a path in steps of dt."""
+    path = np.asarray(path, float)
+    motion = follow(contact, dt * np.arange(path.size), path, frames)
     forces = np.zeros((path.size, 3))
-    n_unconverged = loops.follow_path(
-        np.ascontiguousarray(path, float),
-        dt,
-        model.kind,
-        contact,
-        STEP_TOL * model.limit,
-        energies,
-        forces,
-    )
-    return forces, energies, n_unconverged, contact
+    energies = np.zeros((path.size, 2))
+    forces[:, 0] = motion.force
+    forces[:-1, 1] = motion.mean
+    forces[:, 2] = motion.slip
+    energies[:-1, 0] = motion.losses
+    energies[:, 1] = motion.stored
+    return Path(forces, energies, motion.n_unsolved, motion)

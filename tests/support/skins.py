@@ -4,16 +4,18 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
+from pressed import press, press_to_approach
 from scipy.linalg import cho_factor, cho_solve
 
 from patchfem.contact import (
     ExponentialAsperities,
+    Holder,
     LinearAsperities,
     StripCompliance,
-    press,
-    press_to_approach,
-    strips,
+    StripLayout,
+    StripModel,
 )
+from patchfem.contact import press_strips as press_by_holder
 from patchfem.core import Compliance, Interface, Outcome
 
 
@@ -36,19 +38,15 @@ class LayerState(NamedTuple):
 def make_strips(c, x, weight, offsets, asperities=None):
     """Return strips with a compliance given as an array, or as a compliance with separate diagonals."""
     compliance = c if isinstance(c, StripCompliance) else StripCompliance(c)
-    layout = strips.StripLayout(x, weight, offsets)
-    return strips.StripModel(compliance, layout, asperities)
+    return StripModel(compliance, StripLayout(x, weight, offsets), asperities)
 
 
 def press_strips(
     c, x, weight, offsets, gap, roll=0.0, load=None, moment=None, asperities=None, **control
 ):
     """Return the state of strips under a load and its moments, or by an approach."""
-    moments = {key: control.pop(key) for key in ("roll_moment", "spring") if key in control}
-    loads = strips.HolderLoads(load, moment, **moments)
-    return strips.press_strips(
-        make_strips(c, x, weight, offsets, asperities), gap, loads, roll=roll, **control
-    )
+    strips = make_strips(c, x, weight, offsets, asperities)
+    return press_by_holder(strips, gap, Holder(load, moment=moment, roll=roll, **control))
 
 
 def press_layer(
@@ -74,8 +72,8 @@ def press_layer(
             state.pressure[0],
             state.gap[0],
             state.stiffness[0],
-            state.delta,
-            state.theta,
+            state.position.delta,
+            state.position.theta,
             state.load,
             state.moment,
             state.iterations,

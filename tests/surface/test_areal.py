@@ -1,4 +1,4 @@
-"""Areal scans: levelling compared with a dense least-squares fit, rows and columns."""
+"""Areal scans: levelling compared with a dense least-squares fit."""
 
 import numpy as np
 import pytest
@@ -37,28 +37,8 @@ def test_exact_levelling_agrees_with_least_squares():
     )
 
 
-def test_exact_rows_and_columns_of_scan_are_traces():
-    """Rows and columns of a scan are traces with its heights, source and notes."""
-    surface = make_scan(random_heights((4, 6), 0.2))
-    row = surface.row(2)
-    column = surface.column(-1)
-    assert np.array_equal(row.x, surface.x) and np.array_equal(row.z, surface.z[2], equal_nan=True)
-    assert np.array_equal(column.x, surface.y) and np.array_equal(
-        column.z, surface.z[:, 5], equal_nan=True
-    )
-    assert (row.source, column.source) == ("scan.txt, row 2", "scan.txt, column -1")
-    assert row.notes == ("one",)
-
-
-def test_refuses_absent_rows_and_collinear_heights():
-    """A row or column that the scan does not have, and a scan of collinear heights, are refused."""
-    surface = make_scan(random_heights((4, 6)))
-    for select, index in ((surface.row, 4), (surface.row, -5), (surface.column, 6)):
-        with pytest.raises(
-            PatchfemError,
-            match=r"scan\.txt: no (row|column) -?\d; the scan has [46] of them, counted",
-        ):
-            select(index)
+def test_refuses_collinear_heights():
+    """A scan of collinear heights is refused."""
     line = np.full((4, 6), np.nan)
     line[range(4), range(4)] = 1e-6
     line[0, 0] = 2e-6

@@ -6,11 +6,11 @@ from functools import cache
 import numpy as np
 import pytest
 from pieces import make_bare_layers, make_bare_pair, make_coated_pair, make_refined_grid
+from pressed import solve_forces
 from scipy.linalg import expm
 from wear_forms import uniform_wear_pressure, worn_crown_half_width, worn_pad_fraction, worn_volume
 
 from patchfem.closed_forms.contact import hertz_half_width
-from patchfem.contact.unilateral import solve_forces
 from patchfem.elasticity import Piece, interface_compliance
 from patchfem.wear import WearProblem, make_initial_wear_state, take_jump, wear_rates
 from patchfem.wear.depth import solve_jump

@@ -12,7 +12,7 @@ import numpy as np
 from scipy.fft import dct, idct
 
 from ...core import NotConverged
-from ..edges import ContactEdge, compute_edge_fraction, parabola_change
+from ..edges import ContactEdge, parabola_change, place_edges
 
 # Smallest magnitude of a compliance of the free ends, relative to the largest, whose eigenfunction
 # is kept
@@ -152,20 +152,15 @@ def find_edges(compliance: PointCompliance, force, gap, force_rate) -> list:
     list of ContactEdge
         By increasing x.
     """
-    active = force > 0
-    x = compliance.x
     gap_rate = 1 - compliance.product(force_rate)
-    cell = x[1] - x[0]
-    edges = []
-    for change in np.flatnonzero(active[1:] != active[:-1]):
-        node, side = (int(change), 1) if active[change] else (int(change) + 1, -1)
-        outside = node + side
-        fraction = compute_edge_fraction(
-            force[node], force_rate[node], gap[outside], gap_rate[outside]
-        )
-        position = x[node] + side * cell * (fraction - EDGE_OFFSET_FRACTION)
-        edges.append(ContactEdge(node, side, fraction, float(position)))
-    return edges
+    return place_edges(
+        compliance.x,
+        force,
+        gap,
+        force_rate,
+        gap_rate,
+        lambda node, inner, outer, fraction: EDGE_OFFSET_FRACTION * outer,
+    )
 
 
 def set_stiffness(compliance: PointCompliance, active, motion, edges: list) -> float:

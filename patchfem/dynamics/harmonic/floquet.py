@@ -16,9 +16,9 @@ corners in time. Neighbours with equal coefficients become one wide cell.
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.linalg import expm
 
 from ...core import ModalBasis
-from ..propagator import matrix_exponentials
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -104,7 +104,7 @@ def find_monodromy(
         )
         a[:, k, n : 2 * n] = memory.gain[first][:, None] * rows[memory.row]
         a[:, k, k] = -memory.loss[first]
-    steps = matrix_exponentials(a * width[:, None, None])
+    steps = expm(a * width[:, None, None])
     for k, reversal in enumerate(reversals, 2 * n):
         across = np.zeros(size)
         across[:n] = rows[reversal.row]

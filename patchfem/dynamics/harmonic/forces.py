@@ -5,6 +5,7 @@ from functools import lru_cache
 import numpy as np
 
 from ...core import PatchfemError, frozen_array
+from ...friction.protocol import Element
 from .harmonic import ContactResponse
 from .laws import Jenkins, SampledSlide, evaluate_series, find_harmonics, make_law
 
@@ -18,9 +19,9 @@ class LawGroup:
     """Friction laws and springs that act on the interface rows of a modal basis.
 
     `parts` is a law, a pair (row, law) or a list of them. A row is the number of an interface of
-    `modes` or participations (n,); a law alone acts on
-    interface 0; a ContactModel is converted to its law. rows: (i, n); laws: a tuple of laws for every row;
-    modes: the modal basis.
+    `modes` or participations (n,); a law alone acts on interface 0. An Element is converted to its
+    law; None means bonds that are no single element.
+    rows: (i, n); laws: a tuple of laws for every row; modes: the modal basis.
     A call with the harmonics (i, H + 1) of the slides and omega returns a
     `harmonic.ContactResponse`.
     """
@@ -29,8 +30,9 @@ class LawGroup:
         rows = {}
         laws = {}
         for part in parts if isinstance(parts, list) else [parts]:
-            row, law = part if isinstance(part, tuple) else (0, part)
-            law = make_law(law) if hasattr(law, "fields") else law
+            is_pair = isinstance(part, tuple) and not isinstance(part, Element)
+            row, law = part if is_pair else (0, part)
+            law = make_law(law) if law is None or isinstance(law, Element) else law
             faces = modes.interfaces
             if np.ndim(row) == 0 and not 0 <= row < len(faces):
                 raise PatchfemError(

@@ -488,25 +488,24 @@ def _count_samples(stick_fraction: float) -> int:
     return int(min(SAMPLES_PER_STICK * 2 * np.pi / max(angle, 1e-9), 65536))
 
 
-def make_law(model):
-    """Return the harmonic-balance law that corresponds to a contact model (`march.models.ContactModel`).
+def make_law(element: Element | None):
+    """Return the harmonic-balance law of an Element; None means bonds that are no single element.
 
     Raises
     ------
     PatchfemError
         If harmonic balance cannot treat it; the message says what to do.
     """
-    element = model.element
     form = element.form if element is not None else ""
     if form == "parallel":
         count = int(element.numbers[1])
         return Jenkins(element.numbers[2 : 2 + count], element.numbers[2 + count :])
     if form == "speed":
         return SpeedLaw(element)
-    # If bonds neither grow nor break gradually, one stretch describes the memory of a bond point.
-    if form == "flow" or (form == "points" and element.numbers[3] < 0 and not element.numbers[8]):
+    # If bonds do not grow, one stretch describes the memory of a bond point.
+    if form == "flow" or (form == "points" and element.numbers[3] < 0):
         return FlowLaw(element)
-    if model.set_valued:
+    if form == "rigid":
         raise PatchfemError(
             'accuracy.method: "harmonic" '
             "cannot treat rigid friction, because the force of rigid friction jumps; use the exact "

@@ -19,4 +19,4 @@ def sample_forces(num, speed, force, slope):
         (N,) force [N] and slope [N s/m], which are written.
     """
     for i in range(speed.size):
-        force[i], slope[i] = law.mean_force(num[0], num[0], 0.0, speed[i], 0.0, 1.0)
+        force[i], slope[i] = law.find_force(num[0], speed[i])

@@ -12,7 +12,7 @@ from ...campaigns.compare import SurfaceRuns
 from ...core import PatchfemError
 from ...surface.compare import compare
 from ...surface.compare.compare import DEFAULTS, Options
-from ...surface.compare.records import Comparison, ScanMaps, Track
+from ...surface.compare.records import Comparison, Track
 from ...surface.profile import level, resample_evenly
 from ...surface.quantity import LEVEL, SIDE, Quantity
 from ...surface.roughness.spectrum import BAND
@@ -240,7 +240,7 @@ def _make_data(comparison: Comparison) -> dict[str, Variable]:
     if curves is None:
         return _make_separate(comparison)
     heights = (curves.before, curves.after)
-    if isinstance(curves, ScanMaps):
+    if comparison.is_areal:
         data = maps(
             curves.x, curves.y, before_map=heights[0], after_map=heights[1], depth_map=curves.depth
         )

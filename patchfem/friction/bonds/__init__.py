@@ -1,23 +1,26 @@
-"""Friction law as a sum over bonds (eq. 2.17), and the algorithms that evaluate the sum.
+"""Friction law as a sum over bonds (eq. 2.17): the moments of the bonds, and the list of their strips.
 
-In: bond parameters, relative displacement and pressure. Out: traction and energies. Read `parameters`, then
-`recursion`, which is exact for reading="stretch" with p = 1, then `quadrature`, the direct sum for every order and
-reading over the `strips` of a path. These are NumPy.
+In: bond parameters, relative displacement and pressure. Out: traction and energies. The two readings of eq. 2.17
+(`Bonds.reading`):
 
-Compiled, along a line: `point_kernels` has the recursion, `list_kernels` the sum as one list of strips. `engines`
-chooses between them by error and cost. `list_numbers` makes the arrays of a list, whose positions `list_rows_kernels`
-names; `list_sum_kernels` has its sums, `list_merge_kernels` joins its strips.
+- "report": eqs. 2.14 to 2.17 as printed. A bond carries (R/eps)^p exp(-R/eps) along u/|u|, with u its stretch and R the path
+  since it formed, and its length eps grows from zero (eq. 2.10). The path element is |v| dt in place of the signed dX1.
+- "stretch": a bond carries (|u|/eps)^p exp(-D) along u/|u|, with D the damage, the integral of dR/eps along the path. The
+  bond length in the power is that at which the bond formed. On a path without reversal this is "report". It never
+  creates energy for p >= 0.
 
-Which code runs: reading="stretch" with p = 1, the default, is summed by the recursion. Every other sum
-along a line is the compiled list, which `engines` truncates and merges to the tolerance. The NumPy
-`Quadrature` sums the bonds of a bench that is evaluated sample by sample (`runs.bench.law`). A strip is
-here a piece of the path along which the bonds of a point formed, not a strip of the patch.
+A bond stores the energy that it gives back when its stretch goes to zero without further damage: f u/(p + 1) for
+"stretch", and f u for "report", whose force f does not depend on the stretch. A step dissipates its work less the gain
+in stored energy. For "report" this may be negative: energy is created.
 
-Numerical errors: `EngineChoice.error` bounds what dropped and merged strips change, and every run adds this bound to
+Read `parameters`, then `point_kernels`: the moments of the bonds, exact for reading="stretch" with p = 1, the default.
+Every other law is a list of strips (`list_rows_kernels`), with one cut-off, one merge and one set of functions
+(`list_kernels`, `list_step_kernels`) for every form of the sum (`list_sum_kernels`). `engines` chooses cut-off and merge
+width by error and cost. `points_kernels` has the functions for many points, and `points` the laws for a prescribed motion.
+A strip is here a piece of the path along which the bonds of a point formed, not a strip of the patch.
+
+Numerical errors: `EngineChoice.error` bounds what dropped and joined strips change, and every run adds this bound to
 its errors. The Gauss rules have no bound of their own. Their strips are pieces of the path in a time step, so that the
 runs with half and a quarter of the steps show their error; only increments above MAX_STRIP_LENGTH bond lengths have
-pieces of a fixed length. Measured on benches of p = 0.5 and 2: with 40 steps per cycle and increments of up to 1.6 bond
-lengths, work and peak force differ by at most 2e-6 from those with 6400 steps. With one Gauss point in place of two, 12
-measures of benches and rigs change by up to 3e-4; 11 stated errors contain the change, but not that of the peak force
-of a bench with p = 0.5. The sum over the nodes of a patch that slips part by part has the error of its mesh.
+pieces of a fixed length. The sum over the nodes of a patch that slips part by part has the error of its mesh.
 """

@@ -11,14 +11,8 @@ from math import ceil, inf, sqrt
 from typing import NamedTuple
 
 from ... import cost_model
-from .list_forms_kernels import (
-    FORM_MOMENTS,
-    FORM_POWER,
-    FORM_REPORT,
-    FORM_REPORT_GROWING,
-    MAX_STRIP_LENGTH,
-)
 from .list_numbers import MAX_DAMAGE, cutoff_age, sum_form
+from .list_rows_kernels import FORM_GROWING, FORM_REPORT, MAX_STRIP_LENGTH
 from .parameters import Bonds
 
 # Settings of a list, by engine: whether it drops old strips, whether it merges strips
@@ -31,10 +25,8 @@ ENGINES = (*LIST_SETTINGS, "recursion")
 # Upper bounds of the error of merging, divided by the square of the merge width (measured by
 # test_merge_bounds)
 MERGE_ERROR_CONSTANT = 0.25  # bound for a constant bond length
-MERGE_ERROR_GROWING = 1.0  # bound for reading="stretch" with growing bonds
-MERGE_ERROR_REPORT_GROWING = 6.0  # bound for reading="report" with growing bonds
-# Bound for reading="report" with a constant bond length and an order below 1
-MERGE_ERROR_REPORT_FRACTIONAL = 1.0
+MERGE_ERROR_STRETCH_GROWING = 1.0  # bound for reading="stretch" with growing bonds
+MERGE_ERROR_GROWING = 6.0  # bound for reading="report" with growing bonds
 # Error that merging adds at any merge width for growing bonds with p < 0; it is due to bonds that
 # form at a reversal
 NEGATIVE_ORDER_ERROR = 3e-4
@@ -85,22 +77,9 @@ class EngineChoice:
 RECURSION = EngineChoice("recursion", 0.0, 0.0, 0.0, 0.0, cost_model.RECURSION_STEP_SECONDS)
 
 
-def unsupported_reason(engine: str, reading: str, order: float) -> str:
-    """Return a sentence that states why an engine cannot sum a law, and which engine can.
-
-    Parameters
-    ----------
-    engine, reading : str
-        Values of accuracy.quadrature and friction.reading.
-    order : float
-        Order p of the law.
-
-    Returns
-    -------
-    str
-        "" if the engine can sum the law.
-    """
-    if engine == "recursion" and (reading != "stretch" or order != 1):
+def unsupported_reason(engine: str, law: Bonds) -> str:
+    """Return a sentence that states why an engine cannot sum a law, and which engine can; "" if it can."""
+    if engine == "recursion" and (law.reading != "stretch" or law.order != 1):
         return 'works only with reading = "stretch" and order = 1; use "auto" or "merged"'
     return ""
 
@@ -147,10 +126,10 @@ def choose_engine(
         If the engine cannot sum the law.
     """
     engine, tail, merge = requested or RequestedEngine()
-    reason = unsupported_reason(engine, law.reading, law.order)
+    reason = unsupported_reason(engine, law)
     if reason:
         raise ValueError(f"{engine} {reason}")
-    if engine == "recursion" or (engine == "auto" and sum_form(law) == FORM_MOMENTS):
+    if engine == "recursion" or (engine == "auto" and not unsupported_reason("recursion", law)):
         return RECURSION
     if tail is None:
         tail = min(1e-3 * tolerance, MAX_TAIL)
@@ -165,32 +144,40 @@ def choose_engine(
         return choices[engine]
     if merge is not None:
         return choices["merged" if merge > 0 else "truncated"]
-    accurate_choices = [
-        choice for choice in choices.values() if choice.tail > 0 and choice.error <= 0.1 * tolerance
-    ]
-    return min(accurate_choices or [choices["truncated"]], key=lambda choice: choice.seconds)
+    if choices["merged"].error > 0.1 * tolerance:
+        return choices["truncated"]
+    return min(choices["truncated"], choices["merged"], key=lambda choice: choice.seconds)
 
 
 def _merge_error_factor(law: Bonds) -> float:
     """Return the bound of the error caused by merging strips, divided by the merge width squared."""
-    form = sum_form(law)
-    if form == FORM_REPORT_GROWING:
-        return MERGE_ERROR_REPORT_GROWING
-    if law.has_growth:
-        return MERGE_ERROR_GROWING
-    if form == FORM_REPORT and law.order < 1:
-        return MERGE_ERROR_REPORT_FRACTIONAL
-    return MERGE_ERROR_CONSTANT
+    if not law.has_growth:
+        return MERGE_ERROR_CONSTANT
+    return MERGE_ERROR_GROWING if law.reading == "report" else MERGE_ERROR_STRETCH_GROWING
 
 
 def _estimate(
     law: Bonds, name: str, tail: float, merge: float, stroke: float, steps: float
 ) -> EngineChoice:
-    """Estimate length, cost and error of a bond list with given settings; a setting of 0 is switched off."""
+    """Estimate length, cost and error of a bond list with given settings; a setting of 0 is switched off.
+
+    Stroke and steps are those of `choose_engine`.
+    """
+    form = sum_form(law)
     increment = stroke / max(steps, 1)
-    strips = _estimate_strip_count(law, tail, merge, stroke, increment)
-    seconds_per_strip = cost_model.STRIP_SECONDS[int(sum_form(law))]
-    if sum_form(law) in (FORM_POWER, FORM_REPORT) and law.order not in (0, 1, 2):
+    reach = min(cutoff_age(law.order, tail) if tail > 0 else MAX_DAMAGE, MAX_DAMAGE)
+    strips = reach / max(increment, 1e-12) * max(1.0, increment / MAX_STRIP_LENGTH)
+    if form == FORM_REPORT:
+        # A strip lasts from reversal to reversal
+        strips = reach / stroke + 2
+    elif form == FORM_GROWING:
+        strips *= 2
+    if merge > 0:
+        # Strips of age R are joined up to merge exp(R/3), but not beyond a reversal
+        strips = min(strips, 5 / merge + 20 + 2 * reach / stroke + 180 * (form == FORM_GROWING))
+
+    seconds_per_strip = cost_model.STRIP_SECONDS[int(form)]
+    if law.order not in (0, 1, 2):
         seconds_per_strip = cost_model.ANY_ORDER_STRIP_SECONDS
     panels = 1 if increment <= 1 else 2 + ceil(increment).bit_length()
     # A long increment takes five Gauss points per panel instead of the two values of Simpson's
@@ -198,28 +185,7 @@ def _estimate(
     factor = 1 if increment <= 0.1 else 5 / 2 * panels
     pass_seconds = cost_model.PASS_SECONDS + seconds_per_strip * strips
     seconds = cost_model.LIST_STEP_SECONDS + N_PASSES_PER_STEP * pass_seconds * factor
-    error = tail
-    if merge > 0 and sum_form(law) != FORM_MOMENTS:
-        error += _merge_error_factor(law) * merge**2
-        if sum_form(law) == FORM_REPORT_GROWING and law.order < 0:
-            error += NEGATIVE_ORDER_ERROR
+    error = tail + (_merge_error_factor(law) * merge**2 if merge > 0 else 0.0)
+    if merge > 0 and form == FORM_GROWING and law.order < 0:
+        error += NEGATIVE_ORDER_ERROR
     return EngineChoice(name, tail, merge, error, strips, seconds)
-
-
-def _estimate_strip_count(
-    law: Bonds, tail: float, merge: float, stroke: float, increment: float
-) -> float:
-    """Estimate the number of strips in a bond list; stroke and increment are in bond lengths."""
-    form = sum_form(law)
-    reach = cutoff_age(law.order, tail) if tail > 0 else MAX_DAMAGE
-    strips = min(reach, MAX_DAMAGE) / max(increment, 1e-12) * max(1.0, increment / MAX_STRIP_LENGTH)
-    if form == FORM_REPORT:
-        strips = reach / stroke + 2
-    elif form == FORM_REPORT_GROWING:
-        strips *= 2
-    if merge > 0:
-        merged = 5 / merge + 20 + 2 * min(reach / stroke, 50)
-        if form == FORM_REPORT_GROWING:
-            merged += 180
-        strips = min(strips, merged)
-    return strips

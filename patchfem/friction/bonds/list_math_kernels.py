@@ -1,18 +1,18 @@
-"""Exponential, logarithm and incomplete gamma function for the compiled sums over bonds.
+"""Exponential, logarithm, power and incomplete gamma function for the compiled sums over bonds.
 
 `fast_exp` and `fast_log` have no branches: a loop that calls them takes 0.5 ns per exponential and
 1 ns per power.
 """
 
-from math import exp, lgamma, log
-
 import numpy as np
 
 from ...compiled.jit import njit
 from ..flags_kernels import NJIT_NO_REFCOUNT
-from .list_forms_kernels import N_TABLE_STEPS
+from .list_rows_kernels import N_TABLE_STEPS
 
-MAX_TABLE_ARGUMENT = 1e6  # smallest argument x at which P(p + 1, x) is set to 1 for every order
+N_SERIES_TERMS = (
+    22  # number of terms of the series of P(p + 1, x) that are above round-off for x < 1
+)
 
 
 @njit(error_model="numpy", fastmath={"contract"}, **NJIT_NO_REFCOUNT)
@@ -59,86 +59,64 @@ def fast_log(x):
     return np.float64(e) * 0.6931471805599453 + 2 * s * (1 + z * p)
 
 
-@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def gammainc(a, x):
-    """Return the regularised lower incomplete gamma function P(a, x), a > 0, to 1e-14.
-
-    Compare `scipy.special.gammainc`.
-    """
-    if x <= 0:
-        return 0.0
-    front = exp(a * log(x) - x - lgamma(a))
-    if x < a + 1:
-        term = 1 / a
-        total = term
-        for n in range(1, 500):
-            term *= x / (a + n)
-            total += term
-            if term < 1e-17 * total:
-                break
-        return front * total
-    b = x + 1 - a
-    c = 1e300
-    d = 1 / b
-    h = d
-    for n in range(1, 500):
-        an = -n * (n - a)
-        b += 2
-        d = an * d + b
-        d = 1e-300 if d == 0 else d
-        c = b + an / c
-        c = 1e-300 if c == 0 else c
-        d = 1 / d
-        h *= d * c
-        if abs(d * c - 1) < 1e-16:
-            break
-    return 1 - front * h
+@njit(error_model="numpy", fastmath={"contract"}, forceinline=True, **NJIT_NO_REFCOUNT)
+def whole_power(x, p):
+    """Return x^p for p = 0, 1 or 2 without a branch."""
+    first = min(p, 1.0)
+    second = max(p - 1.0, 0.0)
+    return (1.0 - first + first * x) * (1.0 - second + second * x)
 
 
-@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def bond_gammainc(p, x):
-    """Return P(p + 1, x) to 1e-15, the fraction of the limit that the last x bond lengths carry.
-
-    It has a closed form for p = 0, 1 and 2. NumPy form: `scipy.special.gammainc(p + 1, x)`.
-    """
-    if x <= 0:
-        return 0.0
+@njit(error_model="numpy", fastmath={"contract"}, forceinline=True, **NJIT_NO_REFCOUNT)
+def power(x, p):
+    """Return x^p of x >= 0; fast for the orders 0, 1 and 2."""
     if p == 0.0 or p == 1.0 or p == 2.0:
-        return 1 - (1 + min(p, 1.0) * x * (1 + max(p - 1, 0.0) * 0.5 * x)) * fast_exp(-x)
-    return gammainc(p + 1, x)
+        return whole_power(x, p)
+    return fast_exp(p * fast_log(x))
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def interpolate_gammainc(p, x, table, inverse_gamma):
-    """Return P(p + 1, x) to 1e-10 by a cubic between two entries of a table; exact for x < 1.
+def bond_gammainc(p, x, density, inverse_gamma, table):
+    """Return P(p + 1, x), the fraction of the limit that bonds of the last x bond lengths carry.
 
-    The slopes of the cubic are x^p exp(-x)/Gamma(p + 1). It takes 4 ns.
+    It has a closed form for p = 0, 1 and 2. Else it is a power series for x < 1, and above it a cubic between two
+    entries of a table, with the slopes x^p exp(-x)/Gamma(p + 1); its error is below 1e-12.
 
     Parameters
     ----------
     p, x : float
         Order and argument.
+    density, inverse_gamma : float
+        x^(p + 1) exp(-x)/Gamma(p + 1), 1/Gamma(p + 1).
     table : (k,) array
-        P(p + 1, x) at multiples of 1/32 (`list_numbers.gamma_table`).
-    inverse_gamma : float
-        1/Gamma(p + 1).
+        P(p + 1, x) at multiples of 1/N_TABLE_STEPS (`list_numbers.gamma_table`).
 
     Returns
     -------
     float
     """
-    if x < 1 or p == 1.0 or p == 2.0 or p == 0.0:
-        return bond_gammainc(p, x)
-    index = int(x * N_TABLE_STEPS) if x < MAX_TABLE_ARGUMENT else table.size
+    if p == 0.0 or p == 1.0 or p == 2.0:
+        return 1 - (1 + min(p, 1.0) * x * (1 + max(p - 1, 0.0) * 0.5 * x)) * fast_exp(-x)
+    if x < 1:
+        # P(a, x) = x^a exp(-x)/Gamma(a + 1) (1 + x/(a + 1) + x^2/((a + 1)(a + 2)) + ...), a = p + 1
+        term = density / (p + 1)
+        total = term
+        for n in range(1, N_SERIES_TERMS):
+            term *= x / (p + 1 + n)
+            total += term
+        return total
+    index = int(min(x * N_TABLE_STEPS, 1.0 * table.size))
     if index + 1 >= table.size:
         return 1.0
+
+    # Hermite's cubic between two entries
     width = 1.0 / N_TABLE_STEPS
     low = index * width
-    high = (index + 1) * width
-    slope_low = inverse_gamma * fast_exp(p * fast_log(low) - low) * width
-    slope_high = inverse_gamma * fast_exp(p * fast_log(high) - high) * width
-    start = table[index]
-    change = table[index + 1] - start
+    high = low + width
+    slope_low = inverse_gamma * width * fast_exp(p * fast_log(low) - low)
+    slope_high = inverse_gamma * width * fast_exp(p * fast_log(high) - high)
+    change = table[index + 1] - table[index]
     t = x * N_TABLE_STEPS - index
     cubic = slope_low + slope_high - 2 * change
-    return start + t * (slope_low + t * (3 * change - 2 * slope_low - slope_high + t * cubic))
+    square = 3 * change - 2 * slope_low - slope_high
+    return table[index] + t * (slope_low + t * (square + t * cubic))

@@ -4,21 +4,22 @@ from math import ceil, gamma
 
 import numpy as np
 
-from .list_forms_kernels import (
-    FORM_MOMENTS,
-    FORM_POWER,
+from .list_rows_kernels import (
+    FORM_GROWING,
     FORM_REPORT,
-    FORM_REPORT_GROWING,
+    FORM_STRETCH,
+    LAW,
     N_TABLE_STEPS,
+    STATUS,
+    LawNumbers,
+    ListStatus,
 )
-from .list_rows_kernels import LAW, STATUS, ListStatus
 from .parameters import Bonds
 
 MAX_DAMAGE = 745.0  # damage from which exp(-damage) underflows to zero
-MAX_STRIPS_PER_LENGTH = 4  # largest number of strips of an increment per bond length
-N_JACOBI_POINTS = 4  # number of Gauss-Jacobi points in the form FORM_POWER
-# Number of entries of a law array, including the Gauss-Jacobi points and weights of two powers
-N_LAW_NUMBERS = 24
+MAX_STRIPS_PER_LENGTH = (
+    4  # number of strips per bond length of the cut-off for which there is memory
+)
 N_WORK_STRIPS = 64  # number of strips of workspace in addition to those of an increment
 UNMERGED_CAPACITY = 20_000  # initial capacity, in strips, of a list whose strips are not merged
 
@@ -26,8 +27,8 @@ UNMERGED_CAPACITY = 20_000  # initial capacity, in strips, of a list whose strip
 def sum_form(law: Bonds) -> float:
     """Return the code of the formula by which a law is summed over bonds (see `list_rows_kernels`)."""
     if law.reading == "stretch":
-        return FORM_MOMENTS if law.order == 1 else FORM_POWER
-    return FORM_REPORT_GROWING if law.has_growth else FORM_REPORT
+        return FORM_STRETCH
+    return FORM_GROWING if law.has_growth else FORM_REPORT
 
 
 def cutoff_age(order: float, tail: float) -> float:
@@ -49,37 +50,26 @@ def law_numbers(law: Bonds, reach: float, merge: float, half_width: float = 0.0)
     reach : float
         Cut-off in bond lengths of path; for reading="stretch" in units of damage.
     merge : float
-        Largest width of a merged strip of age 0 in bond lengths; 0 merges nothing.
+        Largest width of a joined strip of age 0 in bond lengths; 0 joins nothing.
     half_width : float
         Half the width in bond lengths over which the initial bonds are distributed. With 0 their force jumps at
         displacement 0, and no step of a rig can end in the jump.
 
     Returns
     -------
-    (24,) array
+    (8,) array
     """
-    form = sum_form(law)
-    numbers = np.zeros(N_LAW_NUMBERS)
+    numbers = np.zeros(len(LawNumbers._fields))
     numbers[LAW.order] = law.order
-    numbers[LAW.form] = form
+    numbers[LAW.form] = sum_form(law)
     numbers[LAW.length] = law.length
     numbers[LAW.initial] = law.initial
     numbers[LAW.inverse_gamma] = 1 / gamma(law.order + 1)
     numbers[LAW.merge_width] = merge
-    numbers[LAW.cutoff] = min(reach, MAX_DAMAGE) * (law.length if form >= FORM_REPORT else 1.0)
+    age_unit = 1.0 if law.reading == "stretch" else law.length
+    numbers[LAW.cutoff] = min(reach, MAX_DAMAGE) * age_unit
     numbers[LAW.half_width] = half_width * law.length
-    if form == FORM_POWER:
-        rules = _jacobi_rule(law.order), _jacobi_rule(law.order + 1)
-        numbers[LAW.nodes :] = np.concatenate(rules)
     return numbers
-
-
-def _jacobi_rule(power: float) -> np.ndarray:
-    """Return Gauss-Jacobi points in (0, 1) for the weight t^power, followed by their weights."""
-    from scipy.special import roots_jacobi
-
-    x, weights = roots_jacobi(N_JACOBI_POINTS, 0.0, power)
-    return np.concatenate([(1 + x) / 2, weights / 2 ** (power + 1)])
 
 
 def make_status(capacity: int, count: int | None = None) -> np.ndarray:
@@ -93,12 +83,12 @@ def make_status(capacity: int, count: int | None = None) -> np.ndarray:
 
     Returns
     -------
-    (16,) array, or (count, 16) array
+    (14,) array, or (count, 14) array
     """
     status = np.zeros((count or 1, len(ListStatus._fields)))
     start = capacity * np.arange(count or 1)
-    for position in (STATUS.room_start, STATUS.head, STATUS.end):
-        status[:, position] = start
+    status[:, STATUS.room_start] = start
+    status[:, STATUS.head] = status[:, STATUS.end] = start + 1
     status[:, STATUS.room_end] = start + capacity
     status[:, STATUS.pressure] = 1.0
     status[:, STATUS.initial_pressure] = 1.0
@@ -111,11 +101,11 @@ def make_path_state(law: Bonds) -> np.ndarray:
 
 
 def gamma_table(law: Bonds) -> np.ndarray:
-    """Tabulate P(p + 1, x) (k,) at multiples x of 1/32 for `list_math_kernels.interpolate_gammainc`.
+    """Tabulate P(p + 1, x) (k,) at multiples x of 1/N_TABLE_STEPS for `list_math_kernels.bond_gammainc`.
 
     The table is empty if P has a closed form. It ends at x = 60 + 4 p, where P is 1 to the last digit.
     """
-    if sum_form(law) != FORM_REPORT or law.order in (0, 1, 2):
+    if law.order in (0, 1, 2):
         return np.zeros(0)
     from scipy.special import gammainc
 
@@ -140,3 +130,32 @@ def list_capacity(law: Bonds, reach: float, merge: float) -> int:
     if merge > 0:
         return 4 * step + ceil(16 / merge)
     return 4 * step + UNMERGED_CAPACITY
+
+
+def enlarge_lists(bondlist, statuses, capacity: int) -> np.ndarray:
+    """Return a larger array of strips for lists that follow each other.
+
+    Parameters
+    ----------
+    bondlist : (r, k) array
+        Strips of all lists.
+    statuses : (m, 14) array
+        Status of each list, changed in place.
+    capacity : int
+        Number of columns of each list, two more than its strips.
+
+    Returns
+    -------
+    (r, m capacity) array
+    """
+    enlarged = np.zeros((len(bondlist), capacity * len(statuses)))
+    for j, status in enumerate(statuses):
+        first, head, end = status[[STATUS.room_start, STATUS.head, STATUS.end]].astype(int)
+        start = j * capacity
+        enlarged[:, start] = bondlist[:, first]
+        enlarged[:, start + 1 : start + 1 + end - head] = bondlist[:, head:end]
+        status[STATUS.room_start] = start
+        status[STATUS.head] = start + 1
+        status[STATUS.end] = start + 1 + end - head
+        status[STATUS.room_end] = start + capacity
+    return enlarged

@@ -1,69 +1,103 @@
-"""Named indices of the arrays of a list of strips of bonds (eq. 2.17).
+"""Named indices of the arrays of a list of strips of bonds (eq. 2.17), and the forms of the sum.
 
-A strip holds the bonds that formed on one straight increment, or on several increments that were merged. Some rows of
-the array of strips depend on the form of the sum (`list_forms_kernels`): `MOMENT` names the rows of a strip that is
-known by its moments; `POWER_ROW`, `REPORT_ROW` and `GROWING_ROW` name what the other forms keep beside the rows of
-`STRIP`.
+A strip holds the bonds that formed on one straight increment, or on several increments in one direction that were joined.
+Inside a strip a position is the fraction of its length from its end. Two values per strip hold at its Gauss points:
 
-The age measure of a form is the quantity by which bonds age: the damage int dR/eps for reading="stretch", and the path
-R [m] for reading="report". A scaled number contains the factor exp(age measure - reference), so that ageing multiplies the
-sum over all strips by a single number. A relative pressure is relative to the pressure of the friction limit.
+- `FORM_STRETCH`, reading="stretch": weights, that is path/eps^p with the scale exp(damage at formation - reference); so
+  damage multiplies the sum over all strips by a single number
+- `FORM_GROWING`, reading="report" with growing bonds: lengths of mature bonds [m] when these bonds formed, with the scale
+  exp(growth J - reference); they say by how much the bonds are shorter than mature ones
+- `FORM_REPORT`, reading="report" with a constant bond length: no values, the sum over a strip has a closed form
+
+Force and energy of a strip hold for unit relative pressure, that is per friction limit. The points of a rigid interface
+have the same path, so that they share a list: every strip then has one pressure per point.
+
+Two columns are no strips: the first one of a list has the initial bonds, that after the last strip the bonds that form on
+a trial increment.
 """
 
+from math import sqrt
 from typing import NamedTuple
+
+import numpy as np
+
+FORM_STRETCH = 0.0
+FORM_REPORT = 1.0
+FORM_GROWING = 2.0
+
+# Positions of the two Gauss points of a strip, as fractions of its length from its end
+GAUSS_POINT_1 = 0.5 - sqrt(1 / 12)
+GAUSS_POINT_2 = 0.5 + sqrt(1 / 12)
+N_ROWS = 14  # number of rows of the array of strips of one point
+# Largest length of a strip of age 0, as it forms, in bond lengths. Two Gauss points sum exp(-R/eps) over it to 4e-9.
+MAX_STRIP_LENGTH = 1 / 16
+N_TABLE_STEPS = 128  # number of entries of the table of P(p + 1, x) per unit of x
+
+
+class BondList(NamedTuple):
+    """Arrays of a list. Other tuples with these fields serve as well.
+
+    - bondlist: (N_ROWS, capacity) strips, see `StripRows`; the columns may be shared with the lists of other points. With
+      further rows it is the list of several points of one path, and these rows are their pressures.
+    - now: (6,) state of the path, see `PathRows`
+    - status: (14,) see `ListStatus`
+    - law: (8,) parameters, see `LawNumbers`
+    - table: (k,) values of P(p + 1, x), see `list_math_kernels.bond_gammainc`
+    - growth: (5,) parameters of eq. 2.10, see `point_kernels.grow`
+    """
+
+    bondlist: np.ndarray
+    now: np.ndarray
+    status: np.ndarray
+    law: np.ndarray
+    table: np.ndarray
+    growth: np.ndarray
+
+
+class BondLists(NamedTuple):
+    """Arrays of the lists of m points; the fields are those of `BondList`, with a row per point where named in the plural.
+
+    - bondlist: (N_ROWS, m capacity) strips of all lists, one after the other
+    - nows, statuses: (m, 6), (m, 14)
+    - law, table, growth: those of all points
+    """
+
+    bondlist: np.ndarray
+    nows: np.ndarray
+    statuses: np.ndarray
+    law: np.ndarray
+    table: np.ndarray
+    growth: np.ndarray
 
 
 class StripRows(NamedTuple):
     """Rows of the array that stores the strips of a bond list.
 
-    - start, end: relative displacement [m] at the start and at the end of the strip; of a spread strip, which
-      represents several passes over the same range, the lower and the upper end of this range
-    - age_measure, age_width: age measure at the end of the strip, and its change along the strip
-    - weight: path/eps^p in the form FORM_POWER, else the path [m]; times the relative pressure
-    - covered, path: path [m] that the strip covers, and the path at its end
+    - start, end: relative displacement [m] at the start and at the end of the strip
+    - path, damage: path R [m] and damage int dR/eps [1] at its end
+    - covered: path [m] along the strip
+    - density: eps^(p - 1) [m^(p - 1)], by which weights become densities of bonds, in the form FORM_STRETCH
+    - value_1, value_2: values at both Gauss points
+    - force, energy: force [1] and stored energy [m] in the state of the last sum
+    - present_force, present_energy: the same in the present state
+    - mean: contribution [1] to the path-mean force of an increment
+    - pressure: relative pressure of the first point; the following rows are those of the other points
     """
 
     start: int = 0
     end: int = 1
-    age_measure: int = 2
-    age_width: int = 3
-    weight: int = 4
-    covered: int = 7
-    path: int = 8
-
-
-class MomentRows(NamedTuple):
-    """Rows of a strip in the form FORM_MOMENTS: centre [m], variance [m2] and scaled weight [m]."""
-
-    centre: int = 0
-    variance: int = 1
-    weight: int = 5
-
-
-class PowerRows(NamedTuple):
-    """Rows of a strip in the form FORM_POWER: scaled weights at both Gauss points.
-
-    A spread strip has its whole weight in the first row.
-    """
-
-    weight_1: int = 5
-    weight_2: int = 6
-
-
-class ReportRows(NamedTuple):
-    """Row of a strip in the form FORM_REPORT: relative pressure at which its bonds formed."""
-
-    pressure: int = 5
-
-
-class GrowingRows(NamedTuple):
-    """Additional rows of a strip of growing bonds, for friction.reading = "report".
-
-    They hold the scaled starting lengths [m] of the bonds at both Gauss points; `FORM_REPORT_GROWING` is this form.
-    """
-
-    length_1: int = 5
-    length_2: int = 6
+    path: int = 2
+    damage: int = 3
+    covered: int = 4
+    density: int = 5
+    value_1: int = 6
+    value_2: int = 7
+    force: int = 8
+    energy: int = 9
+    present_force: int = 10
+    present_energy: int = 11
+    mean: int = 12
+    pressure: int = 13
 
 
 class LawNumbers(NamedTuple):
@@ -72,10 +106,9 @@ class LawNumbers(NamedTuple):
     - order, form: exponent p, and the form of the sum
     - length, initial: bond length eps_0 [m], density m_0 of the initial bonds [1]
     - inverse_gamma: 1/Gamma(p + 1)
-    - merge_width: largest width of a merged strip of age 0 [bond lengths]; 0 merges nothing
-    - cutoff: increase of the age measure since formation beyond which strips are dropped
+    - merge_width: largest width of a joined strip of age 0 [bond lengths]; 0 joins nothing
+    - cutoff: damage, or path [m] for reading="report", since formation beyond which strips are dropped
     - half_width: half the width [m] over which the initial bonds are distributed; 0 puts all at one displacement
-    - nodes: first of 16 numbers: four Gauss-Jacobi points and weights for |u|^p, and four for |u|^(p + 1)
     """
 
     order: int = 0
@@ -86,7 +119,6 @@ class LawNumbers(NamedTuple):
     merge_width: int = 5
     cutoff: int = 6
     half_width: int = 7
-    nodes: int = 8
 
 
 class PathRows(NamedTuple):
@@ -96,7 +128,7 @@ class PathRows(NamedTuple):
     - damage: int dR/eps, with the bond length of each step
     - growth: exponent J of the growth of bonds (eq. 2.10)
     - length: length [m] of mature bonds
-    - reference: age measure to which the scaled numbers refer
+    - reference: damage, or growth in the form FORM_GROWING, to which the values of the strips refer
     """
 
     displacement: int = 0
@@ -111,43 +143,34 @@ class ListStatus(NamedTuple):
     """Indices of the status numbers of a bond list.
 
     - head, end: first strip, and last strip + 1
-    - n_spread: number of spread strips, which are the first ones of the list
     - n_after_merge: number of strips after the last merge
     - energy, force: stored energy [m] and force [1] of the bonds, per friction limit mu_s N
     - created, dissipated: energies [m] since the start, per friction limit
     - n_extra: number of strips in excess of one per step
-    - n_unlike: number of merged strips whose ranges differ
     - max_strips: largest number of strips
-    - owed: energy [m] that the next dissipation repays, see `dynamics.interfaces.list_kernels`
-    - room_start, room_end: columns of the array that belong to this list
-    - pressure: relative pressure under which bonds form
-    - initial_pressure: relative pressure under which the initial bonds formed
+    - owed: energy [m] that the next dissipation repays, see `points.lists_kernels`
+    - room_start, room_end: columns of the array that belong to this list; the first one has the initial bonds
+    - pressure: relative pressure under which bonds form; of several points the largest
+    - initial_pressure: relative pressure under which the initial bonds of one point formed
     """
 
     head: int = 0
     end: int = 1
-    n_spread: int = 2
-    n_after_merge: int = 3
-    energy: int = 4
-    force: int = 5
-    created: int = 6
-    dissipated: int = 7
-    n_extra: int = 8
-    n_unlike: int = 9
-    max_strips: int = 10
-    owed: int = 11
-    room_start: int = 12
-    room_end: int = 13
-    pressure: int = 14
-    initial_pressure: int = 15
+    n_after_merge: int = 2
+    energy: int = 3
+    force: int = 4
+    created: int = 5
+    dissipated: int = 6
+    n_extra: int = 7
+    max_strips: int = 8
+    owed: int = 9
+    room_start: int = 10
+    room_end: int = 11
+    pressure: int = 12
+    initial_pressure: int = 13
 
 
 STRIP = StripRows()
-MOMENT = MomentRows()
-POWER_ROW = PowerRows()
-REPORT_ROW = ReportRows()
-GROWING_ROW = GrowingRows()
 LAW = LawNumbers()
 PATH = PathRows()
 STATUS = ListStatus()
-N_ROWS = 9  # number of rows of the array of strips

@@ -1,11 +1,16 @@
 """Compiled sums over a list of strips of bonds (eq. 2.17): force and stored energy.
 
-Each form of the sum has a function: `sum_moments` and `sum_powers` for reading="stretch", `sum_report` and
-`sum_growing` for reading="report"; `sum_initial` adds the bonds that were there at the start. The arrays are described
-in `list_rows_kernels`. In a strip u is the relative displacement since a bond formed, R the path since then.
+In a strip u is the relative displacement since a bond formed, and R the path since then. Per friction limit a bond carries
+(|u|/eps)^p exp(-damage) for reading="stretch", and (R/eps)^p exp(-R/eps) for reading="report", along u/|u|. The arrays
+are described in `list_rows_kernels`.
+
+Every strip gets its force and energy for unit pressure (`sum_strips`). Two Gauss points suffice, except near u = 0, where
+the force has a kink or jumps, and near R = 0, where a fractional power of R is steep. Such a strip is divided into pieces
+on which the density of bonds is taken as linear; the power is then integrated exactly (`_average_power`). A constant bond
+length has a closed form (`_sum_report`).
 """
 
-from math import exp
+from math import ceil, exp
 from typing import NamedTuple
 
 import numpy as np
@@ -13,719 +18,526 @@ from numba import uint64
 
 from ...compiled.jit import njit
 from ..flags_kernels import FASTMATH_FLAGS, NJIT_NO_REFCOUNT
-from .list_forms_kernels import FORM_POWER, GAUSS_POINT_1, GAUSS_POINT_2
-from .list_math_kernels import (
-    bond_gammainc,
-    fast_exp,
-    fast_log,
-    interpolate_gammainc,
+from .list_math_kernels import bond_gammainc, fast_exp, fast_log, power, whole_power
+from .list_rows_kernels import (
+    FORM_REPORT,
+    FORM_STRETCH,
+    GAUSS_POINT_1,
+    GAUSS_POINT_2,
+    LAW,
+    PATH,
+    STATUS,
+    STRIP,
 )
-from .list_rows_kernels import GROWING_ROW, LAW, MOMENT, POWER_ROW, REPORT_ROW, STRIP
 
-# Smallest ratio of the last to the first bond length of a strip that can contain fully grown bonds
-MIN_GROWING_RATIO = 0.05
 # Largest displacement, relative to the path, at which the initial bonds count as unstressed
 UNSTRESSED_TOL = 1e-14
 # Smallest length of a growing bond relative to that of mature bonds; it keeps R/length finite
 MIN_LENGTH_RATIO = 1e-9
-MIN_PATH = 1e-300  # smallest path [m] since a bond formed; it keeps the logarithm finite
-# Smallest width of a spread strip, relative to its distance from the present position, that is not
-# neglected
-MIN_SPREAD_RATIO = 1e-4
+PATH_ROUND_OFF = 1e-15  # largest difference of two equal paths, relative to the whole path
+MIN_POSITIVE = 1e-300  # smallest path [m] or value whose logarithm is taken
+# Distance of u = 0 from the middle of a strip, in half lengths of the strip, from which two Gauss points suffice
+KINK_REACH = 1.0  # for whole orders: the strip does not contain u = 0
+SINGULAR_REACH = 5.0  # for fractional powers of u
+# Ratio of R to the length of a strip above which two Gauss points suffice for a fractional power of R
+STEEP_REACH = 3.0
+# Ratio of the last to the first bond length of a strip above which its bonds grew at rest, not along the strip
+MIN_RESTING_RATIO = 0.05
+# Largest damage along a piece, and largest number of pieces; with them the linear density of a piece changes the force
+# by less than 2e-6 of the friction limit
+MAX_PIECE_DAMAGE = 0.07
+MAX_PIECES = 4
+# Ratio of u to the length of a piece from which two Gauss points are more exact than a difference of powers
+FAR_RATIO = 30.0
+GAUSS_RULE_5 = (  # five Gauss points in (-1, 1), each with its weight
+    (-0.906179845938664, 0.23692688505618908),
+    (-0.5384693101056831, 0.47862867049936647),
+    (0.0, 0.5688888888888889),
+    (0.5384693101056831, 0.47862867049936647),
+    (0.906179845938664, 0.23692688505618908),
+)
 
 
 class BondSum(NamedTuple):
-    """Sums of force and stored energy over bonds; the units depend on the form of the sum."""
+    """Sums of force [1] and stored energy [m] over bonds, per friction limit."""
 
     force: float
     energy: float
 
 
-class Moments(NamedTuple):
-    """Sums of weight, weight times u and weight times u^2 over bonds (eq. 2.17 with p = 1)."""
+class PathValues(NamedTuple):
+    """Path state of a list after an increment, and the bond length [m] in the middle of it."""
 
-    m: float
-    z: float
-    s2: float
-
-
-class MatureBonds(NamedTuple):
-    """Present length [m] of mature (fully grown) bonds, and factor exp(reference - J) of scaled starting lengths."""
-
+    displacement: float
+    path: float
+    damage: float
+    growth: float
     length: float
-    scale: float
+    middle_length: float
 
 
-class StripRange(NamedTuple):
-    """Range of indices of the strips of a bond list.
-
-    Spread strips are those from `head` to `first`, and strips of a single pass those from `first` to `end`.
-    """
-
-    head: int
-    first: int
-    end: int
-
-
-@njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def sum_moments(displacement, scale, bonds, strips):
-    """Sum the moments of strips in the form FORM_MOMENTS; 0.3 ns per strip.
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
+def sum_strips(after, bonds):
+    """Write force [1] and stored energy [m] of every strip for unit pressure.
 
     Parameters
     ----------
-    displacement : float
-        Present relative displacement [m].
-    scale : float
-        exp(reference - damage), which undoes the scale of the weights.
-    bonds : (N_ROWS, capacity) array
-        Array of strips.
-    strips : Range
-        Strips that are summed.
-
-    Returns
-    -------
-    Moments
-        Sums [m], [m2], [m3] of weights without the factor 1/eps_0.
+    after : PathValues
+        State of the path for which the sum is taken.
+    bonds : BondList
     """
-    m = 0.0
-    z = 0.0
-    s2 = 0.0
-    for k in range(uint64(strips.head), uint64(strips.end)):
-        u = displacement - bonds[MOMENT.centre, k]
-        weight = bonds[MOMENT.weight, k]
-        m += weight
-        z += weight * u
-        s2 += weight * (u * u + bonds[MOMENT.variance, k])
-    return Moments(m * scale, z * scale, s2 * scale)
-
-
-@njit(error_model="numpy", fastmath=FASTMATH_FLAGS, forceinline=True, **NJIT_NO_REFCOUNT)
-def _gauss_stretches(displacement, bonds, k):
-    """Return the stretch u [m] of the bonds at both Gauss points of a strip."""
-    end = bonds[STRIP.end, k]
-    step = end - bonds[STRIP.start, k]
-    at_end = displacement - end
-    return at_end + GAUSS_POINT_1 * step, at_end + GAUSS_POINT_2 * step
-
-
-@njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def _sum_gauss_powers(displacement, bonds, first, end, p):
-    """Sum w |u|^p sgn u and w |u|^(p + 1) over both Gauss points of strips that formed in a single pass."""
-    force = 0.0
-    energy = 0.0
-    if p == 0.0:
-        for k in range(uint64(first), uint64(end)):
-            u_1, u_2 = _gauss_stretches(displacement, bonds, k)
-            weight_1 = bonds[POWER_ROW.weight_1, k]
-            weight_2 = bonds[POWER_ROW.weight_2, k]
-            force += np.copysign(weight_1, u_1) + np.copysign(weight_2, u_2)
-            energy += weight_1 * abs(u_1) + weight_2 * abs(u_2)
-    elif p == 2.0:
-        for k in range(uint64(first), uint64(end)):
-            u_1, u_2 = _gauss_stretches(displacement, bonds, k)
-            force_1 = bonds[POWER_ROW.weight_1, k] * u_1 * u_1
-            force_2 = bonds[POWER_ROW.weight_2, k] * u_2 * u_2
-            force += np.copysign(force_1, u_1) + np.copysign(force_2, u_2)
-            energy += force_1 * abs(u_1) + force_2 * abs(u_2)
-    else:
-        for k in range(uint64(first), uint64(end)):
-            u_1, u_2 = _gauss_stretches(displacement, bonds, k)
-            force_1 = bonds[POWER_ROW.weight_1, k] * fast_exp(p * fast_log(abs(u_1)))
-            force_2 = bonds[POWER_ROW.weight_2, k] * fast_exp(p * fast_log(abs(u_2)))
-            force += np.copysign(force_1, u_1) + np.copysign(force_2, u_2)
-            energy += force_1 * abs(u_1) + force_2 * abs(u_2)
-    return BondSum(force, energy)
-
-
-@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def _integrate_jacobi(size, slope, nodes, p):
-    """Integrate t^p exp(slope t) from 0 to size by four Gauss-Jacobi points with the weight t^p."""
-    if size <= 0:
-        return 0.0
-    total = 0.0
-    for i in range(4):
-        total += nodes[4 + i] * fast_exp(slope * size * nodes[i])
-    return total * fast_exp((p + 1) * fast_log(size))
-
-
-@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def _integrate_power_strip(displacement, bonds, k, p, nodes, is_force):
-    """Integrate |u|^p over a strip near u = 0.
-
-    Each side is a difference of two integrals that begin at u = 0.
-    """
-    start = bonds[STRIP.start, k]
-    end = bonds[STRIP.end, k]
-    step = end - start
-    slope = bonds[STRIP.age_width, k] / step
-    low = min(start, end)
-    high = max(start, end)
-    integral_below = _integrate_jacobi(displacement - low, -slope, nodes, p)
-    integral_below -= _integrate_jacobi(displacement - high, -slope, nodes, p)
-    integral_above = _integrate_jacobi(high - displacement, slope, nodes, p)
-    integral_above -= _integrate_jacobi(low - displacement, slope, nodes, p)
-    density = 2 * bonds[POWER_ROW.weight_1, k] / abs(step)
-    density *= exp(slope * (displacement - end + GAUSS_POINT_1 * step))
-    return density * (
-        integral_below - integral_above if is_force else integral_below + integral_above
-    )
-
-
-@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def average_spread(displacement, low, high, p):
-    """Average |u|^p sgn u and |u|^(p + 1) over bonds that are distributed uniformly over a range.
-
-    Parameters
-    ----------
-    displacement, low, high : float
-        Present relative displacement and ends of the range [m], low < high.
-    p : float
-        Exponent.
-
-    Returns
-    -------
-    BondSum
-    """
-    width = high - low
-    middle = displacement - (low + high) / 2
-    if p == 0.0:
-        distance = abs(middle)
-        if 2 * distance >= width:
-            return BondSum(np.sign(middle), distance)
-        return BondSum(2 * middle / width, width / 4 + middle * middle / width)
-    if width < MIN_SPREAD_RATIO * abs(middle) or width == 0:
-        power = fast_exp(p * fast_log(abs(middle)))
-        return BondSum(power * np.sign(middle), power * abs(middle))
-    u = displacement - low
-    v = displacement - high
-    power_u = fast_exp((p + 1) * fast_log(abs(u)))
-    power_v = fast_exp((p + 1) * fast_log(abs(v)))
-    force = (power_u - power_v) / ((p + 1) * width)
-    return BondSum(force, (power_u * u - power_v * v) / ((p + 2) * width))
-
-
-@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def sum_linear_density(displacement, start, end, weights, p):
-    """Sum w |u|^p sgn u and w |u|^(p + 1) over a strip whose density is linear along it.
-
-    Where u has one sign the sums for p = 0 are those of the Gauss points, so nothing jumps as the displacement
-    reaches the strip.
-
-    Parameters
-    ----------
-    displacement, start, end : float
-        Present relative displacement and ends of the strip [m].
-    weights : (float, float)
-        Weights at both Gauss points.
-    p : float
-        Exponent.
-
-    Returns
-    -------
-    BondSum
-    """
-    weight_1, weight_2 = weights
-    step = end - start
-    u = displacement - end
-    v = displacement - start
-    power_u = fast_exp((p + 1) * fast_log(abs(u)))
-    power_v = fast_exp((p + 1) * fast_log(abs(v)))
-    # These are averages of |u|^p sgn u, |u|^(p + 1) and |u|^(p + 1) u over the strip.
-    odd = (power_v - power_u) / ((p + 1) * step)
-    even = (power_v * v - power_u * u) / ((p + 2) * step)
-    third = (power_v * v * v - power_u * u * u) / ((p + 3) * step)
-    slope = 2 * (weight_2 - weight_1) / ((GAUSS_POINT_2 - GAUSS_POINT_1) * step)
-    middle = (weight_1 + weight_2) - slope * 0.5 * (u + v)
-    return BondSum(middle * odd + slope * even, middle * even + slope * third)
-
-
-@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def sum_powers(displacement, damage, bonds, strips, law):
-    """Sum the forces and energies of bonds over strips in the form FORM_POWER (eq. 2.17).
-
-    Two Gauss points per strip are exact enough away from u = 0. A strip near u = 0 is integrated from there; if it is
-    as narrow for its age as a merged strip, its density is taken as linear.
-
-    Parameters
-    ----------
-    displacement, damage : float
-        Present relative displacement [m] and damage [1].
-    bonds, strips : array, Range
-        Array of strips, and those that are summed.
-    law : (24,) array
-        Numbers of `LAW`.
-
-    Returns
-    -------
-    BondSum
-        Scaled sums of w |u|^p sgn u and of w |u|^(p + 1).
-    """
+    law = bonds.law
+    form = law[LAW.form]
+    if form == FORM_REPORT:
+        _sum_report(after, bonds)
+        return
+    strips = bonds.bondlist
+    scale = _value_scale(after, bonds)
+    # A bond of reading="stretch" stores f u/(p + 1), because its force is proportional to |u|^p
     p = law[LAW.order]
-    merge_width = law[LAW.merge_width] * law[LAW.length]
-    nodes = law[LAW.nodes :]
-    total = _sum_gauss_powers(displacement, bonds, strips.first, strips.end, p)
-    force = total.force
-    energy = total.energy
-    is_polynomial = p == 3.0
-    # Fractional powers are singular at u = 0, which also affects Gauss points in strips nearby.
-    reach = 1.0 if p == 0.0 or p == 2.0 else 5.0
-    for k in range(strips.end if is_polynomial else strips.first, strips.end):
-        start = bonds[STRIP.start, k]
-        end = bonds[STRIP.end, k]
-        width = abs(end - start)
-        if abs(2 * displacement - start - end) > reach * width:
-            continue
-        is_narrow = width <= merge_width * fast_exp((damage - bonds[STRIP.age_measure, k]) / 3)
-        if is_narrow and p >= 1:
-            continue
-        gauss = _sum_gauss_powers(displacement, bonds, k, k + 1, p)
-        if is_narrow:
-            weights = (bonds[POWER_ROW.weight_1, k], bonds[POWER_ROW.weight_2, k])
-            exact = sum_linear_density(displacement, start, end, weights, p)
+    force_factor = law[LAW.inverse_gamma] / law[LAW.length]
+    energy_factor = force_factor
+    if form == FORM_STRETCH:
+        force_factor *= scale
+        energy_factor = force_factor / (p + 1)
+    if form == FORM_STRETCH:
+        _sum_gauss_stretch(after, force_factor, energy_factor, bonds)
+    else:
+        _sum_gauss_growing(after, scale, force_factor, bonds)
+    for k in range(int(bonds.status[STATUS.head]), int(bonds.status[STATUS.end])):
+        if not _suits_gauss(after, bonds, k, p, form):
+            exact = _integrate_strip(after, scale, bonds, k)
+            strips[STRIP.force, k] = force_factor * exact.force
+            strips[STRIP.energy, k] = energy_factor * exact.energy
+
+
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
+def _value_scale(after, bonds):
+    """Return the factor that undoes the scale of the values of the strips."""
+    reference = bonds.now[PATH.reference]
+    if bonds.law[LAW.form] == FORM_STRETCH:
+        return exp(reference - after.damage)
+    return exp(reference - after.growth)
+
+
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
+def _suits_gauss(after, bonds, k, p, form):
+    """Return whether two Gauss points sum a strip exactly enough."""
+    strips = bonds.bondlist
+    start = strips[STRIP.start, k]
+    end = strips[STRIP.end, k]
+    distance = abs(2 * after.displacement - start - end)
+    if form == FORM_STRETCH:
+        if p == 1.0 or p == 3.0:
+            return True
+        reach = KINK_REACH if p == 0.0 or p == 2.0 else SINGULAR_REACH
+        return distance > reach * abs(end - start)
+    is_steep = p < 2 and p != np.floor(p)
+    is_young = after.path - strips[STRIP.path, k] <= STEEP_REACH * strips[STRIP.covered, k]
+    return distance > KINK_REACH * abs(end - start) and not (is_steep and is_young)
+
+
+@njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
+def _sum_gauss_stretch(after, force_factor, energy_factor, bonds):
+    """Write force and energy of all strips for reading="stretch" by two Gauss points each."""
+    strips = bonds.bondlist
+    p = bonds.law[LAW.order]
+    is_whole = p == 0.0 or p == 1.0 or p == 2.0
+    for k in range(uint64(bonds.status[STATUS.head]), uint64(bonds.status[STATUS.end])):
+        end = strips[STRIP.end, k]
+        step = end - strips[STRIP.start, k]
+        u_1 = after.displacement - end + GAUSS_POINT_1 * step
+        u_2 = after.displacement - end + GAUSS_POINT_2 * step
+        if is_whole:
+            power_1 = whole_power(abs(u_1), p)
+            power_2 = whole_power(abs(u_2), p)
         else:
-            exact = BondSum(
-                _integrate_power_strip(displacement, bonds, k, p, nodes, True),
-                _integrate_power_strip(displacement, bonds, k, p + 1, nodes[8:], False),
-            )
-        force += exact.force - gauss.force
-        energy += exact.energy - gauss.energy
-    for k in range(strips.head, strips.first):
-        average = average_spread(displacement, bonds[STRIP.start, k], bonds[STRIP.end, k], p)
-        force += bonds[POWER_ROW.weight_1, k] * average.force
-        energy += bonds[POWER_ROW.weight_1, k] * average.energy
-    return BondSum(force, energy)
+            power_1 = fast_exp(p * fast_log(abs(u_1)))
+            power_2 = fast_exp(p * fast_log(abs(u_2)))
+        force_1 = strips[STRIP.value_1, k] * power_1
+        force_2 = strips[STRIP.value_2, k] * power_2
+        force = np.copysign(force_1, u_1) + np.copysign(force_2, u_2)
+        strips[STRIP.force, k] = force_factor * force
+        strips[STRIP.energy, k] = energy_factor * (force_1 * abs(u_1) + force_2 * abs(u_2))
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def _sum_report_closed(displacement, path, bonds, strips, law):
-    """Sum strips for friction.reading = "report" for p = 0, 1 or 2, where P(p + 1, x) is elementary.
-
-    The bond length is constant, and each strip has been passed only once.
-
-    With S(x) = 1 - P(p + 1, x) the integral of y phi(y) from 0 to x is (p + 1) (1 - S(x)) - x phi(x).
-    """
-    p = law[LAW.order]
-    eps0 = law[LAW.length]
-    force = 0.0
-    energy = 0.0
-    # These are the coefficients of S(x) = (1 + linear x (1 + quadratic x)) exp(-x) and of x phi(x).
-    linear = min(p, 1.0)
-    quadratic = max(p - 1, 0.0) * 0.5
-    phi_0 = 1.0 - linear
-    phi_1 = linear * (1.0 if p == 1.0 else 0.0)
-    phi_2 = quadratic
-    for k in range(uint64(strips.first), uint64(strips.end)):
-        end = bonds[STRIP.end, k]
-        step = end - bonds[STRIP.start, k]
-        direction = np.copysign(1.0, step)
-        path_to_end = path - bonds[STRIP.age_measure, k]
-        zero_position = min(max(direction * (end - displacement), 0.0), abs(step))
-        # The path in bond lengths since bonds formed is x at the end of the strip, y at u = 0 and z
-        # at the start.
-        x = path_to_end / eps0
-        y = (path_to_end + zero_position) / eps0
-        z = (path_to_end + abs(step)) / eps0
-        exp_x = fast_exp(-x)
-        exp_y = fast_exp(-y)
-        exp_z = fast_exp(-z)
-        s_x = (1 + linear * x * (1 + quadratic * x)) * exp_x
-        s_y = (1 + linear * y * (1 + quadratic * y)) * exp_y
-        s_z = (1 + linear * z * (1 + quadratic * z)) * exp_z
-        signed = 2 * s_y - s_x - s_z
-        pressure = bonds[REPORT_ROW.pressure, k]
-        density_x = exp_x * x * (phi_0 + x * (phi_1 + x * phi_2))
-        density_y = exp_y * y * (phi_0 + y * (phi_1 + y * phi_2))
-        density_z = exp_z * z * (phi_0 + z * (phi_1 + z * phi_2))
-        lever = (p + 1) * signed + 2 * density_y - density_x - density_z
-        offset = direction * (displacement - end - direction * path_to_end)
-        force += pressure * (direction * signed)
-        energy += pressure * (offset * signed + eps0 * lever)
-    return BondSum(force, energy)
+def _sum_gauss_growing(after, scale, factor, bonds):
+    """Write force and energy of all strips of growing bonds by two Gauss points each."""
+    strips = bonds.bondlist
+    p = bonds.law[LAW.order]
+    is_whole = p == 0.0 or p == 1.0 or p == 2.0
+    min_length = MIN_LENGTH_RATIO * after.length
+    for k in range(uint64(bonds.status[STATUS.head]), uint64(bonds.status[STATUS.end])):
+        end = strips[STRIP.end, k]
+        step = end - strips[STRIP.start, k]
+        u_1 = after.displacement - end + GAUSS_POINT_1 * step
+        u_2 = after.displacement - end + GAUSS_POINT_2 * step
+        covered = strips[STRIP.covered, k]
+        path = after.path - strips[STRIP.path, k]
+        length_1 = max(after.length - scale * strips[STRIP.value_1, k], min_length)
+        length_2 = max(after.length - scale * strips[STRIP.value_2, k], min_length)
+        x_1 = max(path + GAUSS_POINT_1 * covered, MIN_POSITIVE) / length_1
+        x_2 = max(path + GAUSS_POINT_2 * covered, MIN_POSITIVE) / length_2
+        if is_whole:
+            force_1 = whole_power(x_1, p) * fast_exp(-x_1)
+            force_2 = whole_power(x_2, p) * fast_exp(-x_2)
+        else:
+            force_1 = fast_exp(p * fast_log(x_1) - x_1)
+            force_2 = fast_exp(p * fast_log(x_2) - x_2)
+        force = np.copysign(force_1, u_1) + np.copysign(force_2, u_2)
+        weight = 0.5 * factor * covered
+        strips[STRIP.force, k] = weight * force
+        strips[STRIP.energy, k] = weight * (force_1 * abs(u_1) + force_2 * abs(u_2))
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def _sum_report_table(displacement, path, bonds, strips, law, table):
-    """Sum strips for friction.reading = "report" at a constant bond length, with a table of P(p + 1, x).
-
-    It holds for any order p and strips that have been passed only once.
-    """
-    p = law[LAW.order]
-    eps0 = law[LAW.length]
-    inverse_gamma = law[LAW.inverse_gamma]
-    force = 0.0
-    energy = 0.0
-    # The values at the start of a strip are those at the end of the preceding one, which is visited
-    # next.
-    last = -1.0
-    last_lever = 0.0
-    for k in range(strips.end - 1, strips.first - 1, -1):
-        end = bonds[STRIP.end, k]
-        step = end - bonds[STRIP.start, k]
-        direction = np.copysign(1.0, step)
-        path_to_end = path - bonds[STRIP.age_measure, k]
-        zero_position = min(max(direction * (end - displacement), 0.0), abs(step))
-        x = path_to_end / eps0
-        z = (path_to_end + abs(step)) / eps0
-        if last < 0:
-            last = interpolate_gammainc(p, x, table, inverse_gamma)
-            last_lever = _integrate_lever(p, x, last, inverse_gamma)
-        p_x = last
-        lever_x = last_lever
-        last = interpolate_gammainc(p, z, table, inverse_gamma)
-        last_lever = _integrate_lever(p, z, last, inverse_gamma)
-        p_y = p_x if zero_position == 0 else last
-        lever_y = lever_x if zero_position == 0 else last_lever
-        if 0 < zero_position < abs(step):
-            y = (path_to_end + zero_position) / eps0
-            p_y = interpolate_gammainc(p, y, table, inverse_gamma)
-            lever_y = _integrate_lever(p, y, p_y, inverse_gamma)
-        signed = last - 2 * p_y + p_x
-        lever = last_lever - 2 * lever_y + lever_x
-        pressure = bonds[REPORT_ROW.pressure, k]
-        offset = direction * (displacement - end - direction * path_to_end)
-        force += pressure * (direction * signed)
-        energy += pressure * (offset * signed + eps0 * lever)
-    return BondSum(force, energy)
-
-
-@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def sum_report(displacement, path, bonds, strips, law, table):
-    """Compute the exact sum of strips for friction.reading = "report" at a constant bond length (eq. 2.17).
-
-    A strip of one pass is split where u changes its sign.
-
-    Parameters
-    ----------
-    displacement, path : float
-        Present relative displacement and path [m].
-    bonds, strips : array, Range
-        Array of strips, and those that are summed.
-    law : (24,) array
-        Numbers of `LAW`.
-    table : (k,) array
-        As `list_math_kernels.interpolate_gammainc` takes it.
-
-    Returns
-    -------
-    BondSum
-        Force [1] and energy [m] per friction limit.
-    """
-    p = law[LAW.order]
-    eps0 = law[LAW.length]
-    inverse_gamma = law[LAW.inverse_gamma]
-    if p == 0.0 or p == 1.0 or p == 2.0:
-        total = _sum_report_closed(displacement, path, bonds, strips, law)
-    else:
-        total = _sum_report_table(displacement, path, bonds, strips, law, table)
-    force = total.force
-    energy = total.energy
-    for k in range(strips.head, strips.first):
-        path_to_end = path - bonds[STRIP.age_measure, k]
-        average = average_spread(displacement, bonds[STRIP.start, k], bonds[STRIP.end, k], 0.0)
-        older = interpolate_gammainc(
-            p, (path_to_end + bonds[STRIP.age_width, k]) / eps0, table, inverse_gamma
-        )
-        younger = interpolate_gammainc(p, path_to_end / eps0, table, inverse_gamma)
-        full_force = bonds[REPORT_ROW.pressure, k] * (older - younger)
-        force += average.force * full_force
-        energy += average.energy * full_force
-    return BondSum(force, energy)
-
-
-@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def _integrate_lever(p, x, gamma_p, inverse_gamma):
-    """Return the integral of y phi(y) from 0 to x: (p + 1) P(p + 1, x) - x phi(x).
-
-    gamma_p is P(p + 1, x).
-    """
-    if x <= 0:
-        return 0.0
-    return (p + 1) * gamma_p - inverse_gamma * fast_exp((p + 1) * fast_log(x) - x)
-
-
-@njit(error_model="numpy", fastmath=FASTMATH_FLAGS, forceinline=True, **NJIT_NO_REFCOUNT)
-def _gauss_path_ratios(path, mature, bonds, k):
-    """Return the path / bond length R/eps of growing bonds at both Gauss points of a strip."""
-    path_to_end = path - bonds[STRIP.age_measure, k]
-    width = bonds[STRIP.age_width, k]
-    min_length = MIN_LENGTH_RATIO * mature.length
-    length_1 = max(mature.length - mature.scale * bonds[GROWING_ROW.length_1, k], min_length)
-    length_2 = max(mature.length - mature.scale * bonds[GROWING_ROW.length_2, k], min_length)
-    path_1 = max(path_to_end + GAUSS_POINT_1 * width, MIN_PATH)
-    path_2 = max(path_to_end + GAUSS_POINT_2 * width, MIN_PATH)
-    return path_1 / length_1, path_2 / length_2
-
-
-@njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def _sum_gauss_growing(displacement, path, mature, bonds, strips, p):
-    """Sum W/2 f(R/eps) sgn u, and this times |u|, over both Gauss points of growing strips."""
-    force = 0.0
-    energy = 0.0
-    if p == 1.0:
-        for k in range(uint64(strips.first), uint64(strips.end)):
-            u_1, u_2 = _gauss_stretches(displacement, bonds, k)
-            x_1, x_2 = _gauss_path_ratios(path, mature, bonds, k)
-            force_1 = bonds[STRIP.weight, k] * x_1 * fast_exp(-x_1)
-            force_2 = bonds[STRIP.weight, k] * x_2 * fast_exp(-x_2)
-            force += np.copysign(force_1, u_1) + np.copysign(force_2, u_2)
-            energy += force_1 * abs(u_1) + force_2 * abs(u_2)
-    else:
-        for k in range(uint64(strips.first), uint64(strips.end)):
-            u_1, u_2 = _gauss_stretches(displacement, bonds, k)
-            x_1, x_2 = _gauss_path_ratios(path, mature, bonds, k)
-            force_1 = bonds[STRIP.weight, k] * fast_exp(p * fast_log(x_1) - x_1)
-            force_2 = bonds[STRIP.weight, k] * fast_exp(p * fast_log(x_2) - x_2)
-            force += np.copysign(force_1, u_1) + np.copysign(force_2, u_2)
-            energy += force_1 * abs(u_1) + force_2 * abs(u_2)
-    return BondSum(0.5 * force, 0.5 * energy)
-
-
-@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def interpolate_start_length(fraction, length_1, length_2):
-    """Interpolate the scaled starting length of bonds log-linearly between the Gauss points.
+def interpolate_value(fraction, value_1, value_2):
+    """Interpolate between the values at both Gauss points of a strip, log-linearly where both are positive.
 
     Parameters
     ----------
     fraction : float
         Position as a fraction of the strip, measured from its end.
-    length_1, length_2 : float
-        Values at the Gauss points, 0 once nothing is left of them.
+    value_1, value_2 : float
+        Values at the Gauss points, >= 0.
 
     Returns
     -------
     float
     """
-    if length_1 > MIN_PATH and length_2 > MIN_PATH:
+    if value_1 > MIN_POSITIVE and value_2 > MIN_POSITIVE:
         rise = (fraction - GAUSS_POINT_1) / (GAUSS_POINT_2 - GAUSS_POINT_1)
-        return length_1 * exp(rise * (fast_log(length_2) - fast_log(length_1)))
-    return max(length_1, length_2)
+        return value_1 * exp(rise * (fast_log(value_2) - fast_log(value_1)))
+    return max(value_1, value_2)
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def _bond_length(fraction, mature, bonds, k):
-    """Return the bond length [m] at a position within a strip; it approaches the length of fully grown bonds."""
-    start = interpolate_start_length(
-        fraction, bonds[GROWING_ROW.length_1, k], bonds[GROWING_ROW.length_2, k]
-    )
-    return max(mature.length - mature.scale * start, MIN_LENGTH_RATIO * mature.length)
+def _integrate_strip(after, scale, bonds, k):
+    """Integrate a strip on each side of u = 0, in pieces of linear density."""
+    strips = bonds.bondlist
+    start = strips[STRIP.start, k]
+    end = strips[STRIP.end, k]
+    is_stretch = bonds.law[LAW.form] == FORM_STRETCH
+    zero_position = 0.0
+    if end != start:
+        zero_position = min(max((end - after.displacement) / (end - start), 0.0), 1.0)
+    n_pieces = 1
+    if is_stretch:
+        ratio = max(strips[STRIP.value_1, k], MIN_POSITIVE) / max(
+            strips[STRIP.value_2, k], MIN_POSITIVE
+        )
+        damage = fast_log(ratio) / (GAUSS_POINT_2 - GAUSS_POINT_1)
+        n_pieces = min(max(ceil(abs(damage) / MAX_PIECE_DAMAGE), 1), MAX_PIECES)
 
-
-@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def _is_steep(p):
-    """Return whether R^p is so steep near R = 0 that two Gauss points do not suffice."""
-    return p < 2 and p != np.floor(p)
-
-
-@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def _integrate_growing_strip(displacement, path, mature, bonds, k, p):
-    """Integrate a strip of growing bonds on each side of u = 0 by two Gauss points.
-
-    The length of a young bond is proportional to R, so (R/length)^p is smooth and the points are those of R. Where the
-    bonds grew at rest instead, R^p is steep towards R = 0; the points are then those of R^(p + 1), which is exact.
-    """
-    start = bonds[STRIP.start, k]
-    end = bonds[STRIP.end, k]
-    width = bonds[STRIP.age_width, k]
-    step = end - start
-    path_to_end = max(path - bonds[STRIP.age_measure, k], 0.0)
     force = 0.0
     energy = 0.0
-    zero_position = min(max((end - displacement) / step, 0.0), 1.0)
-    is_steep = False
-    if _is_steep(p):
-        last = _bond_length(0.0, mature, bonds, k)
-        first = _bond_length(1.0, mature, bonds, k)
-        grew_at_rest = last > MIN_GROWING_RATIO * first
-        is_steep = grew_at_rest and path_to_end * first < 0.5 * (path_to_end + width) * last
     for side in range(2):
         low = 0.0 if side == 0 else zero_position
         high = zero_position if side == 0 else 1.0
         if high <= low:
             continue
-        for point in range(2):
-            gauss = GAUSS_POINT_1 if point == 0 else GAUSS_POINT_2
-            fraction = low + gauss * (high - low)
-            weight = 0.5 * (high - low) * width
-            if is_steep:
-                power_low = (path_to_end + low * width) ** (p + 1)
-                power_high = (path_to_end + high * width) ** (p + 1)
-                position = (power_low + gauss * (power_high - power_low)) ** (1 / (p + 1))
-                fraction = (position - path_to_end) / width
-                weight = 0.5 * (power_high - power_low) / (p + 1) * position ** (-p)
-            x = max(path_to_end + fraction * width, MIN_PATH) / _bond_length(
-                fraction, mature, bonds, k
-            )
-            point_force = weight * fast_exp(p * fast_log(x) - x)
-            u = displacement - end + fraction * step
-            force += np.copysign(point_force, u)
-            energy += point_force * abs(u)
-    density = bonds[STRIP.weight, k] / width
-    return BondSum(density * force, density * energy)
-
-
-@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def _spread_growing_strip(displacement, path, mature, bonds, k, p):
-    """Sum a strip of growing bonds that are distributed uniformly over its range; each bond keeps its age."""
-    low = min(bonds[STRIP.start, k], bonds[STRIP.end, k])
-    high = max(bonds[STRIP.start, k], bonds[STRIP.end, k])
-    average = average_spread(displacement, low, high, 0.0)
-    # At a position outside the strip all bonds pull in one direction, so their sum there is the
-    # force that they can carry.
-    beyond = high + bonds[STRIP.age_width, k]
-    full_force = _sum_gauss_growing(beyond, path, mature, bonds, StripRange(k, k, k + 1), p).force
-    return BondSum(average.force * full_force, average.energy * full_force)
-
-
-@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def sum_growing(displacement, path, mature, bonds, strips, law):
-    """Sum strips for friction.reading = "report" with growing bonds (eqs. 2.10 and 2.17).
-
-    Parameters
-    ----------
-    displacement, path : float
-        Present relative displacement and path [m].
-    mature : MatureBonds
-        Length of mature bonds, and factor that undoes the scale of the starting lengths.
-    bonds, strips : array, Range
-        Array of strips, and those that are summed.
-    law : (24,) array
-        Numbers of `LAW`.
-
-    Returns
-    -------
-    BondSum
-        Force [m] and energy [m2], without the factor 1/(eps_0 Gamma(p + 1)).
-    """
-    p = law[LAW.order]
-    merge_width = law[LAW.merge_width] * law[LAW.length]
-    total = _sum_gauss_growing(displacement, path, mature, bonds, strips, p)
-    force = total.force
-    energy = total.energy
-    for k in range(strips.first, strips.end):
-        from_start = displacement - bonds[STRIP.start, k]
-        from_end = displacement - bonds[STRIP.end, k]
-        path_to_end = path - bonds[STRIP.age_measure, k]
-        width = bonds[STRIP.age_width, k]
-        is_young = _is_steep(p) and path_to_end <= 3 * width
-        if from_start * from_end >= 0 and not is_young:
-            continue
-        strip = StripRange(k, k, k + 1)
-        gauss = _sum_gauss_growing(displacement, path, mature, bonds, strip, p)
-        is_narrow = width <= merge_width * fast_exp(path_to_end / (3 * mature.length))
-        if not is_young and is_narrow and path_to_end > mature.length:
-            exact = _spread_growing_strip(displacement, path, mature, bonds, k, p)
-        else:
-            exact = _integrate_growing_strip(displacement, path, mature, bonds, k, p)
-        force += exact.force - gauss.force
-        energy += exact.energy - gauss.energy
-    for k in range(strips.head, strips.first):
-        x_1, x_2 = _gauss_path_ratios(path, mature, bonds, k)
-        full_force = fast_exp(p * fast_log(x_1) - x_1) + fast_exp(p * fast_log(x_2) - x_2)
-        full_force *= 0.5 * bonds[STRIP.weight, k]
-        average = average_spread(displacement, bonds[STRIP.start, k], bonds[STRIP.end, k], 0.0)
-        force += average.force * full_force
-        energy += average.energy * full_force
+        for piece in range(n_pieces):
+            piece_low = low + (high - low) * piece / n_pieces
+            piece_high = low + (high - low) * (piece + 1) / n_pieces
+            if is_stretch:
+                part = _integrate_stretch_piece(after, bonds, k, piece_low, piece_high)
+            else:
+                part = _integrate_growing_piece(after, scale, bonds, k, piece_low, piece_high)
+            force += part.force
+            energy += part.energy
     return BondSum(force, energy)
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def sum_initial(displacement, path, damage, law):
-    """Return force and energy of the initial bonds: density m_0, unstressed at displacement 0.
+def _integrate_stretch_piece(after, bonds, k, low, high):
+    """Integrate c |u|^p sgn u, and this times |u|, between two positions of a strip of weight c."""
+    strips = bonds.bondlist
+    value_1 = strips[STRIP.value_1, k]
+    value_2 = strips[STRIP.value_2, k]
+    width = high - low
+    weight_1 = value_1
+    weight_2 = value_2
+    if width < 1:
+        weight_1 = width * interpolate_value(low + GAUSS_POINT_1 * width, value_1, value_2)
+        weight_2 = width * interpolate_value(low + GAUSS_POINT_2 * width, value_1, value_2)
+    step = strips[STRIP.end, k] - strips[STRIP.start, k]
+    u_low = after.displacement - strips[STRIP.end, k] + low * step
+    u_high = after.displacement - strips[STRIP.end, k] + high * step
+    p = bonds.law[LAW.order]
+    return _average_power(u_low, u_high, weight_1, weight_2, p)
+
+
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
+def _integrate_growing_piece(after, scale, bonds, k, low, high):
+    """Integrate (R/eps)^p exp(-R/eps) sgn u, and this times |u|, between two positions of a strip on one side of u = 0.
+
+    Young bonds that grew along the strip have a length proportional to R, so (R/eps)^p is smooth. Where they grew at
+    rest instead, R^p is integrated exactly and the rest is taken as linear.
+    """
+    strips = bonds.bondlist
+    p = bonds.law[LAW.order]
+    value_1 = strips[STRIP.value_1, k]
+    value_2 = strips[STRIP.value_2, k]
+    covered = strips[STRIP.covered, k]
+    path = max(after.path - strips[STRIP.path, k], 0.0)
+    step = strips[STRIP.end, k] - strips[STRIP.start, k]
+    last = _bond_length(0.0, after, scale, value_1, value_2)
+    first = _bond_length(1.0, after, scale, value_1, value_2)
+    is_steep = p < 2 and p != np.floor(p) and last > MIN_RESTING_RATIO * first
+    steep_power = p if is_steep else 0.0
+
+    # The density without R^steep_power at both Gauss points, and the same times |u|
+    width = high - low
+    force_1 = force_2 = 0.0
+    energy_1 = energy_2 = 0.0
+    sign = 1.0
+    for point in range(2):
+        fraction = low + (GAUSS_POINT_1 if point == 0 else GAUSS_POINT_2) * width
+        length = _bond_length(fraction, after, scale, value_1, value_2)
+        distance = max(path + fraction * covered, MIN_POSITIVE)
+        u = after.displacement - strips[STRIP.end, k] + fraction * step
+        density = fast_exp(-distance / length)
+        if is_steep:
+            density *= power(1 / length, p)
+        else:
+            density *= power(distance / length, p)
+        density *= 0.5 * width * covered
+        sign = np.copysign(1.0, u)
+        if point == 0:
+            force_1 = density
+            energy_1 = density * abs(u)
+        else:
+            force_2 = density
+            energy_2 = density * abs(u)
+    r_low = path + low * covered
+    r_high = path + high * covered
+    force = _average_power(r_low, r_high, force_1, force_2, steep_power).force
+    energy = _average_power(r_low, r_high, energy_1, energy_2, steep_power).force
+    return BondSum(sign * force, energy)
+
+
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
+def _bond_length(fraction, after, scale, value_1, value_2):
+    """Return the length [m] of growing bonds at a position within a strip."""
+    start = interpolate_value(fraction, value_1, value_2)
+    return max(after.length - scale * start, MIN_LENGTH_RATIO * after.length)
+
+
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
+def _average_power(u_low, u_high, weight_1, weight_2, p):
+    """Integrate w |u|^p sgn u and w |u|^(p + 1) over a piece whose density is linear along it.
+
+    Parameters
+    ----------
+    u_low, u_high : float
+        u at both ends of the piece; the density is linear in u.
+    weight_1, weight_2 : float
+        Weights at the Gauss points, measured from `u_low`; their sum is the weight of the piece.
+    p : float
+        Exponent.
+
+    Returns
+    -------
+    BondSum
+    """
+    width = u_high - u_low
+    if abs(u_low + u_high) > FAR_RATIO * abs(width):
+        u_1 = u_low + GAUSS_POINT_1 * width
+        u_2 = u_low + GAUSS_POINT_2 * width
+        force_1 = weight_1 * power(abs(u_1), p)
+        force_2 = weight_2 * power(abs(u_2), p)
+        force = np.copysign(force_1, u_1) + np.copysign(force_2, u_2)
+        return BondSum(force, force_1 * abs(u_1) + force_2 * abs(u_2))
+    if width == 0:
+        return BondSum(0.0, 0.0)
+
+    # Averages of |u|^p sgn u, |u|^(p + 1) and |u|^(p + 1) u over the piece
+    power_low = power(abs(u_low), p) * abs(u_low)
+    power_high = power(abs(u_high), p) * abs(u_high)
+    odd = (power_high - power_low) / ((p + 1) * width)
+    even = (power_high * u_high - power_low * u_low) / ((p + 2) * width)
+    third = (power_high * u_high * u_high - power_low * u_low * u_low) / ((p + 3) * width)
+    slope = 2 * (weight_2 - weight_1) / ((GAUSS_POINT_2 - GAUSS_POINT_1) * width)
+    middle = weight_1 + weight_2 - slope * 0.5 * (u_low + u_high)
+    return BondSum(middle * odd + slope * even, middle * even + slope * third)
+
+
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
+def _sum_report(after, bonds):
+    """Write force and energy of all strips for reading="report" at a constant bond length.
+
+    They are differences of P(p + 1, R/eps_0); a strip is split where u changes its sign. The lever int y phi(y) dy =
+    (p + 1) P(p + 1, x) - x phi(x) gives the energy.
+    """
+    strips = bonds.bondlist
+    eps0 = bonds.law[LAW.length]
+    # The values at the start of a strip are those at the end of the preceding one, which is visited next
+    known_path = -1.0
+    older = BondSum(0.0, 0.0)
+    for k in range(int(bonds.status[STATUS.end]) - 1, int(bonds.status[STATUS.head]) - 1, -1):
+        end = strips[STRIP.end, k]
+        step = end - strips[STRIP.start, k]
+        direction = np.copysign(1.0, step)
+        path = after.path - strips[STRIP.path, k]
+        zero = min(max(direction * (end - after.displacement), 0.0), abs(step))
+
+        is_known = abs(path - known_path) <= PATH_ROUND_OFF * after.path
+        younger = older if is_known else _sum_youngest(path / eps0, bonds)
+        known_path = path + abs(step)
+        older = _sum_youngest(known_path / eps0, bonds)
+        if zero == 0:
+            middle = younger
+        elif zero == abs(step):
+            middle = older
+        else:
+            middle = _sum_youngest((path + zero) / eps0, bonds)
+        signed = older.force - 2 * middle.force + younger.force
+        lever = older.energy - 2 * middle.energy + younger.energy
+        offset = direction * (after.displacement - end) - path
+        strips[STRIP.force, k] = direction * signed
+        strips[STRIP.energy, k] = offset * signed + eps0 * lever
+
+
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
+def _sum_youngest(x, bonds):
+    """Return the integrals of phi(y) and of y phi(y) from 0 to x, with phi(y) = y^p exp(-y)/Gamma(p + 1)."""
+    if x <= 0:
+        return BondSum(0.0, 0.0)
+    p = bonds.law[LAW.order]
+    inverse_gamma = bonds.law[LAW.inverse_gamma]
+    density = inverse_gamma * x * power(x, p) * fast_exp(-x)
+    total = bond_gammainc(p, x, density, inverse_gamma, bonds.table)
+    return BondSum(total, (p + 1) * total - density)
+
+
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
+def sum_initial(after, bonds):
+    """Return force and energy of the initial bonds for unit pressure: density m_0, unstressed at displacement 0.
 
     Their force may jump at displacement 0, to the round-off of the path; there it is 0, the mean of both sides. If the
     law distributes them over a width, they store nothing at displacement 0.
 
     Parameters
     ----------
-    displacement, path, damage : float
-        Present relative displacement [m], path [m] and damage [1].
-    law : (24,) array
-        Numbers of `LAW`.
+    after : PathValues
+        State of the path for which the sum is taken.
+    bonds : BondList
 
     Returns
     -------
     BondSum
-        Force [1] and energy [m] per friction limit.
     """
+    law = bonds.law
     p = law[LAW.order]
     eps0 = law[LAW.length]
-    initial = law[LAW.initial]
     half_width = law[LAW.half_width]
-    is_at_place = half_width == 0 and abs(displacement) <= UNSTRESSED_TOL * path
-    if initial == 0 or is_at_place:
+    displacement = after.displacement
+    weight = law[LAW.initial] * law[LAW.inverse_gamma]
+    is_at_place = half_width == 0 and abs(displacement) <= UNSTRESSED_TOL * after.path
+    age = PATH.damage if law[LAW.form] == FORM_STRETCH else PATH.path
+    is_old = bonds.now[age] > law[LAW.cutoff]
+    if weight == 0 or after.path == 0 or is_at_place or is_old:
         return BondSum(0.0, 0.0)
-    if law[LAW.form] <= FORM_POWER:
-        weight = (
-            initial * law[LAW.inverse_gamma] * fast_exp(-damage) * fast_exp(-p * fast_log(eps0))
-        )
-        if half_width > 0:
-            average = average_spread(displacement, -half_width, half_width, p)
-            at_rest = fast_exp((p + 1) * fast_log(half_width)) / (p + 2)
-            energy = weight * (average.energy - at_rest) / (p + 1)
-            return BondSum(weight * average.force, energy)
-        force = weight * fast_exp(p * fast_log(abs(displacement)))
-        return BondSum(force * np.sign(displacement), force * abs(displacement) / (p + 1))
-    force = initial * law[LAW.inverse_gamma] * fast_exp(p * fast_log(path / eps0) - path / eps0)
-    if half_width > abs(displacement):
-        energy = force * displacement * displacement / (2 * half_width)
-        return BondSum(force * displacement / half_width, energy)
-    return BondSum(force * np.sign(displacement), force * (abs(displacement) - half_width / 2))
+
+    stretch_power = 0.0
+    if law[LAW.form] == FORM_STRETCH:
+        stretch_power = p
+        weight *= fast_exp(-after.damage) / power(eps0, p)
+    else:
+        weight *= power(max(after.path / eps0, MIN_POSITIVE), p) * fast_exp(-after.path / eps0)
+    low = displacement - half_width
+    high = displacement + half_width
+    total = _average_power(low, high, 0.5 * weight, 0.5 * weight, stretch_power)
+    at_rest = 0.0
+    if half_width > 0:
+        at_rest = weight * power(half_width, stretch_power) * half_width / (stretch_power + 2)
+    return BondSum(total.force, (total.energy - at_rest) / (stretch_power + 1))
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def average_initial(increment, displacement, path, law):
-    """Return the exact mean force of the initial bonds over an increment, for friction.reading = "report".
+def average_initial(increment, bonds):
+    """Return the exact mean force of the initial bonds over an increment for unit pressure and reading="report".
 
     The force jumps at displacement 0, or changes its sign over the width over which the bonds are distributed.
 
     Parameters
     ----------
-    increment, displacement, path : float
-        Increment [m]; relative displacement and path [m] before it.
-    law : (24,) array
-        Numbers of `LAW`.
+    increment : float
+        Increment [m] from the present state.
+    bonds : BondList
 
     Returns
     -------
     float
         Path-mean force [1] per friction limit.
     """
-    p = law[LAW.order]
+    law = bonds.law
     eps0 = law[LAW.length]
     half_width = law[LAW.half_width]
-    size = abs(increment)
-    if law[LAW.initial] == 0:
+    if law[LAW.initial] == 0 or bonds.now[PATH.path] > law[LAW.cutoff]:
         return 0.0
+    size = abs(increment)
+    path = bonds.now[PATH.path]
     direction = np.copysign(1.0, increment)
-    # These are the lengths of the increment before it enters and before it leaves the range of the
-    # bonds.
-    path_to_entry = min(max(-direction * displacement - half_width, 0.0), size)
-    path_to_exit = min(max(-direction * displacement + half_width, 0.0), size)
-    p_start = bond_gammainc(p, path / eps0)
-    p_entry = bond_gammainc(p, (path + path_to_entry) / eps0)
-    p_exit = bond_gammainc(p, (path + path_to_exit) / eps0)
-    total = bond_gammainc(p, (path + size) / eps0) - p_exit - (p_entry - p_start)
-    if path_to_exit > path_to_entry:
-        middle = 0.5 * (
-            direction * displacement + path_to_entry + (direction * displacement + path_to_exit)
-        )
-        total += (p_exit - p_entry) * middle / half_width
+    along = direction * bonds.now[PATH.displacement]
+
+    # Lengths of the increment before it enters and before it leaves the range of the bonds
+    to_entry = min(max(-along - half_width, 0.0), size)
+    to_exit = min(max(-along + half_width, 0.0), size)
+    at_start = _sum_youngest(path / eps0, bonds).force
+    at_entry = at_start
+    if to_entry > 0:
+        at_entry = _sum_youngest((path + to_entry) / eps0, bonds).force
+    at_exit = at_entry
+    if to_exit > to_entry:
+        at_exit = _sum_youngest((path + to_exit) / eps0, bonds).force
+    total = _sum_youngest((path + size) / eps0, bonds).force - at_exit - (at_entry - at_start)
+    if to_exit > to_entry:
+        middle = along + 0.5 * (to_entry + to_exit)
+        total += (at_exit - at_entry) * middle / half_width
     return direction * law[LAW.initial] * total * eps0 / size
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def formed_force(path, eps, law):
-    """Return the force [1] of the bonds that form on a straight increment / friction limit.
+def sum_formed(path, eps, bonds):
+    """Return force and energy of the bonds that form on a straight increment, for unit pressure.
 
     Parameters
     ----------
     path, eps : float
-        Length of the increment, bond length [m].
-    law : (24,) array
-        Numbers of `LAW`.
+        Length of the increment and bond length [m].
+    bonds : BondList
+
+    Returns
+    -------
+    BondSum
+    """
+    law = bonds.law
+    youngest = _sum_youngest(path / eps, bonds)
+    ratio = eps / law[LAW.length]
+    # The energy is that of reading="stretch", where R = |u|: f u/(p + 1)
+    return BondSum(ratio * youngest.force, ratio * eps * youngest.energy / (law[LAW.order] + 1))
+
+
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
+def average_formed(increment, eps, bonds):
+    """Return the exact mean force, over an increment, of the bonds that form on it, for unit pressure.
+
+    With x = |increment|/eps it is (1/x) int P(p + 1, y) dy = P(p + 1, x) - (1/x) int y phi(y) dy from 0 to x.
+
+    Parameters
+    ----------
+    increment, eps : float
+        Increment and bond length [m].
+    bonds : BondList
 
     Returns
     -------
     float
+        Path-mean force [1] per friction limit.
     """
-    return eps / law[LAW.length] * bond_gammainc(law[LAW.order], path / eps)
+    x = abs(increment) / eps
+    youngest = _sum_youngest(x, bonds)
+    mean = eps / bonds.law[LAW.length] * (youngest.force - youngest.energy / x)
+    return np.copysign(mean, increment)

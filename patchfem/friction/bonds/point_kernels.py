@@ -1,12 +1,19 @@
-"""Bonds of one point on a line for friction.reading = "stretch" and p = 1, compiled (see `recursion`).
+"""Bonds of one point on a line for friction.reading = "stretch" and p = 1, summed exactly by their moments (compiled).
 
-m [Pa], z [Pa m] and s2 [Pa m2] are the sums over the bonds of a point: density, stretch and stretch squared. sigma [Pa]
-is the pressure under which new bonds form, eps [m] the bond length of the step. The traction is mu_s/eps_0 z. Per unit
-of path in the direction e = 1 or -1 (eq. 2.17 with p = 1)
+With k = exp(-int dR/eps) the surviving fraction of a bond, u its stretch and 1/eps frozen when it forms, the sums over all
+bonds m = sum sigma k dL/eps [Pa], z = sum sigma k u dL/eps [Pa m] and s2 = sum sigma k u^2 dL/eps [Pa m2] obey, per unit
+of path in the direction e = 1 or -1 (eq. 2.17 with p = 1),
 
     m' = (sigma - m)/eps,   z' = m e - z/eps,   s2' = 2 z e - s2/eps,
 
-which the functions solve exactly over an increment, with x = |increment|/eps.
+which the functions solve exactly over an increment, with x = |increment|/eps and a bond length eps [m] that is constant in
+it; sigma [Pa] is the pressure under which new bonds form. The traction is mu_s z/eps_0. Stored energy mu_s s2/(2 eps_0)
+and dissipation mu_s s2/(2 eps_0 eps) per path are never negative: passive for every path, pressure and bond length.
+
+Load. Where the load falls at rest, the bonds without stretch, which formed last, are released first: the force stays as
+long as a population with the moments (m, z, s2) exists, m >= z^2/s2. Beyond that all stretches shrink, and no point
+keeps more than mu_s sigma. Where it rises, unstretched bonds of density m_0 form. Neither adds energy.
+
 Functions named short_* hold for increments up to MAX_SHORT_PATH bond lengths and have no branch, so that loops over
 points vectorise. All arrays are C-ordered float64.
 """
@@ -215,68 +222,6 @@ def _step_bonds(bonds, increment, sigma, eps, shapes, powers):
     )
 
 
-@njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def _split_elastic(play, increment, half):
-    """Split an increment of a point with an elastic range; return its elastic part and the play."""
-    start = play * half
-    end = start + increment
-    if end >= half:
-        return half - start, 1.0
-    if end <= -half:
-        return -half - start, -1.0
-    return increment, end / half
-
-
-@njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def elastic_bond_mean(m, z, play, half, increment, sigma, eps):
-    """Return the path-mean stretch of the bonds of a point with an elastic range.
-
-    Parameters
-    ----------
-    m, z, increment, sigma, eps : float
-        As in `bond_mean`.
-    play, half : float
-        Position in the elastic range, -1 to 1, and half its width [m].
-
-    Returns
-    -------
-    mean, slope : float
-        As in `bond_mean`.
-    """
-    elastic = _split_elastic(play, increment, half)[0]
-    damaging = increment - elastic
-    # A quotient by a smaller increment would overflow.
-    if damaging == 0.0 or abs(increment) < 1e-280:
-        return z + 0.5 * m * increment, 0.5 * m
-    if elastic == 0.0:
-        return bond_mean(m, z, increment, sigma, eps)
-    mean, slope = bond_mean(m, z + m * elastic, damaging, sigma, eps)
-    total = (elastic * (z + 0.5 * m * elastic) + damaging * mean) / increment
-    return total, (mean + slope * damaging - total) / increment
-
-
-@njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def elastic_bond_step(m, z, s2, play, half, increment, sigma, eps):
-    """Advance the bonds of a contact point with an elastic range by an increment.
-
-    Parameters
-    ----------
-    m, z, s2, increment, sigma, eps : float
-        As in `bond_step`.
-    play, half : float
-        As in `elastic_bond_mean`.
-
-    Returns
-    -------
-    step, play : BondStep, float
-        Bonds after the increment, and their position in the elastic range.
-    """
-    elastic, play = _split_elastic(play, increment, half)
-    s2 += elastic * (2 * z + m * elastic)
-    z += m * elastic
-    return bond_step(m, z, s2, increment - elastic, sigma, eps), play
-
-
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def grow(eps, v0, v1, path, dt, growth):
     """Return the length of growing bonds after a time step (eq. 2.10 of the 1985 report).
@@ -287,7 +232,7 @@ def grow(eps, v0, v1, path, dt, growth):
         Bond length before [m].
     v0, v1, path, dt : float
         Speeds [m/s] at the ends, path [m] and duration [s] of the step.
-    growth : ndarray
+    growth : (5,) array
         Growth a_s at rest [m s-2], below 0 for a constant length; path l_k of the weakening [m]; floor
         v_h of the speed [m/s]; lengths eps_0 at rest and eps_k of sliding bonds [m].
 
@@ -327,32 +272,9 @@ def _integrate_slowness(v, min_speed):
     return (1 + log(abs(v) / min_speed)) * (1.0 if v > 0 else -1.0)
 
 
-@njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def bond_end_stretch(m, z, increment, sigma, eps):
-    """Return the stretch of the bonds of a point at the end of an increment.
-
-    Parameters
-    ----------
-    m, z, increment, sigma, eps : float
-        As in `bond_mean`.
-
-    Returns
-    -------
-    z, slope : float
-        Stretch [Pa m] and its derivative over the increment [Pa].
-    """
-    direction = 1.0 if increment > 0 else -1.0
-    x = abs(increment) / eps
-    shapes = shape_functions(x)
-    density_deficit = sigma - m
-    fresh = direction * eps * (sigma * x * shapes.f1 - density_deficit * x * shapes.decay)
-    end = z * shapes.decay + fresh
-    return end, sigma - density_deficit * shapes.decay - direction * end / eps
-
-
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def press_point(bonds, s0, s1, initial, length):
-    """Change the normal load on the bonds of a contact point at rest.
+    """Change the normal load on the bonds of a contact point at rest; the stored energy never increases.
 
     Parameters
     ----------

@@ -6,27 +6,13 @@ loading, the variable w = -ln(1 - y) removes the knee: dw/dx = (1 - y^n)/(1 - y)
 integral over w on loading and over |y| on unloading, by a Gauss rule on short pieces. Newton's method inverts it.
 """
 
-from math import exp, expm1, inf, log, log1p, nan
+from math import exp, expm1, log, log1p
 
 import numpy as np
 
 from ...compiled.jit import njit
 from ..flags_kernels import FASTMATH_FLAGS, NJIT_NO_REFCOUNT
-from ..protocol_kernels import (
-    HAS_SPEED_LAYER,
-    IS_SET_VALUED,
-    IntegratedStretch,
-    Rates,
-    Reading,
-    RelaxedStretch,
-    solve_step,
-    step_bond_length,
-)
-from .exponential_kernels import exp_minus
-
-NUMBER_UNITS = "N m 1 1"  # units of `numbers`, for batches that scale time and force
-HAS_ZERO_KINK = True  # whether the slope over the path jumps between loading and unloading
-IS_RATE_INDEPENDENT = True  # whether z depends on the path alone
+from ..protocol_kernels import Rates, RelaxedStretch
 
 GAUSS_POINTS = np.polynomial.legendre.leggauss(8)[0]  # Gauss points of a piece in (-1, 1)
 GAUSS_WEIGHTS = np.polynomial.legendre.leggauss(8)[1]  # weights of these points
@@ -179,112 +165,14 @@ def _z_slope(y, n, s):
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def rate_equation(numbers, stretch, velocity, direction):
-    """Return the force at the stretch eps z and dz/dx along the slip.
+    """Return the force at the stretch eps z.
 
     Returns
     -------
     Rates
     """
     stiffness = numbers[1] / numbers[2]
-    stretch_rate = _z_slope(direction * stretch / numbers[2], numbers[3], numbers[4])
-    return Rates(stiffness * stretch, stretch_rate, stiffness, 0.0)
-
-
-@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def _knee_rate(u, n, s):
-    """Return dw/dx at u = 1 - y, which is between 1/2 and n.
-
-    A Runge-Kutta step of any length is therefore stable.
-    """
-    return n * (1 - 0.5 * (n - 1) * u) if u < 1e-5 else _z_slope(1 - u, n, s) / u
-
-
-@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def _follow_knee(u, x, n, s):
-    """Return 1 - y after a path x, and its integral, for forces near the friction limit.
-
-    A Runge-Kutta step of order 4 in w gives u. The integral of u over the path is that of 1/(dw/dx) over u, which
-    Simpson's rule gives.
-    """
-    k0 = _knee_rate(u, n, s)
-    k1 = _knee_rate(u * exp_minus(0.5 * x * k0), n, s)
-    k2 = _knee_rate(u * exp_minus(0.5 * x * k1), n, s)
-    k3 = _knee_rate(u * exp_minus(x * k2), n, s)
-    end = u * exp_minus(x * (k0 + 2 * (k1 + k2) + k3) / 6)
-    middle = _knee_rate(0.5 * (u + end), n, s)
-    return end, (u - end) / 6 * (1 / k0 + 4 / middle + 1 / _knee_rate(end, n, s))
-
-
-@njit(error_model="numpy", forceinline=True, **NJIT_NO_REFCOUNT)
-def integrate_stretch(numbers, stretch, mean_square, increment, direction):
-    """Return the stretch after an increment of any length, to order 4.
-
-    It is exact for n = 1 on loading.
-
-    Returns
-    -------
-    IntegratedStretch
-    """
-    length = numbers[2]
-    u = 1 - direction * stretch / length
-    x = direction * increment / length
-    if numbers[3] == 1.0 and u <= 1.0 and x >= 0.0:
-        end = u * exp_minus(x)
-        area = u - end
-    else:
-        end, area = _follow_knee(u, x, numbers[3], numbers[4])
-    after = direction * length * (1 - end)
-    return IntegratedStretch(after, after * after, numbers[1] * length * (x - area))
-
-
-@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def mean_force(numbers, memory, rel_disp, increment, bond_length, dt):
-    """Return the path-mean force over an increment.
-
-    Returns
-    -------
-    force, slope : float
-        Path-mean force [N] and its derivative over the increment [N/m].
-    """
-    limit = numbers[1]
-    length = numbers[2]
-    z = memory[0]
-    direction = 1.0 if increment > 0 else -1.0
-    x = abs(increment) / length
-    rise = _z_slope(direction * z, numbers[3], numbers[4])
-    if x < 1e-7:  # the series replaces a quotient of two numbers close to zero
-        return limit * (z + 0.5 * direction * x * rise), 0.5 * limit / length * rise
-    end, area = _follow_path(direction * z, x, numbers[3], numbers[4])
-    return direction * limit * area / x, limit / length * (end - area / x) / x
-
-
-@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def update_memory(numbers, memory, increment, force, v0, v1, dt, bond_length):
-    """Advance z by an increment; work that is not stored is dissipated.
-
-    Returns
-    -------
-    float
-        Dissipated energy [J].
-    """
-    z = memory[0]
-    direction = 1.0 if increment > 0 else -1.0
-    end, area = _follow_path(direction * z, abs(increment) / numbers[2], numbers[3], numbers[4])
-    memory[0] = direction * end
-    return numbers[1] * numbers[2] * (area - 0.5 * (end * end - z * z))
-
-
-@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def read_memory(numbers, memory, rel_disp, velocity):
-    """Return the force mu N z, the energy of the spring and the slip q - eps z.
-
-    Returns
-    -------
-    Reading
-    """
-    z = memory[0]
-    energy = 0.5 * numbers[1] * numbers[2] * z * z
-    return Reading(numbers[1] * z, energy, rel_disp - numbers[2] * z)
+    return Rates(stiffness * stretch, stiffness, 0.0)
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)

@@ -21,16 +21,15 @@ class Coulomb(LastTraction):
     has_force_at_rest: ClassVar[bool] = True  # the traction persists while the interface rests
 
     @property
-    def _breakaway(self) -> float:
+    def _static_coefficient(self) -> float:
         return self.kinetic if self.static is None else self.static
 
     def element(self, load: float) -> Element:
-        """Return the Element under a constant load [N], with the static and kinetic friction force.
-
-        It has no kernels, because a set-valued law has no slope.
-        """
-        limit = self._breakaway * load
-        return Element("", np.array([0.0, limit, self.kinetic * load]), np.zeros(1), limit)
+        """Return the Element under a constant load [N], with the static and kinetic friction force."""
+        limit = self._static_coefficient * load
+        return Element(
+            "", np.array([0.0, limit, self.kinetic * load]), np.zeros(1), limit, form="rigid"
+        )
 
     def limit_fraction(self, dq, dt):
         """Return the ratio of the friction force to its limit for increments dq [m]; 0 at rest."""
@@ -65,12 +64,12 @@ class Coulomb(LastTraction):
         mean = self.kinetic * (s0 + s1) / 2 * np.sign(dq)
         return Step(mean, mean * dq, self.kinetic * s1 * np.sign(dq))
 
-    def breakaway_traction(self, sigma, direction: float):
+    def static_traction(self, sigma, direction: float):
         """Return the traction mu_s sigma (m,) [Pa] at the instant at which sliding starts.
 
         direction: sign of the motion.
         """
-        return self._breakaway * sigma * direction
+        return self._static_coefficient * sigma * direction
 
 
 def from_keys(friction, load: float) -> Coulomb:

@@ -121,7 +121,7 @@ def parallel_element(stiffness, yield_displacement) -> Element:
     limit = float(stiffness @ yield_displacement)
     total = float(stiffness.sum())
     return Element(
-        "friction.laws.elastic_plastic_kernels",
+        "",
         np.concatenate([[0.0, stiffness.size], stiffness, yield_displacement]),
         np.zeros(3 + stiffness.size),
         limit,

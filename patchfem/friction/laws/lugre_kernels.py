@@ -5,28 +5,14 @@ numbers: stiffness [N/m], kinetic and static force [N], Stribeck velocity v_s [m
 path.
 """
 
-from math import inf, nan
+from math import exp
 from typing import NamedTuple
 
 from ...compiled.jit import njit
 from ..bonds.point_kernels import shape_functions
 from ..flags_kernels import FASTMATH_FLAGS, NJIT_NO_REFCOUNT
-from ..protocol_kernels import (
-    HAS_SPEED_LAYER,
-    HAS_ZERO_KINK,
-    IS_RATE_INDEPENDENT,
-    IS_SET_VALUED,
-    Rates,
-    Reading,
-    RelaxedStretch,
-    integrate_stretch,
-    solve_step,
-    step_bond_length,
-)
-from .exponential_kernels import exp_minus
+from ..protocol_kernels import Rates, RelaxedStretch
 
-# Units of `numbers`, for batches that scale time and force
-NUMBER_UNITS = "N/m N N m/s N_s/m N_s/m"
 # Smallest friction limit relative to the static force; z relaxes over limit/stiffness, which must
 # not be 0
 MIN_LIMIT_RATIO = 1e-9
@@ -47,7 +33,7 @@ class _Relaxation(NamedTuple):
 def _relaxation_length(numbers, velocity):
     """Return the length g/stiffness [m] over which z relaxes, and its velocity derivative [s]."""
     ratio = velocity / numbers[4]
-    rise = (numbers[3] - numbers[2]) * exp_minus(ratio * ratio)
+    rise = (numbers[3] - numbers[2]) * exp(-ratio * ratio)
     limit = max(numbers[2] + rise, MIN_LIMIT_RATIO * numbers[3])
     return limit / numbers[1], -2 * ratio / numbers[4] * rise / numbers[1]
 
@@ -67,7 +53,6 @@ def rate_equation(numbers, stretch, velocity, direction):
     length_term = direction * stretch * velocity * length_derivative / (length * length)
     return Rates(
         numbers[1] * stretch + (numbers[5] * stretch_rate + numbers[6]) * velocity,
-        stretch_rate,
         numbers[1] - numbers[5] * direction * velocity / length,
         numbers[5] * (stretch_rate + length_term) + numbers[6],
     )
@@ -111,51 +96,6 @@ def _relax(numbers, stretch, increment, dt):
         shapes.decay,
         by_time,
     )
-
-
-@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def mean_force(numbers, memory, rel_disp, increment, bond_length, dt):
-    """Return the path-mean force over an increment; for dt = 0 it excludes the damping forces.
-
-    Returns
-    -------
-    force, slope : float
-        Path-mean force [N] and its derivative over the increment [N/m].
-    """
-    relaxed = _relax(numbers, memory[0], increment, dt)
-    force = numbers[1] * relaxed.mean
-    slope = numbers[1] * relaxed.mean_by_increment
-    if dt > 0:
-        force += (numbers[5] * (relaxed.end - memory[0]) + numbers[6] * increment) / dt
-        slope += (numbers[5] * relaxed.end_by_increment + numbers[6]) / dt
-    return force, slope
-
-
-@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def update_memory(numbers, memory, increment, force, v0, v1, dt, bond_length):
-    """Advance z by an increment; work that is not stored is dissipated.
-
-    Returns
-    -------
-    float
-        Dissipated energy [J].
-    """
-    before = memory[0]
-    memory[0] = _relax(numbers, before, increment, dt).end
-    return force * increment - 0.5 * numbers[1] * (memory[0] * memory[0] - before * before)
-
-
-@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def read_memory(numbers, memory, rel_disp, velocity):
-    """Return the force at a velocity, the energy of the bristles and the slip q - z.
-
-    Returns
-    -------
-    Reading
-    """
-    z = memory[0]
-    force = rate_equation(numbers, z, velocity, 1.0 if velocity > 0 else -1.0).force
-    return Reading(force, 0.5 * numbers[1] * z * z, rel_disp - z)
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)

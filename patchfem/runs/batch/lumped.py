@@ -139,10 +139,7 @@ def refusal_reason(model: Model) -> str:
     ):
         return "the interface of the case is not one point under a constant load, or its flexure has an end stop"
     if law_has_trait(friction.law, "bonds") and (
-        needs_bond_list(friction)
-        or friction.slip_growth is not None
-        or friction.initial_bonds != 1
-        or friction.breakaway
+        needs_bond_list(friction) or friction.slip_growth is not None or friction.initial_bonds != 1
     ):
         return "its bonds grow, differ or are computed as a list of bonds"
     if (

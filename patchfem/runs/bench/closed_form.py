@@ -40,9 +40,9 @@ def slide_in_closed_form(task: SlideTask) -> SlideHistories:
     frames = task.frame_indices
     tau = fraction[frames, None] * limits[direction[frames]]
     for sample, sign in find_rest_ends(model, slide).items():
-        breakaway = law.breakaway_traction(sigma, sign)
-        force[sample] = weight @ breakaway
-        tau[frames == sample] = breakaway
+        traction = law.static_traction(sigma, sign)
+        force[sample] = weight @ traction
+        tau[frames == sample] = traction
     task.options.report(1.0)
     load = np.full(slide.size, float(weight @ sigma))
     return SlideHistories(

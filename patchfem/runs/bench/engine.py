@@ -2,7 +2,7 @@
 
 In: a model with [slide]. Out: `BenchEngine`, steps per cycle and `RunSizes`. A law without memory has a
 closed form. Recursion, bond lists and parallel elements use the compiled kernels of the rigs. If
-the pressure at a point changes during the motion, a NumPy law is evaluated sample by sample.
+the pressure at a point changes during the motion, an object of the law is evaluated sample by sample.
 """
 
 from dataclasses import dataclass, replace
@@ -12,10 +12,10 @@ from math import ceil
 import numpy as np
 
 from ...core import Missing
-from ...dynamics.march import capacity
 from ...effects import law_has_trait, needs_bond_list
 from ...friction.bonds import engines as bond_engines
 from ...friction.bonds import parameters
+from ...points import time_march
 from ..sizes import COMPILED_CODE, MemoryPart, RunSizes
 
 MAX_GROOVE_STEPS = 200_000  # Largest number of steps per cycle over grooves.
@@ -84,20 +84,21 @@ def choose_bench_engine(
         If the sum over bonds would take too long.
     """
     f = model.friction
-    if model.partial_slip and (law_has_trait(f.law, "bonds") or model.grooves is not None):
+    has_bonds = law_has_trait(f.law, "bonds")
+    if model.partial_slip and (has_bonds or model.grooves is not None):
         if model.grooves is None and (
             needs_bond_list(f) or find_requested_engine(model) not in ("auto", "recursion")
         ):
             choice = choice or choose_bond_summation(model, slide)
-            return _make_bond_sum_engine(model, slide, n_points, choice, n_points)
+            return _make_bond_sum_engine(model, slide, n_points, choice)
         return BenchEngine(Method.POINTS)
     if model.partial_slip:
         return BenchEngine(Method.ELEMENTS)
-    if has_changing_pressure(model) and model.grooves is None:
+    if has_changing_pressure(model) and model.grooves is None and not has_bonds:
         return BenchEngine(Method.STEPPED)
     if law_has_trait(f.law, "memoryless"):
         return BenchEngine(Method.CLOSED)
-    if not law_has_trait(f.law, "bonds"):
+    if not has_bonds:
         return BenchEngine(Method.ELEMENTS)
     return _make_bond_sum_engine(
         model, slide, n_points, choice or choose_bond_summation(model, slide)
@@ -153,9 +154,9 @@ def find_requested_engine(model) -> str:
     scene_engine = model.accuracy.quadrature
     f = model.friction
     rig = model.rig is not None
-    has_separate_lists = (
-        model.side == "lower" and (model.partial_slip or (rig and needs_bond_list(f)))
-    ) or (rig and model.load_varies and needs_bond_list(f))
+    has_separate_lists = (model.side == "lower" and (model.partial_slip or needs_bond_list(f))) or (
+        rig and model.load_varies and needs_bond_list(f)
+    )
     return (
         "merged" if has_separate_lists and scene_engine in ("auto", "recursion") else scene_engine
     )
@@ -188,17 +189,14 @@ def mean_stroke(slide) -> tuple:
 
 
 def _make_bond_sum_engine(
-    model, slide, n_points: int, choice: "bond_engines.EngineChoice", n_lists: int = 1
+    model, slide, n_points: int, choice: "bond_engines.EngineChoice"
 ) -> BenchEngine:
-    """Return the bench engine of a nonlocal law.
-
-    `n_lists` is the number of bond lists: one per point with shear modes, otherwise 1.
-    """
+    """Return the bench engine of a nonlocal law on `n_points` points."""
     law = model.bonds
+    is_stepped = has_changing_pressure(model) and model.grooves is None and not model.partial_slip
     if choice.engine == "recursion":
-        return BenchEngine(Method.RECURSION, choice)
-    if law.breakaway and n_lists == 1:  # A bond list cannot represent an elastic range.
-        return BenchEngine(Method.STEPPED)
+        return BenchEngine(Method.STEPPED if is_stepped else Method.RECURSION, choice)
+    n_lists = n_points if model.partial_slip else 1
     size = slide.size
     max_move = float(np.abs(np.diff(slide)).max())
     strips = min(choice.strips, size * max(1.0, 4 * max_move / law.length))
@@ -212,6 +210,8 @@ def _make_bond_sum_engine(
             "accuracy.steps_per_cycle or slide.cycles, or raise accuracy.tail or accuracy.merge",
             "",
         )
+    if is_stepped:
+        return BenchEngine(Method.STEPPED, choice)
     return BenchEngine(Method.LIST if n_lists == 1 else Method.LISTS, choice)
 
 
@@ -252,7 +252,9 @@ def count_bench_sizes(model, n_points: int) -> RunSizes:
     unknowns = {}
     if engine.choice is not None and engine.choice.strips:
         unknowns["bond_list_about"] = strips = int(engine.choice.strips)
-        parts.append(MemoryPart(capacity.list_bytes(strips), "the list of bonds", "accuracy.tail"))
+        parts.append(
+            MemoryPart(time_march.count_list_bytes(strips), "the list of bonds", "accuracy.tail")
+        )
     return RunSizes(unknowns, tuple(parts), engine=engine.name)
 
 

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...effects import law_has_trait, needs_bond_list
+from ...effects import law_has_trait
 from ...response.coarser import CoarserRuns, StepRun, estimate_errors, second_order_errors
 from ...response.errors import (
     FrictionScale,
@@ -22,8 +22,7 @@ from ...response.errors import (
 )
 from ...slip import shear_modes
 from . import bench, rigid, shear
-from .engine import LIST_METHODS, Method, uses_parallel_elements
-from .law import estimate_tail_loss
+from .engine import Method, uses_parallel_elements
 from .ledger import BenchOptions
 
 # Tolerance that sets the steps of runs on coarser meshes. It differs from that of the run, because
@@ -91,7 +90,7 @@ def estimate_bench_errors(model, patches: list, fine_run, steps: int, say=None) 
     coarser_runs = list_coarser_runs(model, patches, fine_run, steps)
     bench_runs = {}
     errors, seconds = estimate_errors(solve, fine_run.values, coarser_runs, bench_runs)
-    if find_bond_sum_error(model, fine_run.engine):
+    if find_bond_sum_error(fine_run.engine):
         errors.append(("bonds", _estimate_bond_sum_errors(model, fine_run)))
     step_runs = [StepRun(steps, fine_run.seconds, fine_run.values)]
     for run in coarser_runs[0].runs:
@@ -143,19 +142,15 @@ def list_coarser_runs(model, patches: list, fine_run, steps: int) -> list:
             out.append(CoarserRuns((coarser,), second_order_errors, quarter, "modes"))
     if law_has_trait(model.friction.law, "cells") and fine_run.engine.method is Method.ELEMENTS:
         out.append(rigid.list_merged_cell_runs(quarter))
-    if fine_run.engine.method in LIST_METHODS and choice.merge > 0:
+    if choice is not None and choice.merge > 0:
         narrow = quarter._replace(choice=replace(choice, merge=FINER_MERGE_FACTOR * choice.merge))
         out.append(CoarserRuns((narrow,), finer_errors, quarter, "bonds"))
     return out
 
 
-def find_bond_sum_error(model, engine) -> float:
+def find_bond_sum_error(engine) -> float:
     """Return the error of bond summation relative to the friction limit; 0 without bonds."""
-    if engine.method in LIST_METHODS:
-        return engine.choice.error
-    if engine.method is Method.STEPPED and needs_bond_list(model.friction):
-        return estimate_tail_loss(model)
-    return 0.0
+    return 0.0 if engine.choice is None else engine.choice.error
 
 
 def _estimate_bond_sum_errors(model, fine_run) -> dict:
@@ -169,4 +164,4 @@ def _estimate_bond_sum_errors(model, fine_run) -> dict:
         float(work.sum()),
         float(work[fine_run.first :].sum()),
     )
-    return friction_errors(fine_run.values, find_bond_sum_error(model, fine_run.engine), scale)
+    return friction_errors(fine_run.values, find_bond_sum_error(fine_run.engine), scale)

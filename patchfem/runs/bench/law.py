@@ -1,4 +1,4 @@
-"""Friction law of a bench run as a NumPy object, and the pressure at the interface nodes.
+"""Friction law of a bench run as an object, and the pressure at the interface nodes.
 
 In: a model with friction and its Patch. Out: a law object for any value of friction.law, nodal
 pressures and areas.
@@ -7,33 +7,30 @@ pressures and areas.
 import numpy as np
 
 from ...effects import law_has_trait
-from ...friction.bonds import quadrature, recursion
+from ...friction.bonds import points
 from ...friction.record import make_law
 from . import averaged_law
 
 
-def make_numpy_law(model, patch=None):
-    """Return the friction law of a model as a NumPy object; only an averaged law uses the patch."""
+def make_numpy_law(model, patch=None, choice=None):
+    """Return the friction law of a model as an object whose steps NumPy calls.
+
+    Parameters
+    ----------
+    model : Model
+    patch : Patch, optional
+        Patch of an averaged law.
+    choice : EngineChoice, optional
+        Method of the sum over bonds of the nonlocal law.
+    """
     f = model.friction
     if law_has_trait(f.law, "averaged"):
         return averaged_law.make_averaged_law(model, patch)
     if not law_has_trait(f.law, "bonds"):
         return make_law(f, patch.pressure.load if patch is not None else model.point.load)
-
-    law = model.bonds
-    engine = model.accuracy.quadrature
-    if engine == "recursion" or (engine == "auto" and law.reading == "stretch" and law.order == 1):
-        return recursion.FirstOrderBonds(law)
-
-    return quadrature.Quadrature(law, estimate_tail_loss(model))
-
-
-def estimate_tail_loss(model) -> float:
-    """Return the truncation error of the sum over bonds, relative to the friction limit."""
-    accuracy = model.accuracy
-    if accuracy.quadrature == "direct":
-        return 0.0
-    return accuracy.tail if accuracy.tail is not None else 1e-3 * accuracy.tolerance
+    if choice.engine == "recursion":
+        return points.FirstOrderBonds(model.bonds)
+    return points.ListedBonds(model.bonds, choice.tail, choice.merge)
 
 
 def nodal_pressure(model, patch) -> tuple:

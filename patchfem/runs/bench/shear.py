@@ -4,27 +4,30 @@ In: a `SlideTask` of a model with [contact.shear]. Out: `SlideHistories`, and co
 mesh error of parallel elements.
 """
 
+from dataclasses import replace
+
 import numpy as np
 
-from ...dynamics.march.models import (
-    jenkins_model,
-    lower_pressure_fields,
-    point_lists_model,
-    points_model,
-)
+from ...contact.stiffness import tangential_stiffness
 from ...effects import law_has_trait
 from ...friction.record import make_law
+from ...points import contacts
 from ...response.coarser import CoarserRuns
 from ...response.errors import ERROR_MEASURES, absolute_change, convergence_errors
+from ...slip import shear_modes
 from ...slip.fields import bond_shear_modes, element_fields, point_fields
 from ..patch.jenkins_elements import elements
 from .ledger import SlideHistories, SlideTask
-from .path_response import follow_path
-from .rigid import make_climbing_model
+from .path_response import follow_slide, make_slide_histories
 
 # Ratio of the assumed pressure of an initially unloaded node of the lower piece to the mean
 # pressure.
 OPEN_PRESSURE_FRACTION = 1e-3
+# Bond length of the points that represent Coulomb's law over grooves, relative to the tolerance times the slide at gross
+# slip; on flat ground the force is then wrong by at most .17 of the tolerance, relative to the friction limit.
+COULOMB_LENGTH_RATIO = 0.1
+# Smallest bond length for the choice of shear modes over grooves, relative to the slide at gross slip.
+MIN_LENGTH_RATIO = 1e-3
 
 
 def slide_in_shear(task: SlideTask) -> SlideHistories:
@@ -51,9 +54,10 @@ def _slide_elements(task: SlideTask) -> SlideHistories:
     springs = reduction.stiffness, reduction.yield_displacement
     if task.options.springs:
         springs = task.options.springs(*springs)
-    response = follow_path(jenkins_model(*springs), task)
-    tau, local = element_fields(patch, reduction, response.states, length)
-    return response.to_slide_histories(patch.pressure.load, tau, local)
+    motion = follow_slide(contacts.make_parallel_contact(*springs, np.zeros(0)), task)
+    states = [(one.slide, one.stretch) for one in motion.snapshots]
+    tau, local = element_fields(patch, reduction, states, length)
+    return make_slide_histories(task, motion, patch.pressure.load, tau, local)
 
 
 def _slide_over_grooves(task: SlideTask) -> SlideHistories:
@@ -61,36 +65,94 @@ def _slide_over_grooves(task: SlideTask) -> SlideHistories:
     model = task.model
     patch = task.patch
     load = patch.pressure.load
-    contact = make_climbing_model(model, load, patch, model.accuracy.shear_modes)
-    depends_on_speed = not law_has_trait(model.friction.law, "timeless")
-    response = follow_path(contact, task, depends_on_speed)
-    response.require_convergence()
-    tau, local = compute_groove_fields(patch, contact, response.states)
-    return response.to_slide_histories(load, tau, local)
+    contact = make_flank_contact(model, load, patch, model.accuracy.shear_modes)
+    motion = follow_slide(contact, task)
+    tau, local = compute_groove_fields(patch, contact, motion.snapshots)
+    return make_slide_histories(task, motion, load, tau, local)
 
 
-def compute_groove_fields(patch, contact, states) -> tuple:
+def make_flank_contact(model, load: float, patch=None, n_modes: int | None = None):
+    """Return the points of a law with memory on the flanks of grooves.
+
+    A bench has no lifted mass. Coulomb's law at points of pieces that deform in shear is an elastic-plastic law of a
+    short length.
+
+    Parameters
+    ----------
+    model : Model
+    load : float
+        Normal load [N].
+    patch : Patch, optional
+        Patch whose pieces deform in shear.
+    n_modes : int, optional
+        Number of shear modes of the pieces; default: by the tolerance.
+
+    Returns
+    -------
+    points.contacts.Contact
+    """
+    f = model.friction
+    law = model.bonds if law_has_trait(f.law, "bonds") else f
+    grooves = model.grooves
+    row = np.zeros(0)
+    if model.rig is None:
+        grooves = replace(grooves, lifted_mass=0.0)
+    else:
+        modes = model.rig.modes
+        row = modes.slide
+        grooves.check_lifted_mass(f.static, modes.mass / float(modes.slide @ modes.slide))
+    if not model.partial_slip:
+        return contacts.make_flank_contact(law, grooves, load, row)
+    force = patch.pressure.sigma_n * patch.pieces.interface.weight
+    limit = f.static * force
+    tolerance = model.accuracy.tolerance
+    length = getattr(law, "length", None) or f.bond_length
+    if not length:
+        compliance = patch.slip_compliance
+        gross_slip_slide = limit.sum() / tangential_stiffness(compliance, force > 0)
+        law = f.model_copy(
+            update={"bond_length": COULOMB_LENGTH_RATIO * tolerance * gross_slip_slide}
+        )
+        length = max(COULOMB_LENGTH_RATIO * tolerance, MIN_LENGTH_RATIO) * gross_slip_slide
+    weakening = 1.0
+    if getattr(law, "has_growth", False):
+        weakening = 1 / law.ratio if law.ratio > 0 else np.inf
+    if n_modes is not None:
+        reduced = shear_modes.shear_modes(patch.slip_compliance, limit, length, n_modes, weakening)
+    else:
+        reduced = shear_modes.find_sufficient_modes(
+            patch.slip_compliance,
+            limit,
+            length,
+            shear_modes.N_SHEAR_MODES,
+            0.1 * tolerance,
+            weakening,
+        )
+    shares = force[reduced.points] / force.sum()
+    return contacts.make_flank_contact(law, grooves, load, row, reduced, shares)
+
+
+def compute_groove_fields(patch, contact, snapshots) -> tuple:
     """Return traction (f, m) [Pa] and slip (f, m) [m] at the nodes of a patch over grooves.
 
     Parameters
     ----------
     patch : Patch
-    contact
-        Contact model of the grooves.
-    states : sequence
-        f states as pairs (relative displacement [m], `ClimbingModel.shown`).
+    contact : points.contacts.Contact
+    snapshots : sequence of points.time_march.Snapshot
     """
-    index = contact.shear.points
-    m = patch.x.size
-    tau = np.zeros((len(states), m))
-    local = np.zeros((len(states), m))
-    for i, (slide, (along, elastic, vertical)) in enumerate(states):
-        t = float(contact.grooves.slope(slide))
-        tau[i, index] = (vertical * t + along * np.hypot(1.0, t)) / patch.pieces.interface.weight[
-            index
-        ]
-        local[i] = slide
-        local[i, index] -= elastic / np.hypot(1.0, t)
+    index = contact.reduction.points
+    weight = patch.pieces.interface.weight[index]
+    shares = np.array([law.load for law in contact.point_sets[0].laws])
+    shares = shares / shares.sum()
+    tau = np.zeros((len(snapshots), patch.x.size))
+    local = np.zeros((len(snapshots), patch.x.size))
+    for i, one in enumerate(snapshots):
+        t = float(contact.grooves.slope(one.slide))
+        length = np.hypot(1.0, t)
+        tau[i, index] = (one.vertical * shares * t + one.forces * length) / weight
+        local[i] = one.slide
+        local[i, index] -= (one.stretch + one.bend) / length
     return tau, local
 
 
@@ -99,19 +161,31 @@ def _slide_bond_points(task: SlideTask) -> SlideHistories:
     model = task.model
     patch = task.patch
     law = model.bonds
-    choice = task.engine.choice
-    shear = compute_point_shear_modes(model, patch, task.options.modes)
+    bond_sum = make_bond_sum(law, task.engine.choice)
+    modes = compute_point_shear_modes(model, patch, task.options.modes)
+    row = np.zeros(0)
     if model.side == "lower":
-        contact = make_bond_lists_on_lower_piece(model, patch, choice, shear)
-    elif choice is not None:
-        contact = make_bond_lists_with_shear(patch, law, shear, choice)
+        contact = make_lower_contact(model, patch, row, modes, bond_sum)
     else:
-        weight = patch.pieces.interface.weight
-        contact = points_model(law, weight, patch.pressure.sigma_n, shear)
-    response = follow_path(contact, task, law.has_growth)
-    response.require_convergence()
-    tau, local = point_fields(patch, law, contact.reduction, response.states)
-    return response.to_slide_histories(patch.pressure.load, tau, local)
+        force = patch.pressure.sigma_n * patch.pieces.interface.weight
+        contact = contacts.make_bond_contact(law, force[modes.points], row, modes, bond_sum)
+    motion = follow_slide(contact, task)
+    tau, local = point_fields(patch, modes, motion.snapshots)
+    return make_slide_histories(task, motion, patch.pressure.load, tau, local)
+
+
+def make_bond_sum(law, choice) -> "contacts.BondSum | None":
+    """Return the settings of a sum over lists of bonds; None for the recursion.
+
+    Parameters
+    ----------
+    law : Bonds
+    choice : EngineChoice or None
+        Method of bond summation.
+    """
+    if choice is None or choice.engine == "recursion":
+        return None
+    return contacts.BondSum(law, choice.reach(law.order), choice.merge)
 
 
 def compute_point_shear_modes(model, patch, n_modes: int | None = None):
@@ -161,50 +235,28 @@ def count_shear_modes(model, patch) -> int | None:
     return compute_point_shear_modes(model, patch).stiffness.size
 
 
-def make_bond_lists_on_lower_piece(model, patch, choice, shear):
-    """Return the contact model with a bond list per node, for a pressure fixed to the lower piece.
+def make_lower_contact(model, patch, row, shear, bond_sum) -> contacts.Contact:
+    """Return the points of bonds at all nodes, under a pressure that is fixed to the lower piece.
 
     Parameters
     ----------
     model : Model
     patch : Patch
-    choice : Choice
-        Method of bond summation.
+    row : (n,) array
+        Slide per modal coordinate.
     shear : ShearModes or None
         Shear modes at the nodes; None for pieces that are rigid in shear.
+    bond_sum : BondSum or None
+        Sum over lists of bonds, or None for the recursion.
     """
-    law = model.bonds
-    sigma = patch.pressure.sigma_n
     mean = mean_loaded_pressure(patch)
-    return point_lists_model(
-        law,
-        law.static * mean * patch.pieces.interface.weight,
-        np.full(sigma.size, mean),
+    return contacts.make_bond_contact(
+        model.bonds,
+        mean * patch.pieces.interface.weight,
+        row,
         shear,
-        choice.reach(law.order),
-        choice.merge,
-        lower_pressure_fields(patch.x, sigma, mean),
-    )
-
-
-def make_bond_lists_with_shear(patch, law, shear, choice, force=None):
-    """Return the contact model with a bond list at each point of the shear modes.
-
-    Parameters
-    ----------
-    patch : Patch
-    law
-        Bond parameters.
-    shear : ShearModes
-    choice : Choice
-        Method of bond summation.
-    force : (k,), optional
-        Normal forces [N] of the points, if a few points represent all nodes.
-    """
-    sigma = patch.pressure.sigma_n[shear.points] if force is None else np.ones_like(force)
-    force = patch.pieces.interface.weight[shear.points] * sigma if force is None else force
-    return point_lists_model(
-        law, law.static * force, sigma, shear, choice.reach(law.order), choice.merge
+        bond_sum,
+        np.stack([patch.x, patch.pressure.sigma_n / mean]),
     )
 
 

@@ -1,7 +1,6 @@
-"""Rigid sliding with NumPy laws, sample by sample, for varying pressure.
+"""Rigid sliding of a law as an object, sample by sample, for varying pressure.
 
-In: a `SlideTask`. Out: `SlideHistories`. This implementation accepts every law and every bench run with
-rigid sliding; it is the reference for the compiled engines.
+In: a `SlideTask`. Out: `SlideHistories`. The load varies in time, or the pressure is fixed to the lower piece.
 """
 
 from collections.abc import Callable
@@ -9,7 +8,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...core import Missing
 from ...friction.protocol import Step
 from .law import find_rest_ends, make_numpy_law, nodal_pressure
 from .ledger import (
@@ -22,25 +20,16 @@ from .ledger import (
     sum_losses_by_sign,
 )
 
-# Largest number of operations (strips x samples x points) of a direct sum over bonds.
-MAX_STRIP_POINT_PRODUCTS = 2e11
-
 
 def slide_step_by_step(task: SlideTask) -> SlideHistories:
-    """Compute the friction histories of rigid sliding with a NumPy law, sample by sample.
+    """Compute the friction histories of rigid sliding with a law as an object, sample by sample.
 
     The pressure moves with the upper piece, is fixed to the lower piece, or varies with the load.
-
-    Raises
-    ------
-    Missing
-        If the sum over bonds would take too long.
     """
     model = task.model
     slide = task.slide
-    law = make_numpy_law(model, task.patch)
+    law = make_numpy_law(model, task.patch, task.engine.choice)
     points = _make_pressed_points(task)
-    refuse_expensive_sum(model, law, slide.size, points.weight.size, slide)
     take_step = _step_under_changing_load if model.load_varies else _step_law
     histories = _evaluate_law(task, law, take_step, points, find_rest_ends(model, slide))
     frames = task.frame_indices
@@ -82,7 +71,7 @@ class _LawHistories(NamedTuple):
 
 
 def _evaluate_law(
-    task: SlideTask, law, take_step: Callable, points: _PressedPoints, breakaways: dict
+    task: SlideTask, law, take_step: Callable, points: _PressedPoints, rest_ends: dict
 ) -> _LawHistories:
     """Evaluate a friction law along the displacement of a task, sample by sample.
 
@@ -93,7 +82,7 @@ def _evaluate_law(
     take_step : callable
         Function that computes one step of the law.
     points : _PressedPoints
-    breakaways : dict
+    rest_ends : dict
         Sign of the velocity after each rest, by the sample at which the rest ends.
     """
     weight = points.weight
@@ -116,8 +105,8 @@ def _evaluate_law(
             work[sample] = work[sample - 1] + increment * (mean @ weight)
 
         # the traction at the end of a rest is that of the motion that begins there
-        if sample in breakaways:
-            traction = law.breakaway_traction(sigma, breakaways[sample])
+        if sample in rest_ends:
+            traction = law.static_traction(sigma, rest_ends[sample])
         else:
             traction = law.traction(state)
         force[sample] = traction @ weight
@@ -133,34 +122,6 @@ def _evaluate_law(
         stack_energies(work, stored, losses),
         np.array(tau).reshape(len(tau), weight.size),
     )
-
-
-def refuse_expensive_sum(model, law, n_samples: int, n_points: int, slide) -> None:
-    """Raise Missing if a direct sum over bonds needs too many operations.
-
-    Bonds are assumed to be neglected after a path of 25 bond lengths.
-
-    Parameters
-    ----------
-    model : Model
-    law
-        Friction law; a law that does not sum over bonds is never refused.
-    n_samples, n_points : int
-        Number of samples and of points.
-    slide : (k,)
-        Relative displacement of the samples [m].
-    """
-    if not hasattr(law, "weights"):
-        return
-    reach = 25 * model.friction.bond_length
-    per_step = max(float(np.abs(np.diff(slide)).mean()), 1e-300)
-    strips = min(n_samples, 2 * reach / per_step + 64)
-    if 6 * strips * n_samples * n_points > MAX_STRIP_POINT_PRODUCTS:
-        raise Missing(
-            f"the direct sum over bonds would need {6 * strips * n_samples * n_points:.1e} multiplications, more "
-            f"than the limit of {MAX_STRIP_POINT_PRODUCTS:.0e}; lower accuracy.steps_per_cycle or slide.cycles",
-            "",
-        )
 
 
 def _make_pressed_points(task: SlideTask) -> _PressedPoints:

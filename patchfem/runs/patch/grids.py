@@ -333,8 +333,8 @@ def find_contact_extent(patch: Patch, slip=None) -> ContactExtent:
         low = float(x[max(closest_node - 1, 0)])
         high = float(x[min(closest_node + 1, x.size - 1)])
         return ContactExtent((low, high), (float(x[closest_node]),), (), np.inf)
-    strips = patch.strips.pressure if patch.strips is not None else sigma[None]
-    is_loaded = strips > (1e-3 * strips.max() if patch.skin is not None else 0.0)
+    strips = patch.state.pressure
+    is_loaded = strips > (1e-3 * strips.max() if patch.has_smooth_skin else 0.0)
     loaded_nodes = np.flatnonzero(is_loaded.any(axis=0))
     low = x[max(loaded_nodes[0] - 1, 0)]
     high = x[min(loaded_nodes[-1] + 1, x.size - 1)]

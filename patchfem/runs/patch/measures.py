@@ -422,7 +422,7 @@ def _compute_resolution(patch: Patch, missed_peak: float) -> Resolution:
     n_nodes = max(int(active.sum()), 1)
     is_unresolved = n_nodes <= MAX_UNRESOLVED_NODES and cells.any()
     edge_offset = None
-    if patch.skin is None:
+    if not patch.has_smooth_skin:
         edge_offset = _contact_edge_position_error(pair, longest_cell)
     return Resolution(
         length=interface.length,

@@ -11,13 +11,21 @@ from typing import NamedTuple
 import numpy as np
 
 from ...contact import edges
-from ...contact.strip_compliance import WarmStart
-from ...contact.unilateral import press, press_to_approach
+from ...contact.press import (
+    Holder,
+    StripLayout,
+    StripModel,
+    StripsState,
+    press_strips,
+    split_into_strips,
+    strip_offsets,
+)
+from ...contact.strip_compliance import StripCompliance, WarmStart
 from ...core import Compliance, ContactState, PatchfemError, frozen_array
 from ...exceptions import UnresolvedTrace
-from . import skin as skin_press
-from . import strips as strip_press
+from ...model.patch import PatchStrips
 from .condensed import CondensedPair
+from .skin import make_skin_law
 
 
 class Surface(NamedTuple):
@@ -58,17 +66,15 @@ class PointSolution(NamedTuple):
 class SolvedContact(NamedTuple):
     """Contact solution of two pieces for a given unloaded gap.
 
-    - pieces: Compliance including the asperity layer, a nonlinear layer being linearised at the
-      operating point.
+    - pieces: Compliance including the asperity layer of a patch without strips, a nonlinear layer being linearised
+      at the operating point.
     - pressure: ContactState; for strips its mean over the width.
-    - skin: StripsState with a single strip, for a nonlinear asperity layer; else None.
-    - strips: StripsState of a patch in strips, else None.
+    - state: StripsState; a patch without strips is a single one.
     """
 
     pieces: Compliance
     pressure: ContactState
-    skin: object = None
-    strips: object = None
+    state: StripsState
 
 
 @dataclass(frozen=True, eq=False, slots=True, weakref_slot=True)
@@ -79,7 +85,7 @@ class Patch:
 
     - model: PatchModel.
     - pair: condensed pieces.
-    - pieces, pressure, skin, strips: see `SolvedContact`.
+    - pieces, pressure, state: see `SolvedContact`.
     - slip_compliance (m, m): tangential compliance [m/N] of nodes that slip one by one: that of
       the asperity layer, that of the pieces if the scene has [contact.shear], and that of the
       holder spring, which is equal in all entries.
@@ -99,8 +105,7 @@ class Patch:
     pair: CondensedPair
     pieces: Compliance
     pressure: ContactState
-    skin: object
-    strips: object
+    state: StripsState
     slip_compliance: np.ndarray
     unloaded_gap: np.ndarray
     notes: tuple
@@ -165,15 +170,30 @@ class Patch:
         return self.model.interface.skin is not None
 
     @property
+    def has_smooth_skin(self) -> bool:
+        """Whether the pieces carry pressure at every separation, through a nonlinear asperity layer."""
+        return self.has_skin and self.model.interface.skin.law != "linear"
+
+    @property
+    def strips(self) -> StripsState | None:
+        """Contact state of a patch that is divided into strips, else None."""
+        return None if self.model.interface.strips is None else self.state
+
+    @property
+    def layer_compliance(self) -> np.ndarray | None:
+        """Compliance (s, m) [m/N] of the asperity layer at the nodes of each strip; None without a layer."""
+        if not self.has_skin:
+            return None
+        return compute_layer_compliance(self.model.interface.skin, self.state)
+
+    @property
     def skin_fraction(self) -> np.ndarray | None:
         """Fraction (m,) of the nodal compliance due to the asperity layer; None without a layer."""
         if not self.has_skin:
             return None
-        bare = np.diag(self.pair.compliance.normal)
-        if self.strips is None:
-            return 1 - bare / np.diag(self.pieces.normal)
-        stiffness = self.strips.stiffness.max(axis=0) * self.pieces.interface.weight
-        return 1 / (1 + bare * stiffness)
+        bare = np.diag(self.pair.compliance.normal) * len(self.state.force)
+        layer = self.layer_compliance.min(axis=0)
+        return layer / (bare + layer)
 
     @property
     def active(self) -> np.ndarray:
@@ -214,12 +234,16 @@ def solve_patch_contact(patch_model, pair: CondensedPair, worn=None, coarse=None
         raise PatchfemError("; or ".join(sentences), error.key) from None
     gap = heights + pair.end_gap if worn is None else heights + pair.end_gap + worn
 
-    start = None if coarse is None else np.interp(x, coarse.x, coarse.active.astype(float)) > 0.5
+    start = None
+    if coarse is not None:
+        rows = [np.interp(x, coarse.x, row > 0) for row in coarse.state.force]
+        start = np.array(rows) > 0.5
 
     def solve_gap(unloaded_gap) -> Patch:
         """Solve the contact problem for an unloaded gap (m,) [m]."""
         begin = perf_counter()
-        contact = solve_contact(patch_model, pair.compliance, unloaded_gap, start=start)
+        warm_start = WarmStart(start)
+        contact = solve_contact(patch_model, pair.compliance, unloaded_gap, warm_start=warm_start)
         times = seconds | {"press": perf_counter() - begin}
         return make_patch(patch_model, pair, unloaded_gap, contact, notes, times)
 
@@ -321,20 +345,12 @@ def make_contact_force_function(patch_model, pair: CondensedPair):
     """
     bare = pair.compliance
     gap = patch_model.gap.evaluate(bare.interface.x).heights + pair.end_gap
-    if patch_model.interface.strips is not None:
-        return StripForceSolver(patch_model, bare, gap)
-
-    def compute_forces(worn, softening):
-        """Return the contact forces (m,) [N] for worn depth (m,) [m] and softening (m,) [m/N]."""
-        soft = replace(bare, normal=bare.normal + np.diag(softening)) if softening.any() else bare
-        return solve_contact(patch_model, soft, gap + worn).pressure.sigma_n * bare.interface.weight
-
-    return compute_forces
+    return ContactForceSolver(patch_model, bare, gap)
 
 
 @dataclass(eq=False, slots=True)
-class StripForceSolver:
-    """Solver for the contact forces of worn strips, started from the previous contact set.
+class ContactForceSolver:
+    """Solver for the contact forces of worn surfaces, started from the previous contact set.
 
     A run that continues from a saved state calls `start_from_forces` first, so that its results are bitwise
     those of an uninterrupted run.
@@ -355,20 +371,19 @@ class StripForceSolver:
         self.warm_start.contact_set = np.asarray(force) > 0
 
     def __call__(self, worn, softening) -> np.ndarray:
-        """Return the contact forces (s, m) [N] for worn depth [m] and softening [m/N], (s, m) each."""
-        added = softening if softening.any() else None
-        gap = self.gap + worn
-        return solve_contact(self.model, self.bare, gap, added, self.warm_start).strips.force
+        """Return the contact forces [N] for worn depth [m] and softening [m/N], (m,) each, or (s, m) for strips."""
+        added = np.atleast_2d(softening) if softening.any() else None
+        state = solve_contact(self.model, self.bare, self.gap + worn, added, self.warm_start).state
+        return state.force.reshape(np.shape(worn))
 
 
 def solve_contact(
-    patch_model, pieces: Compliance, gap, added=None, warm_start=None, start=None
+    patch_model, pieces: Compliance, gap, added=None, warm_start=None
 ) -> SolvedContact:
     """Solve the contact of condensed pieces with the asperity layer, load and holder of a model.
 
-    The conditions are pressure >= 0, gap >= 0 and pressure times gap = 0 at every node. They are solved
-    by an active set (`contact.unilateral`). A patch in strips and one with a nonlinear asperity layer
-    have solvers of their own.
+    A patch without strips is a single strip. The strips do not interact: each one has the compliance of its
+    fraction of the width (`contact.press`).
 
     Parameters
     ----------
@@ -380,9 +395,7 @@ def solve_contact(
     added : (s, m) ndarray, optional
         What each strip adds to the diagonal of its compliance [m/N].
     warm_start : WarmStart, optional
-        Results of the previous solution of the strips.
-    start : (m,) ndarray of bool, optional
-        Contact set of a similar patch without strips, from which the search starts.
+        Results of a similar solution; those of this one are written.
 
     Returns
     -------
@@ -390,38 +403,60 @@ def solve_contact(
     """
     loading = patch_model.loading
     skin = patch_model.interface.skin
-    if patch_model.interface.strips is not None:
-        return SolvedContact(
-            pieces, *strip_press.solve_strip_contact(patch_model, pieces, gap, added, warm_start)
-        )
-    if skin is not None and skin.law != "linear":
-        return SolvedContact(
-            *skin_press.solve_contact_with_asperity_layer(patch_model, pieces, gap)
-        )
-    pieces = add_linear_skin_compliance(skin, pieces)
-    angle = patch_model.gap.angle
-    if loading.approach is not None:
-        pressure = press_to_approach(pieces, gap, loading.approach, angle, start)
-        return SolvedContact(pieces, pressure)
-    spring = loading.rotational_stiffness
-    pressure = press(pieces, gap, loading.load, loading.moment, angle, start, spring)
-    return SolvedContact(pieces, pressure)
+    count, roll, offset = patch_model.interface.strips or PatchStrips(1, 0.0, None)
+    strip = split_into_strips(pieces, count)
+    offsets = strip_offsets(patch_model.pieces.width, count)
+    strips = StripModel(
+        StripCompliance(strip.normal, added, warm_start),
+        StripLayout(pieces.interface.x, strip.weight, offsets),
+        None if skin is None else make_skin_law(patch_model),
+    )
+    is_loaded = loading.approach is None
+    holder = Holder(
+        load=loading.load if is_loaded else None,
+        approach=loading.approach,
+        moment=loading.moment if is_loaded else None,
+        roll_moment=None if offset is None else loading.load * offset,
+        spring=loading.rotational_stiffness if is_loaded else 0.0,
+        rotation=patch_model.gap.angle,
+        roll=roll,
+    )
+    state = press_strips(strips, gap, holder)
+    pressure = state.pressure
+    # A smooth law never reaches 0; what is set to 0 is smaller than the residual of the load balance.
+    if strips.is_smooth:
+        pressure = np.where(pressure > edges.MIN_RELATIVE_PRESSURE * pressure.max(), pressure, 0.0)
+    mean_state = ContactState(
+        frozen_array(pressure.mean(axis=0)),
+        frozen_array(state.gap.min(axis=0)),
+        state.position.delta,
+        state.position.theta,
+        state.load,
+        state.moment,
+        state.outcome,
+        state.iterations,
+        state.residuals,
+    )
+    if skin is not None and patch_model.interface.strips is None:
+        pieces = _add_layer(skin, pieces, compute_layer_compliance(skin, state)[0])
+    return SolvedContact(pieces, mean_state, state)
 
 
-def add_linear_skin_compliance(skin, pieces: Compliance) -> Compliance:
-    """Return the compliance of pieces with a linear asperity layer between them.
+def compute_layer_compliance(skin, state: StripsState) -> np.ndarray:
+    """Return the compliance (s, m) [m/N] of an asperity layer at the nodes of each strip of a contact state.
 
-    Without a layer, or with another law, the compliance is returned unchanged. A layer without a
-    tangential ratio is rigid in shear.
+    A nonlinear law is linearised; the compliance of unloaded nodes is limited.
     """
-    if skin is None or skin.law != "linear":
-        return pieces
-    layer_compliance = 1 / (skin.normal_stiffness * pieces.interface.weight)
+    if skin.law == "linear":
+        return np.broadcast_to(1 / (skin.normal_stiffness * state.layout.weight), state.force.shape)
+    stiffness = np.maximum(state.stiffness * state.layout.weight, 1e-300)
+    return 1 / np.maximum(stiffness, edges.MIN_RELATIVE_PRESSURE * stiffness.max())
+
+
+def _add_layer(skin, pieces: Compliance, layer) -> Compliance:
+    """Return the compliance of pieces in series with a layer (m,) [m/N]; without a tangential ratio it is rigid in shear."""
     tangential = pieces.tangential
     if skin.tangential_ratio is not None:
-        tangential = tangential + np.diag(layer_compliance / skin.tangential_ratio)
-    return Compliance(
-        pieces.interface,
-        frozen_array(pieces.normal + np.diag(layer_compliance)),
-        frozen_array(tangential),
-    )
+        tangential = tangential + np.diag(layer / skin.tangential_ratio)
+    normal = pieces.normal + np.diag(layer)
+    return Compliance(pieces.interface, frozen_array(normal), frozen_array(tangential))

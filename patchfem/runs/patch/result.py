@@ -9,6 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from ...contact.press import NEGLECTED_SHEAR_NOTE
 from ...core import Outcome
 from ...formatting import format_length, format_quantity
 from ...model.pieces import make_piece_meshes
@@ -256,7 +257,7 @@ def notes_on_neglected_effects(model, patch, coarse) -> list:
             patch_model, float(patch.pressure.load / loaded_area)
         )
     if patch.strips is not None:
-        out.append(patch.strips.note)
+        out.append(NEGLECTED_SHEAR_NOTE)
     if model.kind == "patch":
         out += note_on_normal_shear_coupling(patch_model, patch)
     elif patch.pair.coupling > MIN_COUPLING_RATIO:

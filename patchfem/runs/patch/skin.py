@@ -1,7 +1,6 @@
 """Asperity layer (skin) between the pieces of a patch.
 
-In: a `PatchModel` with a skin. Out: its pressure law, the contact pressure, the compliance
-linearised at the operating point, and a note on asperity stiffnesses that come from a profile.
+In: a `PatchModel` with a skin. Out: its pressure law, and a note on asperity stiffnesses that come from a profile.
 """
 
 from dataclasses import replace
@@ -10,10 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from ...contact import asperity_laws
-from ...contact.edges import MIN_RELATIVE_PRESSURE
-from ...contact.strip_compliance import StripCompliance
-from ...contact.strips import HolderLoads, StripLayout, StripModel, press_strips
-from ...core import Compliance, ContactState, PatchfemError, frozen_array
+from ...core import PatchfemError
 from ...formatting import format_length, format_quantity
 from ...model import peaks as traces
 from ...surface.roughness import peaks
@@ -99,68 +95,4 @@ def _format_coarse_stiffness(patch_model, coarse, pressure: float) -> str:
     )
     return (
         f"{asperity_layer_stiffness(replace(patch_model, interface=interface), pressure):.3g} Pa/m"
-    )
-
-
-def cut_off_negligible_pressure(pressure) -> np.ndarray:
-    """Set pressures (..., m) [Pa] of a smooth layer to 0 where they are negligible.
-
-    The pressure law never reaches 0. The pressure that is set to 0 is smaller than the residual of
-    the load balance. The limit is relative to the largest pressure.
-    """
-    return np.where(pressure > MIN_RELATIVE_PRESSURE * pressure.max(), pressure, 0.0)
-
-
-def solve_contact_with_asperity_layer(patch_model, pieces: Compliance, gap) -> tuple:
-    """Solve the contact of two pieces with a smooth asperity layer between them.
-
-    The gap of the ContactState is the separation of the mean planes; it is negative where the layer
-    is compressed beyond its mean height.
-
-    Parameters
-    ----------
-    patch_model : PatchModel
-    pieces : Compliance
-    gap : (m,)
-        Unloaded gap [m].
-
-    Returns
-    -------
-    tuple
-        Compliance with the layer linearised at the operating point, ContactState, and StripsState
-        with a single strip.
-    """
-    interface = pieces.interface
-    loading = patch_model.loading
-    loads = HolderLoads()
-    if loading.approach is None:
-        loads = HolderLoads(loading.load, loading.moment, spring=loading.rotational_stiffness)
-    layout = StripLayout(interface.x, interface.weight, np.zeros(1))
-    strips = StripModel(StripCompliance(pieces.normal), layout, make_skin_law(patch_model))
-    angle = patch_model.gap.angle
-    state = press_strips(strips, gap, loads, approach=loading.approach, rotation=angle)
-    pressure = ContactState(
-        frozen_array(cut_off_negligible_pressure(state.pressure[0])),
-        state.gap[0],
-        state.delta,
-        state.theta,
-        state.load,
-        state.moment,
-        state.outcome,
-        state.iterations,
-        state.residuals,
-    )
-    stiffness = np.maximum(state.stiffness[0] * interface.weight, 1e-300)
-    # The lower bound keeps the compliance of unloaded nodes finite.
-    layer_compliance = np.diag(1 / np.maximum(stiffness, MIN_RELATIVE_PRESSURE * stiffness.max()))
-    ratio = patch_model.interface.skin.tangential_ratio
-    tangential = (
-        pieces.tangential + layer_compliance / ratio if ratio is not None else pieces.tangential
-    )
-    return (
-        Compliance(
-            interface, frozen_array(pieces.normal + layer_compliance), frozen_array(tangential)
-        ),
-        pressure,
-        state,
     )

@@ -10,10 +10,9 @@ import numpy as np
 
 from ...closed_forms import contact
 from ...contact import edges, stiffness
-from ...core import Outcome
+from ...contact.press import split_into_strips
 from ...elasticity.lapack import use_one_blas_thread
 from ...mesh.grid import TensorGrid
-from . import strips
 from .edge_values import EdgeValues
 from .press import Patch
 
@@ -149,44 +148,69 @@ def _compute_static_values(patch: Patch) -> dict:
         parts = [(weight, compute_static_values(part)) for weight, part in patch.step_variants]
         names = parts[0][1]
         return {name: float(sum(weight * part[name] for weight, part in parts)) for name in names}
-    state = patch.strips
-    sigma = patch.pressure.sigma_n[None] if state is None else state.pressure
+    state = patch.state
     edge_values = EdgeValues(0.0, 0.0, 0.0, 0.0, 0.0)
-    if state is None and patch.pressure.outcome is not Outcome.NO_CONTACT:
+    if patch.pressure.load > 0:
         with use_one_blas_thread():
             edge_values = _compute_edge_values(patch)
-    elif state is not None and state.load > 0:
-        edge_values = strips.compute_strip_edge_values(patch)
     out = assemble_static_values(
         np.ptp(patch.x),
         patch.pieces.interface.weight.sum(),
         patch.pressure,
-        max(estimate_peak_pressure(patch.x, row, patch.skin_fraction) for row in sigma),
+        max(estimate_peak_pressure(patch.x, row, patch.skin_fraction) for row in state.pressure),
         edge_values,
     )
-    if state is not None:
+    if patch.strips is not None:
         out |= {
             "pressure_centre_lateral": state.centre_y,
             "roll_moment": state.roll_moment,
-            "roll": state.roll,
+            "roll": state.position.roll,
         }
     return {name: float(value) for name, value in out.items()}
 
 
 def _compute_edge_values(patch: Patch) -> EdgeValues:
-    """Return contact length and contact stiffnesses of a patch without strips."""
-    pressed = edges.SetFactor(patch.pieces.normal, patch.active)
-    ends = contact_ends(patch, pressed)
-    intervals = contact_intervals(patch, ends)
+    """Return contact length and contact stiffnesses, summed over the strips of a patch."""
+    count = len(patch.state.force)
+    skin = patch.model.interface.skin
     motions = np.stack([np.ones(patch.x.size), patch.x], axis=1)
-    normal, rotational = edges.set_stiffness(pressed, motions, ends)
+    stiffnesses = np.zeros(3)
+    intervals = []
+    strip_pieces = split_into_strips(patch.pair.compliance, count)
+    coupling = patch.pair.closing
+    if count > 1:
+        coupling = coupling * count
+    for strip, active in enumerate(loaded_nodes(patch)):
+        if not active.any():
+            continue
+        # The layer of each strip is in series with its fraction of the pieces.
+        normal = strip_pieces.normal
+        tangential = strip_pieces.tangential
+        if skin is not None:
+            layer = patch.layer_compliance[strip]
+            normal = normal + np.diag(layer)
+            if skin.tangential_ratio is not None:
+                tangential = tangential + np.diag(layer / skin.tangential_ratio)
+        pressed = edges.SetFactor(normal, active)
+        ends = _find_ends(patch, strip, pressed)
+        intervals.append(edges.contact_intervals(patch.x, active, ends))
+        stiffnesses[:2] += edges.set_stiffness(pressed, motions, ends)
+        stiffnesses[2] += _full_stick_stiffness(normal, tangential, coupling, active, ends)
+    normal_stiffness, rotational_stiffness, tangential_stiffness = stiffnesses.tolist()
     return EdgeValues(
-        length=float(np.diff(intervals).sum()),
-        width=float(intervals[-1, 1] - intervals[0, 0]),
-        normal=float(normal),
-        tangential=_full_stick_stiffness(patch, ends),
-        rotational=float(rotational),
+        length=float(sum(np.diff(part).sum() for part in intervals) / count),
+        width=float(max(part[-1, 1] for part in intervals) - min(part[0, 0] for part in intervals)),
+        normal=normal_stiffness,
+        tangential=tangential_stiffness,
+        rotational=rotational_stiffness,
     )
+
+
+def loaded_nodes(patch: Patch) -> np.ndarray:
+    """Return whether each node of each strip carries pressure (s, m), in a smooth asperity layer a fraction of the peak."""
+    pressure = patch.state.pressure
+    minimum = edges.MIN_RELATIVE_PRESSURE if patch.has_smooth_skin else 0.0
+    return pressure > minimum * pressure.max()
 
 
 def contact_intervals(patch: Patch, ends: list) -> np.ndarray:
@@ -194,54 +218,55 @@ def contact_intervals(patch: Patch, ends: list) -> np.ndarray:
 
     ends: contact edges from `contact_ends`.
     """
-    force = patch.pressure.sigma_n * patch.pieces.interface.weight
-    return edges.contact_intervals(patch.x, force, ends)
+    return edges.contact_intervals(patch.x, patch.active, ends)
 
 
-def contact_ends(patch: Patch, pressed: edges.SetFactor | None = None) -> list:
-    """Return the contact edges between nodes as a list of `ContactEdge`.
-
-    The list is empty for a patch in strips. `pressed` is the factor of the nodes in contact, if it is known.
-    """
-    if patch.strips is not None:
+def contact_ends(patch: Patch) -> list:
+    """Return the contact edges between nodes as a list of `ContactEdge`; [] for a patch in strips."""
+    if patch.strips is not None or not patch.active.any():
         return []
+    return _find_ends(patch, 0, edges.SetFactor(patch.pieces.normal, patch.active))
+
+
+def _find_ends(patch: Patch, strip: int, pressed: edges.SetFactor) -> list:
+    """Return the contact edges of one strip; `pressed` is the factor of its nodes in contact."""
     x = patch.x
-    if patch.skin is not None:
-        minimum = edges.MIN_RELATIVE_PRESSURE
-        ends = edges.find_pressure_edges(x, patch.skin.pressure[0], minimum)
+    state = patch.state
+    if patch.has_smooth_skin:
+        pressure = state.pressure
+        ends = edges.find_pressure_edges(
+            x, pressure[strip], edges.MIN_RELATIVE_PRESSURE, pressure.max()
+        )
     else:
-        normal = patch.pieces.normal
-        bare = patch.pair.compliance.normal
-        softness = None if normal is bare else np.diag(normal) - np.diag(bare)
-        force = patch.pressure.sigma_n * patch.pieces.interface.weight
-        pressed = pressed or edges.SetFactor(normal, patch.active)
         ends = edges.find_edges(
             pressed,
             x,
-            force,
-            patch.gap,
-            softness,
+            state.force[strip],
+            state.gap[strip],
+            patch.layer_compliance[strip] if patch.has_skin else None,
             patch.pair.row,
             is_quadratic=patch.pair.is_quadratic,
         )
     jumps = patch.model.gap.jumps
-    return edges.snap_to_steps(ends, x, patch.unloaded_gap, jumps) if jumps else ends
+    if not jumps:
+        return ends
+    gap = np.broadcast_to(patch.unloaded_gap, state.gap.shape)[strip]
+    return edges.snap_to_steps(ends, x, gap, jumps)
 
 
-def _full_stick_stiffness(patch: Patch, ends: list) -> float:
-    """Return the tangential contact stiffness [N/m] in full stick.
+def _full_stick_stiffness(normal, tangential, coupling, active, ends: list) -> float:
+    """Return the tangential contact stiffness [N/m] in full stick of the nodes in contact.
 
     Approach and rotation are fixed. For dissimilar pieces, the stiffness includes the coupling of shear
     and normal displacement. ends: contact edges.
     """
-    active = patch.active
-    if not patch.pair.closing.any():
-        sheared = edges.SetFactor(patch.pieces.tangential, active)
-        return float(edges.set_stiffness(sheared, np.ones((patch.x.size, 1)), ends)[0])
+    if not coupling.any():
+        sheared = edges.SetFactor(tangential, active)
+        return float(edges.set_stiffness(sheared, np.ones((active.size, 1)), ends)[0])
 
     def coupled_stiffness(contact_set) -> float:
         """Return the tangential stiffness [N/m] for a contact set (m,)."""
-        return stiffness.coupled_stiffness(patch.pieces, patch.pair.closing, contact_set)
+        return stiffness.coupled_stiffness(normal, tangential, coupling, contact_set)
 
     at_nodes = coupled_stiffness(active)
     out = at_nodes

@@ -9,7 +9,7 @@ number of steps.
 """
 
 from functools import lru_cache
-from math import ceil, inf, log2, pi, sqrt
+from math import ceil, inf, pi, sqrt
 from time import thread_time
 from typing import NamedTuple
 
@@ -18,14 +18,13 @@ import numpy as np
 from ...core import Missing
 from ...effects import law_has_trait, needs_bond_list
 from ...friction.bonds import engines
-from ...friction.bonds.list_forms_kernels import FORM_REPORT_GROWING
 from ...friction.bonds.list_numbers import sum_form
+from ...friction.bonds.list_rows_kernels import FORM_GROWING
 from ...friction.bonds.parameters import MAX_LIST_SECONDS
 from ...model.model import Model
 from ...structure.drive_sizes import (
     find_drive_omega,
     find_max_acceleration,
-    find_max_frequency_ratio,
 )
 from ..bench import engine as bench_engine
 from .numerics import Numerics
@@ -46,9 +45,6 @@ MAX_STRIPS_PER_STEP = 0.1
 # Largest number of strips, at about one per step, at which steps are halved again; each halving
 # makes the run four times as expensive.
 MIN_LONG_LIST = 500
-# Smallest slip, in bond lengths, at which the motion of a block does not count as elastic.
-MIN_SLIP_LENGTHS = 1e-3
-MAX_HALVINGS = 2  # Largest number of halvings of the step (0 to 3 were needed).
 # Ratio of the cost of a patch with shear compliance to that of a single list, due to its many lists
 # and the additional Newton iterations.
 SHEAR_COST_FACTOR = 256.0
@@ -119,29 +115,6 @@ def _estimate_held_displacement(model: Model, min_ratio: float = MIN_STUCK_RATIO
     return holding_force / limit if limit >= min_ratio * holding_force else inf
 
 
-def count_step_halvings(model: Model) -> int:
-    """Return how many times the automatic time step is halved for a block that sticks on its bonds.
-
-    A stuck block vibrates on its bonds faster than its modes and its drive. Up to MAX_HALVINGS
-    halvings give a period of this vibration as many steps as the fastest mode or the drive has. No
-    halving is needed if the slip, half the square of the stretch, is below MIN_SLIP_LENGTHS bond
-    lengths.
-    """
-    rig = model.rig
-    f = model.friction
-    if f is None or not law_has_trait(f.law, "bonds") or model.accuracy.steps_per_cycle is not None:
-        return 0
-    stretch = _estimate_held_displacement(model)
-    if stretch == inf or stretch**2 / 2 < MIN_SLIP_LENGTHS:
-        return 0
-    max_frequency = max(
-        find_max_frequency_ratio(rig.drive.signal) / rig.drive.signal.period,
-        float(rig.structure.frequencies.max()),
-    )
-    doublings = ceil(log2(_find_bond_frequency(model) / (2 * pi * max_frequency)))
-    return min(max(0, doublings), MAX_HALVINGS)
-
-
 def _find_bond_frequency(model: Model) -> float:
     """Return the angular frequency [rad/s] of a block on the stiffness of its bonds."""
     f = model.friction
@@ -170,7 +143,7 @@ def find_holding_ratio(model: Model, acceleration: float | None = None) -> float
     if not is_printed_law and (is_released or model.bonds.order != 0):
         return 0.0
     if is_released:
-        if rig.start is None or sum_form(model.bonds) != FORM_REPORT_GROWING:
+        if rig.start is None or sum_form(model.bonds) != FORM_GROWING:
             return 0.0
         slides = rig.modes.interfaces @ rig.start.z
         holding_force = _compute_constraint_force(rig, 0.0, np.zeros(rig.modes.omega.size), slides)
@@ -185,9 +158,7 @@ def find_min_list_growth_ratio(model: Model) -> float:
     It is 1 for a driven block if each step leaves a permanent strip, i.e. if the bonds grow or have
     order 0. Otherwise it is MIN_STUCK_RATIO.
     """
-    leaves_strips = (
-        sum_form(model.bonds) == FORM_REPORT_GROWING or model.friction.reading != "report"
-    )
+    leaves_strips = sum_form(model.bonds) == FORM_GROWING or model.friction.reading != "report"
     return 1.0 if leaves_strips and model.rig.drive.kind != "free" else MIN_STUCK_RATIO
 
 
@@ -302,7 +273,7 @@ def is_bond_list_too_long(model: Model, numerics: Numerics, counters: dict) -> b
     strips = counters.get("strips", 0.0)
     if strips <= MIN_LONG_LIST or model.bonds.reading != "report":
         return False
-    if sum_form(model.bonds) == FORM_REPORT_GROWING:
+    if sum_form(model.bonds) == FORM_GROWING:
         return is_bond_list_growing(model)
     return strips > MAX_STRIPS_PER_STEP * numerics.cycles * numerics.steps
 

@@ -15,10 +15,10 @@ import numpy as np
 
 from ... import cost_model
 from ...core import Missing
-from ...dynamics import checkpoint
 from ...effects import law_has_trait
 from ...model import patch as patch_model
 from ...model.model import Model
+from ...points import checkpoint
 from ...structure.drive_sizes import (
     find_max_acceleration,
     find_max_frequency_ratio,

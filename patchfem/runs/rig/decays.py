@@ -15,7 +15,6 @@ import numpy as np
 from ...compiled import load
 from ...core import NotConverged, PatchfemError
 from ...dynamics.harmonic import forces, quasi_static
-from ...dynamics.march import models
 from ...response.decay_curve import (
     MIN_HALF_CYCLE,
     DecayCurve,
@@ -119,9 +118,7 @@ def make_laws_on_mesh(model, patch, meshed: tuple = ()):
     load("dynamics.harmonic.cycle_kernels", None)
     return forces.LawGroup(
         rig.modes,
-        list(
-            enumerate(map(models.element_model, interface.make_interface_elements(model, meshed)))
-        ),
+        list(enumerate(interface.make_interface_elements(model, meshed))),
     )
 
 

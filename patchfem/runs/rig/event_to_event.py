@@ -19,7 +19,6 @@ from ...core import (
     SineDrive,
 )
 from ...dynamics.event_list import DRIVE_CHANGE, RELEASE, REVERSAL, STOP, EventLog
-from ...dynamics.grooves import climbing
 from ...dynamics.integrated import find_accelerations
 from ...formatting import format_length
 from ...hybrid import cases, periodic
@@ -218,7 +217,7 @@ class LumpedEvaluator(RunEvaluator):
     def _explain_end(self, motion, travel: float) -> str:
         """Return why a motion ended early, "" if it reached the travel of the scene."""
         if motion.status == Status.LEAVES_GROOVES:
-            return climbing.lift_message(self.model.grooves, motion.time)
+            return self.model.grooves.describe_lift(motion.time)
         if travel >= self.model.rig.springs.travel:
             return ""
         return (
@@ -356,12 +355,10 @@ class LumpedEvaluator(RunEvaluator):
 
         None for laws that have no such events, because some part of them always slips.
         """
-        if self.is_rigid:
-            directions = motion.find_directions()
-        elif self.joints.laws and all(has_stick(law) for law, _ in self.joints.laws):
-            directions = _find_slip_directions(motion, is_free=self.model.rig.drive.kind == "free")
-        else:
+        have_elements = self.joints.laws and all(has_stick(law) for law, _ in self.joints.laws)
+        if not (self.is_rigid or have_elements):
             return None
+        directions = motion.find_directions()
         rows = motion.event_rows
         slides = (
             rows[:, 1 : 1 + self.model.rig.modes.omega.size] @ self.model.rig.modes.interfaces.T
@@ -568,26 +565,6 @@ def _divide(begin: float, end: float, period: float, minimum: int) -> np.ndarray
     """Return times (k,) [s] of equal distances from begin to end, SAMPLES_PER_CYCLE in a period."""
     count = round((end - begin) / period * SAMPLES_PER_CYCLE) + 1
     return np.linspace(begin, end, max(minimum, count))
-
-
-def _find_slip_directions(motion, *, is_free: bool) -> np.ndarray:
-    """Return the directions (e + 1, i) of slip of elements at the start and after each event; 0 while all of them stick.
-
-    The first element slips where the first piece of the curve ends, and all stick after a reversal. In a release, all
-    stick at the start.
-    """
-    directions = motion.find_directions()
-    # Without an event in the elastic range, a motion that begins with a reversal slipped at the start.
-    slips = np.zeros(directions.shape[1], bool)
-    if not is_free:
-        for row in motion.event_rows[::-1]:
-            slips[int(row[-2])] = int(row[-1]) == Margin.MOTION
-    directions[0, ~slips] = 0.0
-    for k, row in enumerate(motion.event_rows, 1):
-        if int(row[-1]) in (Margin.LIMIT, Margin.MOTION):
-            slips[int(row[-2])] = int(row[-1]) == Margin.LIMIT
-        directions[k, ~slips] = 0.0
-    return directions
 
 
 def _list_remembered_reversals(state: State, interface: int) -> np.ndarray:

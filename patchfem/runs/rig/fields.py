@@ -4,11 +4,13 @@ In: the Solution with its snapshots, and the Patch. Out: pressure, gap, shear st
 interface nodes by name.
 """
 
+from types import SimpleNamespace
+
 import numpy as np
 
-from ...dynamics.march import varying_load
 from ...effects import law_has_trait, needs_bond_list
 from ...friction import record
+from ...points import time_march
 from ...slip import fields
 from ..bench import averaged_law
 from ..bench import shear as bench_shear
@@ -50,35 +52,27 @@ def collect_interface_fields(model, numerics, patch, solution) -> dict:
         return make_interface_frames(patch, window.time[at], tau, slip, window.slide[at])
 
     snapshots = solution.snapshots
-    if model.partial_slip and model.grooves is not None:
-        tau, local = bench_shear.compute_groove_fields(
-            patch, solution.contact, [(s["slide"], s["nodes"]) for s in snapshots]
-        )
-        return make_interface_frames(
-            patch,
-            np.array([s["time"] for s in snapshots]),
-            tau,
-            local,
-            np.array([s["slide"] for s in snapshots]),
-        )
-    time = np.array([s["time"] for s in snapshots])
-    shear = bool(model.partial_slip)
+    reduction = getattr(solution.contact, "reduction", None)
+    is_march = isinstance(snapshots[0], time_march.Snapshot)
+    if not is_march:
+        snapshots = [SimpleNamespace(**one) for one in snapshots]
     rule = SlipRule()
     has_node_bonds = numerics.per_point and model.grooves is None and not needs_bond_list(f)
-    if law_has_trait(f.law, "bonds") and (shear or has_node_bonds):
-        moments = [(s["slide"], s["bonds"]) for s in snapshots]
-        tau, local = fields.point_fields(patch, model.bonds, solution.contact.reduction, moments)
-    elif shear:
-        length = (
-            0.0 if solution.contact.reduction is None else record.make_law(f).element(1.0).length
-        )
-        states = [(s["slide"], s["stretch"]) for s in snapshots]
-        tau, local = fields.element_fields(patch, solution.contact.reduction, states, length)
+    has_points = is_march and snapshots[0].forces.size > 1
+    if model.partial_slip and model.grooves is not None:
+        tau, local = bench_shear.compute_groove_fields(patch, solution.contact, snapshots)
+    elif has_points and law_has_trait(f.law, "bonds") and (model.partial_slip or has_node_bonds):
+        tau, local = fields.point_fields(patch, reduction, snapshots)
+    elif model.partial_slip:
+        length = 0.0 if reduction is None else record.make_law(f).element(1.0).length
+        states = [(one.slide, one.stretch) for one in snapshots]
+        tau, local = fields.element_fields(patch, reduction, states, length)
         rule = SlipRule(f.static * sigma)
     else:
-        tau = np.array([s["force"] / patch.pressure.load * sigma for s in snapshots])
-        local = np.array([np.full(sigma.size, s["slip"]) for s in snapshots])
-    slide = np.array([s["slide"] for s in snapshots])
+        tau = np.array([one.force / patch.pressure.load * sigma for one in snapshots])
+        local = np.array([np.full(sigma.size, one.slip) for one in snapshots])
+    time = np.array([one.time for one in snapshots])
+    slide = np.array([one.slide for one in snapshots])
     return make_interface_frames(patch, time, tau, local, slide, rule)
 
 
@@ -87,23 +81,27 @@ def _collect_varying_load_fields(patch, solution) -> dict:
 
     The first frame is the initial state. The status is 0 for open, 1 for stick and 2 for slip.
     """
-    law = solution.contact.law
     sets = solution.contact.sets
     weight = patch.pieces.interface.weight
     snapshots = solution.snapshots
-    time = np.array([0.0] + [state["time"] for state in snapshots])
-    slide = np.array([0.0] + [state["slide"] for state in snapshots])
-    nodal = np.stack([patch.pressure.sigma_n * weight] + [state["nodal"] for state in snapshots])
-    lift = np.array([0.0] + [state["heave"] for state in snapshots])[:, None]
-    turn = np.array([0.0] + [state["turn"] for state in snapshots])[:, None]
+    time = np.array([0.0, *(one.time for one in snapshots)])
+    slide = np.array([0.0, *(one.slide for one in snapshots)])
+    nodal = np.stack([patch.pressure.sigma_n * weight, *(one.nodal for one in snapshots)])
+    lift = np.array([0.0, *(one.heave for one in snapshots)])[:, None]
+    turn = np.array([0.0, *(one.pitch for one in snapshots)])[:, None]
     gap = np.maximum(sets.opening + lift + turn * sets.x + nodal @ sets.c, 0.0)
     gap[nodal > 0] = 0.0
     gap[0] = patch.pressure.gap
     tau = np.zeros_like(nodal)
     local = np.zeros_like(nodal)
-    for k, state in enumerate(snapshots, 1):
-        tau[k], stretch = _compute_nodal_friction(law, state, nodal[k])
-        local[k] = slide[k] - stretch - state["bend"]
+    for k, one in enumerate(snapshots, 1):
+        tau[k] = one.forces
+        local[k] = slide[k] - one.stretch - one.bend
+        if one.forces.size == 1:
+            # The law acts on the resultant.
+            total = nodal[k].sum()
+            tau[k] = one.force / total * nodal[k] if total > 0 else 0.0
+            local[k] = slide[k]
     return {
         "time": time,
         "normal_stress": nodal / weight,
@@ -113,18 +111,3 @@ def _collect_varying_load_fields(patch, solution) -> dict:
         "status": compute_status(nodal > 0, tau, local),
         "holder_slide": slide,
     }
-
-
-def _compute_nodal_friction(law, snapshot, nodal) -> tuple:
-    """Return friction forces (m,) [N] and elastic stretches (m,) [m] at the interface nodes."""
-    top, bottom, _ = snapshot["memory"]
-    if law.kind == varying_load.LawKind.PLASTIC:
-        return law.static * top, law.length * np.divide(
-            top, bottom, out=np.zeros_like(top), where=bottom > 0
-        )
-    if law.kind == varying_load.LawKind.POINTS:
-        return law.static / law.length * bottom, np.divide(
-            bottom, top, out=np.zeros_like(top), where=top > 0
-        )
-    total = nodal.sum()
-    return (snapshot["force"] / total * nodal if total > 0 else 0 * nodal), np.zeros_like(nodal)

@@ -13,7 +13,7 @@ from ...formatting import format_length
 from ...model.rig import MAX_TRAVEL
 from ...response.rows import TABLE
 from .engines import ENGINES
-from .interface import make_single_contact
+from .interface import make_single_law
 from .steady.balance import BalanceFinder
 
 FLUTTER_MEASURE = "flutter_amplitude"
@@ -114,14 +114,14 @@ def _find_limit_cycles(model, numerics, patch) -> LimitCycles:
     load = patch.pressure.load if patch is not None else model.point.load
     if reason := ENGINES["harmonic"].find_unsupported_feature(model, steady=True):
         return LimitCycles([], f"limit cycles cannot be computed {reason}")
-    contact = make_single_contact(model, numerics, patch)
+    element = make_single_law(model, numerics, patch).element
     try:
-        if contact.set_valued:
+        if element is not None and element.form == "rigid":
             if rig.springs.is_nonlinear:
                 return LimitCycles([], f"{RIGID_LAW_REASON} a nonlinear spring")
             if not modes.omega.all():
                 return LimitCycles([], f"{RIGID_LAW_REASON} a mode of 0 Hz")
-            static, kinetic = contact.element.numbers[1:3]
+            static, kinetic = element.numbers[1:3]
             cycles = limit_cycles.find_relay_cycles(modes, row, kinetic, static)
             return LimitCycles(cycles, NO_SLIDING_NOTE)
         finder = BalanceFinder(model, numerics, patch)

@@ -8,7 +8,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...dynamics.grooves import climbing
 from ...effects import law_has_trait
 from ...friction import record
 from ...hybrid.cases import Load
@@ -30,7 +29,7 @@ class Joints(NamedTuple):
 
     - laws: (LawNumbers, Load) of each interface.
     - elements: stiffness [N/m] and yield displacement [m] (e,) of the elements of each interface; () for other laws.
-    - contact: ContactModel of a patch that slips part by part, or None.
+    - contact: interface.SingleLaw of a patch that slips part by part, or None.
     - stick_tolerance: largest slip per cycle [m] at which the interfaces count as stuck.
     """
 
@@ -97,7 +96,8 @@ def _list_laws(model: Model, patch) -> list[tuple[LawNumbers, Load]]:
 
     load = _make_load(model, patch)
     if model.grooves is not None:
-        climbing.check_lifted_mass(model.grooves, friction.static, rig.modes)
+        slide = rig.modes.slide
+        model.grooves.check_lifted_mass(friction.static, rig.modes.mass / float(slide @ slide))
         is_rigid = law_has_trait(friction.law, "set-valued")
         make = make_grooves if is_rigid else smooth_grooves.make_grooves
         return [(make(friction, model.grooves), load)]
@@ -127,7 +127,7 @@ def _make_soft_joints(model: Model, numerics: Numerics, patch) -> Joints:
     elif len(rig.modes.interfaces) > 1:
         elements = list_elements(model, numerics, patch)
     else:
-        contact = interface.make_single_contact(model, numerics, patch)
+        contact = interface.make_single_law(model, numerics, patch)
         elements = [_read_elements(contact.element)]
 
     # The engine has a continuous law for interfaces without a patch that slips part by part.
@@ -162,7 +162,7 @@ def list_elements(model: Model, numerics: Numerics, patch) -> list[tuple[np.ndar
     if len(model.rig.modes.interfaces) > 1:
         parts = interface.make_interface_elements(model, numerics.meshed)
     else:
-        parts = [interface.make_single_contact(model, numerics, patch).element]
+        parts = [interface.make_single_law(model, numerics, patch).element]
     return [_read_elements(part) for part in parts]
 
 

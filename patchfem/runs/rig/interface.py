@@ -1,40 +1,55 @@
-"""Contact model of an engine, from friction law, load and patch.
+"""Contact points of a time integration, and laws of single interfaces, from friction law, load and patch.
 
-In: a Model, its Numerics and its Patch. Out: a contact model of `dynamics` (single interface,
-several joints, grooves, varying load), or the Elements of every interface.
+In: a Model, its Numerics and its Patch. Out: a `points.contacts.Contact`, or the Elements of the interfaces.
 """
+
+from typing import NamedTuple
 
 import numpy as np
 
-from ...dynamics.march import joints, models
-from ...effects import law_has_trait
+from ...contact import contact_sets
+from ...core import PatchfemError
+from ...effects import describe_unsupported, law_has_trait, needs_bond_list
+from ...friction.laws import coulomb
 from ...friction.laws.elastic_plastic import parallel_element
 from ...friction.laws.stretch import points_element
 from ...friction.protocol import Element
 from ...friction.record import make_law
 from ...model.law import InterfaceLaw, make_bond_parameters
 from ...model.model import Model
+from ...points import contacts
 from ...slip import fields, shear_modes
 from ...structure.drive_sizes import find_drive_omega
-from ..bench import averaged_law, rigid, shear
+from ..bench import averaged_law, shear
 from ..patch import faces, jenkins_elements, store
-from . import strips, varying_load
+from . import strips
 from .bond_lists import choose_bond_summation
 from .numerics import Numerics
 
 # Largest ratio of the error of the backbone curve to the tolerance, in the reduction to few modes
 # and in that to few points.
 REDUCTION_TOL_FRACTION = 1e-3
+# Pressure that is added to each node in the weights of shear modes under a changing load, relative to the mean pressure.
+MIN_PRESSURE_FRACTION = 1.0
 
 
-def make_contact(model: Model, numerics: Numerics, patch):
-    """Return the contact model of a time integration, with all interfaces and nonlinear springs.
+class SingleLaw(NamedTuple):
+    """Law of one interface without internal degrees of freedom, or of a patch as parallel elements.
 
-    It is a ContactModel for a single interface, a JointsModel for several interfaces or nonlinear
-    springs, or a model of grooves. Under a nonlocal law with [contact.shear], the nodes of the patch
-    with pressure become points of bonds with the friction limits mu sigma_n area [N]. They are coupled
-    by shear modes of the pieces, as many as keep the error of the backbone curve below a tenth of the
-    tolerance (`slip.shear_modes`).
+    - element: Element, or None for bonds that are no single element
+    - reduction: JenkinsSet of a patch, or None
+    """
+
+    element: Element | None
+    reduction: object = None
+
+
+def make_contact(model: Model, numerics: Numerics, patch) -> contacts.Contact:
+    """Return the contact points of a time integration, with all interfaces and nonlinear springs.
+
+    Under a nonlocal law with [contact.shear], the nodes of the patch with pressure become points of bonds with the
+    friction limits mu sigma_n area [N]. They are coupled by shear modes of the pieces, as many as keep the error of the
+    backbone curve below a tenth of the tolerance (`slip.shear_modes`).
 
     Parameters
     ----------
@@ -46,30 +61,41 @@ def make_contact(model: Model, numerics: Numerics, patch):
     Raises
     ------
     PatchfemError
-        If the law cannot be combined with other joints.
+        If the law cannot be combined with the load or with other interfaces.
     """
     rig = model.rig
-    has_joints = len(rig.modes.interfaces) > 1
+    rows = rig.modes.interfaces
+    springs = []
+    if rig.springs.interlock is not None:
+        springs.append(contacts.make_interlocking_spring(*rig.springs.interlock, rows[0]))
+    if rig.springs.cubic is not None:
+        springs.append(contacts.make_cubic_spring(rig.springs.cubic, rig.modes.output))
+    scale = rig.modes.mass * find_drive_omega(rig.drive.signal) * rig.speed_scale
+    if len(rows) > 1:
+        elements = _make_independent_elements(model, numerics, patch)
+        return contacts.make_contact(elements, rows, springs, scale)
+    if model.friction is None:
+        return contacts.make_contact([], rows[:0], springs, scale)
+    contact = _make_own_contact(model, numerics, patch, rows[0])
+    return contacts.add_springs(contact, springs)
+
+
+def _make_own_contact(model: Model, numerics: Numerics, patch, row) -> contacts.Contact:
+    """Return the contact points of the only interface, of the slide `row` (n,) per coordinate."""
     if model.grooves is not None:
         load = patch.pressure.load if patch is not None else model.point.load
-        return rigid.make_climbing_model(model, load, patch, numerics.shear_modes)
-    alone = None if has_joints else make_single_contact(model, numerics, patch)
-    if not has_joints and not rig.springs.is_nonlinear:
-        return alone
-
-    rows = [*rig.modes.interfaces]
-    all_joints = []
-    if has_joints:
-        elements = _make_independent_elements(model, numerics, patch)
-        all_joints = [joints.Joint(k, element) for k, element in enumerate(elements)]
-    if rig.springs.interlock is not None:
-        all_joints.append(joints.make_interlocking_spring(0, *rig.springs.interlock))
-    if rig.springs.cubic is not None:
-        all_joints.append(joints.make_cubic_spring(len(rows), rig.springs.cubic))
-        rows.append(rig.modes.output)
-    size = rig.modes.mass * find_drive_omega(rig.drive.signal) * rig.speed_scale
-    single_contact = alone if alone is not None and alone.limit > 0 else None
-    return joints.JointsModel(single_contact, tuple(all_joints), np.array(rows), size)
+        return shear.make_flank_contact(model, load, patch, numerics.shear_modes)
+    if model.rig.friction.load_varies:
+        return _make_varying_contact(model, numerics, patch, row)
+    law = model.friction.law
+    load = patch.pressure.load if patch is not None else model.point.load
+    if law_has_trait(law, "bonds"):
+        choice = choose_bond_summation(model, numerics)
+        if model.partial_slip or choice.engine != "recursion" or numerics.per_point:
+            return _make_bond_contact(model, numerics, patch, load, row)
+    single = make_single_law(model, numerics, patch)
+    contact = contacts.make_contact([single.element], [row])
+    return contacts.with_elements(contact, single.reduction)
 
 
 def _make_independent_elements(model: Model, numerics: Numerics, patch) -> list:
@@ -118,8 +144,8 @@ def make_element(interface: InterfaceLaw, load: float, speed: float) -> Element:
     return make_law(f, load).element(load)
 
 
-def make_single_contact(model: Model, numerics: Numerics, patch):
-    """Return the contact model of a rig with one interface.
+def make_single_law(model: Model, numerics: Numerics, patch) -> SingleLaw:
+    """Return the law of a rig with one interface under a constant load.
 
     Parameters
     ----------
@@ -129,83 +155,66 @@ def make_single_contact(model: Model, numerics: Numerics, patch):
         None under [normal].
     """
     f = model.friction
-    has_partial_slip = model.partial_slip
     if f is None:
-        return models.frictionless_model()
-    if model.rig.friction.load_varies:
-        return varying_load.make_varying_load_model(model, numerics, patch)
+        return SingleLaw(parallel_element([0.0], [1.0]))
     if model.rig.friction.has_partial_slip:
-        return models.jenkins_model(
-            *faces.make_patch_elements(
-                model.rig.friction.interfaces[0], model.accuracy.tolerance, 0 in numerics.meshed
-            )
-        )
+        own = model.rig.friction.interfaces[0]
+        parts = faces.make_patch_elements(own, model.accuracy.tolerance, 0 in numerics.meshed)
+        return SingleLaw(parallel_element(*parts[:2]), parts[2])
     load = patch.pressure.load if patch is not None else model.point.load
     if law_has_trait(f.law, "bonds"):
-        return _make_bond_contact(model, numerics, patch, load)
+        is_single = not (model.partial_slip or numerics.per_point)
+        if is_single and choose_bond_summation(model, numerics).engine == "recursion":
+            return SingleLaw(points_element(model.bonds, [1.0], [load]))
+        return SingleLaw(None)
     if law_has_trait(f.law, "averaged"):
-        return models.coulomb_model(
-            *(f.static * load * averaged_law.slip_force_ratio(model, patch),) * 2
-        )
+        limit = f.static * load * averaged_law.slip_force_ratio(model, patch)
+        return SingleLaw(coulomb.Coulomb(limit, limit).element(1.0))
     element = make_law(f, load).element(load)
-    if not has_partial_slip:
-        return models.element_model(element)
-
+    if not model.partial_slip:
+        return SingleLaw(element)
     if patch.strips is not None:  # Strips of a patch that does not yaw have the same displacement.
-        strip_elements = jenkins_elements.strip_elements(patch, f.static, element.length)
-        return models.jenkins_model(*map(np.concatenate, zip(*strip_elements)))
+        parts = jenkins_elements.strip_elements(patch, f.static, element.length)
+        return SingleLaw(parallel_element(*map(np.concatenate, zip(*parts))))
     elements = jenkins_elements.elements(patch, f.static, element.length)
-    return models.jenkins_model(elements.stiffness, elements.yield_displacement, elements)
+    return SingleLaw(parallel_element(elements.stiffness, elements.yield_displacement), elements)
 
 
-def _make_bond_contact(model: Model, numerics: Numerics, patch, load: float):
-    """Return the contact model of a nonlocal law.
-
-    The bonds are summed in a list, at the points of shear modes, at the nodes, or at a single
-    point.
-    """
+def _make_bond_contact(model: Model, numerics: Numerics, patch, load: float, row):
+    """Return the points of a nonlocal law: at the points of shear modes, at the nodes, or at a single point."""
     law = model.bonds
     choice = choose_bond_summation(model, numerics)
-    is_list = choice.engine != "recursion"
-    limit = model.friction.static * load
-    if model.side == "lower" and (model.partial_slip or is_list):
-        modes = None
+    bond_sum = shear.make_bond_sum(law, choice)
+    if patch is None:
+        return contacts.make_bond_contact(law, load, row, None, bond_sum)
+    modes = None
+    if model.side == "lower":
         if model.partial_slip:
             modes = shear.compute_point_shear_modes(model, patch, numerics.shear_modes)
-        return shear.make_bond_lists_on_lower_piece(model, patch, choice, modes)
-    if is_list and not model.partial_slip:
-        return models.bond_list_model(law, limit, choice.reach(law.order), choice.merge)
+        return shear.make_lower_contact(model, patch, row, modes, bond_sum)
     if model.partial_slip:
-        reduced, force = _compute_shear_modes(patch, law, numerics.shear_modes, model)
-        if is_list:
-            return shear.make_bond_lists_with_shear(patch, law, reduced, choice, force)
-        if force is not None:
-            return models.points_model(law, force, np.ones_like(force), reduced)
-        weight = patch.pieces.interface.weight
-        return models.points_model(law, weight, patch.pressure.sigma_n, reduced)
-    if numerics.per_point:
-        x = patch.x
-        weight = patch.pieces.interface.weight
-        sigma = patch.pressure.sigma_n
-        return models.points_model(
-            law, weight, sigma, None, (x, sigma) if model.side == "lower" else None
-        )
-    return models.points_model(law, [1.0], [load])
+        modes, force = _compute_shear_modes(patch, law, numerics.shear_modes, model)
+        return contacts.make_bond_contact(law, force, row, modes, bond_sum)
+    if bond_sum is None and numerics.per_point:
+        force = patch.pressure.sigma_n * patch.pieces.interface.weight
+        return contacts.make_bond_contact(law, force, row)
+    return contacts.make_bond_contact(law, load, row, None, bond_sum)
 
 
 def _compute_shear_modes(patch, law, n_modes: int | None, model) -> tuple:
-    """Compute the shear modes of a patch, and the normal forces if it is reduced to few points.
+    """Compute the shear modes of a patch, and the normal forces (k,) [N] of their points.
 
-    The forces (k,) [N] are normal forces; they are None if all nodes are points. Both are cached
-    for all runs with the same Patch.
+    Both are cached for all runs with the same Patch.
     """
     tolerance = model.accuracy.tolerance
     has_few_points = model.patch.mesh.can_gather_points
 
     def make() -> tuple:
-        """Compute the shear modes, and the normal forces of the few points."""
+        """Compute the shear modes, and the normal forces of the points."""
         if not has_few_points:
-            return fields.bond_shear_modes(patch, law, n_modes, 0.1 * tolerance, fewest=False), None
+            reduced = fields.bond_shear_modes(patch, law, n_modes, 0.1 * tolerance, fewest=False)
+            force = patch.pressure.sigma_n * patch.pieces.interface.weight
+            return reduced, force[reduced.points]
         mode_tolerance = REDUCTION_TOL_FRACTION * tolerance
         reduced = fields.bond_shear_modes(patch, law, n_modes, mode_tolerance, fewest=True)
         reduced, limit, _ = shear_modes.find_fewest_gauss_points(
@@ -215,3 +224,142 @@ def _compute_shear_modes(patch, law, n_modes: int | None, model) -> tuple:
 
     key = ("shear modes", patch, law, n_modes, tolerance, has_few_points)
     return store.get_or_compute(key, make)
+
+
+# ---- loads that change
+
+
+def _make_varying_contact(model: Model, numerics: Numerics, patch, row) -> contacts.Contact:
+    """Return the points of an interface whose load changes with the motion, or over time.
+
+    Raises
+    ------
+    PatchfemError
+        If law, load and patch cannot be combined.
+    """
+    f = model.friction
+    modes = model.rig.modes
+    law = f
+    bond_sum = None
+    if law_has_trait(f.law, "bonds"):
+        law = model.bonds
+        if needs_bond_list(f) and law.reading != "report":
+            raise PatchfemError(
+                describe_unsupported(
+                    "friction: a changing normal load together with reading = 'stretch' and an order other than 1",
+                    "recursion",
+                )
+            )
+        if needs_bond_list(f):
+            choice = choose_bond_summation(model, numerics)
+            bond_sum = contacts.BondSum(law, choice.reach(f.order), choice.merge)
+    if patch is None:
+        if any(part is not None and np.any(part) for part in (modes.normal, modes.pitch)):
+            raise PatchfemError(
+                "structure.mode.normal: with [normal] the contact is a single point, which cannot move normal to the "
+                "contact (`normal`) or rotate (`pitch`); use [contact] in place of [normal]"
+            )
+        preload = float(model.point.evaluate(np.zeros(1))[0])
+        return contacts.make_pressed_contact(
+            law, preload, row, bond_sum=bond_sum, load=model.point.evaluate
+        )
+    sets = make_contact_sets(patch, model.patch.loading.rotational_stiffness)
+    weight = patch.pieces.interface.weight
+    force = patch.pressure.sigma_n * weight
+    mean = force.sum() * weight / weight.sum()
+    measure = force + mean * MIN_PRESSURE_FRACTION
+    modes_of_pieces = None
+    if model.partial_slip:
+        modes_of_pieces = choose_shear_modes(
+            model, patch, law, force, measure, numerics.shear_modes
+        )
+    still = np.zeros(modes.omega.size)
+    return contacts.make_pressed_contact(
+        law,
+        force,
+        row,
+        modes_of_pieces,
+        bond_sum,
+        sets=sets,
+        heave=still if modes.normal is None else np.asarray(modes.normal, float),
+        pitch=still if modes.pitch is None else np.asarray(modes.pitch, float),
+    )
+
+
+def make_contact_sets(patch, spring: float = 0.0) -> "contact_sets.ContactSets":
+    """Return the contact sets of a patch in the vicinity of its solved contact state.
+
+    The rotational spring of the holder is in series with the pitch, as a compliance x_i x_j/K in addition to that of the
+    pieces.
+
+    Parameters
+    ----------
+    patch : Patch
+    spring : float
+        Rotational stiffness of the holder [N m/rad], 0 for a rigid one.
+
+    Raises
+    ------
+    PatchfemError
+        For a nonlinear asperity layer, for strips and for a patch that carries no load.
+    """
+    if patch.has_smooth_skin:
+        raise PatchfemError(
+            describe_unsupported(
+                "contact.asperities.law: a nonlinear law under a normal load that changes", "linear"
+            )
+        )
+    if patch.strips is not None:
+        raise PatchfemError(
+            describe_unsupported("[contact.strips] with a normal load that changes", "either")
+        )
+    force = patch.pressure.sigma_n * patch.pieces.interface.weight
+    compliance = patch.pieces.normal
+    if spring > 0:
+        compliance = compliance + np.outer(patch.x, patch.x) / spring
+    return contact_sets.ContactSets(
+        compliance, patch.x, patch.pressure.gap - compliance @ force, force > 0
+    )
+
+
+def choose_shear_modes(model: Model, patch, law, force, measure, count: int | None):
+    """Return the shear modes of pieces whose contact set changes during the motion.
+
+    The modes are weighted with mu_s times the preload plus MIN_PRESSURE_FRACTION of its mean pressure, so that nodes that
+    are open at first also count; with m modes they are exact for any weights.
+
+    Parameters
+    ----------
+    model : Model
+    patch : Patch
+    law : Bonds, or the keys of an elastic-plastic law
+    force, measure : (m,) array
+        Nodal forces of the preload [N], without and with the fraction of the mean pressure.
+    count : int or None
+        Number of modes; None for as many as a tenth of the tolerance needs.
+
+    Raises
+    ------
+    PatchfemError
+        If the law has no elastic range, or the patch is unstable.
+    """
+    if getattr(law, "law", "bonds") in ("coulomb", "tanh"):
+        raise PatchfemError(
+            describe_unsupported(
+                "friction.law: this law together with [contact.shear] and a normal load that changes",
+                "stiff",
+            )
+        )
+    compliance = patch.slip_compliance
+    length = getattr(law, "length", None) or law.bond_length
+    # An unstable patch could jump without a change of the drive, so it is rejected as under a constant load.
+    if getattr(law, "has_growth", False):
+        weakening = 1 / law.ratio if law.ratio > 0 else np.inf
+        shear_modes.shear_modes(compliance, law.static * force, length, 1, weakening)
+    limit = law.static * measure
+    if count is not None:
+        return shear_modes.shear_modes(compliance, limit, length, count)
+    tolerance = 0.1 * model.accuracy.tolerance
+    return shear_modes.find_sufficient_modes(
+        compliance, limit, length, shear_modes.N_SHEAR_MODES, tolerance
+    )

@@ -29,11 +29,6 @@ EXACT_RELATIVE_ERROR = 1e-9
 MAX_BISECTIONS = 40
 
 
-def list_level_ends(rig) -> tuple:
-    """Return the cycle numbers (l,) at which the drive levels end."""
-    return tuple(rig.drive.levels.cycles * (k + 1) for k in range(len(rig.drive.levels.amplitudes)))
-
-
 def add_level_errors(levels, coarser_runs: list, solutions: dict) -> tuple:
     """Add the differences from coarse runs to the errors of each drive level.
 
@@ -109,22 +104,6 @@ def find_onset(levels, run_level, tolerance: float, is_past_onset=None) -> tuple
         else:
             low = middle
     return (low + high) / 2, (high - low) / 2
-
-
-def replace_level(drive, number: int, level: float):
-    """Return a drive in levels that ends after level `number`, whose amplitude is replaced.
-
-    Parameters
-    ----------
-    drive
-        Drive in levels.
-    number : int
-        Index of the level.
-    level : float
-        [m s-2].
-    """
-    segment = replace(drive.segments[number], amplitude=level)
-    return replace(drive, segments=(*drive.segments[:number], segment))
 
 
 def compute_level_measures(

@@ -4,19 +4,19 @@ In: a Model, its Numerics and its Patch. Out: a Solution. The measures come from
 work of the energy balance and the harmonics of the loop.
 """
 
+from functools import partial
+from operator import attrgetter
 from time import perf_counter
-from typing import NamedTuple
 
 import numpy as np
 
 from ...core import IntegratedMeasures
-from ...dynamics.march import march as engine
 from ...effects import law_has_trait
 from ...friction.record import make_law
+from ...points import time_march as engine
 from ...response.ends import estimate_window_error
 from ...response.inside_steps import add_substep_samples
 from ...response.measures import compute_step_harmonic, peak_sampling_errors
-from ...response.rows import ROWS_NEEDING_RUN
 from ...response.spectrum import friction_harmonic, motion_harmonic
 from ...structure.drive_sizes import (
     estimate_peak_speed,
@@ -34,21 +34,6 @@ from .solution import CycleLoop, Solution, compute_sampled_loop, first_interface
 # Safety factor on the first-order error due to a run that does not end exactly at the requested
 # time.
 END_ERROR_FACTOR = 1.5
-
-
-class March(NamedTuple):
-    """Completed time integration of a rig, with its contact model and CPU time.
-
-    - contact: contact model of the time integration.
-    - result: MarchResult.
-    - seconds: CPU time of the integration [s].
-    - prepare: CPU time of each part of the preparation [s].
-    """
-
-    contact: object
-    result: object
-    seconds: float
-    prepare: dict
 
 
 def march_in_time(model, numerics, patch, frames: int = 0, say=None, progress=None) -> Solution:
@@ -69,53 +54,45 @@ def march_in_time(model, numerics, patch, frames: int = 0, say=None, progress=No
     Solution
         Without errors from coarse runs.
     """
-    march = integrate_without_postprocessing(model, numerics, patch, frames, say, progress)
-    evaluator = MarchEvaluator(model, numerics, patch, march.contact)
-    return evaluator.make_solution(march.result, march.seconds, prepare=march.prepare)
-
-
-def integrate_without_postprocessing(
-    model, numerics, patch, frames: int = 0, say=None, progress=None
-) -> March:
-    """Integrate the motion of a rig in time steps without evaluating its measures.
-
-    Parameters
-    ----------
-    model, numerics, patch, frames, say, progress
-        See `march_in_time`.
-    """
     rig = model.rig
     begin = perf_counter()
     contact = make_contact(model, numerics, patch)
     reduced = perf_counter() - begin
-    engine.warm_up(rig.modes, rig.drive.signal, contact, say)
-    loaded = perf_counter() - begin - reduced
+    engine.load_kernels(contact, say)
+    prepare = {"reduce": reduced, "compiled_code": perf_counter() - begin - reduced}
     begin = perf_counter()
     # Strips that slide independently have no common shear stress, so no output frames are stored.
-    frames = 0 if rig.friction.strips_slide_apart else frames
+    slide_apart = rig.friction.strips_slide_apart
     progress = BondListGuard(progress) if has_bond_list(model, numerics) else progress
     # The histories of a patch that is reduced to a few points are not used.
-    keeps_extremes = model.patch is not None and model.patch.mesh.can_gather_points
-    run = engine.march(
-        rig.modes,
-        rig.drive.signal,
-        contact,
-        numerics.cycles,
-        numerics.steps,
-        numerics.window,
-        rig.springs.travel,
-        frames,
-        say,
-        progress,
-        rig.start,
-        rig_levels.list_level_ends(rig),
-        keeps_samples=numerics.whole and not keeps_extremes,
-        keeps_extremes=keeps_extremes,
-        even=bool(ROWS_NEEDING_RUN),
+    is_gathered = model.patch is not None and model.patch.mesh.can_gather_points
+
+    def integrate(drive, before, watch, is_last, cycles=numerics.cycles):
+        """Integrate under a drive from the end of another run, None for the start of the rig."""
+        run = engine.march(
+            rig.modes,
+            drive,
+            contact,
+            cycles,
+            numerics.steps,
+            window=numerics.window,
+            travel=rig.springs.travel,
+            start=rig.start if before is None else before,
+            frames=0 if slide_apart or not is_last else frames,
+            keeps_samples=numerics.whole and not is_gathered,
+            progress=watch,
+        )
+        return strips.average_march_over_strips(run, patch) if slide_apart else run
+
+    evaluator = MarchEvaluator(model, numerics, patch, contact)
+    if not rig.drive.levels.amplitudes:
+        run = integrate(rig.drive.signal, None, progress, True)
+        return evaluator.make_solution(run, perf_counter() - begin, prepare=prepare)
+    cycles = rig.drive.levels.cycles
+    run, fields = rig_levels.run_levels(
+        evaluator, partial(integrate, cycles=cycles), None, attrgetter("end"), progress
     )
-    seconds = perf_counter() - begin
-    run = strips.average_march_over_strips(run, patch) if rig.friction.strips_slide_apart else run
-    return March(contact, run, seconds, {"reduce": reduced, "compiled_code": loaded})
+    return evaluator.make_solution(run, perf_counter() - begin, prepare=prepare, **fields)
 
 
 class MarchEvaluator(RunEvaluator):
@@ -139,8 +116,6 @@ class MarchEvaluator(RunEvaluator):
             changes = estimate_window_error(run.window, period, n_steps - round(n_steps))
             late = {name: END_ERROR_FACTOR * change for name, change in changes.items()}
         fields = {"bond_summation": self.choose_bond_summation(), "extra": {"late": late}}
-        if self.model.rig.drive.levels.amplitudes:
-            fields["levels"], fields["run_level"] = self._evaluate_levels(run)
         return fields
 
     def estimate_run_errors(self, run, drive, values: dict) -> dict:
@@ -258,25 +233,3 @@ class MarchEvaluator(RunEvaluator):
         if span > 0:
             force = compute_step_harmonic(window.time, run.step_force, omega)
         return compute_sampled_loop(window, drive, work, force)
-
-    def _evaluate_levels(self, done) -> tuple:
-        """Return the drive levels of a run, and a function that runs another level."""
-        rig = self.model.rig
-        numerics = self.numerics
-
-        def run_level(number, level):
-            """Run a level from the final state of level `number`, or from rest if it is -1."""
-            other = rig_levels.replace_level(rig.drive.signal, number + 1, level)
-            if number >= 0:
-                run = done.marks[number].after.fork(other)
-            else:
-                run = engine.start_run(
-                    rig.modes, other, self.contact, numerics.steps, rig.springs.travel, rig.start
-                )
-            mark = run.march_to_mark(round(rig.drive.levels.cycles), numerics.window)
-            if rig.friction.strips_slide_apart:
-                mark = strips.average_last_cycles_over_strips(mark, self.patch)
-            return self.evaluate_level(level, mark, other)
-
-        marks = zip(rig.drive.levels.amplitudes, done.marks)
-        return tuple(self.evaluate_level(size, mark) for size, mark in marks), run_level

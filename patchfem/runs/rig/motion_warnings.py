@@ -70,7 +70,7 @@ def collect_warnings(run) -> list:
         )
     if model.grooves is not None and model.partial_slip:
         warnings += note_on_shear_modes(
-            model, solution.contact.shear.stiffness.size, solution.contact.shear.points.size
+            model, solution.contact.reduction.stiffness.size, solution.contact.reduction.points.size
         )
     warnings += [
         *warn_of_work_check(measures, steps, harmonics),

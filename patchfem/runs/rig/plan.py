@@ -8,10 +8,10 @@ from math import inf, pi
 
 import numpy as np
 
-from ...dynamics.march import capacity
 from ...effects import law_has_trait
 from ...friction.bonds import parameters
 from ...model.model import Model
+from ...points import time_march
 from ...response.rows import add_interface_number, remove_interface_number
 from ...slip import shear_modes
 from ...structure.drive_sizes import find_drive_omega, find_max_acceleration
@@ -165,7 +165,9 @@ def _count_march_sizes(model: Model, numerics, n_points: int) -> RunSizes:
     has_bonds = model.grooves is None and law_has_trait(f.law, "bonds")
     if has_bonds and bond_lists.has_bond_list(model, numerics):
         entries = int(bond_lists.estimate_bond_list_cost(model, numerics).strips)
-        part = MemoryPart(capacity.list_bytes(entries), "the list of bonds", "accuracy.tail")
+        part = MemoryPart(
+            time_march.count_list_bytes(entries), "the list of bonds", "accuracy.tail"
+        )
         return RunSizes({"bond_list_about": entries}, (part,))
     load_varies = model.rig.friction.load_varies
     if model.partial_slip and (has_bonds or model.grooves is not None or load_varies):

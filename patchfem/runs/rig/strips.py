@@ -23,17 +23,8 @@ def average_march_over_strips(march, patch):
         march,
         response=average_histories_over_strips(march.response, loads, offsets),
         window=window,
-        marks=tuple(average_last_cycles_over_strips(mark, patch) for mark in march.marks),
         step_force=(window.force[1:] + window.force[:-1]) / 2,
     )
-
-
-def average_last_cycles_over_strips(level_end, patch):
-    """Average the last cycles at the end of a drive level over independently sliding strips."""
-    window = average_histories_over_strips(
-        level_end.window, compute_strip_loads(patch), patch.strips.offsets
-    )
-    return replace(level_end, window=window, step_force=(window.force[1:] + window.force[:-1]) / 2)
 
 
 def average_histories_over_strips(response, loads, offsets):

@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...contact import strips
+from ...contact.press import strip_offsets
 from ...core import PatchfemError, frozen_array
 from ...disk.atomic_write import write_atomically
 from ...wear.depth import wear_rates
@@ -314,8 +314,7 @@ def _take_next_jump(model, problem: WearProblem, state: WearState) -> WearState:
         """Compute the state after a jump that ends at a given cycle or earlier."""
         return take_jump(problem, state, model.accuracy.tolerance, model.wear.jumps, until=cycle)
 
-    if model.patch.interface.strips is not None:
-        problem.press.start_from_forces(state.force)
+    problem.press.start_from_forces(state.force)
     next_state = jump_to(find_cycle_of_next_table_row(model.wear, problem, state))
     low = state.cycle
     high = np.inf
@@ -462,8 +461,8 @@ def _replay_wear(patch_model, model, patch, other_patch, moments) -> tuple:
             return np.interp(other_patch.x, patch.x, path)
         rows = np.array([np.interp(other_patch.x, patch.x, row) for row in path])
         width = patch_model.pieces.width
-        offsets = strips.strip_offsets(width, len(area))
-        row_offsets = strips.strip_offsets(width, len(rows))
+        offsets = strip_offsets(width, len(area))
+        row_offsets = strip_offsets(width, len(rows))
         return np.array([np.interp(offsets, row_offsets, column) for column in rows.T]).T
 
     jumps = []

@@ -6,7 +6,7 @@ and the reference of keys are made from it. `scene.rules` says which keys need o
 
 from __future__ import annotations
 
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import Field, field_validator
 
@@ -83,9 +83,6 @@ class Temperature(Table):
 
 class Friction(Table):
     """The friction law; `law` decides which of the other keys are needed."""
-
-    # Elastic part of the bond length. Its key was removed in 2.0; the engines that read it find 0.
-    breakaway: ClassVar[float] = 0.0
 
     law: key(LawName, "the friction law")
     static: key(NonNegative, "coefficient of static friction mu_s")

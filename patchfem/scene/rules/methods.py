@@ -9,6 +9,7 @@ from ...effects import (
     describe_law,
     describe_unsupported,
     find_waveform,
+    has_return_map,
     law_has_trait,
     law_supports,
     needs_bond_list,
@@ -102,7 +103,7 @@ ENGINE_SUPPORT = {
     "hybrid": EngineSupport("events", "no-law yaw faces levels parts spring load grooves"),
     "exact": EngineSupport("exact", "no-law yaw faces levels"),
     "piecewise": EngineSupport("pieces", "parts faces levels"),
-    "march": EngineSupport("", " ".join(FEATURE_FINDERS)),
+    "march": EngineSupport("march", " ".join(FEATURE_FINDERS)),
     "harmonic": EngineSupport("", "no-law parts grooves spring faces levels"),
 }
 # Support of the maps of a period by which method "harmonic" finds steady motions exactly.
@@ -140,11 +141,14 @@ def _find_unsupported_joint(support: EngineSupport, motion: MotionFeatures) -> J
 
     The map of events ("exact") needs patches that slip as a whole. A law that sticks without displacement becomes
     spring-slider elements ("pieces") only with a compliance in series. Motions from event to event ("events") exist for
-    all laws with a finite number of states, and for the elements of a patch that slips part by part.
+    all laws with a finite number of states, and for the elements of a patch that slips part by part; time steps ("march")
+    for all laws with a return map.
     """
     for joint in motion.joints:
         if support.law == "events":
             is_supported = _has_finite_state(joint, motion)
+        elif support.law == "march":
+            is_supported = has_return_map(joint.law)
         else:
             is_supported = not support.law or law_supports(joint.law, support.law)
         if support.law == "exact":
@@ -184,6 +188,7 @@ def check_method(draft: SceneDraft, kind: str) -> None:
             METHOD_KEY, f"= '{method}' has no meaning in a {kind} scene and is not used"
         )
     check = {
+        "auto": _find_auto_obstacle,
         "exact": _find_exact_obstacle,
         "march": _find_march_obstacle,
         "harmonic": _find_harmonic_obstacle,
@@ -284,6 +289,8 @@ def _find_exact_obstacle(motion: MotionFeatures) -> str:
 
 def _find_march_obstacle(motion: MotionFeatures) -> str:
     """Return why a motion cannot be computed in time steps, or "" if it can."""
+    if feature := find_unsupported_feature(ENGINE_SUPPORT["march"], motion):
+        return f"'march' {feature} is not supported yet; leave `method` out"
     laws = [joint.law.law for joint in motion.joints]
     if not motion.has_grooves or not laws or not law_has_trait(laws[0], "memoryless"):
         return ""
@@ -293,6 +300,15 @@ def _find_march_obstacle(motion: MotionFeatures) -> str:
         f"the motion over grooves under law '{laws[0]}' is computed from event to event since 2.0; use 'exact' or leave "
         "`method` out"
     )
+
+
+def _find_auto_obstacle(motion: MotionFeatures) -> str:
+    """Return why no engine can compute a motion in time, or "" if one can."""
+    feature = find_unsupported_feature(ENGINE_SUPPORT["march"], motion)
+    why = find_unsupported_feature(ENGINE_SUPPORT["hybrid"], motion)
+    if not (feature and why):
+        return ""
+    return f"the motion cannot be computed from event to event {why}, nor in time steps {feature}; use another law"
 
 
 def _find_harmonic_obstacle(motion: MotionFeatures) -> str:

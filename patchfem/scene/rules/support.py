@@ -328,6 +328,10 @@ SUPPORT = (
         "accuracy.harmonics, accuracy.method=harmonic, grooves",
         "leave `harmonics` out: the motion is integrated until it repeats",
     ),
+    (
+        "accuracy.harmonics, accuracy.method=harmonic, several interfaces",
+        "leave `harmonics` out: the steady motion of all interfaces is found without it",
+    ),
     ("patch.holder.tangential_stiffness, grooves", "out"),
     ("grooves, patch.strips, mode with yaw", "either"),
     ("grooves, patch.strips, partial slip", "either"),

@@ -1,243 +1,241 @@
-"""Alignment of two traces: cleaning, choice of the place, fit to the unworn heights, and its checks."""
+"""Alignment of two surfaces: choice of the place, fit to the unworn heights, gain of the instrument, and checks."""
 
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy import ndimage
 
-from ...core import PatchfemError
-from ..profile import Profile, remove_spikes
-from . import changes
-from .fit import Fit, fit_unworn
+from .depth_map import UNWORN_LIMIT
+from .fit import Fit, evaluate, fit_unworn
+from .model import Model
+from .place import Place, change_second, find_place, order
+from .raster import MIN_HEIGHTS, Raster, fill_gaps
 from .statistics import (
-    MAX_GAINS,
-    UNWORN_LIMIT,
-    WAVES_PER_TRACE,
+    WAVES_PER_SIDE,
     estimate_gain,
     find_mirror_finish,
     find_mode,
-    is_other_gain,
     remove_long_waves,
-)
-from .traces import (
-    MIN_SIGNIFICANCE,
-    Place,
-    TraceModel,
-    find_places,
-    mirror,
+    smooth,
 )
 
-MIN_SAMPLES = 40  # smallest number of heights of a trace that is compared
-SURE_SIGNIFICANCE = 12.0  # significance of a place although others are nearly as significant
-LIKELY_SIGNIFICANCE = 6.0  # significance of a clear place that suffices if enough heights agree
-MIN_EXCESS = 0.2  # fraction of the heights, beyond those by chance, that agree at such a place
-MIN_AGREEMENT = 3.0  # heights that agree, relative to those of unrelated traces
-MIN_AGREEING = 0.05  # fraction of heights that agree, in addition to that
-CLEAR_MISFIT = 0.9  # misfit of a place relative to that of a more significant one that it replaces
-BEND_GAIN = (
-    0.8  # noise about a parabola relative to that about a line, from which on it is subtracted
+MAX_FIT_POINTS = (
+    40_000  # number of points to which the place is fitted; more would hardly improve it
 )
-MAX_NEW_GROWTH = 0.01  # fraction of the heights above the first trace that a parabola may add
+MIN_COMMON = 0.2  # smallest common part relative to the own surface
 MAX_STRETCH = 0.015  # largest error of length of a place
-N_OTHER_PLACES = 15  # number of other places that show how many heights agree by chance
-MIN_NOISE = 1e-15  # smallest standard deviation of a depth [m]; flat traces have none
-EVEN_DEVIATION = 1 / np.sqrt(12)  # standard deviation of a uniform error of one digit
-MAX_MORE_CHANGED = (
-    1.1  # changed heights with a gain relative to those without it; less noise shows more
+N_TERMS = {1: (2, 3), 2: (3,)}  # numbers of terms of the datums that are tried
+# Noise about a parabola relative to that about a line, from which on the parabola is subtracted.
+BEND_GAIN = 0.8
+MAX_NEW_GROWTH = 0.01  # fraction of the heights above the first trace that a parabola may add
+SURE_SIGNIFICANCE = (
+    12.0  # the same as MIN_SIGNIFICANCE, of a place among others nearly as significant
 )
+LIKELY_SIGNIFICANCE = 6.0  # significance of a place that suffices if enough heights agree
+MIN_EXCESS = 0.2  # fraction of the heights, beyond those by chance, that agree at such a place
+MIN_AGREEMENT = 3.0  # heights that agree, relative to those of unrelated surfaces
+MIN_AGREEING = 0.05  # fraction of heights that agree, in addition to that
+N_OTHER_PLACES = 15  # number of other places that show how many heights agree by chance
+MIN_NOISE = 1e-15  # smallest standard deviation of a depth [m]; flat surfaces have none
+EVEN_DEVIATION = 1 / np.sqrt(12)  # standard deviation of a uniform error of one digit
+MAX_GAINS = 8  # number of gains in turn; heights that agree show only a part of a large one
 MAX_GAIN_ERROR = 0.01  # standard deviation of the gain of two calibrated measurements
+MIN_GAIN_CHANGE = 0.003  # smallest change of the gain that is corrected
+MIN_GAIN_DEVIATIONS = 5.0  # the same in standard deviations
+# Changed heights with a gain relative to those without it; less noise shows more.
+MAX_MORE_CHANGED = 1.1
 
 
 @dataclass(frozen=True, eq=False)
 class Aligned:
-    """Two traces after alignment, or the code of the reason why they cannot be compared.
+    """Two surfaces after alignment, or the code of the reason why they cannot be compared.
 
-    - gain: factor by which the heights of the second trace were divided.
+    - gain: factor by which the heights of the second surface were divided.
     - gain_error: standard deviation of the gain, as far as the valleys show it.
     """
 
-    model: TraceModel | None = None
-    fit: Fit | None = None
     reason: str = ""
-    is_mirrored: bool = False
+    model: Model | None = None
+    fit: Fit | None = None
+    place: Place | None = None
     gain: float = 1.0
     gain_error: float = MAX_GAIN_ERROR
 
 
-def clean_trace(trace: Profile, *, keep_spikes: bool = False) -> Profile:
-    """Return the known heights of a trace, without spikes, dropouts and dust."""
-    clean = trace if keep_spikes else remove_spikes(trace)
-    known = ~clean.missing
-    if not keep_spikes:
-        known &= ~_find_saturated(trace.z)
-    if known.sum() < MIN_SAMPLES:
-        raise PatchfemError(
-            f"compare: {trace.source}: {known.sum()} heights; a comparison needs at least {MIN_SAMPLES}"
-        )
-    return replace(clean, x=clean.x[known], z=clean.z[known])
-
-
-def _find_saturated(z) -> np.ndarray:
-    """Return the heights (n,) bool at the end of the range of the instrument, far from all others."""
-    levels = np.unique(z[~np.isnan(z)])
-    is_saturated = np.zeros(z.size, bool)
-    if levels.size > 3:
-        for extreme, inner, span in (
-            (levels[0], levels[1], levels[-1] - levels[1]),
-            (levels[-1], levels[-2], levels[-2] - levels[0]),
-        ):
-            is_extreme = z == extreme
-            if is_extreme.sum() > 1 and abs(extreme - inner) > span / 2:
-                is_saturated |= is_extreme
-    return is_saturated
-
-
-def align_traces(
-    first: Profile, second: Profile, shift: float | None = None, *, is_straight: bool = False
+def align(
+    first: Raster, second: Raster, shift: float | None = None, *, is_straight: bool = False
 ) -> Aligned:
-    """Place the second trace on the first, and fit place and datum to the unworn heights.
+    """Place the second surface on the first, and fit place and datum to the unworn heights.
 
     Parameters
     ----------
-    first, second : Profile
-        Traces without missing heights.
+    first, second : Raster
     shift : float, optional
         Known shift of the second trace [m].
     is_straight : bool
-        Whether the datum is known to be straight.
+        Whether the datum of traces is known to be straight.
     """
-    places = [Place(shift, 0.0, False, np.inf)] if shift is not None else find_places(first, second)
-    best = None
-    for place in places:
-        trace = mirror(second) if place.is_mirrored else second
-        model = TraceModel(first, trace, place)
-        if model.x.size < MIN_SAMPLES:
-            continue
-        state, misfit = model.refine_place()
-        if abs(state[1]) > MAX_STRETCH:
-            continue
-        if best is None or misfit < CLEAR_MISFIT * best[3]:
-            best = place, model, state, misfit
-    if best is None:
-        return Aligned(reason="elsewhere")
-    place, model, state, _ = best
+    place = Place(-np.array([shift]), 0.0) if shift is not None else find_place(first, second)
+    model = _make_model(first, second, place)
+    if model is None:
+        return Aligned(_find_reason(first, second))
+    state = model.refine_place()
+    model.keep_common(state)
+    if model.known.sum() < MIN_HEIGHTS:
+        return Aligned(_find_reason(first, second))
 
     digit = EVEN_DEVIATION * float(np.hypot(_find_digit(first.z), _find_digit(second.z)))
     digit = max(digit, MIN_NOISE)
     fit = _fit_datum(model, state, digit, is_straight=is_straight)
-    gain, calibrated, gain_error = _calibrate(model, fit, digit, is_straight=is_straight)
-    if gain != 1.0:
-        error = min(gain_error, MAX_GAIN_ERROR)
-        return Aligned(model, calibrated, "", place.is_mirrored, gain, error)
-    is_speck = changes.find_specks(
-        model.x, model.second + fit.depth, model.second, fit.worn, fit.grown
-    )
-    if is_speck.any():
-        model.keep(~is_speck)
-        fit = fit_unworn(model, fit.state, slice(0, fit.jacobian.shape[1]), digit)
 
-    agreeing = fit.unworn.mean()
-    if shift is None and not _is_same_place(places, place, model, fit):
-        reason = "mirror_finish" if find_mirror_finish((first.z, second.z)) else "elsewhere"
-        return Aligned(model, fit, reason, place.is_mirrored)
-    reason = "" if agreeing > MIN_AGREEING else "no_datum"
-    error = min(gain_error, MAX_GAIN_ERROR)
-    return Aligned(model, fit, reason, place.is_mirrored, gain_error=error)
+    # Heights that agree show only a part of a large gain, so gains are measured in turn until none is left.
+    uncalibrated = model, fit
+    total = 1.0
+    for _ in range(MAX_GAINS):
+        gain, error = _measure_gain(model, fit)
+        if abs(gain - 1) <= max(MIN_GAIN_DEVIATIONS * error, MIN_GAIN_CHANGE):
+            break
+        total *= gain
+        scaled_model = _make_model(first, _calibrate(second, total), _move(place, fit.state))
+        scaled = _fit_datum(scaled_model, scaled_model.start, digit, is_straight=is_straight)
+        is_quieter = np.median(scaled.noise) < np.median(fit.noise)
+        if not is_quieter or scaled.n_changed > MAX_MORE_CHANGED * fit.n_changed:
+            model, fit = uncalibrated
+            total = 1.0
+            break
+        model = scaled_model
+        fit = scaled
+    if total == 1.0:
+        error = np.hypot(error, gain - 1)
+    aligned = Aligned("", model, fit, place, total, float(min(error, MAX_GAIN_ERROR)))
+
+    if shift is None and not _is_same_place(aligned):
+        return replace(aligned, reason=_find_reason(first, second))
+    if fit.unworn.mean() < MIN_AGREEING:
+        return replace(aligned, reason="no_datum")
+    return _use_all_points(aligned, first, second, digit)
 
 
-def _is_same_place(places: list[Place], place: Place, model: TraceModel, fit: Fit) -> bool:
-    """Return whether the traces have a place in common: by its significance, or by the heights that agree."""
-    chance = _estimate_chance(model.second + fit.depth, model.second, float(np.median(fit.noise)))
-    agreeing = fit.unworn.mean()
-    waves = remove_long_waves(model.second)
-    if abs(fit.state[1]) > MAX_STRETCH or np.median(fit.noise) > waves.std():
+def _find_reason(first: Raster, second: Raster) -> str:
+    is_finish = find_mirror_finish([fill_gaps(surface.z) for surface in (first, second)])
+    return "mirror_finish" if is_finish else "elsewhere"
+
+
+def _make_model(first: Raster, second: Raster, place: Place, stride: int = 0) -> Model | None:
+    """Return the model at a place, on part of the points by default; None if the surfaces hardly overlap."""
+    changed = change_second(second, mirrored=place.mirrored, inverted=place.inverted)
+    own, other = order(first, changed)
+    if not stride:
+        stride = int(np.ceil((own.z.size / MAX_FIT_POINTS) ** (1 / own.z.ndim)))
+    model = Model(own, other, place, stride)
+    count = model.known.sum()
+    return model if count >= max(MIN_HEIGHTS, MIN_COMMON * model.known.size) else None
+
+
+def _use_all_points(aligned: Aligned, first: Raster, second: Raster, digit: float) -> Aligned:
+    """Return the depths at all points, if the place was fitted to a part of them."""
+    state = aligned.fit.state
+    if aligned.model.own.z.shape == order(first, second)[0].z.shape:
+        return aligned
+    place = _move(aligned.place, state)
+    model = _make_model(first, _calibrate(second, aligned.gain), place, stride=1)
+    fit = evaluate(model, state, aligned.fit.jacobian.shape[1], digit)
+    return replace(aligned, model=model, fit=fit, place=place)
+
+
+def _calibrate(second: Raster, gain: float) -> Raster:
+    """Divide the heights about their mean by a gain."""
+    mean = np.nanmean(second.z)
+    return second._replace(z=mean + (second.z - mean) / gain)
+
+
+def _move(place: Place, state) -> Place:
+    """Return the place of a state."""
+    n_axes = place.shift.size
+    return place._replace(shift=state[:n_axes], turn=float(state[n_axes]))
+
+
+def _is_same_place(aligned: Aligned) -> bool:
+    """Return whether the surfaces have a place in common: by its significance, or by the heights that agree."""
+    model = aligned.model
+    fit = aligned.fit
+    first, second = (remove_long_waves(fill_gaps(model.draw(z))) for z in _get_heights(model, fit))
+    noise = float(np.median(fit.noise))
+    is_stretched = model.n_axes == 1 and abs(fit.state[1]) > MAX_STRETCH
+    if is_stretched or noise > second[model.known].std():
         return False
-    is_clear = len(places) == 1
-    if place.significance > (MIN_SIGNIFICANCE if is_clear else SURE_SIGNIFICANCE):
+    significance = aligned.place.significance
+    if significance > SURE_SIGNIFICANCE:
         return True
-    is_likely = is_clear and place.significance > LIKELY_SIGNIFICANCE
-    if is_likely and agreeing - chance > MIN_EXCESS * (1 - chance):
+    chance = _estimate_chance(first, second, noise)
+    agreeing = fit.unworn.mean()
+    if significance > LIKELY_SIGNIFICANCE and agreeing - chance > MIN_EXCESS * (1 - chance):
         return True
     return agreeing > MIN_AGREEMENT * chance + MIN_AGREEING
 
 
-def _fit_datum(model: TraceModel, state, digit: float, *, is_straight: bool) -> Fit:
-    """Fit a straight and a parabolic datum, and return the better one."""
-    fits = []
-    for degree in (1,) if is_straight else (1, 2):
-        start = model.find_datum(state, degree)
-        fits.append(fit_unworn(model, start, slice(0, 3 + degree), digit))
-    return fits[-1] if len(fits) > 1 and _is_bent(*fits) else fits[0]
+def _get_heights(model: Model, fit: Fit) -> tuple[np.ndarray, np.ndarray]:
+    """Return the heights (n,) [m] of the first and the second surface at the known points."""
+    own = model.own.z[model.known]
+    return (own, own - fit.depth) if model.sign > 0 else (own + fit.depth, own)
+
+
+def _estimate_chance(first, second, noise: float) -> float:
+    """Return the fraction of heights of unrelated surfaces that agree within the noise.
+
+    They are those of both surfaces, without their long waves, at other places.
+    """
+    count = first.shape[-1]
+    fractions = []
+    for k in range(1, N_OTHER_PLACES + 1):
+        depth = np.roll(first, k * count // (N_OTHER_PLACES + 1), axis=-1) - second
+        distance = np.abs(depth - find_mode(depth.ravel()))
+        fractions.append((distance < UNWORN_LIMIT * noise).mean())
+    return float(np.median(fractions))
+
+
+def _fit_datum(model: Model, state, digit: float, *, is_straight: bool) -> Fit:
+    """Fit datums with more and more terms, and return the last one that explains the depths better."""
+    best = None
+    for n_terms in N_TERMS[model.n_axes]:
+        if best is not None and is_straight:
+            break
+        start = model.find_datum(state, n_terms)
+        fit = fit_unworn(model, start, model.n_axes + 1 + n_terms, digit)
+        if best is None or _is_bent(best, fit):
+            best = fit
+    return best
 
 
 def _is_bent(straight: Fit, bent: Fit) -> bool:
     """Return whether a parabolic datum explains the depths better than a straight one."""
-    n_changed = [(fit.worn | fit.grown).sum() for fit in (straight, bent)]
     is_quieter = np.median(bent.noise) < BEND_GAIN * np.median(straight.noise)
     has_grown = bent.grown.mean() > straight.grown.mean() + MAX_NEW_GROWTH
-    return bool((is_quieter or n_changed[1] < n_changed[0] / 2) and not has_grown)
+    return bool((is_quieter or bent.n_changed < straight.n_changed / 2) and not has_grown)
 
 
-def _estimate_chance(first, second, noise: float) -> float:
-    """Return the fraction of heights of unrelated traces that agree within the noise.
-
-    They are those of both traces at other places, without their long waves.
-    """
-    waves = [remove_long_waves(z) for z in (first, second)]
-    fractions = []
-    for k in range(1, N_OTHER_PLACES + 1):
-        depth = np.roll(waves[0], k * first.size // (N_OTHER_PLACES + 1)) - waves[1]
-        fractions.append((np.abs(depth - find_mode(depth)) < UNWORN_LIMIT * noise).mean())
-    return float(np.median(fractions))
-
-
-def _measure_gain(model: TraceModel, fit: Fit) -> tuple[float, float]:
-    """Return the ratio of the depths of valleys, second to first trace, and its error.
+def _measure_gain(model: Model, fit: Fit) -> tuple[float, float]:
+    """Return the ratio of the depths of valleys, second to first surface, and its error.
 
     Tops may be worn, which an error of the gain resembles, so they do not count.
     """
-    # The mean line is that of the unworn heights, so that a track does not bend it.
-    smooth = model.second.size / WAVES_PER_TRACE
-    weight = fit.unworn.astype(float)
-    total = np.maximum(ndimage.gaussian_filter1d(weight, smooth), 1e-12)
-    first, second = (
-        z - ndimage.gaussian_filter1d(weight * z, smooth) / total
-        for z in (model.second + fit.depth, model.second)
-    )
+    # The mean surface is that of the unworn heights, so that a track does not bend it.
+    deviations = np.array(model.own.z.shape) / WAVES_PER_SIDE
+    weight = model.draw(fit.unworn.astype(float), 0.0)
+    total = np.maximum(smooth(weight, deviations), 1e-12)
+    heights = []
+    for z in _get_heights(model, fit):
+        z = model.draw(z - np.median(z), 0.0)
+        waves = z - smooth(weight * z, deviations) / total
+        heights.append(waves[model.known])
+    first, second = heights
     noise = float(np.median(fit.noise))
     use = (np.abs(fit.depth) < 4 * UNWORN_LIMIT * noise) & (first + second < 0)
     use &= ~fit.worn & ~fit.grown
     return estimate_gain(first[use], second[use], noise)
 
 
-def _calibrate(
-    model: TraceModel, fit: Fit, digit: float, *, is_straight: bool
-) -> tuple[float, Fit, float]:
-    """Divide the second trace by its gain, if that explains the depths better; return gain, fit and error of the gain.
-
-    Heights that agree show only a part of a large gain, so gains are measured in turn until none is left.
-    """
-    uncalibrated = model.second, fit
-    total = 1.0
-    for _ in range(MAX_GAINS):
-        gain, error = _measure_gain(model, fit)
-        if not is_other_gain(gain, error):
-            return total, fit, float(np.hypot(error, gain - 1))
-        total *= gain
-        mean = model.second.mean()
-        model.second = mean + (model.second - mean) / gain
-        state = np.append(fit.state[:2], [0.0, 0.0, 0.0])
-        scaled = _fit_datum(model, state, digit, is_straight=is_straight)
-        is_quieter = np.median(scaled.noise) < np.median(fit.noise)
-        changed, before = ((each.worn | each.grown).sum() for each in (scaled, fit))
-        fit = scaled
-        if not is_quieter or changed > MAX_MORE_CHANGED * before:
-            break
-    model.second, fit = uncalibrated
-    return 1.0, fit, float(np.hypot(error, gain - 1))
-
-
 def _find_digit(z) -> float:
     """Return the smallest difference of two heights [m], at most their range over 100."""
-    steps = np.diff(np.unique(z))
-    return float(min(steps.min(), np.ptp(z) / 100)) if steps.size else 0.0
+    levels = np.unique(z[np.isfinite(z)])
+    steps = np.diff(levels)
+    return float(min(steps.min(), np.ptp(levels) / 100)) if steps.size else 0.0

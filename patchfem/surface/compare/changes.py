@@ -1,4 +1,4 @@
-"""Heights of a trace that noise does not explain: single samples, running means, shallow tracks."""
+"""Heights that noise does not explain: single ones, means over windows, shallow tracks."""
 
 from functools import lru_cache
 from typing import NamedTuple
@@ -6,20 +6,19 @@ from typing import NamedTuple
 import numpy as np
 from scipy import ndimage
 
-from ..profile import find_runs
-from .statistics import compute_threshold, estimate_correlation, estimate_one_sided_scale
-
-WINDOWS = (1, 4, 16, 64)  # number of samples in the running means that are tested
-MIN_RUN = (
-    4  # samples of the shortest worn part; a single one may be an error of interpolation at a kink
+from .statistics import (
+    compute_threshold,
+    estimate_correlation,
+    estimate_one_sided_scale,
 )
-MAX_PULL = 4.0  # standard deviations to which a single depth counts in a mean
-TOP_FRACTIONS = (0.05, 0.1, 0.2, 0.4)  # fractions of the heights that are tested as worn tops
-MIN_TOP_DEVIATIONS = 6.0  # standard deviations of their mean depth above which tops are worn
-MAX_SPECK_WIDTH = 50e-6  # largest width of a speck of dust [m]
-MAX_SPECKS = 4  # number of specks above which they are worn or grown tops of the surface
-SPECK_HEIGHT = 1.2  # smallest height of a speck relative to that of all unchanged heights
-N_PARTS = 60  # number of parts of the trace whose means show a shallow track
+
+WINDOWS = {1: (1, 4, 16, 64), 2: (1, 3, 9, 25)}  # sides of the windows whose mean depth is tested
+MIN_SIDE = 4  # side of the smallest changed part; a smaller one may be an error of interpolation
+MIN_SPOT_SIDE = {1: 1, 2: 3}  # the same of points that are changed alone
+MAX_PULL = {1: 4.0, 2: 8.0}  # standard deviations to which a single depth counts in a mean
+# Fraction of the means above or below zero that are unchanged at least.
+UNCHANGED_FRACTION = {1: 0.5, 2: 0.25}
+N_PARTS = 60  # parts of the trace whose means show a shallow track
 FLANK_PARTS = 5  # smallest number of parts on either side of a shallow track
 MIN_TRACK_PARTS = 3  # smallest number of parts in a shallow track
 DATUM_DEGREE = 3  # degree of the polynomial that a datum may add to shallow depths
@@ -27,104 +26,50 @@ DATUM_DEGREE = 3  # degree of the polynomial that a datum may add to shallow dep
 MIN_STEP = 8.0
 
 
-class ShallowTrack(NamedTuple):
-    """Samples of a track that only means show, and the mean depth [m] from which on it is found.
-
-    `samples` is empty if there is none. `limit` holds for a track over the middle third.
-    """
-
-    samples: slice
-    limit: float
-
-
 def find_changed(depth, noise) -> np.ndarray:
-    """Return the samples (n,) bool whose depth, alone or in running means, noise does not explain."""
-    relative = depth / noise
-    limit = compute_threshold(len(WINDOWS) * depth.size)
-    changed = relative > limit
-    remainder = np.clip(np.where(changed, 0.0, relative), -MAX_PULL, MAX_PULL)
-    for window in WINDOWS[1:]:
-        if window > depth.size / 4:
+    """Find the points whose depth, alone or in means over windows, noise does not explain.
+
+    Parameters
+    ----------
+    depth, noise : (n,) or (m, n) array [m]
+        Depth and the standard deviation of an unworn one; NaN where unknown.
+
+    Returns
+    -------
+    array
+        Mask of the same shape.
+    """
+    known = np.isfinite(depth)
+    relative = np.where(known, depth / noise, 0.0)
+    changed = np.zeros(depth.shape, bool)
+    windows = WINDOWS[depth.ndim]
+    limit = compute_threshold(len(windows) * known.sum())
+    pull = MAX_PULL[depth.ndim]
+    remainder = np.clip(relative, -pull, pull)
+    for side in windows:
+        if side > min(depth.shape) / 4:
             break
+        use = known & ~changed
+        weight = ndimage.uniform_filter(use.astype(float), side)
+        values = relative if side == 1 else remainder
+        mean = ndimage.uniform_filter(np.where(use, values, 0.0), side) / np.maximum(weight, 0.25)
         # Slow errors of the datum make means scatter more than those of white noise.
-        mean = ndimage.uniform_filter1d(remainder, window)
-        scatter = max(estimate_one_sided_scale(mean[~changed]), 1 / np.sqrt(window))
-        changed |= ndimage.binary_dilation(mean > limit * scatter, iterations=window // 2)
-    changed[find_shallow_track(np.clip(depth, -MAX_PULL * noise, MAX_PULL * noise)).samples] = True
-    grown = ndimage.binary_dilation(changed)
-    return ndimage.binary_opening(grown, np.ones(MIN_RUN + 2))
+        fraction = UNCHANGED_FRACTION[depth.ndim]
+        scatter = estimate_one_sided_scale(mean[use & (weight > 0.5)], fraction)
+        scatter = max(scatter, side ** (-depth.ndim / 2))
+        high = (mean > limit * scatter) & (weight > 0.25)
+        spot = MIN_SPOT_SIDE[depth.ndim]
+        if side == 1:
+            changed |= ndimage.binary_opening(high, np.ones((spot,) * depth.ndim))
+        else:
+            changed |= ndimage.binary_dilation(high, np.ones((side,) * depth.ndim))
+    if depth.ndim > 1:
+        return ndimage.binary_opening(changed, np.ones((MIN_SIDE,) * depth.ndim)) & known
 
-
-def find_changed_tops(heights, relative, correlation: float) -> np.ndarray:
-    """Return the tops (n,) bool of a surface whose mean depth shows wear below the noise of a height.
-
-    The mean over the tops must differ from that of the middle heights by more than the mean of the
-    valleys does; an error of the gain of the instrument changes both alike.
-
-    Parameters
-    ----------
-    heights : (n,) array [m]
-        Means of both surfaces, whose noise is independent of that of the depth.
-    relative : (n,) array
-        Depth in standard deviations.
-    correlation : float
-        Number of neighbouring samples that share an error.
-    """
-    rank = np.argsort(np.argsort(heights)) / heights.size
-    relative = np.clip(relative, -MAX_PULL, MAX_PULL)
-    tops = np.zeros(heights.size, bool)
-    highest = MIN_TOP_DEVIATIONS
-    middle = relative[np.abs(rank - 0.5) < 0.1].mean()
-    for fraction in TOP_FRACTIONS:
-        is_top = rank > 1 - fraction
-        rise = relative[is_top].mean() - middle
-        fall = middle - relative[rank < fraction].mean()
-        deviations = (rise - 2 * abs(fall)) * np.sqrt(is_top.sum() / correlation / 2)
-        if deviations > highest:
-            highest = deviations
-            tops = is_top
-    return tops
-
-
-def find_specks(x, first, second, worn, grown) -> np.ndarray:
-    """Return the samples (n,) bool of dust and of scratches that only the first trace has.
-
-    Such places are narrow and few. Where depth is lost there, the first trace stands above the surface
-    around it and above all its other heights; in a scratch, the second trace stands below instead. Many
-    such places are worn or grown tops, and one directly beside a wide track is its ridge.
-
-    Parameters
-    ----------
-    x, first, second : (n,) array [m]
-    worn, grown : (n,) bool array
-    """
-    specks = np.zeros(x.size, bool)
-    smooth = first - ndimage.median_filter(first, min(x.size // 10, 401))
-    highest = SPECK_HEIGHT * smooth[~worn].max(initial=0.0)
-    for changed, other, is_loss in ((worn, grown, True), (grown, worn, False)):
-        found = []
-        tracks = np.zeros(x.size + 2 * MIN_RUN, bool)
-        for start, last in find_runs(other):
-            if x[last] - x[start] > MAX_SPECK_WIDTH:
-                tracks[start : last + 2 * MIN_RUN + 1] = True
-        for start, last in find_runs(changed):
-            is_ridge = tracks[start + MIN_RUN : last + MIN_RUN + 1].any()
-            if x[last] - x[start] > MAX_SPECK_WIDTH or is_ridge:
-                continue
-            inside = slice(start, last + 1)
-            margin = last - start + 3
-            beside = np.r_[
-                max(start - margin, 0) : start, last + 1 : min(last + 1 + margin, x.size)
-            ]
-            level = float(np.median(second[beside])) if beside.size else 0.0
-            rise = first[inside].max() - level
-            fall = level - second[inside].min()
-            is_dust = smooth[inside].max() > highest and rise > 2 * fall
-            if is_dust or not is_loss:
-                found.append(slice(max(start - 2, 0), last + 3))
-        for part in found if len(found) <= MAX_SPECKS else ():
-            specks[part] = True
-    return specks
+    places = np.flatnonzero(known)
+    shallow = find_shallow_track(np.clip(depth, -pull * noise, pull * noise)[known])
+    changed[places[shallow.samples]] = True
+    return ndimage.binary_opening(ndimage.binary_dilation(changed), np.ones(MIN_SIDE + 2)) & known
 
 
 class Boxes(NamedTuple):
@@ -152,6 +97,16 @@ def make_boxes(degree: int, n_beside: int, n_inside: int) -> Boxes:
     return Boxes(spans, shapes / sizes[:, None], sizes, datum)
 
 
+class ShallowTrack(NamedTuple):
+    """Samples of a track that only means show, and the mean depth [m] from which on it is found.
+
+    `samples` is empty if there is none. `limit` holds for a track over the middle third.
+    """
+
+    samples: slice
+    limit: float
+
+
 def find_shallow_track(depth) -> ShallowTrack:
     """Find a track in the means of 60 parts, by the likelihood ratio of a box beside a cubic datum."""
     if depth.size < 2 * N_PARTS:
@@ -172,3 +127,14 @@ def find_shallow_track(depth) -> ShallowTrack:
         return ShallowTrack(slice(0), limit)
     first, stop = boxes.spans[best]
     return ShallowTrack(slice(edges[first], edges[stop]), limit)
+
+
+def find_detection_limit(depth, noise) -> float:
+    """Return the mean depth [m] from which on a track of a trace, or a worn square of a scan, is found."""
+    if depth.ndim == 1:
+        return find_shallow_track(depth).limit
+    side = max(side for side in WINDOWS[2] if side <= min(depth.shape) / 4)
+    mean = ndimage.uniform_filter(np.clip(depth / noise, -MAX_PULL[2], MAX_PULL[2]), side)
+    scatter = max(estimate_one_sided_scale(mean.ravel(), UNCHANGED_FRACTION[2]), 1 / side)
+    threshold = compute_threshold(len(WINDOWS[2]) * depth.size)
+    return float(threshold * scatter * np.median(noise))

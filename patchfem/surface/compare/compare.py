@@ -1,66 +1,96 @@
 """Comparison of two surfaces before and after wear: place, datum, worn parts, verdict, numbers.
 
-Codes of the verdict: "worn", "no_wear", "grown", "worn_and_grown", "growth_at_ends", "scar_or_bow",
-"elsewhere", "no_datum", "mirror_finish", "identical".
+Traces and scans take the same way (see the package); what differs by the number of axes stands in tables. Codes of the
+verdict: "worn", "no_wear", "grown", "worn_and_grown", "growth_at_ends", "scar_or_bow", "elsewhere", "no_datum",
+"mirror_finish", "identical".
 """
 
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+from scipy import ndimage
 
 from ...core import PatchfemError
 from ..areal import Areal
 from ..files.read import read_surface
-from ..profile import Profile, resample_evenly, robust_deviation
+from ..profile import Profile, robust_deviation
 from ..quantity import SIDE, Quantity
-from . import changes, waves
-from .alignment import Aligned, align_traces, clean_trace
+from . import waves
+from .alignment import Aligned, align
+from .changes import find_detection_limit
+from .depth_map import UNWORN_LIMIT, DepthMap
+from .depths import make_depths, measure_largest
 from .flanks import find_flanked_track
+from .raster import Raster, clean_surface, fill_gaps, make_raster
 from .records import (
     Comparison,
     Datum,
     Evidence,
     Finding,
     Placement,
-    TraceCurves,
     Track,
     name_estimate,
     name_quantity,
     name_unknown,
 )
-from .section import Section, make_section, measure_hidden_area, measure_largest
-from .statistics import UNWORN_LIMIT, find_mirror_finish, remove_long_waves
-from .track import cover_spans, find_spans, measure_track
+from .section import average_section
+from .statistics import TINY, find_mirror_finish, remove_long_waves
+from .track import find_spans, get_margin, measure_track
 from .verdict import judge_change, limit_wear
 
-END_SAMPLES = 5  # number of samples from an end at which growth includes it
-MAX_TRACK_FRACTION = (
-    0.8  # width of a track relative to the common part, beyond which it may be growth at its ends
-)
+END_SAMPLES = 7  # number of lines from an end at which growth includes it
+MIN_GROWN_LINE = 0.5  # fraction of a line near an end that grew, from which on the end grew
+MARGIN = 7  # side of the square by which worn places of scans are enlarged, so that flanks count
+# Width of a track relative to the common part, beyond which it may be growth at its ends.
+MAX_TRACK_FRACTION = 0.8
 MIN_SCAR_FRACTION = 0.9  # fraction of worn heights in such a scar; worn tops have a smaller one
-MIN_BOW = (
-    3.0  # mean height of a bow relative to the detection limit, from which on it may be a scar
-)
-MIN_DEPOSITS = 0.05  # smallest grown area that is reported, relative to the lost area
+# Mean height of a bow relative to the short waves, from which on it may be a scar.
+MIN_BOW = 3.0
+MIN_DEPOSITS = 0.05  # smallest grown area or volume that is reported, relative to the lost one
 MIN_OTHER_LENGTH = 5e-4  # smallest error of length that is reported
 MAX_STEP_RATIO = 1.01  # ratio of two sampling intervals that counts as equal
-# Quantities of the place of the second trace, and of a comparison of traces.
-PLACEMENT_NAMES = ("shift", "tilt", "scale", "offset", "gain")
+# Fraction of worn heights in a track below which it consists of worn tops.
+MIN_TOPS_FRACTION = 0.6
 END_NAMES = ("worn_from_before", "worn_from_after", "worn_to_before", "worn_to_after")
-NAMES = (
-    *PLACEMENT_NAMES,
-    "worn_depth_mean",
-    "worn_depth_max",
-    "worn_depth_max_at",
-    "worn_area",
-    "grown_area",
-    "worn_depth_within",
-    *END_NAMES,
-)
-MIN_TOPS_FRACTION = 0.6  # fraction of worn heights in a track below which it consists of worn tops
+RATIO_NAMES = ("amplitude_ratio", "slope_ratio")
+
+
+class Names(NamedTuple):
+    """Names of the quantities of traces or scans; wear: those that need wear, place: those that need a common place."""
+
+    lost: str
+    grown: str
+    region: str
+    wear: tuple[str, ...]
+    place: tuple[str, ...]
+
+
+NAMES = {
+    1: Names(
+        lost="worn_area",
+        grown="grown_area",
+        region="common_length",
+        wear=(
+            "worn_depth_mean",
+            "worn_depth_max",
+            "worn_depth_max_at",
+            "worn_area",
+            "grown_area",
+            "worn_depth_within",
+            *END_NAMES,
+        ),
+        place=("shift", "tilt", "scale", "offset", "gain"),
+    ),
+    2: Names(
+        lost="worn_volume",
+        grown="grown_volume",
+        region="common_area",
+        wear=("worn_volume", "grown_volume", "worn_share", "worn_depth_mean", "worn_depth_max"),
+        place=("shift_x", "shift_y", "rotation", "offset", "gain"),
+    ),
+}
 
 
 class Options(NamedTuple):
@@ -115,293 +145,349 @@ def compare_surfaces(
         If a trace stands beside a scan, an option does not suit the surfaces, or a surface has too few
         heights.
     """
-    n_scans = sum(isinstance(surface, Areal) for surface in (before, after))
+    surfaces = (before, after)
+    _check_options(surfaces, options)
+    cleaned = [clean_surface(each, keep_spikes=options.keep_spikes) for each in surfaces]
+    removed = tuple(
+        int(clean.missing.sum() - raw.missing.sum()) for clean, raw in zip(cleaned, surfaces)
+    )
+    first, second = (make_raster(surface) for surface in cleaned)
+    names = NAMES[first.z.ndim]
+    if np.array_equal(first.z, second.z, equal_nan=True) and (first.origin == second.origin).all():
+        values = _name_unknowns((*names.wear, *names.place, "hidden_wear"), "identical")
+        findings = (Finding("identical_files", {}),)
+        result = Comparison(before, after, Finding("identical", {}), values, (), findings)
+    else:
+        aligned = align(first, second, options.shift, is_straight=bool(options.datum))
+        result = _measure(surfaces, (first, second), aligned)
+        ratios = _compare_waves((first, second), result, options.direction)
+        result = replace(result, values=result.values | ratios)
+    evidence = replace(result.evidence, removed=removed)
+    return replace(result, evidence=evidence, direction=options.direction)
+
+
+def _check_options(surfaces: tuple[Profile | Areal, Profile | Areal], options: Options) -> None:
+    """Raise PatchfemError if the options do not suit the surfaces, or a trace stands beside a scan."""
+    n_scans = sum(isinstance(surface, Areal) for surface in surfaces)
+    datum = options.datum
+    direction = options.direction
+    needs = "is needed"
     rules = (
-        (
-            options.datum not in ("", "straight"),
-            f"datum {options.datum!r}: straight is needed, or nothing",
-        ),
-        (
-            options.direction not in ("", "x", "y"),
-            f"direction {options.direction!r}: x or y is needed",
-        ),
+        (datum not in ("", "straight"), f"datum {datum!r}: straight {needs}, or nothing"),
+        (direction not in ("", "x", "y"), f"direction {direction!r}: x or y {needs}"),
         (n_scans == 1, "two traces are needed, or two areal scans"),
         (
             n_scans == 2 and options.shift is not None,
             "a shift can be given only for traces; areal scans are registered automatically",
         ),
         (
-            n_scans == 2 and options.datum,
+            n_scans == 2 and datum,
             "a datum can be given only for traces; the plane of areal scans is fitted",
         ),
     )
     for is_wrong, message in rules:
         if is_wrong:
             raise PatchfemError(f"compare: {message}")
-    clean = clean_trace
-    measure = partial(_measure_traces, options=options)
-    names = NAMES
-    if n_scans:
-        from . import scans
-
-        clean = scans.clean_scan
-        measure = partial(scans.measure_scans, direction=options.direction)
-        names = scans.NAMES
-
-    cleaned = [clean(each, keep_spikes=options.keep_spikes) for each in (before, after)]
-    counts = [(~each.missing).sum() for each in (before, after, *cleaned)]
-    removed = (int(counts[0] - counts[2]), int(counts[1] - counts[3]))
-    first, second = cleaned
-    if np.array_equal(first.z, second.z, equal_nan=True) and np.array_equal(first.x, second.x):
-        values = {name: name_unknown(name, "identical") for name in (*names, "hidden_wear")}
-        findings = (Finding("identical_files", {}),)
-        result = Comparison(first, second, Finding("identical", {}), values, (), findings)
-    else:
-        result = measure(first, second)
-    evidence = replace(result.evidence, removed=removed)
-    direction = options.direction
-    return replace(result, before=before, after=after, evidence=evidence, direction=direction)
 
 
-def _measure_traces(first: Profile, second: Profile, options: Options) -> Comparison:
-    """Compare two clean traces."""
-    aligned = align_traces(first, second, options.shift, is_straight=bool(options.datum))
-    if aligned.reason:
-        result = _compose_unplaced([first, second], aligned, find_flanked_track(first, second))
-        noise = np.sqrt(2) * result.verdict.numbers.get("noise", 0.0)
-        lines = [resample_evenly(trace) for trace in (first, second)]
-        step = max(line.step for line in lines)
-    else:
-        result = _compose_placed([first, second], aligned)
-        curves = result.evidence.curves
-        noise = result.evidence.datum.noise
-        step = float(np.median(np.diff(curves.x)))
-        lines = [Profile(curves.x, z, "") for z in (curves.before, curves.after)]
-    heights = [_resample(line, step).z for line in lines]
-    count = min(z.size for z in heights)
-    ratios = waves.compare_waves([z[None, :count] for z in heights], step, noise)
-    findings = (*result.findings, *_note_steps(first, second))
-    return replace(result, values=result.values | ratios, findings=findings)
+def _name_unknowns(names: tuple[str, ...], reason: str) -> dict[str, Quantity]:
+    return {name: name_unknown(name, reason) for name in names}
 
 
-def _resample(trace: Profile, step: float) -> Profile:
-    count = int(trace.length / step * (1 + 1e-9)) + 1
-    x = trace.x[0] + step * np.arange(count)
-    z = np.interp(x, trace.x, trace.z)
-    return Profile(x, z - np.polyval(np.polyfit(x, z, 1), x), trace.source)
-
-
-def _note_steps(before: Profile, after: Profile) -> tuple[Finding, ...]:
-    steps = [float(np.median(np.diff(trace.x))) for trace in (before, after)]
-    if max(steps) <= MAX_STEP_RATIO * min(steps):
-        return ()
-    return (Finding("other_step", {"before": steps[0], "after": steps[1]}),)
-
-
-def _name_unknowns(reason: str) -> dict[str, Quantity]:
-    return {name: name_unknown(name, reason) for name in NAMES}
-
-
-def _compose_placed(traces: list[Profile], aligned: Aligned) -> Comparison:
-    """Measure the worn depth of traces at the same place."""
-    fit = aligned.fit
-    model = aligned.model
-    section = make_section(model.x, model.second, fit, aligned.gain_error)
-    errors = section.changes.std(axis=0)
-    placed = {
-        "shift": (fit.state[0], errors[0]),
-        "scale": (1 + fit.state[1], errors[1]),
-        "tilt": (fit.state[3] / model.half, errors[3] / model.half),
-        "offset": (fit.state[2], errors[2]),
-        "gain": (aligned.gain, aligned.gain_error),
-    }
-    placement = {name: name_estimate(name, *estimate) for name, estimate in placed.items()}
-    bend = float(fit.state[4])
-    datum = Datum(
-        unworn=float(fit.unworn.mean()),
-        noise=float(np.median(fit.noise)),
-        bend=bend,
-        correlation=section.correlation,
-        detection_limit=changes.find_shallow_track(fit.depth).limit,
-    )
-    curves = _draw_curves(section, model.second + fit.depth)
-    place = Placement(placement, "x" if aligned.is_mirrored else "")
-
-    findings = []
-    if bend:
-        # A scar is deepest in the middle of its parabola, wear of both ends at its ends.
-        area = abs(bend) * (2 if bend > 0 else 1) / 3 * float(np.ptp(section.x))
-        findings.append(Finding("bow_subtracted", {"height": abs(bend), "area": area}))
-    findings.append(Finding("hidden_even_wear", {"limit": None}))
-    if aligned.is_mirrored:
-        findings.append(Finding("mirrored", {}))
-    if aligned.gain != 1.0:
-        findings.append(Finding("other_gain", {"gain": aligned.gain}))
-    scale = placement["scale"]
-    if (
-        min(abs(scale.low - 1), abs(scale.high - 1)) > MIN_OTHER_LENGTH
-        and not scale.low < 1 < scale.high
-    ):
-        numbers = {"scale": scale.value, "low": scale.low, "high": scale.high}
-        findings.append(Finding("other_length", numbers))
-    if section.drift_height > datum.noise:
-        findings.append(Finding("drift", {"height": section.drift_height}))
-    result = _compose(traces, section, Evidence(place, datum, curves), findings)
-    hidden = name_unknown("hidden_wear", "no_limit")._replace(low=0.0)
-    return replace(result, values=result.values | {"hidden_wear": hidden})
-
-
-def _compose_unplaced(
-    traces: list[Profile], aligned: Aligned, section: Section | None
+def _measure(
+    surfaces: tuple[Profile | Areal, Profile | Areal],
+    rasters: tuple[Raster, Raster],
+    aligned: Aligned,
 ) -> Comparison:
-    """Measure the worn depth below the flanks of the second trace, or state that there is no reference."""
-    hidden = {"hidden_wear": name_unknown("hidden_wear", "not_hidden")}
-    if section is None:
-        values = _name_unknowns(aligned.reason) | hidden
+    """Measure the depth at a common place, or below the flanks of the second trace, or say why there is none."""
+    is_trace = rasters[0].z.ndim == 1
+    names = NAMES[rasters[0].z.ndim]
+    if not aligned.reason:
+        depths = make_depths(aligned.model, aligned.fit, aligned.gain_error)
+        placement = _describe_place(aligned)
+        hidden = name_unknown("hidden_wear", "no_limit")._replace(low=0.0)
+    else:
+        depths = find_flanked_track(*rasters) if is_trace else None
+        placement = Placement(_name_unknowns(names.place, "elsewhere"), basis="flanks")
+        hidden = name_unknown("hidden_wear", "not_hidden")
+    if depths is None:
         numbers = {}
         if aligned.reason == "no_datum":
             numbers["unworn"] = float(aligned.fit.unworn.mean())
         if aligned.reason == "mirror_finish":
-            numbers = find_mirror_finish([trace.z for trace in traces])
-        return Comparison(*traces, Finding(aligned.reason, numbers), values)
-    placement = {name: name_unknown(name, "elsewhere") for name in PLACEMENT_NAMES}
-    noise = float(section.noise[0])
-    datum = Datum(float(section.unworn.mean()), noise, 0.0, section.correlation)
-    curves = _draw_curves(section, traces[1].z + section.depth)
-    evidence = Evidence(Placement(placement, basis="flanks"), datum, curves)
-    ends = section.x[section.worn][[0, -1]]
-    findings = [Finding("no_old_surface_left", {"from": float(ends[0]), "to": float(ends[1])})]
-    result = _compose(traces, section, evidence, findings)
-    return replace(result, values=result.values | hidden)
+            numbers = find_mirror_finish([fill_gaps(raster.z) for raster in rasters])
+        values = _name_unknowns((*names.wear, *names.place), aligned.reason)
+        verdict = Finding(aligned.reason, numbers)
+        return Comparison(*surfaces, verdict, values | {"hidden_wear": hidden})
 
-
-def _draw_curves(section: Section, first) -> TraceCurves:
-    """Return the curves of aligned traces; first: heights (n,) [m] of the first one."""
-    heights = first - np.polyval(np.polyfit(section.x, first, 1), section.x)
-    return TraceCurves(
-        x=section.x,
-        before=heights,
-        after=heights - section.depth,
-        depth=section.depth,
-        noise=section.noise,
-        unworn=section.unworn,
-        worn=section.worn,
-        grown=section.grown,
-    )
-
-
-def _compose(
-    traces: list[Profile], section: Section, evidence: Evidence, findings: list[Finding]
-) -> Comparison:
-    """Measure a section, and find the verdict."""
-    placement = evidence.placement
-    length = float(section.widths.sum())
-    placed = placement.values | {
-        "common_length": name_quantity("common_length", length, None, None)
-    }
-    spans = find_spans(section)
-    # New roughness that stands above the first surface is no loss.
-    is_loss = section.depth > -UNWORN_LIMIT * section.noise
-    area, error = section.integrate(cover_spans(section, spans) & is_loss & ~section.grown)
-    hidden = measure_hidden_area(section)
-    bounds = (area, max(area - SIDE * error, 0.0), area + SIDE * error + hidden)
-    lost = section.integrate(section.worn)
-    grown, grown_error = section.integrate(section.grown, -1.0)
-    code = judge_change(bounds, lost[0], error, grown, grown_error)
-    if placement.basis == "flanks" and code != "worn":
+    # What the same tests find above the first surface is a control for what they find below it.
+    spans = find_spans(depths) if is_trace else []
+    area, error = depths.integrate(_cover_loss(depths, spans))
+    bounds = (area, max(area - SIDE * error, 0.0), area + SIDE * error + depths.measure_hidden())
+    is_grown = _enlarge(depths.grown) & depths.inside & ~depths.worn
+    grown, grown_error = depths.integrate(is_grown, -1.0)
+    sure_area = depths.integrate(depths.worn)[0]
+    code = judge_change(bounds, sure_area, error, grown, grown_error)
+    is_placed = placement.basis == "place"
+    if not is_placed and code != "worn":
         code = "elsewhere"
-    numbers = {"lost": area, "grown": grown, "basis": placement.basis}
-    numbers |= limit_wear(bounds[2] / length, evidence.datum.detection_limit)
-
-    bow = 2 / 3 * max(evidence.datum.bend, 0.0) * length
-    waves_height = robust_deviation(remove_long_waves(section.after))
-    is_bow_large = bow > area and evidence.datum.bend > MIN_BOW * waves_height
-    values = _name_unknowns("no_wear") | placed
-    values["grown_area"] = name_estimate("grown_area", grown, grown_error, 0.0)
     tracks = ()
     if code.startswith("worn"):
         # The area of a single track is that of the common part.
         whole = bounds if len(spans) == 1 else None
-        tracks = tuple(measure_track(section, span, whole) for span in spans)
-        if _may_be_growth(section, spans, tracks):
-            code = "growth_at_ends"
-            numbers |= {
-                "scar_depth": bounds[0] / length,
-                "growth_height": tracks[0].values["depth_mean"].value,
-            }
-            tracks = ()
-            values = _name_unknowns("growth_at_ends") | placed
-        elif is_bow_large and (not tracks or any(tracks[0].cut)):
-            code = "scar_or_bow"
-    elif code == "no_wear" and is_bow_large:
-        code = "scar_or_bow"
-    elif (
-        code == "grown" and section.grown[:END_SAMPLES].any() and section.grown[-END_SAMPLES:].any()
-    ):
-        code = "growth_at_ends"
-        height = grown / float(section.widths[section.grown].sum())
-        numbers |= {"scar_depth": height, "growth_height": height}
-    if code == "scar_or_bow":
-        numbers["scar_depth"] = (bow + area) / length
-        tracks = ()
-        values = _name_unknowns("scar_or_bow") | placed
+        tracks = tuple(measure_track(depths, span, whole) for span in spans)
+        tracks = tracks if is_trace else average_section(depths)
+    bend = _get_bend(aligned)
+    code, possible = _doubt(code, depths, spans, tracks, (area, grown, bend))
+    tracks = tracks if code.startswith("worn") else ()
+
+    values = _name_unknowns(names.wear, code if possible else "no_wear") | placement.values
+    values["hidden_wear"] = hidden
+    values[names.region] = name_quantity(names.region, depths.size, None, None)
+    values[names.grown] = name_estimate(names.grown, grown, grown_error, 0.0)
+    regions = {}
+    cutoff = None
     if code.startswith("worn"):
-        values["worn_area"] = name_quantity("worn_area", *bounds)
-        means = (bound / length for bound in bounds)
+        means = [bound / depths.size for bound in bounds]
+        values[names.lost] = name_quantity(names.lost, *bounds)
         values["worn_depth_mean"] = name_quantity("worn_depth_mean", *means)
-        values["worn_depth_max"], values["worn_depth_max_at"] = measure_largest(section)
-        values |= _name_ends(tracks, placement, traces[1])
-        findings += _describe_tracks(section, spans, tracks)
-        if grown > MIN_DEPOSITS * area:
-            findings.append(Finding("deposits", {"area": grown}))
-        regions, cutoff = waves.measure_roughness(evidence.curves, spans[:1])
-        evidence = replace(evidence, roughness=regions, cutoff=cutoff)
-    if code == "grown":
-        findings.append(Finding("exchanged", {}))
-    return Comparison(*traces, Finding(code, numbers), values, tracks, tuple(findings), evidence)
+        values |= _locate_largest(depths)
+        if is_trace:
+            values |= _name_ends(tracks[0].values, placement, float(rasters[1].middle[0]))
+        else:
+            values["worn_share"] = _measure_share(depths)
+        if is_trace and is_placed:
+            regions, cutoff = waves.measure_roughness(depths, spans[:1])
+    limit = find_detection_limit(depths.depth, depths.noise) if is_placed else None
+    datum = Datum(
+        unworn=float(depths.unworn[depths.inside & ~depths.missing].mean()),
+        noise=depths.noise_level,
+        bend=bend,
+        correlation=depths.errors.correlation,
+        detection_limit=limit,
+    )
+    numbers = {"lost": area, "grown": grown, "basis": placement.basis}
+    numbers |= limit_wear(bounds[2] / depths.size, limit) | possible
+    verdict = Finding(code, numbers)
+    evidence = Evidence(placement, datum, depths, regions, cutoff)
+    findings = _collect_findings(verdict, evidence, spans, tracks, rasters)
+    return Comparison(*surfaces, verdict, values, tracks, findings, evidence)
 
 
-def _may_be_growth(section: Section, spans: list, tracks: tuple[Track, ...]) -> bool:
-    """Return whether a scar over nearly all of the trace may be growth at its ends."""
-    if not tracks or any(tracks[0].cut):
-        return False
-    first, last = spans[0]
-    if section.worn[first : last + 1].mean() < MIN_SCAR_FRACTION:
-        return False
-    return tracks[0].values["width"].value > MAX_TRACK_FRACTION * float(section.widths.sum())
+def _get_bend(aligned: Aligned) -> float:
+    """Return the height [m] of the subtracted parabola of traces, 0 without one."""
+    if aligned.reason or aligned.model.n_axes > 1:
+        return 0.0
+    return float(aligned.fit.state[-1])
 
 
-def _describe_tracks(section: Section, spans: list, tracks: tuple[Track, ...]) -> list[Finding]:
-    """Return what the numbers of the longest track leave out."""
-    findings = []
-    if len(tracks) > 1:
-        findings.append(Finding("other_tracks", {"count": len(tracks) - 1}))
-    if tracks and any(tracks[0].cut):
-        findings.append(Finding("track_cut", {}))
-    first, last = spans[0]
-    if section.worn[first : last + 1].mean() < MIN_TOPS_FRACTION:
-        findings.append(Finding("worn_tops", {}))
-    return findings
+def _describe_place(aligned: Aligned) -> Placement:
+    """Return shift, turn and datum with the errors that follow from the unworn heights."""
+    model = aligned.model
+    fit = aligned.fit
+    weighted = fit.jacobian[fit.unworn] / fit.noise[fit.unworn, None]
+    scale = np.sqrt((weighted**2).mean(axis=0)) + TINY
+    covariance = np.linalg.pinv((weighted / scale).T @ (weighted / scale), rcond=1e-10)
+    errors = np.sqrt(np.diag(covariance)) / scale
+    state = fit.state
+    if model.n_axes == 1:
+        half = float(model.own.lengths[0]) / 2
+        placed = {
+            "shift": (-state[0], errors[0]),
+            "scale": (1 / (1 + state[1]), errors[1]),
+            "tilt": (state[3] / half, errors[3] / half),
+            "offset": (state[2], errors[2]),
+        }
+    else:
+        order = ("shift_y", "shift_x", "rotation", "offset")
+        placed = dict(zip(order, zip(state, errors)))
+    placed["gain"] = (aligned.gain, aligned.gain_error)
+    values = {name: name_estimate(name, *estimate) for name, estimate in placed.items()}
+    place = aligned.place
+    return Placement(values, "x" if place.mirrored else "", place.inverted)
+
+
+def _collect_findings(
+    verdict: Finding, evidence: Evidence, spans: list, tracks: tuple[Track, ...], rasters: tuple
+) -> tuple[Finding, ...]:
+    """Return what a reader must know of the place, the datum, the gain and the tracks."""
+    placement = evidence.placement
+    datum = evidence.datum
+    depths = evidence.curves
+    is_placed = placement.basis == "place"
+    gain = placement.values["gain"].value
+    scale = placement.values.get("scale")
+    is_longer = False
+    if is_placed and scale is not None:
+        is_longer = not scale.low - MIN_OTHER_LENGTH < 1 < scale.high + MIN_OTHER_LENGTH
+    # A scar is deepest in the middle of its parabola, wear of both ends at its ends.
+    bow = abs(datum.bend)
+    bow_area = bow * (2 if datum.bend > 0 else 1) / 3 * float(np.ptp(depths.x))
+    has_tops = bool(tracks and spans) and _is_broken(depths, spans[0], MIN_TOPS_FRACTION)
+    grown = verdict.numbers["grown"]
+    has_deposits = (
+        verdict.code.startswith("worn") and grown > MIN_DEPOSITS * verdict.numbers["lost"]
+    )
+    steps = [float(raster.steps[-1]) for raster in rasters]
+    is_uneven = depths.y is None and max(steps) > MAX_STEP_RATIO * min(steps)
+    first, last = depths.x[depths.worn][[0, -1]] if not is_placed else (0.0, 0.0)
+    rows = (
+        (not is_placed, "no_old_surface_left", {"from": float(first), "to": float(last)}),
+        (bow, "bow_subtracted", {"height": bow, "area": bow_area}),
+        (is_placed, "hidden_even_wear", {"limit": None}),
+        (placement.mirrored, "mirrored", {}),
+        (placement.turned, "turned", {}),
+        (gain not in (None, 1.0), "other_gain", {"gain": gain}),
+        (
+            is_longer,
+            "other_length",
+            {} if scale is None else scale._asdict() | {"scale": scale.value},
+        ),
+        (
+            depths.errors.drift > depths.noise_level,
+            "drift",
+            {"height": depths.errors.drift},
+        ),
+        (verdict.code == "grown", "exchanged", {}),
+        (len(tracks) > 1, "other_tracks", {"count": len(tracks) - 1}),
+        (tracks and any(tracks[0].cut), "track_cut", {}),
+        (has_tops, "worn_tops", {}),
+        (has_deposits, "deposits", {"area" if depths.y is None else "volume": grown}),
+        (is_uneven, "other_step", dict(zip(("before", "after"), steps))),
+    )
+    return tuple(Finding(code, numbers) for applies, code, numbers in rows if applies)
+
+
+def _is_broken(depths: DepthMap, span: tuple[int, int], fraction: float) -> bool:
+    """Return whether less than a fraction of the heights in a track are worn."""
+    return bool(depths.worn[span[0] : span[1] + 1].mean() < fraction)
+
+
+def _enlarge(part) -> np.ndarray:
+    return ndimage.binary_dilation(part, np.ones((MARGIN,) * part.ndim))
+
+
+def _cover_loss(depths: DepthMap, spans: list[tuple[int, int]]) -> np.ndarray:
+    """Return the mask of worn places with their flanks."""
+    if depths.depth.ndim > 1:
+        return _enlarge(depths.worn) & depths.inside & ~depths.grown
+    covered = np.zeros(depths.depth.size, bool)
+    for span in spans:
+        margin = get_margin(span)
+        covered[max(span[0] - margin, 0) : span[1] + margin + 1] = True
+    # New roughness that stands above the first surface is no loss.
+    return covered & (depths.depth > -UNWORN_LIMIT * depths.noise) & ~depths.grown
+
+
+def _doubt(
+    code: str,
+    depths: DepthMap,
+    spans: list[tuple[int, int]],
+    tracks: tuple[Track, ...],
+    sizes: tuple[float, float, float],
+) -> tuple[str, dict[str, float]]:
+    """Return the verdict, or that of two possible causes with the numbers of both.
+
+    Parameters
+    ----------
+    code : str
+        Verdict on lost and grown material.
+    depths : DepthMap
+    spans, tracks
+        Tracks of a trace.
+    sizes : tuple of float
+        Lost and grown area or volume, and height of the bow.
+    """
+    area, grown, bend = sizes
+    bow = 2 / 3 * max(bend, 0.0) * depths.size
+    is_cut = bool(tracks) and any(tracks[0].cut)
+    if code == "grown" and _has_grown_at_ends(depths):
+        height = grown / (float(depths.grown.sum()) * depths.cell)
+        return "growth_at_ends", {"scar_depth": height, "growth_height": height}
+    if depths.depth.ndim > 1:
+        return code, {}
+    if code.startswith("worn") and not is_cut:
+        is_wide = tracks[0].values["width"].value > MAX_TRACK_FRACTION * depths.size
+        if is_wide and not _is_broken(depths, spans[0], MIN_SCAR_FRACTION):
+            height = tracks[0].values["depth_mean"].value
+            return "growth_at_ends", {"scar_depth": area / depths.size, "growth_height": height}
+    waves_height = robust_deviation(remove_long_waves(depths.after))
+    is_bow_large = bow > area and bend > MIN_BOW * waves_height
+    if is_bow_large and (code == "no_wear" or (code.startswith("worn") and is_cut)):
+        return "scar_or_bow", {"scar_depth": (bow + area) / depths.size}
+    return code, {}
+
+
+def _has_grown_at_ends(depths: DepthMap) -> bool:
+    """Return whether material grew along two opposite ends or borders, which a scar between them resembles."""
+    axes = set(range(depths.depth.ndim))
+    for axis in axes:
+        others = tuple(axes - {axis})
+        counts = depths.inside.sum(axis=others)
+        grown = depths.grown.sum(axis=others)[counts > 0] / counts[counts > 0]
+        if min(grown[:END_SAMPLES].max(), grown[-END_SAMPLES:].max()) > MIN_GROWN_LINE:
+            return True
+    return False
+
+
+def _locate_largest(depths: DepthMap) -> dict[str, Quantity]:
+    """Return the largest depth and its place."""
+    largest, near = measure_largest(depths)
+    values = {"worn_depth_max": largest}
+    if depths.depth.ndim == 1:
+        best = depths.x[near][int(np.argmax(depths.depth[near]))]
+        places = depths.x[near][[0, -1]]
+        values["worn_depth_max_at"] = name_quantity("worn_depth_max_at", best, *places)
+        return values
+    row, column = np.unravel_index(np.argmax(np.where(near, depths.depth, -np.inf)), near.shape)
+    values["worn_depth_max_x"] = name_quantity("worn_depth_max_x", depths.x[column], None, None)
+    values["worn_depth_max_y"] = name_quantity("worn_depth_max_y", depths.y[row], None, None)
+    return values
+
+
+def _measure_share(depths: DepthMap) -> Quantity:
+    """Return the worn fraction of a scan, known but for a line of points around the worn places."""
+    cell = depths.cell
+    share = float(depths.worn.sum()) * cell / depths.size
+    edge = float(ndimage.binary_dilation(depths.worn).sum()) * cell / depths.size - share
+    return name_quantity("worn_share", share, max(share - edge, 0.0), share + edge)
 
 
 def _name_ends(
-    tracks: tuple[Track, ...], placement: Placement, after: Profile
+    track: dict[str, Quantity], placement: Placement, middle: float
 ) -> dict[str, Quantity]:
-    """Return the mean depth within the longest track, and its ends in both traces."""
-    if not tracks:
-        return {name: name_unknown(name, "no_track") for name in ("worn_depth_within", *END_NAMES)}
-    track = tracks[0].values
+    """Return the mean depth within the longest track, and its ends in both traces; middle: of the second one [m]."""
     values = {"worn_depth_within": name_quantity("worn_depth_within", *track["depth_mean"][:3])}
     shift = placement.values["shift"].value
-    middle = float(after.x.mean())
-    for name in END_NAMES:
-        end, side = name.split("_")[1:]
+    for end in ("from", "to"):
         places = track[end][:3]
-        if places[0] is None or (side == "before" and shift is None):
-            values[name] = name_unknown(name, "cut_off" if places[0] is None else "elsewhere")
-            continue
-        if side == "before":
+        reason = "cut_off" if places[0] is None else ""
+        values[f"worn_{end}_after"] = places, reason
+        if not reason and shift is None:
+            reason = "elsewhere"
+        if not reason:
             scale = placement.values["scale"].value
             places = [middle + (x - middle) / scale - shift for x in places]
-        values[name] = name_quantity(name, *places)
+        values[f"worn_{end}_before"] = places, reason
+    for name in END_NAMES:
+        places, reason = values[name]
+        values[name] = name_unknown(name, reason) if reason else name_quantity(name, *places)
     return values
+
+
+def _compare_waves(
+    rasters: tuple[Raster, Raster], result: Comparison, direction: str
+) -> dict[str, Quantity]:
+    """Compare the waves along the lines of the common part, or of both surfaces without one."""
+    axis = 0 if direction == "y" else -1
+    depths = result.evidence.curves
+    steps = [float(raster.steps[axis]) for raster in rasters]
+    if depths is not None and result.evidence.placement.basis == "place":
+        lines = [np.moveaxis(z, axis, -1) for z in (depths.before, depths.after)]
+        steps = steps[1:] if depths.y is None else steps[:1]
+    elif max(steps) > MAX_STEP_RATIO * min(steps):
+        return _name_unknowns(RATIO_NAMES, "other_step")
+    else:
+        lines = [np.moveaxis(fill_gaps(raster.z), axis, -1) for raster in rasters]
+    noise = 0.0 if result.evidence.datum is None else result.evidence.datum.noise
+    return waves.compare_waves([np.atleast_2d(line) for line in lines], steps[0], noise)

@@ -1,46 +1,25 @@
-"""Robust fit of the place and the datum of a second surface to the heights that did not wear.
-
-The same steps serve traces and scans: a model gives depths, their derivatives and the tests that
-find changed heights.
-"""
+"""Robust fit of the place and the datum of a second surface to the heights that did not wear."""
 
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 
+from .depth_map import UNWORN_LIMIT
+from .model import Model
 from .statistics import (
     TINY,
     TRUNCATED_VARIANCE,
-    UNWORN_LIMIT,
     estimate_one_sided_scale,
     solve_biweight_step,
 )
 
 MAX_CYCLES = 6  # number of alternations between the fit and the choice of the worn heights
 MAX_STEPS = 15  # number of biweight steps in a cycle
-STEP_TOL = (
-    1e-3  # change of the depths, in standard deviations, below which the steps have converged
-)
+# Change of the depths, in standard deviations, below which the steps have converged.
+STEP_TOL = 1e-3
 MIN_UNWORN = 50  # smallest number of heights that are not worn
 # Smallest noise of a height relative to the scale of all of them; a fit of the noise to the slopes may go below.
 MIN_NOISE_FRACTION = 0.3
-
-
-class Model(Protocol):
-    """Depths (n,) of the second surface below the first one, as a function of a state (k,)."""
-
-    def compute_depth(self, state) -> np.ndarray:
-        """Return the depth (n,) [m]."""
-
-    def compute_jacobian(self, state) -> np.ndarray:
-        """Return the derivative (n, k) of the depth by the state."""
-
-    def compute_noise_terms(self, jacobian) -> np.ndarray:
-        """Return the terms (n, j) whose combination with positive factors is the variance of a depth."""
-
-    def find_changed(self, depth, noise) -> np.ndarray:
-        """Return the heights (n,) bool that noise does not explain, of one sign."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,42 +40,67 @@ class Fit:
     grown: np.ndarray
     jacobian: np.ndarray
 
+    @property
+    def n_changed(self) -> int:
+        """Number of worn and grown heights."""
+        return int((self.worn | self.grown).sum())
 
-def fit_unworn(model: Model, state, free, digit: float) -> Fit:
-    """Fit the free parameters to the unworn heights, alternating with the choice of the worn ones.
+
+def fit_unworn(model: Model, state, n_free: int, digit: float) -> Fit:
+    """Fit the first parameters to the unworn heights, alternating with the choice of the worn ones.
 
     Parameters
     ----------
     model : Model
     state : (k,) array
         Start.
-    free : slice
-        Fitted parameters.
+    n_free : int
+        Number of fitted parameters.
     digit : float
         Standard deviation [m] due to the printed digits of the heights; the noise is at least this.
     """
-    worn = np.zeros(model.compute_depth(state).size, bool)
+    fit = None
+    worn = np.zeros(int(model.known.sum()), bool)
     for _ in range(MAX_CYCLES):
         for _ in range(MAX_STEPS):
             depth = model.compute_depth(state)
             sigma = max(estimate_one_sided_scale(depth[~worn]), digit)
-            jacobian = model.compute_jacobian(state)[:, free]
+            jacobian = model.compute_jacobian(state)[:, :n_free]
             change = solve_biweight_step(depth, jacobian, sigma, worn)
             state = state.copy()
-            state[free] += change
+            state[:n_free] += change
             if np.abs(jacobian @ change).max() < STEP_TOL * sigma:
                 break
-        depth = model.compute_depth(state)
-        sigma = max(estimate_one_sided_scale(depth[~worn]), digit)
-        jacobian = model.compute_jacobian(state)
-        noise = estimate_noise(depth, model.compute_noise_terms(jacobian), sigma, worn)
-        earlier = worn
-        worn = model.find_changed(depth, noise)
-        if (earlier == worn).all() or (~worn).sum() < MIN_UNWORN:
+        fit = evaluate(model, state, n_free, digit, worn)
+        if (fit.worn == worn).all() or (~fit.worn).sum() < MIN_UNWORN:
             break
+        worn = fit.worn
+    return fit
+
+
+def evaluate(model: Model, state, n_free: int, digit: float, worn=None) -> Fit:
+    """Return the depths at a state, their noise, and the changed heights.
+
+    Parameters
+    ----------
+    model : Model
+    state : (k,) array
+    n_free : int
+        Number of fitted parameters.
+    digit : float
+        Smallest standard deviation of a depth [m].
+    worn : (n,) bool array, optional
+        Heights that are known to be worn before.
+    """
+    depth = model.compute_depth(state)
+    worn = np.zeros(depth.size, bool) if worn is None else worn
+    sigma = max(estimate_one_sided_scale(depth[~worn]), digit)
+    jacobian = model.compute_jacobian(state)
+    noise = estimate_noise(depth, model.compute_noise_terms(state, jacobian), sigma, worn)
+    worn = model.find_changed(depth, noise)
     unworn = (np.abs(depth) < UNWORN_LIMIT * noise) & ~worn
     grown = model.find_changed(-depth, noise) & ~worn
-    return Fit(state, depth, noise, unworn, worn, grown, jacobian[:, free])
+    return Fit(state, depth, noise, unworn, worn, grown, jacobian[:, :n_free])
 
 
 def estimate_noise(depth, terms, sigma: float, worn) -> np.ndarray:

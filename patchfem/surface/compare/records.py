@@ -12,6 +12,7 @@ import numpy as np
 from ..areal import Areal
 from ..profile import Profile
 from ..quantity import SIDE, Quantity
+from .depth_map import DepthMap
 
 # Unit and definition of each quantity of a comparison.
 DEFINITIONS = {
@@ -132,51 +133,11 @@ class Track:
 
 
 @dataclass(frozen=True, eq=False)
-class TraceCurves:
-    """Curves of two aligned traces at x (n,) [m] of the second one.
-
-    - before, after: heights (n,) [m] about the least-squares line of the first trace.
-    - depth, noise: worn depth and the standard deviation of an unworn one, (n,) [m].
-    - unworn, worn, grown: masks (n,).
-    """
-
-    x: np.ndarray
-    before: np.ndarray
-    after: np.ndarray
-    depth: np.ndarray
-    noise: np.ndarray
-    unworn: np.ndarray
-    worn: np.ndarray
-    grown: np.ndarray
-
-
-@dataclass(frozen=True, eq=False)
-class ScanMaps:
-    """Maps (m, n) of two aligned scans at x (n,), y (m,) [m] of the first one; NaN where unknown.
-
-    - before, after: heights [m] about the least-squares plane of the first scan.
-    - depth: worn depth [m], missing heights filled from their neighbours.
-    - noise: standard deviation of an unworn depth [m].
-    - unworn, worn, grown: masks.
-    """
-
-    x: np.ndarray
-    y: np.ndarray
-    before: np.ndarray
-    after: np.ndarray
-    depth: np.ndarray
-    noise: np.ndarray
-    unworn: np.ndarray
-    worn: np.ndarray
-    grown: np.ndarray
-
-
-@dataclass(frozen=True, eq=False)
 class Evidence:
     """What the numbers of a comparison rest on; None where there is no common place.
 
     - placement, datum: how the second surface was laid on the first.
-    - curves: of traces, or maps of scans.
+    - curves: depths and heights of the aligned surfaces.
     - roughness: {"inside", "outside": {"before", "after", "ratio": {"Ra", "Rq", "slope": Quantity}}}
       of the track, with the ratio after/before; {} without a track. `cutoff` [m] is that of these values.
     - removed: heights left out before and after as spikes, dropouts or dust.
@@ -184,7 +145,7 @@ class Evidence:
 
     placement: Placement | None = None
     datum: Datum | None = None
-    curves: TraceCurves | ScanMaps | None = None
+    curves: DepthMap | None = None
     roughness: dict[str, dict[str, dict[str, Quantity]]] = field(default_factory=dict)
     cutoff: float | None = None
     removed: tuple[int, int] = (0, 0)

@@ -1,13 +1,11 @@
 """Robust statistics of depths, of which some are worn: scale, mode, correlation, thresholds."""
 
 import numpy as np
-from scipy import ndimage, special
+from scipy import fft, special
 
 from ..profile import robust_deviation
 
-UNWORN_LIMIT = 2.5  # standard deviations within which a depth counts as unworn
 BIWEIGHT = 4.685  # tuning constant of Tukey's biweight; 95 % efficient for normal noise
-BIWEIGHT_SLOPE = 0.8  # mean derivative of its score for normal noise
 MODE_FRACTION = 0.3  # fraction of the values in the shortest interval, whose mean is the mode
 MIN_SIDE = 20  # smallest number of depths on one side of zero that shows their scale
 # Fraction of unworn surfaces in which noise alone is reported as wear.
@@ -15,13 +13,9 @@ FALSE_POSITIVE_RATE = 1e-3
 # Mean square of normal values of variance one that lie within UNWORN_LIMIT.
 TRUNCATED_VARIANCE = 0.911
 TINY = 1e-300  # keeps divisions by zero noise finite
-WAVES_PER_TRACE = (
-    40  # length of a surface relative to the deviation of the Gaussian of its long waves
-)
+WAVES_PER_SIDE = 40  # side of a surface relative to the deviation of the Gaussian of its long waves
 MAX_FINISH = 1.5  # short waves relative to the noise, below which no place can be found
 MIN_GAIN_HEIGHTS = 40  # smallest number of heights that show the gain of the instrument
-MAX_GAINS = 8  # number of gains in turn; heights that agree show only a part of a large one
-MIN_GAIN_ERROR = 0.003  # smallest error of the gain that is corrected
 
 
 def estimate_one_sided_scale(depth, fraction: float = 0.5) -> float:
@@ -93,9 +87,22 @@ def compute_threshold(n_tests: float) -> float:
     return float(-special.ndtri(FALSE_POSITIVE_RATE / max(n_tests, 1)))
 
 
-def remove_long_waves(z, part: float = WAVES_PER_TRACE) -> np.ndarray:
+def smooth(z, deviations) -> np.ndarray:
+    """Return the Gaussian mean line or surface of heights (n,) or (m, n) without gaps, mirrored at their borders.
+
+    deviations: standard deviation of the weights in samples, one for each axis or for all of them.
+    """
+    spectrum = fft.dctn(z)
+    for axis, deviation in enumerate(np.broadcast_to(deviations, z.ndim)):
+        count = z.shape[axis]
+        factor = np.exp(-((np.pi * deviation / count * np.arange(count)) ** 2) / 2)
+        spectrum *= factor.reshape([-1 if k == axis else 1 for k in range(z.ndim)])
+    return fft.idctn(spectrum)
+
+
+def remove_long_waves(z, part: float = WAVES_PER_SIDE) -> np.ndarray:
     """Subtract the Gaussian mean line or surface from heights (n,) or (m, n) without gaps."""
-    return z - ndimage.gaussian_filter(z, np.array(z.shape) / part)
+    return z - smooth(z, np.array(z.shape) / part)
 
 
 def find_mirror_finish(surfaces) -> dict[str, float]:
@@ -124,8 +131,3 @@ def estimate_gain(first, second, noise: float) -> tuple[float, float]:
     blocks = np.array_split(np.arange(first.size), 10)
     influence = [first[b] @ (second[b] - gain * first[b]) for b in blocks]
     return gain, float(np.sqrt(10) * np.std(influence) / power)
-
-
-def is_other_gain(gain: float, error: float) -> bool:
-    """Return whether a gain differs from 1 by more than its error."""
-    return abs(gain - 1) > max(5 * error, MIN_GAIN_ERROR)

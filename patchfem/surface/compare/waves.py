@@ -1,51 +1,49 @@
 """Waves and roughness before and after wear: ratios of amplitude and slope, and sizes in a track."""
 
-from itertools import pairwise
-
 import numpy as np
 from scipy import ndimage, special
 
-from ...core import PatchfemError
-from ..profile import Profile
+from ..profile import find_runs
 from ..quantity import SIDE, Quantity
-from ..roughness.filter import filter_trace
+from ..roughness.filter import mean_surface
 from ..roughness.report import fitting_cutoff
 from ..roughness.spectrum import BAND
-from .records import DEFINITIONS, TraceCurves, name_quantity, name_unknown
+from .depth_map import DepthMap
+from .records import DEFINITIONS, name_quantity, name_unknown
 
 MAX_BLOCKS = 12  # largest number of blocks whose ratios show the scatter of a ratio
 MIN_BLOCKS = 4  # smallest number of blocks
 BLOCK_WAVES = 2.0  # smallest length of a block in the longest wave; shorter blocks are correlated
-CUTOFF_TO_DEVIATION = (
-    0.187  # deviation of the Gaussian filter of ISO 16610-21 relative to its cut-off
-)
+# Deviation of the Gaussian filter of ISO 16610-21 relative to its cut-off.
+CUTOFF_TO_DEVIATION = 0.187
 RATIO_ERROR = 0.004  # standard deviation of a ratio due to tip, interpolation and datum
 MAX_NOISE_FRACTION = 0.5  # noise relative to the size of the surface above which a ratio is unknown
-MIN_CUTOFFS = 2.0  # smallest length of a piece in cut-offs, half of one is trimmed at each end
 MIN_WAVES = 3.0  # smallest length of a trace relative to the longest wave of the band
+MIN_STEPS = 4.0  # smallest length of the shortest wave of the band in steps
 # Sizes of the roughness in a track.
 ROUGHNESS_NAMES = ("Ra", "Rq", "slope")
-MIN_STEPS = 4.0  # smallest length of the shortest wave of the band in steps
 
 
 def compare_waves(lines: list[np.ndarray], step: float, noise: float) -> dict[str, Quantity]:
     """Compute the ratios of amplitude and slope, after divided by before, with their intervals.
 
-    The band is cut out by two Gaussian filters. The interval of the logarithm follows from the scatter of
-    the ratios of blocks, which aligned surfaces share.
+    Each line is levelled. The band is cut out by two Gaussian filters. The interval of the logarithm follows from
+    the scatter of the ratios of blocks, which aligned surfaces share.
 
     Parameters
     ----------
     lines : list of (k, n) array [m]
-        Levelled lines before and after wear, at one step.
+        Lines before and after wear, at one step.
     step : float
         Step [m].
     noise : float
         Standard deviation of the depth [m], of both surfaces together.
     """
-    length = min(line.shape[1] for line in lines) * step
+    n_lines, count = np.min([line.shape for line in lines], axis=0)
+    length = count * step
     if length < MIN_WAVES * BAND[1] or step > BAND[0] / MIN_STEPS:
         return {name: name_unknown(name, "band") for name in ("amplitude_ratio", "slope_ratio")}
+    lines = [_level(line[:n_lines, :count]) for line in lines]
     passed = [_pass_band(z, step) for z in lines]
     slopes = [np.diff(z, axis=1) / step for z in lines]
     # White noise has the slope noise sqrt(2)/step, and the fraction of its band in the amplitude.
@@ -99,8 +97,23 @@ def _mean_squares(values, count: int) -> np.ndarray:
     return np.array([np.mean(part**2) for part in parts])
 
 
-def measure_roughness(curves: TraceCurves, spans) -> tuple[dict, float | None]:
+def _level(lines) -> np.ndarray:
+    """Subtract its least-squares line from each line (k, n)."""
+    base = np.vander(np.linspace(-1, 1, lines.shape[1]), 2)
+    return lines - (base @ np.linalg.lstsq(base, lines.T, rcond=None)[0]).T
+
+
+def measure_roughness(depths: DepthMap, spans) -> tuple[dict, float | None]:
     """Measure Ra, Rq and slope inside and outside of the tracks, before and after wear.
+
+    Half a cut-off of the roughness profile is trimmed on both sides of an end of a track.
+
+    Parameters
+    ----------
+    depths : DepthMap
+        Of traces.
+    spans : list
+        First and last sample of each track.
 
     Returns
     -------
@@ -109,51 +122,44 @@ def measure_roughness(curves: TraceCurves, spans) -> tuple[dict, float | None]:
     cutoff : float or None
         Cut-off [m] that fits both regions.
     """
-    edges = [
-        0,
-        *(index for first, last in sorted(spans) for index in (first, last)),
-        curves.x.size - 1,
-    ]
-    pieces = list(pairwise(edges))
-    groups = {"outside": pieces[::2], "inside": pieces[1::2]}
-    step = float(np.median(np.diff(curves.x)))
-    lengths = [max((last - first for first, last in group), default=0) for group in groups.values()]
+    step = depths.cell
+    inside = np.zeros(depths.x.size, bool)
+    for first, last in spans:
+        inside[first : last + 1] = True
+    pieces = {"inside": find_runs(inside), "outside": find_runs(~inside)}
+    lengths = [max((last - first for first, last in runs), default=0) for runs in pieces.values()]
     cutoff = fitting_cutoff(min(lengths) * step, step)
     if cutoff is None:
         return {}, None
+
+    rough = {}
+    for side in ("before", "after"):
+        z = getattr(depths, side)
+        rough[side] = z - mean_surface(z, (cutoff / step,))
+    edge = int(np.ceil(cutoff / 2 / step))
     regions = {}
-    for region, group in groups.items():
-        tables = [
-            _tabulate_sections(curves.x, z, group, cutoff) for z in (curves.before, curves.after)
-        ]
-        if not all(table.size for table in tables):
+    for region, runs in pieces.items():
+        sections = []
+        for first, last in runs:
+            kept = np.arange(first + edge, last + 1 - edge)
+            if kept.size > edge:
+                sections += np.array_split(kept, max(int(kept.size * step / cutoff), 1))
+        if not sections:
             return {}, None
-        regions[region] = {
-            "before": _pool(tables[0]),
-            "after": _pool(tables[1]),
-            "ratio": _divide(*tables),
-        }
+        tables = {side: _tabulate(z, sections, step) for side, z in rough.items()}
+        regions[region] = {side: _pool(table) for side, table in tables.items()}
+        regions[region]["ratio"] = _divide(tables["before"], tables["after"])
     return regions, cutoff
 
 
-def _tabulate_sections(x, z, pieces, cutoff: float) -> np.ndarray:
-    """Return Ra [m], mean square height [m2] and mean square slope (k, 3) of the sections of one cut-off."""
-    step = float(np.median(np.diff(x)))
-    sections = []
-    for first, last in pieces:
-        if x[last] - x[first] < MIN_CUTOFFS * cutoff:
-            continue
-        places = np.arange(x[first], x[last], step)
-        piece = Profile(places, np.interp(places, x, z), "piece")
-        try:
-            rough = filter_trace(piece, cutoff)[1].z
-        except PatchfemError:
-            continue
-        count = max(int(rough.size * step / cutoff), 1)
-        for part in np.array_split(rough, count):
-            slope = np.mean(np.diff(part) ** 2) / step**2
-            sections.append((np.abs(part).mean(), np.mean(part**2), slope))
-    return np.array(sections)
+def _tabulate(z, sections: list, step: float) -> np.ndarray:
+    """Return Ra [m], mean square height [m2] and mean square slope (k, 3) of sections."""
+    parts = [z[section] for section in sections]
+    sizes = [
+        (np.abs(part).mean(), np.mean(part**2), np.mean(np.diff(part) ** 2) / step**2)
+        for part in parts
+    ]
+    return np.array(sizes)
 
 
 def _pool(table) -> dict[str, Quantity]:

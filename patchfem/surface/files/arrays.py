@@ -32,12 +32,12 @@ def read_npy(content: Content, units: tuple[str, str] | None) -> Table:
         return _make_table(path, {"z": numbers})
     if numbers.ndim == 2 and numbers.shape[0] in (2, 3) and numbers.shape[1] > 3:
         numbers = numbers.T
-    if numbers.ndim != 2 or numbers.shape[1] not in (2, 3):
+    if not _is_table(numbers):
         raise PatchfemError(
             f"{path}: contains an array of shape {numbers.shape}; columns x, z or x, y, z are "
             f"needed, as {ARRAY_EXAMPLE} writes them; for a matrix of heights, {GIVE_PIXEL_SIZE}"
         )
-    return _make_table(path, dict(zip("xyz" if numbers.shape[1] == 3 else "xz", numbers.T)))
+    return _make_table(path, _name_columns(numbers))
 
 
 def read_mat(content: Content, _units=None) -> Table:
@@ -45,19 +45,24 @@ def read_mat(content: Content, _units=None) -> Table:
     path = content.path
     with refuse_damage(path):
         arrays = read_real_arrays(path, content.data)
-        by_name = {name.lower(): array for name, array in arrays.items()}
-        height = next((name for name in HEIGHT_NAMES if name in by_name), None)
-        if height and "x" in by_name:
-            columns = {name: by_name[name] for name in "xy" if name in by_name}
-            return _arrange(path, columns, by_name[height])
-        tables = [
-            array
-            for array in arrays.values()
-            if len(array.shape) == 2 and array.shape[1] in (2, 3) and array.shape[0] >= MIN_ROWS
-        ]
-        if len(tables) == 1:
-            columns = tables[0].T
-            return _make_table(path, dict(zip("xyz" if len(columns) == 3 else "xz", columns)))
+    by_name = {name.lower(): array for name, array in arrays.items()}
+    height = next((name for name in HEIGHT_NAMES if name in by_name), None)
+    if height and "x" in by_name:
+        columns = {name: by_name[name].ravel() for name in "xy" if name in by_name}
+        z = by_name[height]
+        shape = tuple(values.size for values in reversed(columns.values()))
+        if all(values.size == z.size for values in columns.values()):
+            return _make_table(path, columns | {"z": z.ravel()})
+        if z.shape == shape:
+            return _make_table(path, columns | {"z": z})
+        shapes = ", ".join(str(values.shape) for values in (*columns.values(), z))
+        raise PatchfemError(
+            f"{path}: x, y and z of shapes {shapes} do not fit together; z needs a row for each y and a column "
+            "for each x"
+        )
+    tables = [array for array in arrays.values() if _is_table(array) and len(array) >= MIN_ROWS]
+    if len(tables) == 1:
+        return _make_table(path, _name_columns(tables[0]))
     listed = ", ".join(f"{shorten(name)} {array.shape}" for name, array in [*arrays.items()][:8])
     raise PatchfemError(
         f"{path}: holds {listed or 'no array'}; variables x, z or x, y, z, or one matrix of these columns, "
@@ -65,21 +70,13 @@ def read_mat(content: Content, _units=None) -> Table:
     )
 
 
-def _arrange(path, places: dict[str, np.ndarray], z: np.ndarray) -> Table:
-    """Return variables of equal size as columns, or a matrix z with a row for each y and a column for each x."""
-    if all(values.size == z.size for values in places.values()):
-        return _make_table(
-            path, {name: values.ravel() for name, values in places.items()} | {"z": z.ravel()}
-        )
-    if "y" in places and z.shape == (places["y"].size, places["x"].size):
-        return _make_table(
-            path, {name: values.ravel() for name, values in places.items()} | {"z": z}
-        )
-    shapes = ", ".join(str(values.shape) for values in (*places.values(), z))
-    raise PatchfemError(
-        f"{path}: x, y and z of shapes {shapes} do not fit together; z needs a row for each y and a column "
-        "for each x"
-    )
+def _is_table(array) -> bool:
+    """Return whether an array has two or three columns."""
+    return array.ndim == 2 and array.shape[1] in (2, 3)
+
+
+def _name_columns(array) -> dict[str, np.ndarray]:
+    return dict(zip("xyz" if array.shape[1] == 3 else "xz", array.T))
 
 
 def _make_table(path, columns: dict[str, np.ndarray]) -> Table:

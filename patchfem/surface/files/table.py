@@ -30,6 +30,7 @@ MIN_ROUNDED = (
 MAX_ROUNDING = (
     0.75  # largest distance from even positions in printed digits, half of which is rounding
 )
+MIN_DIGIT = 1e-5  # smallest printed digit of a position, in the unit of the file
 DIGIT_TOL = 1e-4  # largest deviation from a multiple of a digit, relative to it, that is round-off
 # Largest distance of positions that count as equal, relative to the length of the axis.
 ROUND_OFF = 1e-9
@@ -43,7 +44,7 @@ class Table(NamedTuple):
     "x" (n,) and "y" (m,) if the file gives them; NaN: missing height. units: of each column, None where the
     file states none. place: file, with the line that names the columns if there is one. lines: of each sample
     in the file. notes: sentences on the file. are_units_fixed: whether the format defines or always states its
-    units. remedy: how the file would state its units.
+    units. remedy: how the file would state its units. length: of the scan [m], if the header gives it.
     """
 
     path: object
@@ -54,19 +55,13 @@ class Table(NamedTuple):
     notes: tuple[str, ...] = ()
     are_units_fixed: bool = False
     remedy: str = HEADER_EXAMPLE
+    length: float | None = None
 
     def locate(self, sample: int) -> str:
         """Return the place of a sample in the file for a message."""
         if self.lines is None:
             return f"{self.path}: sample {sample + 1}"
         return f"{self.path}:{self.lines[sample]}"
-
-
-class Axis(NamedTuple):
-    """Increasing positions [m] along an axis, in steps; notes: on rounded positions."""
-
-    places: np.ndarray
-    notes: tuple[str, ...] = ()
 
 
 def make_surface(table: Table, units: tuple[str, str] | None = None) -> Profile | Areal:
@@ -116,8 +111,7 @@ def make_surface(table: Table, units: tuple[str, str] | None = None) -> Profile 
     stated = "heights and length were read in the given units" if units else stated
     if table.columns["z"].ndim == 1 and "y" in table.columns:
         table = _fill_raster(table, factors)
-    make = _make_trace if table.columns["z"].ndim == 1 else _make_scan
-    return make(table, factors, stated)
+    return _make_surface(table, factors, stated)
 
 
 def _set_axes(table: Table, pixel: str | None) -> Table:
@@ -229,95 +223,104 @@ def _find_positions(values) -> tuple[np.ndarray, np.ndarray]:
     return values[order][np.concatenate([[True], is_new])], index
 
 
-def _make_scan(table: Table, factors: dict[str, float], stated: str) -> Areal:
+def _make_surface(table: Table, factors: dict[str, float], stated: str) -> Profile | Areal:
+    """Make the surface of a trace (n,) or of a matrix (m, n), whose positions increase."""
     z = table.columns["z"] * factors["z"]
     axes = []
-    for axis, role in enumerate("yx"):
+    for axis, role in enumerate("yx"[2 - z.ndim :]):
         places = table.columns[role]
-        if places.size < 2:
-            raise PatchfemError(
-                f"{table.path}: {places.size} positions along {role}; a scan needs at least two"
-            )
         if places[-1] < places[0]:
             places = places[::-1]
             z = np.flip(z, axis)
-        axes.append(_undo_rounding(table.path, role, places, factors[role]))
-        if not (np.diff(axes[-1].places) > 0).all():
-            raise PatchfemError(
-                f"{table.path}: {role} reverses; each coordinate of a scan must only rise or only fall"
-            )
+            table = table._replace(lines=None if table.lines is None else table.lines[::-1])
+        places, notes = _undo_rounding(table, role, places, factors[role])
+        table = table._replace(notes=table.notes + notes)
+        if z.ndim == 1:
+            places, z, notes = _average_equal(table, places, z)
+            table = table._replace(notes=table.notes + notes)
+        _require_increase(table, role, places)
+        axes.append(frozen_array(places))
     known = z[np.isfinite(z)]
-    if known.size < 3:
-        raise PatchfemError(f"{table.path}: {known.size} heights; a scan needs at least three")
-    length = max(float(np.ptp(axis.places)) for axis in axes)
-    notes = (*table.notes, *axes[0].notes, *axes[1].notes)
-    notes += _check_span(table.path, length, known, stated)
-    y, x = (frozen_array(axis.places) for axis in axes)
-    return Areal(x, y, frozen_array(z), str(table.path), notes)
+    if known.size <= z.ndim:
+        raise PatchfemError(
+            f"{table.path}: {known.size} heights; a {'scan' if z.ndim > 1 else 'trace'} needs more"
+        )
+    length = max(float(np.ptp(axis)) for axis in axes)
+    notes = table.notes + _check_span(table.path, length, known, stated)
+    surface = Profile if z.ndim == 1 else Areal
+    return surface(*reversed(axes), frozen_array(z), str(table.path), notes)
 
 
-def _make_trace(table: Table, factors: dict[str, float], stated: str) -> Profile:
-    x, z = table.columns["x"], table.columns["z"]
-    if x[-1] < x[0]:
-        x, z = x[::-1], z[::-1]
-        lines = None if table.lines is None else table.lines[::-1]
-        table = table._replace(lines=lines)
-    x, notes = _undo_rounding(table.path, "x", x, factors["x"])
-    notes = table.notes + notes
-    z = z * factors["z"]
+def _require_increase(table: Table, role: str, places) -> None:
+    """Raise PatchfemError if positions [m] do not increase, or there are fewer than two of them."""
+    if places.size < 2:
+        raise PatchfemError(
+            f"{table.path}: every sample lies at {role} = {format_length(places[0])}; a surface needs at least two "
+            f"different {role}"
+        )
+    is_rising = np.diff(places) > 0
+    if is_rising.all():
+        return
+    first = int(np.argmin(is_rising))
+    second = first + 1
+    lines = table.lines
+    if lines is not None and lines[first] > lines[second]:
+        first, second = second, first
+    raise PatchfemError(
+        f"{table.locate(second)}: {role} reverses: {format_length(places[first])} and then "
+        f"{format_length(places[second])}; {role} must only rise or only fall, so keep one trace or scan per file"
+    )
 
-    # Positions may be equal but not decrease.
-    steps = np.diff(x)
+
+def _average_equal(table: Table, x, z) -> tuple[np.ndarray, np.ndarray, tuple[str, ...]]:
+    """Average the heights (n,) of neighbouring samples with the same x, with a note."""
     equal = 1e-6 * (x[-1] - x[0]) / x.size
-    if (steps < -equal).any():
-        first = int(np.argmax(steps < -equal))
-        second = first + 1
-        if table.lines is not None and table.lines[first] > table.lines[second]:
-            first, second = second, first
-        raise PatchfemError(
-            f"{table.locate(second)}: x reverses: {format_length(x[first])} and then {format_length(x[second])}; x "
-            "of a trace must only rise or only fall, so keep only one trace per file"
-        )
-    if x[-1] == x[0]:
-        raise PatchfemError(
-            f"{table.path}: every sample lies at x = {format_length(x[0])}; a trace needs at least two "
-            "different x"
-        )
-    is_new = steps > equal
-    if not is_new.all():
-        group = np.concatenate([[0], np.cumsum(is_new)])
-        first = int(np.argmin(is_new)) + 1
-        place = f"sample {first + 1}" if table.lines is None else f"line {table.lines[first]}"
-        notes += (
-            f"{table.path}: {x.size - group[-1] - 1} samples have the same x as another sample (the first in "
-            f"{place}); the mean of their heights is used",
-        )
-        with np.errstate(invalid="ignore"):
-            z = np.bincount(group, np.nan_to_num(z)) / np.bincount(group, np.isfinite(z))
-        x = np.bincount(group, x) / np.bincount(group)
-    notes += _check_span(table.path, float(x[-1] - x[0]), z[np.isfinite(z)], stated)
-    return Profile(frozen_array(x), frozen_array(z), str(table.path), notes)
+    is_new = np.abs(np.diff(x)) > equal
+    if is_new.all():
+        return x, z, ()
+    group = np.concatenate([[0], np.cumsum(is_new)])
+    first = int(np.argmin(is_new)) + 1
+    place = f"sample {first + 1}" if table.lines is None else f"line {table.lines[first]}"
+    note = (
+        f"{table.path}: {x.size - group[-1] - 1} samples have the same x as another sample (the first in {place}); "
+        "the mean of their heights is used"
+    )
+    with np.errstate(invalid="ignore"):
+        z = np.bincount(group, np.nan_to_num(z)) / np.bincount(group, np.isfinite(z))
+    return np.bincount(group, x) / np.bincount(group), z, (note,)
 
 
-def _undo_rounding(path, role: str, x, factor: float) -> Axis:
-    """Convert positions (n,) to metres, equally spaced ones if they differ from these only by rounding.
+def _undo_rounding(table: Table, role: str, x, factor: float) -> tuple[np.ndarray, tuple[str, ...]]:
+    """Convert positions (n,) to metres, equally spaced ones if they differ from these only by rounding, with a note.
 
-    A step of 0.15625 um printed to 0.1 um makes the slopes 14 % too large.
+    A step of 0.15625 um printed to 0.1 um makes the slopes 14 % too large. If the header gives the length of the scan, it
+    gives the step.
     """
     if x.size < MIN_ROUNDED or not x[-1] > x[0]:
-        return Axis(x * factor)
+        return x * factor, ()
+    digit = find_printed_digit(x)
     count = np.arange(x.size) - (x.size - 1) / 2
     step = float(count @ x / (count @ count))
-    even = float(x.mean()) + step * count
-    distance = float(np.abs(x - even).max())
-    digit = find_printed_digit(x)
-    if not 1e-6 * step < distance <= MAX_ROUNDING * digit or not step > 0:
-        return Axis(x * factor)
+    evens = [float(x.mean()) + step * count]
+    if table.length is not None:
+        steps = (table.length / factor / n for n in (x.size, x.size - 1))
+        evens = [x[0] + step * np.arange(x.size) for step in steps]
+    for even in evens:
+        distance = float(np.abs(x - even).max())
+        step = float(even[1] - even[0])
+        if step > 0 and 1e-6 * step < distance <= MAX_ROUNDING * max(digit, MIN_DIGIT):
+            note = (
+                f"{table.path}: {role} is rounded to {format_length(digit * factor)} in the file; the samples are "
+                f"taken as evenly spaced by {format_length(step * factor)}"
+            )
+            return even * factor, (note,)
+    if table.length is None:
+        return x * factor, ()
     note = (
-        f"{path}: {role} is rounded to {format_length(digit * factor)} in the file; the samples are taken as "
-        f"evenly spaced by {format_length(step * factor)}"
+        f"{table.path}: the length of {format_length(table.length)} in the header does not fit {x.size} samples that "
+        f"end at {format_length(x[-1] * factor)}: the x values of the samples are used"
     )
-    return Axis(even * factor, (note,))
+    return x * factor, (note,)
 
 
 def find_printed_digit(x) -> float:

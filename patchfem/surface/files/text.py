@@ -17,19 +17,15 @@ from collections.abc import Iterator
 import numpy as np
 
 from ...core import PatchfemError
-from ...formatting import format_length
 from .content import Content
 from .header import Column, Header, parse_fact, read_header
 from .rows import read_rows
 from .spellings import HEADER_EXAMPLE, SIZE_LINES, parse_length_unit, shorten
-from .table import Table, find_printed_digit
+from .table import Table
 
 NOT_TEXT = f"export the profile as text with two columns and {HEADER_EXAMPLE}"
 # Largest relative range of the steps of coordinates; the steps of heights vary more.
 MAX_UNEVEN = 1e-6
-MIN_DIGIT = 1e-5  # smallest printed digit of x of a Dektak export, in the unit of the file
-# Largest distance of a rounded position from the true one, in printed digits: a half, and round-off.
-MAX_STEP_ERROR = 0.6
 _QUOTED_NUMBER = re.compile(r'"\s*([+-]?[0-9]*),([0-9]+(?:[eE][+-]?[0-9]+)?)\s*"')
 _CONTROL = re.compile(r"[\x00-\x08\x0e-\x1f\x7f]")
 _DEKTAK_START = "Scan Parameters"
@@ -54,7 +50,7 @@ def read_text(content: Content, units: tuple[str, str] | None = None) -> Table:
     if not header.columns and (header.count > 3 or is_sized):
         return _read_matrix(path, header, lines)
     table = _read_columns(path, header, lines, has_units=units is not None)
-    return table if length is None else _restore_step(table, length)
+    return table if length is None else table._replace(are_units_fixed=True, length=length)
 
 
 def _decode(content: Content) -> str:
@@ -179,33 +175,3 @@ def _translate_dektak(path, text: str) -> tuple[str, float | None]:
     blank_lines = "\n" * settings.count("\n")  # lines keep their numbers for messages
     text = f"{blank_lines}x [{x_unit}],z [{z_unit}]{text[header.end() :]}"
     return text, None if number is None else float(length[1]) * number
-
-
-def _restore_step(table: Table, length: float) -> Table:
-    """Replace the rounded positions of a Dektak export by even ones that fit the length [m] in its settings.
-
-    The lateral column is printed to 0.1 um, so the step that it shows is wrong; the true step is the length of
-    the scan over the number of its points. The printed positions stay if the steps do not fit them.
-    """
-    table = table._replace(are_units_fixed=True)
-    x = table.columns["x"]
-    factor = parse_length_unit(table.units["x"])
-    if factor is None or x.size < 3 or not np.isfinite(x).all() or not x[-1] > x[0]:
-        return table
-    digit = max(find_printed_digit(x), MIN_DIGIT)
-    note = (
-        f"the length of {format_length(length)} in the header does not fit {x.size} samples that end at "
-        f"{format_length(x[-1] * factor)}: the x values of the samples are used"
-    )
-    for count in (x.size, x.size - 1):
-        step = length / factor / count
-        places = x[0] + step * np.arange(x.size)
-        if np.abs(x - places).max() <= MAX_STEP_ERROR * digit:
-            x = places
-            note = (
-                f"x is rounded to {format_length(digit * factor)} in the file; the step "
-                f"{format_length(length)}/{count} = {format_length(step * factor)} of the header is used"
-            )
-            break
-    notes = (f"{table.path}: {note}", *table.notes)
-    return table._replace(columns=table.columns | {"x": x}, notes=notes)

@@ -16,7 +16,7 @@ import numpy as np
 from ...core import PatchfemError
 from ...formatting import format_length, format_number
 from ..profile import Profile, level, remove_spikes, resample_evenly
-from .filter import filter_trace
+from .filter import filter_surface
 from .parameters import MIN_SAMPLES, ROUND_OFF
 
 SUMMIT_FACTOR = 0.8968  # coefficient of 1/alpha in the variance of summit heights (Bush 1976)
@@ -136,7 +136,7 @@ def _filter_short_waves(trace: Profile, cutoff: float | None) -> Profile:
         raise PatchfemError(
             f"{trace.source}: the trace is flat, so it has no peaks; leave [contact.asperities] out"
         )
-    return flat if cutoff is None or cutoff >= flat.length else filter_trace(flat, cutoff)[1]
+    return flat if cutoff is None or cutoff >= flat.length else filter_surface(flat, cutoff)[1]
 
 
 def _describe_dust(trace: Profile) -> tuple:

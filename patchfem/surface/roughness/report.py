@@ -11,7 +11,7 @@ from ..areal import Areal, find_scan_spikes
 from ..profile import Profile, find_spikes, resample_evenly
 from ..quantity import Quantity
 from .areal import AREAL, compute_areal_parameters
-from .filter import filter_scan, filter_trace
+from .filter import filter_surface
 from .form import subtract_form
 from .parameters import (
     MIN_SAMPLES,
@@ -113,64 +113,98 @@ def make_report(
         Nesting index [m] of the S-filter.
     """
     part = surface if window is None else crop(surface, *window)
-    report = _report_scan if isinstance(surface, Areal) else _report_trace
-    return report(part, cutoff, window, form, short)
-
-
-def _report_trace(part: Profile, cutoff, window, form, short) -> RoughnessReport:
-    trace = _require_samples(resample_evenly(_require_samples(part)))
-    primary, form_name = subtract_form(trace, form)
+    is_scan = isinstance(part, Areal)
+    whole = part if is_scan else _require_samples(resample_evenly(_require_samples(part)))
+    primary, form_name = subtract_form(whole, form)
     if short is not None:
-        # The filter keeps the degree of a polynomial, so the form is subtracted again after it.
-        primary = subtract_form(filter_trace(primary, short)[0], form)[0]
-    if np.ptp(primary.z) <= ROUND_OFF * np.abs(trace.z).max():
-        primary = replace(primary, z=frozen_array(np.zeros(primary.z.size)))
-    values = compute_parameters(primary.z, trace.step)
+        # The filter changes the plane or line, so the form is subtracted again after it.
+        primary = subtract_form(filter_surface(primary, short)[0], form)[0]
+    heights = primary.z[~primary.missing]
+    if heights.size and np.ptp(heights) <= ROUND_OFF * np.nanmax(np.abs(whole.z)):
+        primary = replace(primary, z=frozen_array(primary.z * 0.0))
+    waviness = None
+    roughness = None
+    if cutoff is not None:
+        waviness, roughness = filter_surface(primary, cutoff)
+
+    evaluated = primary if roughness is None else roughness
+    heights = evaluated.z[~evaluated.missing]
+    notes = whole.notes + _describe_spikes(part)
+    if is_scan:
+        quantities, more = _measure_scan(evaluated)
+        parts = evaluated
+    else:
+        spectrum = estimate_spectrum(primary.z, whole.step)
+        parts = TraceParts(primary, waviness, roughness, spectrum)
+        quantities, more = _measure_trace(parts, cutoff)
+    size = Sampling(
+        length=float(whole.x[-1] - whole.x[0]),
+        step=float(whole.x[-1] - whole.x[0]) / (whole.x.size - 1),
+        shape=whole.z.shape,
+        measured=None if is_scan else part.x.size,
+    )
+    treatment = Treatment(form_name, short, cutoff, window)
+    return RoughnessReport(
+        whole.source, size, treatment, tuple(quantities), notes + more, parts, heights
+    )
+
+
+def _measure_trace(
+    parts: TraceParts, cutoff: float | None
+) -> tuple[list[Quantity], tuple[str, ...]]:
+    """Return the parameters of the primary profile and of the roughness profile, and notes on the sections."""
+    primary = parts.primary
+    values = compute_parameters(primary.z, primary.step)
     del values["z"]  # of one section, which is Pt
     quantities = [
         _name_value(f"P{name}", value, PROFILE[name], "the levelled trace")
         for name, value in values.items()
     ]
-    spectrum = estimate_spectrum(primary.z, trace.step)
-    quantities += _measure_waves(primary, spectrum)
+    quantities += _measure_waves(primary, parts.spectrum)
+    rough = parts.roughness
+    if rough is None:
+        return quantities, ()
 
-    notes = trace.notes + _describe_spikes(part)
-    waviness = None
-    roughness = None
-    heights = primary.z
-    if cutoff is not None:
-        waviness, roughness = filter_trace(primary, cutoff)
-        heights = roughness.z
-        values = compute_parameters(heights, trace.step, cutoff)
-        errors = estimate_errors(heights, trace.step, cutoff)
-        n_sections = heights.size // round(cutoff / trace.step)
-        for name, value in values.items():
-            long_name = name if name.startswith("Mr") else f"R{name}"
-            quantity = _name_value(long_name, value, PROFILE[name], "the roughness profile")
-            quantities.append(_add_interval(quantity, errors.get(name), n_sections))
-        if n_sections < MIN_SECTIONS:
-            needed = format_length((MIN_SECTIONS + 1) * cutoff)
-            notes += (
-                f"{trace.source}: the {format_length(roughness.length)} within half a cut-off of the ends hold "
-                f"{n_sections} sections of {format_length(cutoff)}, and intervals need {MIN_SECTIONS}: evaluate "
-                f"at least {needed}, or take a shorter cut-off",
-            )
-    if roughness is not None and roughness.length < cutoff * (1 - 1e-9):
+    errors = estimate_errors(rough.z, primary.step, cutoff)
+    n_sections = rough.z.size // round(cutoff / primary.step)
+    for name, value in compute_parameters(rough.z, primary.step, cutoff).items():
+        long_name = name if name.startswith("Mr") else f"R{name}"
+        quantity = _name_value(long_name, value, PROFILE[name], "the roughness profile")
+        quantities.append(_add_interval(quantity, errors.get(name), n_sections))
+    notes = ()
+    remaining = f"{format_length(rough.length)}"
+    if n_sections < MIN_SECTIONS:
         notes += (
-            f"{trace.source}: half a cut-off is trimmed at each end, and the "
-            f"{format_length(roughness.length)} that remain are shorter than one section of "
-            f"{format_length(cutoff)}, the least that ISO 21920 needs; do not use these roughness "
-            "parameters: evaluate a longer part, or take a shorter cut-off",
+            f"{primary.source}: the {remaining} within half a cut-off of the ends hold {n_sections} sections of "
+            f"{format_length(cutoff)}, and intervals need {MIN_SECTIONS}: evaluate at least "
+            f"{format_length((MIN_SECTIONS + 1) * cutoff)}, or take a shorter cut-off",
         )
-    return RoughnessReport(
-        source=trace.source,
-        sampling=Sampling(trace.length, trace.step, (trace.x.size,), part.x.size),
-        treatment=Treatment(form_name, short, cutoff, window),
-        values=tuple(quantities),
-        notes=notes,
-        surface=TraceParts(primary, waviness, roughness, spectrum),
-        heights=heights,
-    )
+    if rough.length < cutoff * (1 - 1e-9):
+        notes += (
+            f"{primary.source}: half a cut-off is trimmed at each end, and the {remaining} that remain are shorter "
+            f"than one section of {format_length(cutoff)}, the least that ISO 21920 needs; do not use these "
+            "roughness parameters: evaluate a longer part, or take a shorter cut-off",
+        )
+    return quantities, notes
+
+
+def _measure_scan(scan: Areal) -> tuple[list[Quantity], tuple[str, ...]]:
+    """Return the parameters of a scan, and a note on missing heights."""
+    if scan.missing.all():
+        raise PatchfemError(
+            f"{scan.source}: no measured height is left within half a cut-off of the borders"
+        )
+    steps = tuple(float(axis[-1] - axis[0]) / (axis.size - 1) for axis in (scan.y, scan.x))
+    quantities = []
+    for name, value in compute_areal_parameters(scan.z, steps).items():
+        reason = value if isinstance(value, str) else ""
+        number = None if reason else value
+        quantities.append(Quantity(number, None, None, *AREAL[name], reason, name))
+    count = int(scan.missing.sum())
+    if not count:
+        return quantities, ()
+    note = f"{scan.source}: {count} of {scan.z.size} heights are missing and are left out"
+    return quantities, (note,)
 
 
 def _measure_waves(primary: Profile, spectrum: Spectrum) -> list[Quantity]:
@@ -209,41 +243,6 @@ def _add_interval(quantity: Quantity, error: float | None, n_sections: int) -> Q
     # a material ratio is at most 1
     high = min(high, 1.0) if quantity.name.startswith("Mr") else high
     return quantity._replace(low=float(low), high=float(high))
-
-
-def _report_scan(scan: Areal, cutoff, window, form, short) -> RoughnessReport:
-    flat, form_name = subtract_form(scan, form)
-    if short is not None:
-        flat = subtract_form(filter_scan(flat, short)[0], form)[0]
-    if cutoff is not None:
-        flat = filter_scan(flat, cutoff)[1]
-    if np.isnan(flat.z).all():
-        raise PatchfemError(
-            f"{scan.source}: no measured height is left within half a cut-off of the borders"
-        )
-    if np.nanmax(flat.z) - np.nanmin(flat.z) <= ROUND_OFF * np.nanmax(np.abs(scan.z)):
-        flat = replace(flat, z=frozen_array(flat.z * 0.0))
-    steps = tuple(float(axis[-1] - axis[0]) / (axis.size - 1) for axis in (flat.y, flat.x))
-    quantities = []
-    for name, value in compute_areal_parameters(flat.z, steps).items():
-        reason = value if isinstance(value, str) else ""
-        number = None if reason else value
-        quantities.append(Quantity(number, None, None, *AREAL[name], reason, name))
-    notes = scan.notes + _describe_spikes(scan)
-    missing = int(np.isnan(flat.z).sum())
-    if missing:
-        notes += (
-            f"{scan.source}: {missing} of {flat.z.size} heights are missing and are left out",
-        )
-    return RoughnessReport(
-        source=scan.source,
-        sampling=Sampling(float(scan.x[-1] - scan.x[0]), steps[1], scan.z.shape),
-        treatment=Treatment(form_name, short, cutoff, window),
-        values=tuple(quantities),
-        notes=notes,
-        surface=flat,
-        heights=flat.z[~np.isnan(flat.z)],
-    )
 
 
 def fitting_cutoff(length: float, step: float) -> float | None:

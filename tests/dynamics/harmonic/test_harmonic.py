@@ -3,6 +3,7 @@ balances."""
 
 import numpy as np
 import pytest
+from bond_moments import advance_bonds
 from harmonic_cases import (
     jenkins_forces,
     make_bond_law,
@@ -22,22 +23,20 @@ from patchfem.dynamics import (
     Interlock,
     LawGroup,
     Spring,
-    coulomb_model,
     evaluate_series,
     find_cycle_energies,
     find_steady_motion,
-    jenkins_model,
     make_balance,
     make_cycle_response,
     pack_harmonics,
-    points_model,
 )
 from patchfem.dynamics.harmonic.harmonic import HarmonicBalance, solve_newton, unpack_harmonics
 from patchfem.dynamics.harmonic.laws import Jenkins, SampledSlide
-from patchfem.friction import Bonds
-from patchfem.friction.bonds.recursion import advance_bonds
+from patchfem.friction import Bonds, Coulomb, points_element
+from patchfem.friction.laws.elastic_plastic import parallel_element
 
 DRIVE = SineDrive(1.0, 1.0)
+GROWING = Bonds(0.3, 1e-6, ratio=0.5, rest_growth=1.0, slip_growth=1e-7)
 # peaks by stiffness, for friction limit 0.8 and damping ratio 0.003; DOP853 at 1e-12
 PEAKS = {
     10: 0.249538145,
@@ -249,7 +248,7 @@ def check_cycle(modes, drive, point, k, w, tolerance, steps=4000):
 def test_exact_five_modes_with_many_elements_agree_with_march(omega):
     """The balance of five modes with many elements agrees with a march of one cycle within 2e-4."""
     modes, (k, w), drive = make_five_modes(), make_elements(), SineDrive(1.5, omega)
-    point = find_steady_motion(modes, drive, jenkins_model(k, w), tolerance=1e-4)
+    point = find_steady_motion(modes, drive, parallel_element(k, w), tolerance=1e-4)
     assert point.error < 1e-4 and np.ptp(evaluate_series(point.coefficients, 512)) > 4 * w.min()
     check_cycle(modes, drive, point, k, w, 2e-4)
 
@@ -353,11 +352,9 @@ def test_refuses_laws_that_cannot_be_balanced():
     a message."""
     modes = make_sdof()
     with pytest.raises(PatchfemError, match="rigid friction"):
-        find_steady_motion(modes, DRIVE, coulomb_model(1.0, 1.0))
+        find_steady_motion(modes, DRIVE, Coulomb(1.0, 1.0).element(1.0))
     with pytest.raises(PatchfemError, match="a constant bond length"):
-        find_steady_motion(
-            modes, DRIVE, points_model(Bonds(0.3, 1e-6, breakaway=0.1), [1.0], [1.0])
-        )
+        find_steady_motion(modes, DRIVE, points_element(GROWING, [1.0], [1.0]))
     with pytest.raises(PatchfemError, match="interface 2"):
         LawGroup(modes, (2, Spring(1.0)))
     with pytest.raises(PatchfemError, match="on at least one interface"):

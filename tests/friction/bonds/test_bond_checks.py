@@ -7,12 +7,12 @@ few uneven steps suffice.
 import numpy as np
 import pytest
 from friction_forms import reversal_force, virgin_force
-from friction_paths import march_path, march_tractions, upper_pressure
+from friction_paths import march_path, upper_pressure
 from hypothesis import given
 from hypothesis import strategies as st
 
-from patchfem.friction import Bonds, FirstOrderBonds, Quadrature
-from patchfem.friction.bonds.parameters import grow, growth_exponents
+from patchfem.friction import Bonds, FirstOrderBonds, ListedBonds, growth_numbers
+from patchfem.friction.bonds.point_kernels import grow
 
 UNIT_PRESSURE = upper_pressure([1.0])
 UNEVEN_PATH = np.array([0.0, 0.02, 0.5, 0.7, 1.0, 1.9, 2.0, 3.3, 4.0])
@@ -26,8 +26,14 @@ def unit_bonds(order=1.0, reading="stretch", initial=1.0, **parameters):
 def make_engines(order, reading, initial):
     """Return the NumPy engines that can sum the bonds of a law."""
     law = unit_bonds(order, reading, initial)
-    engines = [Quadrature(law, tail=0.0)]
+    engines = [ListedBonds(law, tail=0.0)]
     return [*engines, FirstOrderBonds(law)] if reading == "stretch" and order == 1 else engines
+
+
+def find_tolerance(law):
+    """Return the error of a law: that of two Gauss points per strip for a list of the stretch law, else round-off."""
+    is_gauss = isinstance(law, ListedBonds) and law.law.reading == "stretch"
+    return 3e-8 if is_gauss else 1e-12
 
 
 # ---- first loading
@@ -55,7 +61,9 @@ def test_exact_virgin_force_agrees_with_closed_form(order, reading, initial, exp
             assert np.interp([0.5, 1, 2, 4], UNEVEN_PATH, force) == pytest.approx(
                 expected, abs=1e-6
             )
-            assert force == pytest.approx(virgin_force(UNEVEN_PATH, 1.0, order, initial), abs=1e-8)
+            tolerance = find_tolerance(law)
+            expected_force = virgin_force(UNEVEN_PATH, 1.0, order, initial)
+            assert force == pytest.approx(expected_force, abs=tolerance)
 
 
 # ---- reversal
@@ -69,24 +77,30 @@ def test_exact_virgin_force_agrees_with_closed_form(order, reading, initial, exp
     ],
 )
 def test_exact_reversal_force_after_long_sliding(order, reading, expected):
-    """The force after a reversal from steady sliding agrees with the closed form within 1e-12."""
+    """The force after a reversal from steady sliding agrees with the closed form."""
     back = np.array([0.1, np.log(2) / 2, np.log(2), 1, 3])
     path = np.concatenate([np.linspace(0, 40, 9), 40 - back])
     for law in make_engines(order, reading, 1.0 if reading == "stretch" else 0.0):
-        force = march_tractions(law, path, UNIT_PRESSURE).traction[-5:, 0]
+        force = march_path(law, path, UNIT_PRESSURE).traction[-5:, 0]
         assert force == pytest.approx(expected, abs=1e-6)
-        assert force == pytest.approx(reversal_force(back, 1.0, order, reading), abs=1e-12)
+        expected_force = reversal_force(back, 1.0, order, reading)
+        assert force == pytest.approx(expected_force, abs=find_tolerance(law))
 
 
 # ---- growth of the bond length
 
 
-def test_exact_growth_exponents_during_linear_reversal():
-    """The growth exponents of a bond agree with the integral over a velocity that changes linearly from -0.3 to 0.7."""
+def grow_length(law, length, v0, v1, path, time):
+    """Return the bond length and the exponent of its growth after a step."""
+    return grow(length, v0, v1, path, time, growth_numbers(law))
+
+
+def test_exact_growth_exponent_during_linear_reversal():
+    """The growth exponent of a bond agrees with the integral over a velocity that changes linearly from -0.3 to 0.7."""
     law = unit_bonds(rest_growth=0.3, slip_growth=1e30, rest_speed=0.01)
-    rest, slip = growth_exponents(law, 1.0, -1.0, 0.0, 2.0)
-    assert slip == 0 and np.exp(-rest) == pytest.approx(0.03462767, abs=1e-8)
-    rest, slip = growth_exponents(law, -0.3, 0.7, 0.2, 1.0)
+    rest = grow_length(law, 1.0, 1.0, -1.0, 0.0, 2.0)[1]
+    assert np.exp(-rest) == pytest.approx(0.03462767, abs=1e-8)
+    rest = grow_length(law, 1.0, -0.3, 0.7, 0.2, 1.0)[1]
     assert rest == pytest.approx(2.89490779, abs=1e-8)
     times = np.linspace(0, 1, 1_000_001)
     middle = (times[1:] + times[:-1]) / 2
@@ -110,10 +124,11 @@ def test_always_growth_is_independent_of_substeps(
     law = unit_bonds(
         ratio=ratio, rest_growth=rest_growth, slip_growth=slip_growth, rest_speed=rest_speed
     )
-    single_step = grow(law, initial_length, speed, speed, speed * time, time)
+    single_step = grow_length(law, initial_length, speed, speed, speed * time, time)[0]
     length = initial_length
     for _ in range(n_substeps):
-        length = grow(law, length, speed, speed, speed * time / n_substeps, time / n_substeps)
+        part = time / n_substeps
+        length = grow_length(law, length, speed, speed, speed * part, part)[0]
     assert length == pytest.approx(single_step, rel=1e-12)
     assert min(initial_length, ratio) * (1 - 1e-12) <= single_step <= 1 + 1e-12
 
@@ -122,5 +137,5 @@ def test_exact_steady_bond_length_agrees_with_equation():
     """The bond length at constant speed converges to the steady value of equation 2.11."""
     law = unit_bonds(ratio=0.7, rest_growth=0.4, slip_growth=0.1, rest_speed=1e-6)
     for speed in (0.02, 0.2, 2.0):
-        eps = grow(law, 1.0, speed, speed, 1e3, 1e3 / speed)
+        eps = grow_length(law, 1.0, speed, speed, 1e3, 1e3 / speed)[0]
         assert eps == pytest.approx((1 + 0.7 * speed**2 / 0.04) / (1 + speed**2 / 0.04), rel=1e-13)

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from march_paths import follow_path
 
-from patchfem.dynamics import bond_list_model
 from patchfem.friction import Bonds
-from patchfem.friction.bonds.quadrature import cutoff_age
+from patchfem.friction.bonds.list_numbers import cutoff_age
+from patchfem.points.contacts import BondSum, make_bond_contact
 
 ENGINES = {"direct": (0.0, 0.0), "truncated": (1e-6, 0.0), "merged": (1e-6, 0.02)}  # tail, merge
 LAWS = [
@@ -43,17 +43,23 @@ def draw_law_and_path(rng, reading, order):
     )
 
 
+def make_lists(law, tail, merge):
+    """Return a point whose bonds are summed over a list."""
+    reach = cutoff_age(law.order, tail) if tail else np.inf
+    return make_bond_contact(law, 1.0, np.ones(1), bond_sum=BondSum(law, reach, merge))
+
+
 def check_energy_balance(seed, count, reading, order, engine):
     """Check the energy balance of the bond list on random paths."""
     rng, (tail, merge) = np.random.default_rng(seed), ENGINES[engine]
     for _ in range(count):
         law, path = draw_law_and_path(rng, reading, order)
-        model = bond_list_model(law, 1.0, cutoff_age(order, tail) if tail else np.inf, merge)
-        forces, energies, n_failures, _ = follow_path(model, path, 10 ** rng.uniform(-2, 1))
+        contact = make_lists(law, tail, merge)
+        forces, energies, n_unsolved, _ = follow_path(contact, path, 10 ** rng.uniform(-2, 1))
         work = forces[:-1, 1] * np.diff(path)
         dissipated = energies[:-1, 0]
         total_work = np.abs(work).sum()
-        assert n_failures == 0
+        assert n_unsolved == 0
         assert work.sum() - dissipated.sum() == pytest.approx(
             energies[-1, 1], abs=1e-12 * total_work
         )
@@ -81,11 +87,11 @@ def test_order_of_list_work_quadrature_is_two(reading, order, engine):
     """The trapezoidal work of the force converges to the work of the step means with order two (1.3 for order -0.5)."""
     tail, merge = ENGINES[engine]
     law = Bonds(1.0, 1.0, order, reading, 0.6, 0.3, 0.4, 1e-2, 0.0)
-    model = bond_list_model(law, 1.0, cutoff_age(order, tail) if tail else np.inf, merge)
+    contact = make_lists(law, tail, merge)
     errors = []
     for steps in (100, 400):
         path = 1.7 * np.sin(2 * np.pi * np.arange(2 * steps + 1) / steps)
-        forces, _, _, _ = follow_path(model, path, 2 * np.pi / steps)
+        forces, _, _, _ = follow_path(contact, path, 2 * np.pi / steps)
         work = forces[:-1, 1] * np.diff(path)
         errors.append(abs(np.trapezoid(forces[:, 0], path) - work.sum()) / np.abs(work).sum())
     assert errors[1] < 2e-4 and (

@@ -1,10 +1,9 @@
-"""Compiled bond lists of equation 2.17 (direct, truncated, merged) against the NumPy sum, hand sums and mpmath."""
+"""Compiled bond lists of equation 2.17 (direct, truncated, merged) against the recursion, hand sums and closed forms."""
 
 import numpy as np
 import pytest
 from friction_paths import (
     march_path,
-    march_tractions,
     random_walk,
     reference_energy,
     reference_traction,
@@ -14,7 +13,7 @@ from friction_paths import (
 from list_paths import STATUS, march_list
 from scipy.special import gammainc
 
-from patchfem.friction import Bonds, FirstOrderBonds, Quadrature
+from patchfem.friction import Bonds, FirstOrderBonds
 
 UNIT_PRESSURE = upper_pressure([1.0])
 GROWTH = {"ratio": 0.6, "rest_growth": 0.3, "slip_growth": 0.4, "rest_speed": 1e-2}
@@ -23,52 +22,56 @@ GROWTH = {"ratio": 0.6, "rest_growth": 0.3, "slip_growth": 0.4, "rest_speed": 1e
 # ---- direct lists
 
 
-@pytest.mark.parametrize("order", [0.0, 2.0, -0.5])
+@pytest.mark.parametrize("order", [0.0, 2.0])
 @pytest.mark.parametrize("initial", [0.0, 1.0])
-def test_exact_direct_printed_law_equals_numpy_sum(order, initial):
-    """The direct list of the printed law has the forces of the NumPy sum within 1e-12, or 2e-8 for tabulated orders."""
+def test_exact_direct_printed_law_equals_hand_sum(order, initial):
+    """The direct list of the printed law has the forces of a sum over the bonds by hand within 1e-12, also at rest."""
     law = Bonds(1.0, 1.0, order, "report", initial=initial)
     path = np.concatenate(
         [random_walk(3, 40, 0.7), random_walk(3, 40, 0.7)[-1] + np.array([0, 0.2, 0.4, 30, 30])]
     )
     compiled = march_list(law, path)
-    reference = march_tractions(Quadrature(law, tail=0.0), path, UNIT_PRESSURE)
-    tolerance = 1e-12 if order in (0, 1, 2) else 2e-8
-    assert compiled.after == pytest.approx(reference.traction[:, 0], abs=tolerance)
-    assert compiled.ahead == pytest.approx(compiled.after, abs=tolerance)
+    for k in (3, 20, 40, 43, 45):
+        expected = reference_traction(law, path[: k + 1], UNIT_PRESSURE)[0]
+        assert compiled.after[k - 1] == pytest.approx(expected, abs=1e-12)
+    assert compiled.ahead == pytest.approx(compiled.after, abs=1e-12)
 
 
 @pytest.mark.share(0, 3, 6, 8, 11)
 @pytest.mark.parametrize(
     "order, tolerance",
-    [(0.0, 2e-6), (0.5, 1e-4), (0.25, 2e-4), (1.5, 2e-5), (2.0, 2e-5), (3.0, 1e-5)],
+    [(0.0, 2e-6), (0.5, 2e-5), (0.25, 1e-4), (1.5, 2e-6), (2.0, 2e-6), (3.0, 1e-6)],
 )
 @pytest.mark.parametrize("growth", [{}, GROWTH])
-def test_exact_direct_stretch_law_equals_numpy_sum(order, tolerance, growth):
-    """The direct list of the stretch law agrees with the NumPy sum where the stretch of a bond vanishes inside a strip.
+def test_exact_direct_stretch_law_equals_hand_sum(order, tolerance, growth):
+    """The direct list of the stretch law agrees with a sum by hand where the stretch of a bond vanishes inside a strip.
 
     Forces of order 0 were wrong by 5e-2 there before strips were split.
     """
     law = Bonds(1.0, 1.0, order, "stretch", **growth)
     path = np.concatenate([triangle_path(1.5, 3, 13), [-1.43, -0.77, 4.0, 3.3, 3.9]])
-    compiled = march_list(law, path, 0.4)
-    reference = march_tractions(Quadrature(law, tail=0.0), path, UNIT_PRESSURE, 0.4)
-    assert compiled.after == pytest.approx(reference.traction[:, 0], abs=tolerance)
+    compiled = march_list(law, path - path[0], 0.4)
+    for k in (5, 17, 30, 46, *range(len(path) - 6, len(path))):
+        expected = reference_traction(law, path[: k + 1] - path[0], UNIT_PRESSURE, 0.4)[0]
+        assert compiled.after[k - 1] == pytest.approx(expected, abs=tolerance)
     assert compiled.ahead == pytest.approx(compiled.after, abs=tolerance)
 
 
 @pytest.mark.parametrize("growth", [{}, GROWTH])
 def test_exact_direct_stretch_law_equals_recursion(growth):
-    """The list of every bond has the forces, means and energies of the recursion with three states to rounding."""
+    """The list of every bond has the forces, means and energies of the recursion, which is exact, within 3e-8.
+
+    The error is that of two Gauss points on a strip of a sixteenth of a bond length.
+    """
     law = Bonds(1.0, 1.0, initial=0.4, **growth)
     path = np.concatenate(
         [random_walk(5, 80, 0.5), random_walk(5, 80, 0.5)[-1] + np.array([0, 1e-5, 20.0, 1e3])]
     )
     compiled = march_list(law, path, 0.4)
     recursion = march_path(FirstOrderBonds(law), path, UNIT_PRESSURE, 0.4)
-    assert compiled.after == pytest.approx(recursion.traction[:, 0], abs=1e-12)
-    assert compiled.mean == pytest.approx(recursion.mean[:, 0], abs=1e-12)
-    assert compiled.stored == pytest.approx(recursion.stored[:, 0], abs=1e-11)
+    assert compiled.after == pytest.approx(recursion.traction[:, 0], abs=3e-8)
+    assert compiled.mean == pytest.approx(recursion.mean[:, 0], abs=2e-7)
+    assert compiled.stored == pytest.approx(recursion.stored[:, 0], abs=5e-8)
 
 
 @pytest.mark.parametrize("order, tolerance", [(-0.5, 1e-4), (1.0, 1e-5)])
@@ -157,7 +160,7 @@ def test_exact_force_after_step_of_million_bond_lengths(reading, order, toleranc
 
 
 def test_exact_strips_of_tiny_growing_bonds_are_limited():
-    """Steps of a million bond lengths of growing bonds keep at most 300 strips and count the strips left out."""
+    """Steps of a million bond lengths of growing bonds keep at most 100 strips."""
     law = Bonds(
         1.0,
         1.0,
@@ -170,11 +173,7 @@ def test_exact_strips_of_tiny_growing_bonds_are_limited():
         initial=0.0,
     )
     result = march_list(law, np.array([0.0, 1e6, 0.0]), tail=1e-9)
-    assert (
-        np.isfinite(result.after).all()
-        and result.status[STATUS.max_strips] <= 300
-        and result.status[STATUS.n_extra] >= 4e6
-    )
+    assert np.isfinite(result.after).all() and result.status[STATUS.max_strips] <= 100
 
 
 # ---- truncated lists
@@ -200,13 +199,16 @@ def test_always_truncation_error_is_below_tail(reading, order, growth):
 # ---- merged lists
 
 
-@pytest.mark.parametrize("order", [2.0])
-def test_exact_repeated_passes_are_merged_into_one_strip(order):
-    """Growing bonds of many passes over one range, merged into strips, agree with all strips."""
-    law = Bonds(1.0, 1.0, order, "report", initial=0.0, **GROWTH)
-    path = triangle_path(0.1, 30, 40)
-    full = march_list(law, path, 0.05)
-    merged = march_list(law, path, 0.05, 0.05)
-    assert merged.status[STATUS.n_spread] > 5
-    assert merged.after == pytest.approx(full.after, abs=2e-3)
-    assert merged.stored == pytest.approx(full.stored, abs=1e-4)
+@pytest.mark.parametrize("reading, order", [("report", 2.0), ("stretch", 0.5), ("stretch", 2.0)])
+@pytest.mark.parametrize("growth", [{}, GROWTH])
+def test_exact_joined_strips_of_long_strokes(reading, order, growth):
+    """Long strokes in fine steps keep a twentieth of the strips and the forces of all bonds."""
+    law = Bonds(1.0, 1.0, order, reading, initial=0.0, **growth)
+    path = triangle_path(4.0, 2, 3000)
+    full = march_list(law, path, 0.001)
+    merged = march_list(law, path, 0.001, 0.02, 1e-9)
+    bound = 6.0 if growth and reading == "report" else 1.0
+    assert merged.after == pytest.approx(full.after, abs=bound * 0.02**2)
+    assert merged.stored == pytest.approx(full.stored, abs=bound * 0.02**2)
+    if reading == "stretch":
+        assert merged.status[STATUS.max_strips] < 0.05 * full.status[STATUS.max_strips]

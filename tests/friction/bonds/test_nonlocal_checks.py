@@ -10,18 +10,17 @@ from itertools import pairwise
 import mpmath
 import numpy as np
 import pytest
-from friction_paths import march_tractions, upper_pressure
+from friction_paths import march_path, upper_pressure
 from modal_bases import make_modal_basis
 from scipy.special import gammainc
 from vibration_forms import sliding_amplitude
 
 from patchfem import build
 from patchfem.core import SineDrive
-from patchfem.dynamics import points_model
-from patchfem.dynamics.march.march import march
-from patchfem.friction import Bonds, FirstOrderBonds, Quadrature
-from patchfem.friction.bonds.quadrature import cutoff_age
-from patchfem.friction.bonds.recursion import BondState
+from patchfem.friction import Bonds, FirstOrderBonds, ListedBonds
+from patchfem.friction.bonds.list_numbers import cutoff_age
+from patchfem.points.contacts import make_bond_contact
+from patchfem.points.time_march import march
 from patchfem.response import energy_balance
 from patchfem.runs.bench import bench as law_bench
 from patchfem.scene import scene
@@ -39,11 +38,13 @@ def test_exact_dwell_of_stretch_law_agrees_with_closed_form(dwell_time):
     law = FirstOrderBonds(
         Bonds(1.0, 1.0, ratio=0.5, rest_growth=10.0, slip_growth=1e30, rest_speed=1.0)
     )
-    state = BondState(np.array([[1.0], [0.5], [0.5]]), 0.5)
+    state = np.array([[1.0], [0.5], [0.5], [0.5]])
     unit = np.ones(1)
     dwell = law.step(state, 0.0, unit, unit, dwell_time)
     eps = 1 - 0.5 * np.exp(-10 * dwell_time)
-    assert dwell.state.eps == pytest.approx(eps, rel=1e-14) and law.traction(dwell.state)[0] == 0.5
+    assert (
+        dwell.state[3, 0] == pytest.approx(eps, rel=1e-14) and law.traction(dwell.state)[0] == 0.5
+    )
     for x in (0.25, 0.5, 1.0, 2.0):
         force = law.traction(law.step(dwell.state, x, unit, unit, 0.0).state)[0]
         assert force == pytest.approx(eps + (0.5 - eps) * np.exp(-x / eps), abs=1e-12)
@@ -84,7 +85,7 @@ def test_exact_resultant_of_pad_on_lower_piece(order, engine, width, expected):
     """The traction behind the leading edge of a pad on the lower piece and its resultant agree with closed forms (C9)."""
     reading = "report" if engine == "printed" else "stretch"
     law = Bonds(1.0, 1.0, order, reading)
-    law = FirstOrderBonds(law) if engine == "state" else Quadrature(law, tail=0.0)
+    law = FirstOrderBonds(law) if engine == "state" else ListedBonds(law, tail=0.0)
     y, w = np.polynomial.legendre.leggauss(24 if width < 50 else 70)
     depth = width * (1 + y) / 2
     tau = pad_traction(law, depth, width)
@@ -111,7 +112,7 @@ def test_exact_march_converges_beyond_contraction_limit():
         marched = march(
             sdof_basis(omega, 0.003),
             SineDrive(2 * 39.24, omega),
-            points_model(Bonds(0.4, 2e-6), [1e-4], [98.1e4]),
+            make_bond_contact(Bonds(0.4, 2e-6), 98.1, np.ones(1)),
             100,
             16,
             window=2,
@@ -182,7 +183,7 @@ def test_exact_printed_law_with_extreme_orders(order):
     """For orders -0.9 and 20 the first loading, the reversal and the cut-off age agree with incomplete gamma functions."""
     law = Bonds(1.0, 1.0, order, "report", initial=0.0)
     path = np.concatenate([np.linspace(0, 60, 121), 60 - np.array([0.01, 0.5, 4.0, 12.0, 30.0])])
-    force = march_tractions(Quadrature(law, tail=0.0), path, UNIT_PRESSURE).traction[:, 0]
+    force = march_path(ListedBonds(law, tail=0.0), path, UNIT_PRESSURE).traction[:, 0]
 
     def below(x):
         return float(mpmath.gammainc(mpmath.mpf(order) + 1, 0, x, regularized=True))
@@ -208,8 +209,9 @@ def test_order_of_convergence_to_coulomb_is_half():
     coulomb_amplitude = sliding_amplitude(135 / 143, 4 / 6, 0.05) * drive / OMEGA**2
     deficits = []
     for length in (1e-7, 1e-8, 1e-9):
-        model = points_model(Bonds(0.4, length), [1e-4], [98.0665e4])
-        marched = march(sdof_basis(zeta=0.05), SineDrive(drive, omega), model, 60, 3200, window=2)
+        contact = make_bond_contact(Bonds(0.4, length), 98.0665, np.ones(1))
+        basis = sdof_basis(zeta=0.05)
+        marched = march(basis, SineDrive(drive, omega), contact, 60, 3200, window=2)
         assert marched.outcome is None and energy_balance(marched.ledger) <= 1e-8
         deficits.append(1 - np.ptp(marched.window.slide) / 2 / coulomb_amplitude)
     assert np.log10(deficits[0] / deficits[1]) == pytest.approx(0.5, abs=0.03)

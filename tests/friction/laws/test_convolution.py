@@ -4,7 +4,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from friction_paths import march_path, march_tractions, triangle_path, upper_pressure
+from friction_paths import march_path, triangle_path, upper_pressure
 from hypothesis import given
 from hypothesis import strategies as st
 from scene_texts import COULOMB, POINT, SHEAR, SHORT, SLIDE, SMALL_PATCH
@@ -13,7 +13,7 @@ from scipy.special import gamma
 
 from patchfem import SceneError, build, plan
 from patchfem.core import PatchfemError
-from patchfem.friction import Bonds, Coulomb, FirstOrderBonds, Quadrature
+from patchfem.friction import Bonds, Coulomb, FirstOrderBonds, ListedBonds
 from patchfem.friction.laws.convolution import Convolution, average_pressure, sliding_limits
 from patchfem.runs import solve_with_coarser
 from patchfem.runs.bench import bench
@@ -91,7 +91,7 @@ def lower_piece_pressure(nodes, sigma):
 
 @pytest.mark.share(0, 5)
 @pytest.mark.parametrize(
-    "law, order", [(FirstOrderBonds, 1), (Quadrature, 1), (Quadrature, 0), (Quadrature, 2)]
+    "law, order", [(FirstOrderBonds, 1), (ListedBonds, 1), (ListedBonds, 0), (ListedBonds, 2)]
 )
 @pytest.mark.parametrize("direction", [1.0, -1.0])
 def test_exact_long_sliding_reaches_averaged_law(law, order, direction):
@@ -103,10 +103,10 @@ def test_exact_long_sliding_reaches_averaged_law(law, order, direction):
     nodes = np.linspace(0, 60, 241)
     sigma = np.maximum(np.sin(nodes / 2) + 0.8, 0.0)
     bonds = Bonds(0.4, 1.0, float(order), "report" if order != 1 else "stretch", initial=0.0)
-    engine = law(bonds, 0.0) if law is Quadrature else law(bonds)
+    engine = law(bonds, 0.0) if law is ListedBonds else law(bonds)
     pressure = lower_piece_pressure(nodes, sigma)
     coarse, fine = (
-        march_tractions(engine, direction * np.linspace(0, 20, steps + 1), pressure).traction[-1]
+        march_path(engine, direction * np.linspace(0, 20, steps + 1), pressure).traction[-1]
         for steps in (160, 320)
     )
     averaged = Convolution(0.4, 1.0, order, nodes, sigma)

@@ -7,8 +7,9 @@ from friction_paths import march_path, triangle_path, upper_pressure
 from hypothesis import given
 from hypothesis import strategies as st
 
-from patchfem.friction import Coulomb, TanhLaw
+from patchfem.friction import Coulomb
 from patchfem.friction.laws.elastic_plastic import ElasticPlastic
+from patchfem.friction.laws.tanh import TanhLaw
 
 TWO_PRESSURES = upper_pressure([1.0, 0.5])
 PRESSURE = st.just(0.0) | st.floats(1e-6, 4)

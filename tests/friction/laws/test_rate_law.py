@@ -7,7 +7,7 @@ from scipy.integrate import quad, solve_ivp
 
 from patchfem import plan, run
 from patchfem.core import Outcome
-from patchfem.friction import TanhLaw
+from patchfem.friction.laws.tanh import TanhLaw
 
 LOAD, LIMIT, MASS, OMEGA = 115.653761996773, 0.3 * 115.653761996773, 0.884, 2 * np.pi * 143
 LAW = POINT + '[friction]\nlaw = "tanh"\nstatic = 0.3\nreference_speed = "{} m/s"\n'

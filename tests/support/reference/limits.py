@@ -45,13 +45,13 @@ SIZES = {  # Constant -> description of the quantity that it bounds.
     "surface.files.table.MAX_LENGTH": "length of a trace [m]",
     "model.slide.MAX_STEPS_PER_CYCLE": "steps per cycle of a prescribed slide",
     "runs.rig.costs.MAX_MARCH_STEPS": "steps per cycle of a time integration, if the tolerance determines the steps",
-    "dynamics.march.capacity.MAX_ENTRIES": "number of entries in a list of bonds",
+    "points.time_march.MAX_STRIPS": "number of entries in a list of bonds",
     "friction.bonds.parameters.MAX_LIST_SECONDS": "estimated computing time of a run with a list of bonds [s]",
     "runs.rig.costs.MAX_EXACT_SECONDS": "estimated time to compute a whole motion from event to event, with "
     "method `exact` or by engine `hybrid` [s]",
     "structure.drive_sizes.MAX_STORED_SAMPLES": "number of samples at equal spacing that are stored of a whole release, at "
     "least 20 per cycle; of a longer release turning points and the last cycles",
-    "dynamics.checkpoint.MAX_EARLY_SAMPLES": "number of samples stored before the last cycles; longer records are "
+    "points.checkpoint.MAX_EARLY_SAMPLES": "number of samples stored before the last cycles; longer records are "
     "thinned out",
 }
 LEFT_OUT = f"""\

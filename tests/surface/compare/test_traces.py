@@ -1,11 +1,14 @@
 """Comparison of two traces: worn areas and ends of constructed tracks, and what is said in rare cases."""
 
+import os
+from pathlib import Path
+
 import numpy as np
 import pytest
 from scipy.ndimage import gaussian_filter1d
 
 from patchfem.core import PatchfemError
-from patchfem.surface import Options, Profile
+from patchfem.surface import Options, Profile, read_surface
 from patchfem.surface.compare.compare import compare_surfaces
 
 UM = 1e-6
@@ -74,6 +77,45 @@ def test_exact_area_and_ends_of_parabola(depth):
     place = values["worn_depth_max_at"]
     assert place.low <= 2000 * UM <= place.high and place.high - place.low < 400 * UM
     assert values["common_length"].value == pytest.approx(length, rel=1e-3)
+
+
+@pytest.mark.skipif(
+    "PATCHFEM_DATA" not in os.environ, reason="PATCHFEM_DATA names no folder of scans"
+)
+@pytest.mark.parametrize("depth", [0.05 * UM, 1 * UM])
+def test_exact_place_and_area_of_scar_in_measured_trace(depth):
+    """A parabolic scar that is added to a measured trace, which starts 10 um later, has its place, area and ends.
+
+    The trace is measured once, so that each surface gets a noise of 1 nm, and the second one a tilt.
+    """
+    trace = read_surface(Path(os.environ["PATCHFEM_DATA"]) / "dektak-1.csv")
+    step = np.ptp(trace.x) / (trace.x.size - 1)
+    count = 9000
+    start = 64
+    x = trace.x[:count]
+    worn = make_parabola(depth, 3500, 5500, count)
+    random = np.random.default_rng(0)
+    before, after = (
+        trace.z[first : first + count] + NM * random.normal(size=count) for first in (0, start)
+    )
+    after = after - worn + 1e-4 * x
+    found = compare_surfaces(Profile(x, before, "before"), Profile(x, after, "after"))
+
+    assert found.verdict.code == "worn" and found.evidence.placement.basis == "place"
+    values = found.values
+    area = worn.sum() * step
+    truths = {
+        "shift": -start * step,
+        "worn_area": area,
+        "worn_depth_max": depth,
+        "worn_from_after": x[3500],
+        "worn_to_after": x[5500],
+    }
+    for name, true in truths.items():
+        assert values[name].low <= true <= values[name].high, name
+    assert values["shift"].value == pytest.approx(-start * step, abs=0.1 * step)
+    assert values["worn_area"].value == pytest.approx(area, rel=0.005)
+    assert values["worn_depth_max"].high < 1.2 * depth
 
 
 def test_exact_step_of_flat_groove_offset_and_gain():

@@ -141,7 +141,7 @@ REFUSED = {  # bytes, file name, given units, and the expected message
     "broken xml": (write.make_x3p(b"<a><b></a>"), "a.x3p", None, "cut off or damaged; .* .mismatched tag"),
     "an increment of zero": (
         make_x3p(axes=write.format_axis("CX", increment=0.0) + write.format_axis("CY", increment=1e-6)
-            + write.format_axis("CZ", "A")), "a.x3p", None, "x reverses; each coordinate of a scan must only rise"),
+            + write.format_axis("CZ", "A")), "a.x3p", None, "x reverses: 0 um and then 0 um; x must only rise"),
     "no raster": (b"x [um],y [um],z [um]\n0,0,1\n1,1,1\n2,3,1\n3,2,1\n4,5,1\n9,8,1\n7,7,1\n", "a.txt", None,
                   "7 different x and 7 different y do"),
     "a place twice": (b"x [um],y [um],z [um]\n0,0,1\n1,0,1\n0,1,1\n1,1,1\n1,0,2\n", "a.txt", None,

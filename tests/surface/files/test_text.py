@@ -163,8 +163,8 @@ REFUSED = {
                                           "use the same sign in the whole file",
     "x [um];z [um]\n0;1\n1;1.234,5\n": "{path}:3: '1;1.234,5': a decimal comma and a decimal point in one file; "
                                          "use the same sign in the whole file",
-    "x [um];z [um]\n999,5;1\n1,000;2\n1500,5;2\n": "{path}:3: x reverses: 999.5 um and then 1 um; x of a trace "
-                                                  "must only rise or only fall, so keep only one trace per file",
+    "x [um];z [um]\n999,5;1\n1,000;2\n1500,5;2\n": "{path}:3: x reverses: 999.5 um and then 1 um; x must "
+                                                  "only rise or only fall, so keep one trace or scan per file",
     "x [um],z [um]\n0,0,1,5\n": "{path}:2: '0,0,1,5': 2 numbers are needed; with a decimal comma, separate the "
                                  "columns by semicolons or tabs",
     "x [um],z [um]\n0,1\n,2\n": "{path}:3: '' is not a number for x; correct the line or delete it",
@@ -180,11 +180,11 @@ REFUSED = {
                                        "not, correct the header or give --units to profile and compare; write a "
                                        "missing height as nan",
     "x [nm],z [nm]\n0,0\n0.1,0\n": "{path}: the profile is 0.1 nm long; is the unit of x right?",
-    "x [um],z [um]\n0,1\n1,2\n3,1\n2,2\n4,1\n": "{path}:5: x reverses: 3 um and then 2 um; x of a trace must "
-                                                  "only rise or only fall, so keep only one trace per file",
-    "x [um],z [um]\n4,1\n1,2\n2,1\n0,2\n": "{path}:4: x reverses: 1 um and then 2 um; x of a trace must only rise or "
-                                           "only fall, so keep only one trace per file",
-    "x [um],z [um]\n5,1\n5,2\n": "{path}: every sample lies at x = 5 um; a trace needs at least two different x",
+    "x [um],z [um]\n0,1\n1,2\n3,1\n2,2\n4,1\n": "{path}:5: x reverses: 3 um and then 2 um; x must "
+                                                  "only rise or only fall, so keep one trace or scan per file",
+    "x [um],z [um]\n4,1\n1,2\n2,1\n0,2\n": "{path}:4: x reverses: 1 um and then 2 um; x must only rise or "
+                                           "only fall, so keep one trace or scan per file",
+    "x [um],z [um]\n5,1\n5,2\n": "{path}: every sample lies at x = 5 um; a surface needs at least two different x",
     "x [um],z [um]\n" + "1" * 2000: "{path}:2: the line is 2000 characters long; 2 numbers are needed",
     "a" * 2000: "{path}:1: a line is 2000 characters long; two columns are needed, write the header as `x [um],z [um]`",
     "x [um],z [um]\n0,\x00\n": "{path}: not a text file; export the profile as text with two columns and write the "

@@ -6,7 +6,7 @@ import pytest
 from patchfem.surface import make_report
 from patchfem.surface.areal import Areal
 from patchfem.surface.roughness.areal import autocorrelation, compute_areal_parameters
-from patchfem.surface.roughness.filter import ALPHA, filter_scan, mean_surface
+from patchfem.surface.roughness.filter import ALPHA, filter_surface, mean_surface
 
 UM = 1e-6
 
@@ -90,7 +90,7 @@ def test_exact_length_and_aspect_ratio_of_gaussian_surface(degrees):
 def test_exact_wave_transmission_of_areal_filter():
     """The areal filter transmits exp(-pi (alpha cutoff / L)^2) of a wave of length L, half of it at the cut-off."""
     for wave, degrees in ((40.0, 0.0), (40.0, 30.0), (25.0, 90.0)):
-        waves, rough = filter_scan(make_scan(make_plane_wave(240, 240, wave, degrees)), 40 * UM)
+        waves, rough = filter_surface(make_scan(make_plane_wave(240, 240, wave, degrees)), 40 * UM)
         assert waves.z.shape == (200, 200) and waves.x[0] == 20 * UM
         transmission = np.exp(-np.pi * (ALPHA * 40 / wave) ** 2)
         inside = make_plane_wave(240, 240, wave, degrees)[60:-60, 60:-60]

@@ -8,9 +8,10 @@ from synthetic import sine
 
 from patchfem.core import PatchfemError
 from patchfem.surface import Profile, mean_line, resample_evenly
-from patchfem.surface.roughness.filter import ALPHA, filter_trace
+from patchfem.surface.roughness.filter import filter_surface, mean_surface
 
 UM = 1e-6
+ALPHA = np.sqrt(np.log(2) / np.pi)  # ISO 16610-21
 WAVE = 400 * UM
 
 
@@ -27,7 +28,7 @@ def test_exact_filtered_sine_agrees_with_closed_form(cutoff, known):
     """
     assert filtered_rms(cutoff * UM) == pytest.approx(known, rel=3e-6)
     trace = sine(np.arange(400_001) * UM, 1e-6, WAVE)
-    rough = filter_trace(trace, cutoff * UM)[1].z / 1e-6
+    rough = filter_surface(trace, cutoff * UM)[1].z / 1e-6
     assert abs(rough[2000 : 2000 + 400 * 900].std() - filtered_rms(cutoff * UM)) < 1e-9
     assert abs(np.sqrt((rough**2).mean()) - filtered_rms(cutoff * UM)) < 1e-5
 
@@ -36,7 +37,7 @@ def test_exact_filtered_sine_agrees_with_closed_form(cutoff, known):
 def test_exact_mean_line_agrees_with_definition(cutoff, seed):
     """The mean line is the weighted mean of the definition, with weights normalised within the trace."""
     z = np.random.default_rng(seed).normal(size=500)
-    line = mean_line(z, cutoff)
+    line = mean_surface(z, (cutoff,))
     x = np.arange(500)
     for k in (0, 1, 37, 250, 498, 499):
         weight = np.exp(-np.pi * ((x - k) / (ALPHA * cutoff)) ** 2)
@@ -44,11 +45,11 @@ def test_exact_mean_line_agrees_with_definition(cutoff, seed):
 
 
 def test_exact_tilted_mean_line_is_weighted_fit():
-    """With the option `tilted` the mean line is a weighted least-squares line at each sample."""
+    """The mean line that follows slopes is a weighted least-squares line at each sample."""
     z = np.random.default_rng(3).normal(size=400)
     x = np.arange(400)
     cutoff = 90.0
-    line = mean_line(z, cutoff, tilted=True)
+    line = mean_line(z, cutoff)
     for k in (0, 5, 60, 200, 399):
         weight = np.exp(-np.pi * ((x - k) / (ALPHA * cutoff)) ** 2)
         _, offset = np.polyfit(x - k, z, 1, w=np.sqrt(weight))
@@ -58,7 +59,7 @@ def test_exact_tilted_mean_line_is_weighted_fit():
 def test_exact_half_cutoff_is_trimmed_at_ends():
     """Half a cut-off is trimmed at each end of waviness and roughness."""
     trace = sine(np.arange(10_001) * UM, 1e-6, 80 * UM)
-    waviness, rough = filter_trace(trace, 800 * UM)
+    waviness, rough = filter_surface(trace, 800 * UM)
     assert rough.x[0] == pytest.approx(400 * UM) and rough.x[-1] == pytest.approx(9600 * UM)
     assert np.array_equal(waviness.x, rough.x)
 
@@ -99,4 +100,4 @@ def test_exact_uneven_trace_is_resampled_with_notes():
 def test_refuses_cutoff_that_does_not_fit_trace(cutoff, message):
     """A cut-off that is too short for the step, too long for the trace, or nan is refused."""
     with pytest.raises(PatchfemError, match=message.replace("(", r"\(")):
-        filter_trace(sine(np.arange(1000) * UM, UM, 80 * UM, 0.3), cutoff)
+        filter_surface(sine(np.arange(1000) * UM, UM, 80 * UM, 0.3), cutoff)

@@ -26,7 +26,7 @@ from ....response.errors import finer_errors
 from ....response.measures import compute_peak
 from ....response.spectrum import harmonic_measures, odd_harmonics
 from ..evaluation import RunEvaluator, compute_sampled_work, compute_work_check
-from ..interface import make_single_contact
+from ..interface import make_single_law
 from ..solution import Solution, compute_sampled_loop
 from .curves import COLUMN_MEASURES, HARMONIC_ROUND_OFF, CurvePoint, describe_instability
 
@@ -119,7 +119,7 @@ class BalanceFinder:
         rig = model.rig
         parts = []
         if model.friction is not None:
-            parts.append((0, make_single_contact(model, numerics, patch)))
+            parts.append((0, make_single_law(model, numerics, patch).element))
         if rig.springs.interlock is not None:
             parts.append((0, Interlock(*rig.springs.interlock)))
         if rig.springs.cubic is not None:

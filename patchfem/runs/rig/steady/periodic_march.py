@@ -1,7 +1,7 @@
 """Steady motion over grooves, by time integration from a corrected initial state.
 
 In: a Model with grooves, its Numerics and its Patch. Out: the Solution under a sine, and the
-response curve over frequency (`dynamics.harmonic.orbits`).
+response curve over frequency (`points.orbits`).
 """
 
 from dataclasses import replace
@@ -11,10 +11,10 @@ from typing import NamedTuple
 import numpy as np
 
 from ....core import NotConverged, Outcome
-from ....dynamics.harmonic import orbits
-from ....dynamics.march import march as engine
 from ....effects import SINE_WAVEFORM
 from ....model.rig import DriveLevels
+from ....points import orbits
+from ....points import time_march as engine
 from ....response.measures import peak_sampling_errors
 from ..interface import make_contact
 from ..march import MarchEvaluator
@@ -69,8 +69,8 @@ def march_out_of_grooves(model, numerics, patch, drive, contact) -> Solution | N
             contact,
             N_CYCLES_IN_GROOVES,
             steps,
-            1,
-            rig.springs.travel,
+            window=1,
+            travel=rig.springs.travel,
             keeps_samples=False,
         )
         if run.outcome is not Outcome.LEAVES_GROOVES:
@@ -90,14 +90,12 @@ class CycleEvaluation(NamedTuple):
     """Measures and histories of one cycle of a periodic motion over grooves.
 
     - values: measures by name.
-    - mark: Mark at the end of the cycle.
-    - snapshots: states of the interface.
+    - motion: points.time_march.Motion of the cycle.
     - is_stuck: whether the interface sticks.
     """
 
     values: dict
-    mark: object
-    snapshots: list
+    motion: object
     is_stuck: bool
 
 
@@ -118,17 +116,14 @@ class MarchFinder(TracedCurve):
             SET_VALUED_SAMPLES if exact else START_STEPS
         )
         self.numerics = replace(numerics, cycles=1.0, window=1)
-        engine.warm_up(model.rig.modes, model.rig.drive.signal, self.contact, say)
+        engine.load_kernels(self.contact, say)
 
     def _march_to_periodic(self, drive, guess, steps: int):
         """Integrate until the motion is periodic; return the run and its change per period."""
-        run = engine.start_run(
-            self.model.rig.modes, drive, self.contact, steps, self.model.rig.springs.travel
-        )
+        rig = self.model.rig
+        run = engine.March(rig.modes, drive, self.contact, steps, rig.springs.travel)
         if guess is not None:
-            run.contact = type(guess.contact)(*(array.copy() for array in guess.contact))
-            run.state[:] = guess.state
-            run.move_to(*guess.state)
+            run.continue_from(guess)
         change = orbits.march_to_periodic(run)
         if run.outcome is not None and run.outcome is not Outcome.EXCEEDS_TRAVEL:
             raise NotConverged(run.message)
@@ -142,14 +137,14 @@ class MarchFinder(TracedCurve):
 
     def _evaluate_cycle(self, run, steps: int, frames: int = 0) -> CycleEvaluation:
         """Evaluate one cycle of a periodic time integration."""
-        mark, snapshots = orbits.march_cycle(run, frames)
+        motion = orbits.march_cycle(run, frames)
         numerics = replace(self.numerics, steps=steps)
         evaluator = MarchEvaluator(self.model, numerics, self.patch, self.contact)
         is_stuck = (
-            bool(np.ptp(mark.window.slip) <= evaluator.stick_tolerance) and not evaluator.creeps
+            bool(np.ptp(motion.window.slip) <= evaluator.stick_tolerance) and not evaluator.creeps
         )
-        values = evaluator.evaluate_measures(mark, run.drive, stuck=is_stuck)
-        return CycleEvaluation(values | {"drift_per_cycle": 0.0}, mark, snapshots, is_stuck)
+        values = evaluator.evaluate_measures(motion, run.drive, stuck=is_stuck)
+        return CycleEvaluation(values | {"drift_per_cycle": 0.0}, motion, is_stuck)
 
     def compute_steady_motion(self, drive, guess=None) -> tuple:
         """Compute the steady motion under sinusoidal drive, and the guess for a neighbouring drive.
@@ -189,8 +184,8 @@ class MarchFinder(TracedCurve):
             half = reading.values
             run, change = self._march_to_periodic(drive, run, steps)
             reading = self._evaluate_cycle(run, steps, self.frames)
-        values, mark, snapshots, is_stuck = reading
-        peak_errors = peak_sampling_errors(mark.window)
+        values, motion, is_stuck = reading
+        peak_errors = peak_sampling_errors(motion.window)
         multipliers = orbits.estimate_multipliers(run) if run.outcome is None else np.zeros(0)
         regime = "stick-slip" if values.get("stick_fraction") else "sliding"
         outcome = run.outcome or Outcome.STEADY
@@ -220,13 +215,13 @@ class MarchFinder(TracedCurve):
         }
         return Solution(
             values,
-            mark.window,
-            mark.window,
+            motion.window,
+            motion.window,
             np.array([values[name]]),
             (None, None),
             outcome,
-            snapshots,
-            mark.ledger,
+            motion.snapshots,
+            motion.ledger,
             perf_counter() - begin,
             self.contact,
             message=message,

@@ -1,0 +1,73 @@
+"""Climb of a port on the flanks of grooves z(q), whose points rub along the flank (compiled).
+
+Over an increment dq of the port the points slide by ds = int sqrt(1 + t^2) dq along the flank, t = dz/dq, and the height
+rises by dz. With the vertical force V = N + m (w1 - w0)/dt of the load and of a lifted mass m, whose vertical velocity
+obeys dz = dt (w0 + w1)/2, and the friction force f along the flank, the force of the port is U = (V dz + f ds)/dq, which
+does exactly the work of height, lifted mass and law. The normal force at the end is V sqrt(1 + t^2) + f t.
+"""
+
+from math import cos, sin, sqrt
+
+from ..compiled.jit import njit
+from ..friction.flags_kernels import NJIT_CALL
+from .march_rows import Flank
+
+GAUSS_POINT = sqrt(0.6)  # outer node of the Gauss rule of three points
+MIN_PHASE = 1e-4  # phase [rad] below which a series replaces sin(x)/x
+
+
+@njit(**NJIT_CALL)
+def find_slope(flank, q):
+    """Return the slope dz/dq at a slide q [m]."""
+    wave = flank[Flank.WAVE_NUMBER]
+    return flank[Flank.AMPLITUDE] * wave * sin(wave * q - flank[Flank.PHASE])
+
+
+@njit(**NJIT_CALL)
+def climb(flank, q, dq, dt):
+    """Write mean slope, path ratio and vertical force of a trial increment dq [m] from the slide q [m]."""
+    wave = flank[Flank.WAVE_NUMBER]
+    half = 0.5 * wave * dq
+    ratio = sin(half) / half if abs(half) > MIN_PHASE else 1 - half * half / 6
+    middle = wave * (q + 0.5 * dq) - flank[Flank.PHASE]
+    flank[Flank.SLOPE] = flank[Flank.AMPLITUDE] * wave * sin(middle) * ratio
+    path = 0.0
+    for k in range(-1, 2):
+        t = find_slope(flank, q + 0.5 * dq * (1 + k * GAUSS_POINT))
+        path += (4 / 9 if k == 0 else 5 / 18) * sqrt(1 + t * t)
+    flank[Flank.RATIO] = path
+    rise = flank[Flank.SLOPE] * dq / dt - flank[Flank.RISE_SPEED]
+    flank[Flank.TRIAL_VERTICAL] = flank[Flank.LOAD] + 2 * flank[Flank.LIFTED_MASS] * rise / dt
+
+
+@njit(**NJIT_CALL)
+def find_stiffness(flank, q, dq, dt):
+    """Return the derivative of the mean climbing force V dz/dq by the increment [N/m]."""
+    wave = flank[Flank.WAVE_NUMBER]
+    phase = wave * (q + 0.5 * dq) - flank[Flank.PHASE]
+    curvature = 0.5 * flank[Flank.AMPLITUDE] * wave * wave * cos(phase)
+    inertia = 2 * flank[Flank.LIFTED_MASS] * flank[Flank.SLOPE] ** 2 / (dt * dt)
+    return flank[Flank.TRIAL_VERTICAL] * curvature + inertia
+
+
+@njit(**NJIT_CALL)
+def find_normal(flank, q, friction, bound):
+    """Return the normal force [N] at a slide q, for a mean friction force of the step; `bound` is mu [1].
+
+    The friction at the end is extrapolated from that at the start and the mean, and does not exceed mu times the normal
+    force.
+    """
+    t = find_slope(flank, q)
+    limit = bound * flank[Flank.NORMAL]
+    after = min(max(2 * friction - flank[Flank.FORCE], -limit), limit)
+    return max(max(flank[Flank.TRIAL_VERTICAL], 0.0) * sqrt(1 + t * t) + after * t, 0.0)
+
+
+@njit(**NJIT_CALL)
+def find_energy(flank, q):
+    """Return the energy [J] of the height of the load and of the lifted mass at a slide q."""
+    half = sin(0.5 * (flank[Flank.WAVE_NUMBER] * q - flank[Flank.PHASE]))
+    height = 2 * flank[Flank.AMPLITUDE] * half * half
+    return (
+        flank[Flank.LOAD] * height + 0.5 * flank[Flank.LIFTED_MASS] * flank[Flank.RISE_SPEED] ** 2
+    )

@@ -1,0 +1,35 @@
+"""Numbers of the laws of contact points, and the memory of parallel sliders."""
+
+from enum import IntEnum
+
+
+class Law(IntEnum):
+    """Number of a friction law or spring in row 0 of `numbers`."""
+
+    COULOMB = 0
+    TANH = 1
+    JENKINS = 2
+    MASING = 3
+    BOUC_WEN = 4
+    LUGRE = 5
+    BONDS = 6
+    CUBIC = 7
+    INTERLOCK = 8
+    LIST = 9
+
+
+class Masing(IntEnum):
+    """Rows of the memory of parallel sliders, which follow Masing's rules.
+
+    Displacement [m], force [N], direction, number of reversals on the stack, 1 until the sliders have slipped as a
+    whole and -1 then, stored energy [J], mean stretch [m], then displacement and force of each reversal.
+    """
+
+    SLIDE = 0
+    FORCE = 1
+    DIRECTION = 2
+    COUNT = 3
+    VIRGIN = 4
+    ENERGY = 5
+    STRETCH = 6
+    STACK = 7

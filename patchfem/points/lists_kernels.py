@@ -1,0 +1,88 @@
+"""Points whose bonds are summed over a list (eq. 2.17 for any order and reading), for the march (compiled).
+
+`lists` is a `friction.bonds.list_rows_kernels.BondLists`. Its pressures are loads [N], so that its forces and energies are
+those of a point per unit of mu_s, which is numbers[1, j]. A bond keeps the load under which it formed; a point that lifts
+off loses its bonds with the energy that they store.
+"""
+
+from ..compiled.jit import njit
+from ..friction.bonds.list_kernels import list_mean_and_slope
+from ..friction.bonds.list_rows_kernels import FORM_STRETCH, LAW, STATUS
+from ..friction.bonds.list_step_kernels import break_bonds, list_step
+from ..friction.bonds.points_kernels import point_list
+from ..friction.bonds.points_kernels import read as read_bonds
+from ..friction.flags_kernels import NJIT_CALL
+from .march_rows import Point
+from .return_maps_kernels import PointState
+
+# Largest energy that sums may gain in short steps and lose later, relative to the work of a bond length at the limit.
+MAX_OWED = 1e-4
+
+
+@njit(**NJIT_CALL)
+def press_list(lists, j, load):
+    """Set the load [N] under which bonds of point j form."""
+    lists.statuses[j, STATUS.pressure] = load
+
+
+@njit(**NJIT_CALL)
+def write_list_mean(numbers, values, lists, j, dt):
+    """Write the mean force of point j over its slide, and the slope of that force."""
+    bonds = point_list(lists, j)
+    status = bonds.status
+    dq = values[Point.SLIDE, j]
+    values[Point.BY_VELOCITY, j] = 0.0
+    is_empty = status[STATUS.head] == status[STATUS.end]
+    if is_empty and status[STATUS.pressure] == 0.0 and status[STATUS.initial_pressure] == 0.0:
+        values[Point.FORCE, j] = values[Point.BY_SLIDE, j] = 0.0
+        return
+    mean, slope = list_mean_and_slope(dq, bonds, values[Point.SPEED, j], dt)
+
+    # Where many bonds have the same stretch, the mean is steeper than this slope: the secant of two trials shows it.
+    force = numbers[1, j] * mean
+    slope = numbers[1, j] * slope
+    change = dq - values[Point.TRIAL_SLIDE, j]
+    if change != 0.0:
+        secant = (force - values[Point.TRIAL_FORCE, j]) / change
+        slope = secant if secant > slope else slope
+    values[Point.TRIAL_SLIDE, j] = dq
+    values[Point.TRIAL_FORCE, j] = force
+    values[Point.FORCE, j] = force
+    values[Point.BY_SLIDE, j] = slope
+
+
+@njit(**NJIT_CALL)
+def advance_list(numbers, values, lists, j, v0, v1, dt):
+    """Advance the list of point j over its slide; return whether its array has room.
+
+    The work that is not stored is dissipated where it is positive; the reading "report" also creates energy, and both are
+    summed apart. The reading "stretch" creates none: what its sums gain in a short step beyond the work, because strips
+    change from one integration rule to another, was stored before, and is subtracted from the next loss.
+    """
+    bonds = point_list(lists, j)
+    status = bonds.status
+    static = numbers[1, j]
+    before = status[STATUS.energy]
+    has_room = list_step(values[Point.SLIDE, j], bonds, v0, v1, dt)
+    if values[Point.END_LOAD, j] <= 0.0:
+        break_bonds(0, bonds)
+    loss = values[Point.FORCE, j] * values[Point.SLIDE, j]
+    loss -= static * (status[STATUS.energy] - before)
+    if bonds.law[LAW.form] == FORM_STRETCH:
+        owed = status[STATUS.owed] - loss / static
+        largest = MAX_OWED * bonds.law[LAW.length] * values[Point.LOAD, j]
+        status[STATUS.owed] = min(max(owed, 0.0), largest)
+        loss = static * (status[STATUS.owed] - owed)
+    if loss < 0:
+        status[STATUS.created] -= loss
+    else:
+        status[STATUS.dissipated] += loss
+    return has_room
+
+
+@njit(**NJIT_CALL)
+def read_list(numbers, lists, j, load):
+    """Return the `PointState` of point j under a load [N]."""
+    reading = read_bonds(lists, j, load)
+    static = numbers[1, j]
+    return PointState(static * reading.force, static * reading.energy, reading.stretch)

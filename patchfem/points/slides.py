@@ -1,0 +1,113 @@
+"""Contact points along a prescribed slide: the march without modes."""
+
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+
+from .contacts import Contact
+from .march_rows import LISTS_FULL, N_PORT_COLUMNS, Sample, Total
+from .time_march import (
+    copy_system,
+    enlarge_lists,
+    load_kernels,
+    make_snapshot,
+    make_system,
+    split_losses,
+)
+
+BLOCK = 4096  # samples between two reports of the progress
+SAME_STEP = 1e-6  # relative change of the duration of a step below which steps are equal
+
+
+class SlideMotion(NamedTuple):
+    """Friction along a prescribed slide at k samples.
+
+    - force, slip, load (k,): friction force [N], slip [m] and normal load [N]
+    - mean (k - 1,): mean force of each step [N]
+    - stored (k,): stored energy [J]
+    - losses (k - 1,): dissipated energy of each step [J], below 0 if energy is created
+    - snapshots: states of the points at the frames
+    - n_unsolved: number of steps that did not converge
+    """
+
+    force: np.ndarray
+    slip: np.ndarray
+    load: np.ndarray
+    mean: np.ndarray
+    stored: np.ndarray
+    losses: np.ndarray
+    snapshots: list
+    n_unsolved: int
+
+
+def follow(contact: Contact, time, slide, frames=(), say=None, report=None) -> SlideMotion:
+    """Move contact points along a prescribed slide of the first port.
+
+    Parameters
+    ----------
+    contact : Contact
+    time, slide : (k,) array
+        Samples of time [s] and slide [m].
+    frames : sequence of int
+        Samples at which the state of the points is returned.
+    say, report : callable, optional
+        Callbacks for a line of text and for the completed fraction.
+
+    Raises
+    ------
+    Missing
+        If lists of bonds become too long.
+    """
+    kernels = load_kernels(contact, say)
+    time = np.asarray(time, float)
+    slide = np.asarray(slide, float)
+    last = slide.size - 1
+    system = make_system(contact, 1.0)
+    steps = np.diff(time)
+    changes = 1 + np.flatnonzero(
+        np.abs(np.diff(steps)) > SAME_STEP * np.minimum(steps[1:], steps[:-1])
+    )
+    ends = np.unique(
+        np.concatenate([np.arange(0, last, BLOCK), np.asarray(frames, int), changes, [last]])
+    )
+    width = Sample.PORTS + N_PORT_COLUMNS * len(contact.point_sets)
+    rows = np.zeros((slide.size, width))
+    snapshots = []
+    for begin, end in pairwise(ends):
+        size = end - begin
+        structure = system.structure._replace(
+            path=slide[begin : end + 1].copy(), drive=np.zeros((size + 1, 3))
+        )
+        if contact.load is not None:
+            structure = structure._replace(
+                loads=np.asarray(contact.load(time[begin : end + 1]), float)
+            )
+        step = float(time[end] - time[begin]) / size
+        options = system.options._replace(step=step if step > 0 else 1.0)
+        system = system._replace(structure=structure, options=options)
+        saved = copy_system(system) if options.has_lists else None
+        while True:
+            samples = np.zeros((size + 1, width))
+            _, status = kernels.march(system, size, samples)
+            if status != LISTS_FULL:
+                break
+            saved = enlarge_lists(saved, f"before sample {end} of the prescribed slide")
+            system = copy_system(saved)
+        rows[begin : end + 1] = samples
+        if end in frames:
+            force, slip = samples[-1, Sample.PORTS : Sample.PORTS + 2]
+            motion = (float(time[end]), float(slide[end]), 0.0, force, slip, 0.0, 0.0)
+            snapshots.append(make_snapshot(kernels, system, motion))
+        if report is not None:
+            report(end / last)
+    return SlideMotion(
+        rows[:, Sample.PORTS],
+        rows[:, Sample.PORTS + 1],
+        rows[:, Sample.LOAD],
+        rows[:-1, Sample.PORTS + 2],
+        rows[:, Sample.ENERGY],
+        split_losses(rows, 0, system.options.scale),
+        snapshots,
+        int(system.totals[Total.UNSOLVED]),
+    )

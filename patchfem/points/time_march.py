@@ -1,0 +1,1124 @@
+"""March of a rig with contact points over the cycles of its drive, and the record of its motion."""
+
+from copy import copy
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
+from numpy.polynomial.legendre import leggauss
+
+from .. import compiled
+from ..contact.set_arrays import hash_set, make_set_arrays
+from ..core import Missing, ModalBasis, Outcome, Response, SineDrive
+from ..formatting import format_length
+from ..friction.bonds import list_numbers
+from ..friction.bonds.list_rows_kernels import N_ROWS, STATUS, BondLists
+from ..friction.bonds.parameters import growth_numbers
+from ..friction.path_work import sampled_work
+from . import checkpoint
+from .contacts import Contact
+from .law_rows import Law
+from .laws import N_MEMORY, N_NUMBERS
+from .march_rows import (
+    DONE,
+    EXCEEDS_TRAVEL,
+    LEAVES_GROOVES,
+    LISTS_FULL,
+    N_PORT_COLUMNS,
+    NO_CONTACT_SET,
+    RESIDUAL,
+    RESULTANT,
+    Flank,
+    Options,
+    Point,
+    Points,
+    Port,
+    Ports,
+    Sample,
+    Shear,
+    Structure,
+    System,
+    Total,
+)
+
+MAX_ANGLE = 0.5  # largest phase of the fastest mode in the step of a matrix exponential [rad]
+N_GAUSS = 8  # Gauss points of the integrals over that step
+RIGID_LEVELS = 20  # lengths of the steps with rigid points: whole steps and fifteen halvings
+LEVELS = 4  # lengths of other steps, which are halved if they do not converge
+LIST_DAMPING = 1 / 16  # weight of the change of a shear increment for lists, whose forces jump
+REDUNDANT = 1e-10  # relative compliance of ports at rest that outnumber the modes
+FIRST_WIDTH = 1e-6  # width in bond lengths over which the initial bonds of several lists lie
+FIRST_STRIPS = 256  # first strips of each of several lists, in addition to those of one step
+MAX_STRIPS = 2_000_000  # largest number of strips of all lists, which limits the memory
+STRIP_BYTES = 8 * N_ROWS
+LONG_LIST_ADVICE = (
+    'raise accuracy.tail or accuracy.merge, or use reading = "stretch" with order = 1'
+)
+MAX_CYCLES_AT_ONCE = 8
+MAX_STEPS_AT_ONCE = 8000
+# Change of the state between two parts of a march, relative to its size, below which they repeat
+SAME_CYCLE = 1e-11
+TAYLOR_DEGREE = 18  # degree whose remainder is below round-off for matrices of norm 1
+SAME_PLACE = 1e-12  # change of a slide relative to the largest displacement that counts as rest
+N_KEPT = 128  # samples per cycle of the histories before the window
+EDGE = 1e-9  # distance of the samples of a drive from the ends of a step, in steps
+RUNAWAY = (
+    10.0  # output relative to the travel of a softening spring beyond which a step has diverged
+)
+# Sums that a repeated cycle continues
+REPEATED = [Total.WORK_IN, Total.POWER, Total.VISCOUS, Total.FRICTION]
+PRESS_COLUMNS = ("normal_load", "normal_moment", "normal_energy", "heave", "turn")
+
+
+class Snapshot(NamedTuple):
+    """State of the interface at an instant, m points.
+
+    - time [s], slide [m], rate [m/s], force [N], slip [m] of the first port; heave [m] and pitch [rad]
+    - forces, stretch, bend, load (m,): friction force [N], elastic stretch [m] and load [N] of each point, and its
+      displacement by shear of the pieces [m]
+    - nodal (k,): forces of the nodes [N]; (0,) if the pressure does not change
+    - vertical: vertical force on the flanks of grooves [N]
+    """
+
+    time: float
+    slide: float
+    rate: float
+    force: float
+    slip: float
+    heave: float
+    pitch: float
+    forces: np.ndarray
+    stretch: np.ndarray
+    bend: np.ndarray
+    load: np.ndarray
+    nodal: np.ndarray
+    vertical: float
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Motion:
+    """Motion of a rig.
+
+    - response: histories of the samples that were kept
+    - window: histories of all samples of the last cycles
+    - step_force: mean friction force of the first interface in each step of the window [N]
+    - window_work: friction work in the window [J]
+    - extremes (c, 2), phasors (c,): smallest and largest output, and phasor of the output, in each cycle [m]
+    - ledger: energies [J] and counters by name
+    - outcome, message: how the run ended, None and "" at its last step
+    - cycles_done: number of cycles
+    - snapshots: states at the ends of equal parts of the last cycle
+    - end: the march at its end, from which another one can go on
+    - log, events: None and 0, because a march has no list of events
+    """
+
+    response: Response
+    window: Response
+    step_force: np.ndarray
+    window_work: float
+    extremes: np.ndarray
+    phasors: np.ndarray
+    ledger: dict
+    outcome: Outcome | None
+    message: str
+    cycles_done: float
+    snapshots: list
+    end: "March"
+    log: None = None
+    events: int = 0
+
+
+def load_kernels(contact: Contact, say=None):
+    """Return the compiled march with the parts that a contact needs: lists of bonds, contact sets."""
+    parts = {}
+    if contact.bond_sum is None:
+        parts["lists"] = "points.no_lists_kernels"
+    if contact.sets is None:
+        parts["normal"] = "points.no_normal_kernels"
+    return compiled.instantiate("points.march_kernels", parts, say)
+
+
+# ---- arrays of a march
+
+
+class Responses(NamedTuple):
+    """Motion, viscous loss and work of the drive in steps of several lengths, see `march_rows.Structure`."""
+
+    motion: np.ndarray
+    loss: np.ndarray
+    work: np.ndarray
+
+
+def make_responses(modes: ModalBasis, step: float, levels: int) -> Responses:
+    """Return motion and energies of steps of several lengths.
+
+    The matrix exponential is that of the modes with the chain of derivatives of the drive and with constant forces.
+    """
+    n = modes.omega.size
+    matrix = np.zeros((3 * n + 3, 3 * n + 3))
+    velocities = slice(n, 2 * n)
+    matrix[:n, velocities] = np.eye(n)
+    matrix[velocities, :n] = -np.diag(modes.omega**2)
+    matrix[velocities, velocities] = -modes.damping_matrix
+    matrix[velocities, 2 * n] = -np.asarray(modes.base)
+    matrix[2 * n, 2 * n + 1] = matrix[2 * n + 1, 2 * n + 2] = 1.0
+    matrix[velocities, 2 * n + 3 :] = np.eye(n)
+
+    # The first step resolves the fastest mode. As steps double, an integral of x(t)^T form x(t) is the sum of both halves.
+    fastest = float(modes.omega.max(initial=0.0)) * step
+    n_halvings = max(levels - 1, int(np.ceil(np.log2(max(fastest / MAX_ANGLE, 1e-300)))))
+    short = step / 2**n_halvings
+    nodes, weights = leggauss(N_GAUSS)
+    powers = np.concatenate([np.zeros(n), np.ones(n), [2, 3, 4], np.full(n, 2.0)])
+    loss = np.zeros_like(matrix)
+    loss[velocities, velocities] = modes.mass * modes.damping_matrix
+    work = np.zeros_like(matrix)
+    work[2 * n, velocities] = -modes.mass * np.asarray(modes.base)
+    inside = np.array([exponential(matrix, 0.5 * short * (1 + node), powers) for node in nodes])
+    forms = [
+        np.einsum("g,gki,kl,glj->ij", 0.5 * short * weights, inside, form, inside, optimize=True)
+        for form in (loss, work)
+    ]
+    parts = []
+    for k in range(n_halvings + 1):
+        # The square of the last matrix would double its round-off.
+        whole = exponential(matrix, short * 2**k, powers)
+        if k > n_halvings - levels:
+            parts.append((whole[: 2 * n], forms[0], forms[1][2 * n : 2 * n + 3]))
+        forms = [form + whole.T @ form @ whole for form in forms]
+    return Responses(*(np.array(part) for part in zip(*parts[::-1])))
+
+
+def exponential(matrix, time: float, powers) -> np.ndarray:
+    """Return exp(time matrix) (k, k) for a state (k,) of units [s^-powers].
+
+    It is the Taylor polynomial of a fraction 2^-s of the exponent, squared s times.
+    """
+    # In units of the time the entries of the exponent are of order 1.
+    units = time**-powers
+    ratio = units[:, None] / units
+    exponent = time * matrix / ratio
+    n_squares = max(int(np.ceil(np.log2(np.abs(exponent).sum(axis=1).max()))), 0)
+    exponent = exponent / 2**n_squares
+    identity = np.eye(powers.size)
+    result = identity
+    for order in range(TAYLOR_DEGREE, 0, -1):
+        result = identity + exponent @ result / order
+    for _ in range(n_squares):
+        result = result @ result
+    return result * ratio
+
+
+def make_system(
+    contact: Contact,
+    step: float,
+    modes: ModalBasis | None = None,
+    travel: float = np.inf,
+    start=None,
+) -> System:
+    """Return the arrays of a rig or of a prescribed slide at its start, without the drive.
+
+    Parameters
+    ----------
+    contact : Contact
+    step : float
+        [s]
+    modes : ModalBasis, optional
+        Without modes the displacement of the first port is prescribed.
+    travel : float
+        Largest output [m].
+    start : core.InitialState, optional
+    """
+    n = 0 if modes is None else modes.omega.size
+    rows = [
+        np.zeros(n) if modes is None else np.asarray(one.row, float) for one in contact.point_sets
+    ]
+    press = np.zeros(11)
+    press[:2] = -1.0
+    if contact.sets is not None:
+        press[:2] = len(rows), len(rows) + 1
+        rows += [np.asarray(contact.heave, float), np.asarray(contact.pitch, float)]
+    rows = np.array(rows, float).reshape(len(rows), n)
+    laws = {law.numbers[0] for one in contact.point_sets for law in one.laws}
+    levels = RIGID_LEVELS if Law.COULOMB in laws else LEVELS
+    mass = 1.0 if modes is None else float(modes.mass)
+    if modes is None:
+        responses = Responses(*(np.zeros((levels, k, 3)) for k in (0, 3, 3)))
+        shape = np.zeros((3, 0))
+        damping = np.zeros((0, 0))
+    else:
+        responses = make_responses(modes, step, levels)
+        shape = np.array([modes.omega**2, modes.base, modes.output], float)
+        damping = np.array(modes.damping_matrix, float)
+    by_force = responses.motion[:, :, 2 * n + 3 :]
+    compliance = [[rows @ part[:n] @ rows.T, rows @ part[n:] @ rows.T] for part in by_force]
+    points = _make_points(contact, 0 if contact.sets is None else contact.sets.x.size)
+    lists = _make_lists(contact, points, modes is None)
+    state = np.zeros((3, 2 * n))
+    if start is not None:
+        state[0] = [*start.z, *start.v]
+    size = len(rows) + points.stiffness.size
+    ports = Ports(
+        rows,
+        np.array(compliance).reshape(levels, 2, len(rows), len(rows)) / mass,
+        rows @ rows.T / mass,
+        np.zeros((len(Port), len(rows))),
+        np.zeros((size, size)),
+        np.zeros(size),
+        np.zeros(size),
+        press,
+    )
+    size = 3 * n + 3
+    structure = Structure(
+        *responses, shape, damping, np.zeros((1, 3)), np.zeros(0), np.zeros(0), np.zeros(size)
+    )
+    has_lists = Law.LIST in laws
+    options = Options(
+        mass,
+        float(step),
+        float(travel),
+        max(float(contact.limit), 1e-300),
+        LIST_DAMPING if has_lists else 0.0,
+        REDUNDANT if len(rows) > n else 0.0,
+        int(Law.COULOMB in laws),
+        int(has_lists),
+        int(contact.has_loads),
+        int(((points.numbers[0] == Law.BONDS) & (points.numbers[3] >= 0)).any()),
+        int(laws == {Law.BONDS} and len(contact.point_sets) == 1),
+    )
+    sets = _make_no_sets() if contact.sets is None else contact.sets.make_arrays()
+    flank = _make_flank(contact)
+    totals = np.zeros(len(Total))
+    system = System(structure, ports, points, lists, flank, sets, state, totals, options)
+    # Springs and slips refer to the displacement at rest; rigid points slip from the start where their ports move.
+    slides = (rows @ state[0, :n])[points.port]
+    points.values[Point.TOTAL, : slides.size] = slides
+    is_spring = points.is_spring.astype(bool)
+    for memory in (points.memory, points.trial):
+        memory[0, is_spring] = slides[is_spring]
+    velocity = np.sign(rows @ state[0, n:])[points.port] * (points.numbers[0] == Law.COULOMB)
+    for memory in (points.memory, points.trial):
+        memory[0] = np.where(velocity != 0, velocity, memory[0])
+    if contact.sets is not None:
+        _press_first(system, contact)
+    if contact.grooves is not None and modes is not None:
+        _climb_first(system, contact)
+    return system
+
+
+def _make_points(contact: Contact, n_nodes: int) -> Points:
+    """Return the arrays of all points."""
+    laws = [law for one in contact.point_sets for law in one.laws]
+    counts = [len(one.laws) for one in contact.point_sets]
+    numbers = np.zeros((N_NUMBERS, len(laws)))
+    memory = np.zeros((max([N_MEMORY, *(law.memory.size for law in laws)]), len(laws)))
+    values = np.zeros((len(Point), max(len(laws), n_nodes)))
+    for j, law in enumerate(laws):
+        numbers[:, j] = law.numbers
+        memory[: law.memory.size, j] = law.memory
+        values[[Point.START_LOAD, Point.LOAD, Point.END_LOAD], j] = law.load
+        if law.numbers[0] == Law.BONDS:
+            memory[4, j] = law.memory[0]  # bond length in the middle of a step
+    resultant = contact.preload
+    if contact.grooves is not None:
+        resultant *= float(np.hypot(1.0, contact.grooves.slope(0.0)))
+    share = np.array([law.load / resultant for law in laws], float)
+    nodes = np.full(len(laws), RESULTANT, np.int64)
+    place = np.zeros(len(laws))
+    shapes = np.zeros((0, len(laws)))
+    stiffness = np.zeros(0)
+    first = 0
+    for one, count in zip(contact.point_sets, counts):
+        own = slice(first, first + count)
+        if one.nodes is not None:
+            nodes[own] = one.nodes
+        if one.shares is not None:
+            share[own] = one.shares
+            place[own] = one.places
+        if one.shear is not None:
+            shapes = np.zeros((len(one.shear.stiffness), len(laws)))
+            shapes[:, own] = np.asarray(one.shear.shape).T
+            stiffness = np.array(one.shear.stiffness, float)
+        first = first + count
+    shear = np.zeros((len(Shear), stiffness.size))
+    if stiffness.size:
+        shear[Shear.SCALE] = 1 / np.sqrt((shapes**2).mean(axis=1))
+        shear[Shear.LARGEST] = np.abs(shapes).max(axis=1)
+    n_moving = 0 if contact.sets is None else 2  # ports of heave and pitch have no points
+    return Points(
+        np.repeat(np.arange(len(counts)), counts),
+        np.cumsum([0, *counts, *[0] * n_moving]),
+        nodes,
+        share,
+        numbers,
+        memory,
+        memory.copy(),
+        values,
+        shapes,
+        stiffness,
+        shear,
+        np.repeat([one.is_spring for one in contact.point_sets], counts),
+        place,
+        np.zeros((2, 0)) if contact.pressure is None else np.array(contact.pressure, float),
+    )
+
+
+def _make_lists(contact: Contact, points: Points, is_prescribed: bool) -> BondLists:
+    """Return the arrays of the lists of bonds; empty ones without lists."""
+    count = points.port.size
+    if contact.bond_sum is None:
+        empty = np.zeros(0)
+        return BondLists(
+            np.zeros((N_ROWS, 0)), np.zeros((count, 6)), np.zeros((count, 14)), *[empty] * 3
+        )
+    bonds, reach, merge = contact.bond_sum
+    capacity = list_numbers.list_capacity(bonds, reach, merge)
+    if count > 1:
+        step = list_numbers.MAX_STRIPS_PER_LENGTH * int(min(reach, list_numbers.MAX_DAMAGE))
+        capacity = min(capacity, FIRST_STRIPS + step)
+    statuses = list_numbers.make_status(capacity, count)
+    loads = np.where(points.numbers[0] == Law.LIST, points.values[Point.END_LOAD, :count], 0.0)
+    statuses[:, STATUS.pressure] = statuses[:, STATUS.initial_pressure] = loads
+    # The initial bonds of a single list along a prescribed slide have no width, so that it is exact.
+    width = 0.0 if is_prescribed and count == 1 and not points.stiffness.size else FIRST_WIDTH
+    return BondLists(
+        np.zeros((N_ROWS, count * capacity)),
+        np.tile(list_numbers.make_path_state(bonds), (count, 1)),
+        statuses,
+        list_numbers.law_numbers(bonds, reach, merge, width),
+        list_numbers.gamma_table(bonds),
+        growth_numbers(bonds),
+    )
+
+
+def _make_flank(contact: Contact) -> np.ndarray:
+    """Return the numbers of the flank of the first port, (0,) without grooves."""
+    grooves = contact.grooves
+    if grooves is None:
+        return np.zeros(0)
+    flank = np.zeros(len(Flank))
+    flank[Flank.LOAD] = flank[Flank.VERTICAL] = flank[Flank.TRIAL_VERTICAL] = contact.preload
+    flank[Flank.WAVE_NUMBER] = grooves.wave_number
+    flank[Flank.AMPLITUDE] = grooves.amplitude
+    flank[Flank.PHASE] = grooves.phase
+    flank[Flank.LIFTED_MASS] = grooves.lifted_mass
+    flank[Flank.NORMAL] = contact.preload * np.hypot(1.0, float(grooves.slope(0.0)))
+    flank[Flank.RATIO] = 1.0
+    return flank
+
+
+def _make_no_sets():
+    """Return contact sets of a point that is not used."""
+    point = np.zeros(1)
+    return make_set_arrays(
+        np.ones((1, 1)), point, point, (1.0, 0.0, 0.0, 1.0, 1.0), np.zeros(1, bool), n_slots=1
+    )
+
+
+def _press_first(system: System, contact: Contact) -> None:
+    """Find the contact set at the start, and press the points to it."""
+    press = compiled.load("contact.press_kernels")
+    name = hash_set(system.sets, contact.sets.in_contact)
+    n = system.state.shape[1] // 2
+    heave, pitch = (
+        float(np.dot(row, system.state[0, :n])) for row in (contact.heave, contact.pitch)
+    )
+    slot = press.find_set(system.sets, press.build_first_set(system.sets, name), -heave, pitch)
+    system.totals[Total.SLOT] = slot
+
+
+def _climb_first(system: System, contact: Contact) -> None:
+    """Give the lifted mass the vertical velocity of the flank, and the points the normal force there."""
+    n = system.state.shape[1] // 2
+    row = system.ports.rows[0]
+    q = float(row @ system.state[0, :n])
+    slope = float(contact.grooves.slope(q))
+    flank = system.flank
+    normal = flank[Flank.LOAD] * np.hypot(1.0, slope)
+    ratio = normal / flank[Flank.NORMAL]
+    loads = [Point.START_LOAD, Point.LOAD, Point.END_LOAD]
+    system.points.values[loads] *= ratio
+    is_bonds = system.points.numbers[0] == Law.BONDS
+    for memory in (system.points.memory, system.points.trial):
+        memory[1] *= ratio
+        memory[2:4, is_bonds] *= ratio
+    flank[Flank.NORMAL] = normal
+    flank[Flank.RISE_SPEED] = slope * float(row @ system.state[0, n:])
+
+
+def copy_system(system):
+    """Return a copy of nested tuples of arrays."""
+    if isinstance(system, np.ndarray):
+        return system.copy()
+    if isinstance(system, tuple):
+        return type(system)(*map(copy_system, system))
+    return system
+
+
+def sample_drive(drive, step: float, first: int, count: int) -> np.ndarray:
+    """Return value, slope and second derivative (count, 3) of parabolas through the drive in each step.
+
+    The ends are taken inside of the step, because the drive may jump there.
+    """
+    starts = first + np.arange(count)[:, None]
+    times = step * (starts + np.array([EDGE, 0.5, 1 - EDGE]))
+    values = drive.values(times.ravel()).reshape(count, 3)
+    start, middle, end = values.T
+    slope = (4 * middle - 3 * start - end) / step
+    return np.stack([start, slope, 4 * (start - 2 * middle + end) / step**2], axis=1)
+
+
+# ---- march
+
+
+class March:
+    """March of a rig, from rest or from an initial state.
+
+    - modes, drive, contact, steps, step: rig, drive, contact points, steps per cycle and their duration [s]
+    - system: arrays of the engine
+    - done: number of steps since the start
+    - outcome, message: how the march ended, None and "" as long as it goes on
+    - work_sums: friction work from samples, sum of the magnitudes of the friction works of the steps, and created energy
+      [J]
+    """
+
+    def __init__(
+        self, modes, drive, contact: Contact, steps: int, travel: float = np.inf, start=None
+    ):
+        self.modes = modes
+        self.drive = drive
+        self.contact = contact
+        self.steps = steps
+        self.step = drive.period / steps
+        self.system = make_system(contact, self.step, modes, travel, start)
+        self.done = 0
+        self.outcome = None
+        self.message = ""
+        self.work_sums = np.zeros(3)
+        n_columns = len(contact.point_sets) + (2 if contact.sets is not None else 0)
+        self.width = 2 * modes.omega.size + Sample.PORTS + N_PORT_COLUMNS * n_columns
+        self.kernels = load_kernels(contact)
+        self.reset_balance()
+
+    def fork(self, drive=None) -> "March":
+        """Return a copy that goes on by itself, under another drive if one is given."""
+        other = copy(self)
+        other.system = copy_system(self.system)
+        other.work_sums = self.work_sums.copy()
+        if drive is not None:
+            other.drive = drive
+        return other
+
+    def continue_from(self, other: "March") -> None:
+        """Take motion and memory of another march of this contact, which may have steps of another length."""
+        theirs = copy_system(other.system)
+        points = self.system.points._replace(
+            memory=theirs.points.memory,
+            trial=theirs.points.trial,
+            values=theirs.points.values,
+            shear=theirs.points.shear,
+        )
+        self.system = self.system._replace(points=points, flank=theirs.flank, lists=theirs.lists)
+        self.state[:] = other.state
+
+    @property
+    def state(self) -> np.ndarray:
+        """Modal coordinates [m] and velocities [m/s], (2, n)."""
+        return self.system.state[0].reshape(2, -1)
+
+    def reset_balance(self) -> None:
+        """Begin the energy balance and the time anew; the present energy counts as work of the drive."""
+        totals = self.system.totals
+        slot = totals[Total.SLOT]
+        totals[:] = 0.0
+        totals[Total.SLOT] = slot
+        totals[Total.IS_DIRTY] = 1.0
+        self.work_sums[:] = 0.0
+        self.done = 0
+        sample = np.zeros((1, self.width))
+        self._set_drive(1)
+        self.kernels.march(self.system, 0, sample)
+        totals[[Total.WORK_IN, Total.STORED]] = self.find_stored_energy(sample[0])
+        self.first_energy = float(sample[0, 2 * self.modes.omega.size + Sample.ENERGY])
+        self.first_sums = self._sum_lists()
+
+    def find_stored_energy(self, sample) -> float:
+        """Return the energy [J] of modes, interfaces and normal contact at a sample."""
+        z, v = self.state
+        n = 2 * z.size
+        squares = float(v @ v + (self.modes.omega * z) @ (self.modes.omega * z))
+        interface = sample[n + Sample.ENERGY] + sample[n + Sample.CONTACT_ENERGY]
+        interface += sample[n + Sample.SPRINGS]
+        return 0.5 * self.modes.mass * squares + float(interface)
+
+    def move_to(self, position, velocity) -> None:
+        """Set the modal coordinates and velocities (n,); the points slide to the new position slowly."""
+        system = self.system
+        row = system.ports.rows[0]
+        begin = float(row @ self.state[0])
+        end = float(row @ position)
+        self.state[:] = position, velocity
+        if end != begin:
+            path = np.array([begin, end])
+            no_modes = system.structure._replace(
+                path=path,
+                drive=np.zeros((2, 3)),
+                responses=np.zeros((len(system.structure.responses), 0, 3)),
+                loss=np.zeros((len(system.structure.responses), 3, 3)),
+                work=np.zeros((len(system.structure.responses), 3, 3)),
+                inputs=np.zeros(3),
+                modes=np.zeros((3, 0)),
+                damping=np.zeros((0, 0)),
+            )
+            ports = system.ports._replace(
+                rows=np.zeros((len(system.ports.rows), 0)),
+                compliance=np.zeros_like(system.ports.compliance),
+            )
+            still = system._replace(
+                structure=no_modes,
+                ports=ports,
+                state=np.zeros((3, 0)),
+                options=system.options._replace(step=1.0),
+            )
+            self.kernels.march(still, 1, np.zeros((2, self.width - system.state.shape[1])))
+            system.points.shear[[Shear.LAST, Shear.EARLIER, Shear.FIRST]] = 0.0
+        if system.flank.size:
+            slope = float(self.contact.grooves.slope(end))
+            system.flank[Flank.RISE_SPEED] = slope * float(row @ velocity)
+
+    def _set_drive(self, count: int) -> None:
+        """Write the drive, and a prescribed load, of the next steps."""
+        structure = self.system.structure._replace(
+            drive=sample_drive(self.drive, self.step, self.done, count + 1)
+        )
+        if self.contact.load is not None:
+            times = self.step * (self.done + np.arange(count + 1.0))
+            structure = structure._replace(loads=np.asarray(self.contact.load(times), float))
+        self.system = self.system._replace(structure=structure)
+
+    def advance(self, count: int) -> np.ndarray:
+        """March over a number of steps; return the samples (steps done + 1, w) of their starts and of the end.
+
+        A part of the march whose lists of bonds are full is repeated with larger lists.
+
+        Raises
+        ------
+        Missing
+            If the lists become too long.
+        """
+        self._set_drive(count)
+        springs = any(one.is_spring for one in self.contact.point_sets)
+        may_repeat = self.system.options.has_lists or springs
+        saved = copy_system(self.system) if may_repeat else None
+        while True:
+            samples = np.zeros((count + 1, self.width))
+            n_done, status = self.kernels.march(self.system, count, samples)
+            if status != LISTS_FULL:
+                break
+            saved = enlarge_lists(saved, f"at step {self.done + n_done}")
+            self.system = copy_system(saved)
+        samples = samples[: n_done + 1]
+        if springs and status == EXCEEDS_TRAVEL and n_done and self._has_run_away(samples[-1]):
+            self.system = saved
+            self.kernels.march(self.system, n_done - 1, samples[:-1])
+            n_done = n_done - 1
+            samples = samples[:-1]
+            last = abs(float(self.modes.output @ samples[-1, : self.modes.omega.size]))
+            self.message = (
+                f"beyond a displacement of {format_length(last, 3)} the motion grows without limit, because the "
+                "force of the softening spring no longer pulls the block back; the run ended there"
+            )
+        self.done += n_done
+        self._judge(status)
+        self._add_works(samples)
+        return samples
+
+    def _has_run_away(self, sample) -> bool:
+        """Return whether the output of a sample is far beyond the travel."""
+        output = abs(float(self.modes.output @ sample[: self.modes.omega.size]))
+        return output > RUNAWAY * self.system.options.travel
+
+    def _judge(self, status: int) -> None:
+        """Set outcome and message from the status of the compiled march."""
+        advice = "raise accuracy.steps_per_cycle"
+        if status == EXCEEDS_TRAVEL:
+            self.outcome = Outcome.EXCEEDS_TRAVEL
+        elif status == LEAVES_GROOVES:
+            self.outcome = Outcome.LEAVES_GROOVES
+            self.message = self.contact.grooves.describe_lift(self.done * self.step)
+        elif status == NO_CONTACT_SET:
+            self.outcome = Outcome.NOT_CONVERGED
+            self.message = f"at step {self.done} the method could not determine which points are in contact; {advice}"
+        elif status != DONE:
+            self.outcome = Outcome.NOT_CONVERGED
+            self.message = (
+                f"at step {self.done} the computed motion is not a finite number; {advice}"
+            )
+
+    def check_steps(self) -> None:
+        """Set the outcome to not_converged if any step has not met its tolerance."""
+        unsolved = int(self.system.totals[Total.UNSOLVED])
+        if unsolved:
+            self.outcome = Outcome.NOT_CONVERGED
+            self.message = (
+                f"{unsolved} of {self.done} time steps have an error of the friction force above the permitted "
+                f"{RESIDUAL:.0e} of the friction limit; raise accuracy.steps_per_cycle"
+            )
+
+    def _add_works(self, samples) -> None:
+        """Add the friction work of samples: by the forces at the samples, its magnitude, and created energy."""
+        n = 2 * self.modes.omega.size
+        works = samples[:-1, n + Sample.WORK]
+        created = -np.minimum(split_losses(samples, n, self.system.options.scale), 0.0)
+        sampled = np.zeros(works.size)
+        rests = np.ones(works.size, bool)
+        still = SAME_PLACE * np.abs(samples[:, : n // 2]).max(initial=0.0)
+        for k, one in enumerate(self.contact.point_sets):
+            if one.is_spring:
+                continue
+            columns = samples[:, n + Sample.PORTS + N_PORT_COLUMNS * k :]
+            is_rigid = one.laws[0].numbers[0] == Law.COULOMB
+            mean = columns[:-1, 2] if is_rigid else None
+            slide = samples[:, : n // 2] @ np.asarray(one.row, float)
+            sampled += sampled_work(slide, columns[:, 0], mean)
+            rests &= is_rigid & (np.abs(np.diff(slide)) <= still)
+        # What a port at rest does within a step and takes back is no work of the friction.
+        sampled[rests] = works[rests]
+        passed = np.abs(works[~rests]).sum()
+        self.work_sums += float(sampled.sum()), float(passed), float(created.sum())
+
+    def take_snapshot(self, sample) -> Snapshot:
+        """Return the state of the interface at the end of the last step, whose sample is given."""
+        n = self.modes.omega.size
+        row = self.system.ports.rows[0]
+        rest = sample[2 * n :]
+        motion = float(row @ sample[:n]), float(row @ sample[n : 2 * n])
+        ports = rest[Sample.PORTS :]
+        place = self.done * self.step, *motion, ports[0], ports[1]
+        return make_snapshot(
+            self.kernels, self.system, (*place, rest[Sample.HEAVE], rest[Sample.PITCH])
+        )
+
+    def find_ledger(self, sample) -> dict:
+        """Return energies [J] and counters by name at a sample of the present state."""
+        n = 2 * self.modes.omega.size
+        totals = self.system.totals
+        friction = float(totals[Total.FRICTION])
+        sampled, passed, _ = self.work_sums
+        ledger = {
+            "work_in": float(totals[Total.WORK_IN]),
+            "viscous": float(totals[Total.VISCOUS]),
+            "power": float(totals[Total.POWER]),
+            "friction": friction - float(sample[n + Sample.ENERGY] - self.first_energy),
+            "peak_stored": float(totals[Total.STORED]),
+            "iterations": float(totals[Total.ITERATIONS]),
+            "worst_iterations": float(totals[Total.WORST]),
+            "stored": self.find_stored_energy(sample),
+            "booked": friction,
+            "sampled": float(sampled),
+            "passed": float(passed),
+        }
+        if self.system.options.has_lists:
+            names = ("created", "dissipated", "substeps", "strips")
+            ledger |= dict(zip(names, map(float, self._sum_lists() - self.first_sums)))
+        return ledger
+
+    def _sum_lists(self) -> np.ndarray:
+        """Return created and dissipated energy [J], extra strips and length of the longest of the lists of bonds."""
+        statuses = self.system.lists.statuses
+        sums = statuses[:, [STATUS.created, STATUS.dissipated, STATUS.n_extra]].sum(axis=0)
+        return np.append(sums, statuses[:, STATUS.max_strips].max(initial=0.0))
+
+
+def enlarge_lists(system: System, place: str) -> System:
+    """Return a copy of a system whose lists of bonds have twice the room; `place` says where, for the message.
+
+    Raises
+    ------
+    Missing
+        If the lists would have more than MAX_STRIPS strips.
+    """
+    lists = system.lists
+    room = lists.bondlist.shape[1]
+    if room >= MAX_STRIPS:
+        raise Missing(
+            f"the bond list grew beyond {room} entries ({room * STRIP_BYTES / 1e6:.0f} MB) {place}; "
+            f"{LONG_LIST_ADVICE}",
+            "",
+        )
+    statuses = lists.statuses.copy()
+    capacity = min(2 * room, MAX_STRIPS) // len(statuses)
+    bondlist = list_numbers.enlarge_lists(lists.bondlist, statuses, capacity)
+    return system._replace(lists=lists._replace(bondlist=bondlist, statuses=statuses))
+
+
+def count_list_bytes(n_strips: float) -> float:
+    """Return the memory [bytes] of lists of bonds, with the copy during their enlargement."""
+    return 3 * STRIP_BYTES * min(n_strips, MAX_STRIPS)
+
+
+def split_losses(samples, n: int, scale: float) -> np.ndarray:
+    """Return the loss [J] in each step between samples, friction work less the gain of stored energy.
+
+    A loss below 0 within round-off is 0. `n` is the number of columns of the motion, `scale` the friction limit [N].
+    """
+    energy = samples[:, n + Sample.ENERGY]
+    losses = samples[:-1, n + Sample.WORK] - np.diff(energy)
+    force = np.abs(samples[:-1, n + Sample.PORTS : n + Sample.PORTS + 1]).max(axis=1, initial=scale)
+    work = np.abs(samples[:-1, n + Sample.WORK])
+    noise = 1e-12 * work + 1e-14 * np.maximum(energy[1:], energy[:-1])
+    # The last digit of the motion.
+    motion = np.abs(samples[:, : n // 2]).sum(axis=1)
+    noise += 2e-15 * force * np.maximum(motion[1:], motion[:-1])
+    return np.where((losses < 0) & (losses > -noise), 0.0, losses)
+
+
+def make_snapshot(kernels, system: System, motion: tuple) -> Snapshot:
+    """Return the state of the points on the first port; `motion` has the first seven fields of Snapshot."""
+    points = system.points
+    count = points.port.size
+    read = kernels.read_points
+    forces = np.zeros(count)
+    stretch = np.zeros(count)
+    read(system, forces, stretch)
+    values = points.values
+    n_own = int(points.first[1])
+    # The pieces at rest under the present forces; the march brings only their means over a step into equilibrium.
+    shapes = points.shapes[:, :n_own]
+    bend = (shapes @ forces[:n_own] / points.stiffness) @ shapes
+    has_nodes = system.ports.contact[0] >= 0
+    return Snapshot(
+        *motion,
+        forces[:n_own],
+        stretch[:n_own],
+        bend,
+        values[Point.END_LOAD, :n_own].copy(),
+        values[Point.NODE_FORCE, : system.sets.x.size].copy() if has_nodes else np.zeros(0),
+        float(system.flank[Flank.VERTICAL]) if system.flank.size else 0.0,
+    )
+
+
+def march(
+    modes: ModalBasis, drive, contact: Contact, cycles: float, steps_per_cycle: int, *,
+    window: int = 10, travel: float = np.inf, start=None, frames: int = 0, keeps_samples: bool = True,
+    repeats: bool = True, say=None, progress=None,
+) -> Motion:  # fmt: skip
+    """March a rig over the cycles of its drive.
+
+    The march begins with the fraction of a cycle, so that the window has complete cycles. Cycles of a periodic motion
+    under a sine are not computed again.
+
+    Parameters
+    ----------
+    modes : ModalBasis
+    drive : core.SineDrive or another drive
+    contact : Contact
+    cycles : float
+    steps_per_cycle : int
+    window : int
+        Number of last cycles whose samples are all kept.
+    travel : float
+        Largest output [m].
+    start : core.InitialState or March, optional
+        Initial state, or a march that goes on under the drive.
+    frames : int
+        Number of snapshots in the last cycle.
+    keeps_samples : bool
+        Whether samples from before the window are kept.
+    repeats : bool
+        Whether a periodic motion is not computed again.
+    say, progress : callable, optional
+        Callbacks for a line of text and for the completed fraction.
+
+    Raises
+    ------
+    Missing
+        If lists of bonds become too long.
+    """
+    load_kernels(contact, say)
+    if isinstance(start, March):
+        run = start.fork(drive)
+        run.reset_balance()
+    else:
+        run = March(modes, drive, contact, steps_per_cycle, travel, start)
+    n_steps = round(cycles * steps_per_cycle)
+    record = Record(run, n_steps, min(window * steps_per_cycle, n_steps), keeps_samples)
+    saved = checkpoint.open_checkpoint(run, record, (n_steps, steps_per_cycle, window, frames))
+    can_repeat = (
+        repeats
+        and isinstance(drive, SineDrive)
+        and contact.load is None
+        and not run.system.options.has_lists
+    )
+    before = None
+    while run.done < n_steps and run.outcome is None:
+        n_left = n_steps - run.done
+        n_early = n_left - record.n_window
+        size = n_left % steps_per_cycle or steps_per_cycle
+        if size == steps_per_cycle and n_early > steps_per_cycle:
+            most = min(MAX_CYCLES_AT_ONCE, MAX_STEPS_AT_ONCE // steps_per_cycle)
+            size *= max(1, min(most, n_early // steps_per_cycle))
+        totals = run.system.totals.copy()
+        works = run.work_sums.copy()
+        is_last = size == n_left
+        record.add(*advance_with_frames(run, size, frames if is_last else 0))
+        count = (n_steps - record.n_window - run.done) // size
+        state = run.system.state[0]
+        memory = np.concatenate(
+            [run.system.points.memory.ravel(), run.system.points.shear[Shear.VALUE]]
+        )
+        now = np.concatenate([state, memory])
+        if can_repeat and count > 0 and before is not None and before.size == now.size:
+            scale = np.concatenate([record.find_largest_state(), np.abs(memory)])
+            if (np.abs(now - before) <= SAME_CYCLE * scale).all():
+                record.repeat(count)
+                run.done += count * size
+                run.system.totals[REPEATED] += count * (run.system.totals - totals)[REPEATED]
+                run.work_sums += count * (run.work_sums - works)
+        before = now if size % steps_per_cycle == 0 else None
+        saved.write_if_due(run, record)
+        if progress is not None:
+            progress(run.done / n_steps)
+    run.check_steps()
+    return record.make_motion()
+
+
+def advance_with_frames(run: March, size: int, frames: int) -> tuple[int, np.ndarray, list]:
+    """March over a number of steps, with snapshots at the ends of equal parts.
+
+    Returns the number of the first step, the samples and the snapshots.
+    """
+    first = run.done
+    if not frames:
+        return first, run.advance(size), []
+    parts = []
+    snapshots = []
+    for begin, end in pairwise(np.linspace(0, size, min(frames, size) + 1).round().astype(int)):
+        parts.append(run.advance(int(end - begin)))
+        snapshots.append(run.take_snapshot(parts[-1][-1]))
+        if run.outcome is not None:
+            break
+    rows = [part[:-1] for part in parts[:-1]]
+    return first, np.concatenate([*rows, parts[-1]]), snapshots
+
+
+class Record:
+    """Samples of a march: all of the window at its end, and some of each earlier cycle.
+
+    - run, n_steps, n_window: March, its number of steps, and that of the window
+    - keeps_samples: whether samples from before the window are kept
+    - numbers, rows, sums: step numbers, samples and energies (3, k) of the blocks that are kept
+    - extremes, phasors: of the output in each cycle
+    - totals (3,): friction work, dissipated and created energy up to the last sample [J]
+    - snapshots: of the last cycle
+    - last, recent: number of the first step, samples and energies of the last part, and of the last parts, which contain
+      the window
+    - stride: distance of the samples of earlier cycles
+    """
+
+    def __init__(self, run: March, n_steps: int, n_window: int, keeps_samples: bool):
+        self.run = run
+        self.n_steps = n_steps
+        self.n_window = n_window
+        self.keeps_samples = keeps_samples
+        self.numbers = []
+        self.rows = []
+        self.sums = []
+        self.extremes = []
+        self.phasors = []
+        self.totals = np.zeros(3)
+        self.snapshots = []
+        self.last = None
+        self.recent = []
+        # The distance of early samples divides a cycle, so that each one begins with a sample.
+        longest = max(1, run.steps // N_KEPT)
+        self.stride = max(k for k in range(1, longest + 1) if run.steps % k == 0)
+
+    def add(self, first: int, samples, snapshots=()) -> None:
+        """Add the samples (k + 1, w) from the step `first` on."""
+        run = self.run
+        n = 2 * run.modes.omega.size
+        count = len(samples) - 1
+        losses = split_losses(samples, n, run.system.options.scale)
+        # Only lists of bonds can create energy; of other laws a loss below 0 is an error of the step.
+        created = np.maximum(-losses, 0) * run.system.options.has_lists
+        parts = [samples[:-1, n + Sample.WORK], losses + created, created]
+        sums = self.totals[:, None] + np.concatenate(
+            [np.zeros((3, 1)), np.cumsum(parts, axis=1)], axis=1
+        )
+        self.last = first, samples, sums
+        self._keep(self.last)
+        self.totals = sums[:, -1].copy()
+        self.snapshots = list(snapshots)
+
+        # Extremes and phasor of each cycle; a march that ends early has a part of a cycle.
+        output = samples[:, : n // 2] @ run.modes.output
+        speed = samples[:, n // 2 : n] @ run.modes.output
+        steps = run.steps
+        n_whole = count // steps
+        ends = [n_whole * steps] if n_whole else []
+        ends += [count] if count > n_whole * steps or not n_whole else []
+        begin = 0
+        for end in ends:
+            size = steps if end == n_whole * steps and n_whole else end - begin
+            cycles = sliding_window_view(output[begin : end + 1], size + 1)[:: max(size, 1)]
+            speeds = sliding_window_view(speed[begin : end + 1], size + 1)[:: max(size, 1)]
+            self.extremes += find_extremes(cycles, speeds, run.step)
+            angle = 2 * np.pi * ((first + begin + np.arange(size)) % steps) / steps
+            parts = cycles[:, :-1] @ np.stack([np.cos(angle), -np.sin(angle)], axis=1)
+            self.phasors += list(2 / max(size, 1) * (parts[:, 0] + 1j * parts[:, 1]))
+            begin = end
+
+    def _keep(self, part: tuple) -> None:
+        """Keep all samples of the parts within a window of the last one, and of older parts those at equal distances."""
+        self.recent.append(part)
+        last = part[0] + len(part[1]) - 1
+        while len(self.recent) > 1 and self.recent[1][0] <= last - self.n_window:
+            first, samples, sums = self.recent.pop(0)
+            if self.keeps_samples and sum(map(len, self.numbers)) <= checkpoint.MAX_EARLY_SAMPLES:
+                picked = np.arange(0, len(samples) - 1, self.stride)
+                self.numbers.append(first + picked)
+                self.rows.append(samples[picked])
+                self.sums.append(sums[:, picked])
+
+    def find_largest_state(self) -> np.ndarray:
+        """Return the largest magnitudes (2 n,) of the modal coordinates and velocities in the last part."""
+        n = 2 * self.run.modes.omega.size
+        return np.abs(self.last[1][:, :n]).max(axis=0)
+
+    def repeat(self, count: int) -> None:
+        """Repeat the last part of the march."""
+        first, samples, sums = self.last
+        size = len(samples) - 1
+        n_cycles = size // self.run.steps
+        step = (sums[:, -1] - sums[:, 0])[:, None]
+        for k in range(1, count + 1):
+            self._keep((first + k * size, samples, sums + k * step))
+        self.totals = self.totals + count * step[:, 0]
+        self.extremes += count * self.extremes[-n_cycles:]
+        self.phasors += count * self.phasors[-n_cycles:]
+
+    def make_motion(self) -> Motion:
+        """Return the record of a finished march."""
+        run = self.run
+        _, samples, sums = self.last
+        last = samples[-1:]
+        parts = [
+            (first + np.arange(len(one) - 1), one[:-1], energies[:, :-1])
+            for first, one, energies in self.recent
+        ]
+        recent_numbers, recent_rows, recent_sums = zip(*parts)
+        rows = np.concatenate([*self.rows, *recent_rows, last])
+        numbers = np.concatenate([*self.numbers, *recent_numbers, [run.done]]).astype(int)
+        energies = np.concatenate([*self.sums, *recent_sums, sums[:, -1:]], axis=1)
+        if not self.keeps_samples:
+            is_kept = numbers >= run.done - self.n_window
+            rows = rows[is_kept]
+            numbers = numbers[is_kept]
+            energies = energies[:, is_kept]
+        in_window = numbers >= run.done - self.n_window
+        response = make_response(run, rows, numbers, energies)
+        n = 2 * run.modes.omega.size
+        window_rows = rows[in_window][:-1]
+        steps = run.steps
+        return Motion(
+            response,
+            response.select(in_window),
+            window_rows[:, n + Sample.PORTS + 2]
+            if run.contact.point_sets
+            else window_rows[:, 0] * 0,
+            float(window_rows[:, n + Sample.WORK].sum()),
+            np.array(self.extremes),
+            np.array(self.phasors),
+            run.find_ledger(last[0]),
+            run.outcome,
+            run.message,
+            run.done / steps,
+            self.snapshots,
+            run,
+        )
+
+
+def find_extremes(q, v, step: float) -> list[tuple[float, float]]:
+    """Return the smallest and largest of samples q (c, k) of each cycle, those of the cubics between them included.
+
+    `v` (c, k) are the velocities, `step` [s] the distance of the samples.
+    """
+    low = q.min(axis=1)
+    high = q.max(axis=1)
+    # A change of sign within round-off, as at a stop, is no reversal: the cubic would overshoot there.
+    limit = -1e-12 * (v**2).max(axis=1, keepdims=True)
+    row, turn = np.nonzero(v[:, :-1] * v[:, 1:] < limit)
+    # The velocity is the parabola with the mean of the increment.
+    first = v[row, turn]
+    last = v[row, turn + 1]
+    mean = (q[row, turn + 1] - q[row, turn]) / step
+    square = 3 * (first + last) - 6 * mean
+    linear = 6 * mean - 4 * first - 2 * last
+    root = np.sqrt(np.maximum(linear**2 - 4 * square * first, 0.0))
+    x = np.clip(2 * first / (-linear + np.copysign(root, first - last)), 0.0, 1.0)
+    peaks = q[row, turn] + step * x * (first + x * (linear / 2 + x * square / 3))
+    np.minimum.at(low, row, peaks)
+    np.maximum.at(high, row, peaks)
+    return list(zip(low.tolist(), high.tolist()))
+
+
+def make_response(run: March, rows, numbers, energies) -> Response:
+    """Return samples (k, w) with their step numbers (k,) and energies (3, k) as histories.
+
+    `extra` has the energies: friction work, stored, dissipated and created energy [J]; slides, slide rates, forces and
+    slips (k, i) of several interfaces, and forces of springs (k, s); load, moment and energy of the contact, heave and
+    pitch of a contact that moves.
+    """
+    modes = run.modes
+    contact = run.contact
+    time = numbers * run.step
+    n = modes.omega.size
+    z = rows[:, :n]
+    rate = rows[:, n : 2 * n]
+    first = 2 * n + Sample.PORTS
+    sets = contact.point_sets
+    columns = rows[:, first : first + N_PORT_COLUMNS * len(sets)]
+    columns = columns.reshape(len(rows), len(sets), N_PORT_COLUMNS)
+    port_rows = np.array([one.row for one in sets], float).reshape(len(sets), n)
+    push = run.drive.values(time)
+    base = push if run.drive.moving else np.zeros_like(push)
+    forces = columns[..., 0]
+    acceleration = -np.outer(push, modes.base) - rate @ modes.damping_matrix.T - z * modes.omega**2
+    acceleration -= forces @ port_rows / modes.mass
+    work, dissipated, created = energies
+    extra = {"ledger": np.stack([work, rows[:, 2 * n + Sample.ENERGY], dissipated, created])}
+    press = rows[:, 2 * n + Sample.LOAD : 2 * n + Sample.PITCH + 1]
+    if contact.sets is not None or contact.load is not None:
+        extra |= dict(zip(PRESS_COLUMNS, press.T))
+    if contact.sets is not None:
+        # Less load accelerates the holder towards the contact.
+        change = press[:, :2] - [contact.sets.load, contact.sets.moment]
+        acceleration += change @ np.array([contact.heave, contact.pitch]) / modes.mass
+    slides = z @ port_rows.T
+    rates = rate @ port_rows.T
+    is_interface = np.array([not one.is_spring for one in sets], bool)
+    if len(sets) > 1:
+        parts = {"slides": slides, "slide_rates": rates, "forces": forces, "slips": columns[..., 1]}
+        extra["spring_forces"] = forces[:, ~is_interface]
+        if is_interface.any():
+            extra |= {name: part[:, is_interface] for name, part in parts.items()}
+    grooves = contact.grooves
+    if grooves is not None and grooves.lifted_mass:
+        sliding = acceleration @ modes.slide
+        lift = grooves.slope(slides[:, 0]) * sliding
+        lift = lift + grooves.slope_derivative(slides[:, 0]) * rates[:, 0] ** 2
+        extra["normal_load"] = contact.preload + grooves.lifted_mass * lift
+    if is_interface.any():
+        own = int(np.flatnonzero(is_interface)[0])
+        interface = slides[:, own], rates[:, own], forces[:, own], columns[:, own, 1]
+    else:
+        still = np.zeros(len(rows))
+        interface = z @ modes.slide, rate @ modes.slide, still, z @ modes.slide
+    slide, speed, force, slip = interface
+    return Response(
+        time, z, rate, slide, speed, z @ modes.output, rate @ modes.output,
+        acceleration @ modes.output + base, base, force, slip, extra,
+    )  # fmt: skip

@@ -1,0 +1,162 @@
+"""Depths of aligned surfaces, their errors from the means of unworn tiles, and the largest depth."""
+
+from collections.abc import Callable
+from itertools import pairwise, product
+
+import numpy as np
+from scipy import ndimage, special
+
+from ..quantity import SIDE, Quantity
+from .depth_map import MODEL_ERROR, SCATTER_FACTOR, DepthErrors, DepthMap
+from .fit import Fit
+from .model import Model
+from .raster import fill_gaps
+from .records import name_quantity
+from .statistics import estimate_correlation
+
+N_TILES = {1: 40, 2: 8}  # number of tiles along each side, whose means show the errors of the datum
+MIN_TILES = 6  # smallest number of tiles that show these errors
+MIN_TILE_HEIGHTS = 5  # smallest number of unworn heights in such a tile
+MEDIAN_SIZE = {1: 5, 2: 3}  # side of the window whose median depths give the largest depth
+MEDIAN_VARIANCE = 1.57  # variance of a median relative to that of a mean, of normal errors
+MAX_NOISE_RATIO = 4.0  # noise relative to the median above which a depth cannot be the largest
+
+
+def make_depths(model: Model, fit: Fit, gain_error: float = 0.0) -> DepthMap:
+    """Return the depths of aligned surfaces over the part that both show, with the errors of the unworn heights.
+
+    Parameters
+    ----------
+    model : Model
+    fit : Fit
+        Depths at the known points of the model.
+    gain_error : float, optional
+        Standard deviation of the gain of the instrument.
+    """
+    box = tuple(slice(place.min(), place.max() + 1) for place in np.nonzero(model.common))
+    depth = fill_gaps(model.draw(fit.depth))[box]
+    noise = model.draw(fit.noise)[box]
+    noise = np.where(np.isnan(noise), np.median(fit.noise), noise)
+    masks = {
+        name: model.draw(getattr(fit, name), False)[box] for name in ("unworn", "worn", "grown")
+    }
+    first = fill_gaps(model.own.z)[box]
+    first = first if model.sign > 0 else first + depth
+
+    base = model.datum[(slice(fit.jacobian.shape[1] - model.n_axes - 1), *box)]
+    columns = base[: 1 + model.n_axes].reshape(1 + model.n_axes, -1).T
+    trend = columns @ np.linalg.lstsq(columns, first.ravel(), rcond=None)[0]
+    before = first - trend.reshape(first.shape)
+    variance, drift = estimate_variance(depth, noise, masks["unworn"], base)
+    correlation = 1.0
+    if model.n_axes == 1:
+        correlation = estimate_correlation((depth / noise)[masks["unworn"]])
+    model_error = float(np.hypot(MODEL_ERROR, gain_error))
+    # Holes of missing heights belong to the common part.
+    inside = ndimage.binary_fill_holes(model.common[box])
+    axes = [axis[part] for axis, part in zip(model.own.axes, box)]
+    return DepthMap(
+        x=axes[-1],
+        y=axes[0] if model.n_axes > 1 else None,
+        before=before,
+        after=before - depth,
+        depth=depth,
+        noise=noise,
+        **masks,
+        inside=inside,
+        missing=inside & ~model.known[box],
+        cell=float(np.prod(model.own.steps)),
+        errors=DepthErrors(variance, drift, correlation, model_error),
+    )
+
+
+def estimate_variance(depth, noise, unworn, base) -> tuple[Callable[[np.ndarray], float], float]:
+    """Estimate the errors of sums of depths from the means of unworn heights in tiles about the datum.
+
+    With white noise, the mean of c heights has the variance s^2/c; noise that neighbours share and slow errors of the
+    instrument show as a larger s^2. The datum itself is uncertain too: a sum of w depths has the variance
+    s^2 (m^T (B^T C B)^-1 m + w), with the datum B and the counts C of the tiles, and the sum m of the datum.
+
+    Parameters
+    ----------
+    depth, noise, unworn : (n,) or (m, n) array
+        Depths and noise [m], and the mask of heights that are unworn.
+    base : (k, n) or (k, m, n) array
+        Functions of which the datum is a combination.
+
+    Returns
+    -------
+    callable
+        Variance [m2] of the sum of depths as a function of their mask.
+    float
+        Standard deviation [m] of the mean of a tile.
+    """
+    edges = [np.linspace(0, count, N_TILES[depth.ndim] + 1).astype(int) for count in depth.shape]
+    tiles = []
+    for sides in product(*map(pairwise, edges)):
+        tile = tuple(slice(*side) for side in sides)
+        use = unworn[tile]
+        if use.sum() >= MIN_TILE_HEIGHTS:
+            parts = [values[tile][use].mean() for values in (depth, *base)]
+            tiles.append((use.sum(), *parts))
+    counts, means, *centers = np.array(tiles).T if tiles else np.zeros((2 + len(base), 1))
+    root = np.sqrt(counts)
+    centers = np.array(centers).T * root[:, None]
+    # Where tiles are few, a tile may share a single error.
+    variance = float(np.median(noise) ** 2 * depth.size / N_TILES[depth.ndim] ** depth.ndim)
+    freedom = counts.size - len(base)
+    if counts.size >= MIN_TILES:
+        fitted = np.linalg.lstsq(centers, means * root, rcond=None)[0]
+        residual = means * root - centers @ fitted
+        student = special.stdtrit(freedom, 0.975) / SIDE
+        scatter = residual @ residual / freedom * estimate_correlation(residual)
+        variance = float(scatter * student**2)
+    inverse = np.linalg.pinv(centers.T @ centers, rcond=1e-10, hermitian=True)
+
+    def compute_variance(part) -> float:
+        moments = base[:, part].sum(axis=1)
+        return variance * float(moments @ inverse @ moments + part.sum())
+
+    return compute_variance, float(np.sqrt(variance / max(counts.mean(), 1.0)))
+
+
+def measure_largest(depths: DepthMap) -> tuple[Quantity, np.ndarray]:
+    """Measure the largest depth of the worn parts without the bias of the maximum of noisy depths.
+
+    The largest of n medians with normal errors is too large by about sigma sqrt(2 log n). The upper end of the
+    interval contains every single depth, because a crest may be worn as deep, and both ends what the samples do not
+    resolve: the part of the largest depth that every second sample does not show.
+
+    Returns
+    -------
+    Quantity
+        Largest depth [m].
+    array
+        Mask in the shape of the depths of the places that are as deep but for the noise.
+    """
+    n_axes = depths.depth.ndim
+    is_sure = depths.noise < MAX_NOISE_RATIO * depths.noise_level
+    if (is_sure & depths.worn).any():
+        is_sure &= depths.worn
+    smooth = ndimage.median_filter(depths.depth, MEDIAN_SIZE[n_axes])
+    smooth = np.where(is_sure, smooth, -np.inf)
+    depth = np.where(is_sure, depths.depth, -np.inf)
+
+    top = np.unravel_index(np.argmax(smooth), smooth.shape)
+    # Heights that share an error do not improve a median.
+    correlation = depths.errors.correlation
+    factor = MEDIAN_VARIANCE * correlation / MEDIAN_SIZE[n_axes] ** n_axes
+    sigma = float(depths.noise[top]) * min(np.sqrt(factor), 1.0)
+    near = smooth > smooth[top] - 2 * sigma
+    bias = float(np.sqrt(2 * np.log(max(near.sum() / correlation, 1.0))) / 2 * sigma)
+    value = float(smooth[top]) - bias
+
+    crest = float(depth.max())
+    halves = product((slice(0, None, 2), slice(1, None, 2)), repeat=n_axes)
+    coarser = float(np.mean([depth[part].max() for part in halves]))
+    unresolved = crest - coarser if np.isfinite(coarser) else 0.0
+    sigma = float(np.hypot(sigma, depths.level_error))
+    scatter = np.hypot(SCATTER_FACTOR * sigma, depths.errors.model * value)
+    error = SIDE * float(scatter) + unresolved
+    low = max(value - bias - error, 0.0)
+    return name_quantity("worn_depth_max", value, low, max(crest, value) + error), near

@@ -1,0 +1,232 @@
+"""Depth of the second surface below the first one, as a function of place and datum.
+
+A point p of the own surface, which is the second trace or the first scan, lies at c + M (p - c) + shift on the other
+one, with the own middle c; M stretches a trace or rotates a scan. The depth there is z1 + datum - z2, with a straight or
+parabolic datum of traces and a plane of scans. The state is [shift (d), turn, datum (k)], axes in the order y, x.
+"""
+
+from functools import cached_property
+from itertools import combinations, pairwise, product
+
+import numpy as np
+from scipy import ndimage
+
+from ..profile import robust_deviation
+from .changes import find_changed
+from .place import Place, make_matrix
+from .raster import Raster, fill_gaps
+from .statistics import find_mode, smooth, solve_biweight_step
+
+BORDER_SAMPLES = 3  # distance from the border of a surface from which on its spline is accurate
+MIN_KNOWN_WEIGHT = 0.99  # weight of measured neighbours of a point whose height is known
+KINK_SAMPLES = 7  # number of samples over which an error of interpolation at a kink spreads
+N_TILES = {1: 20, 2: 8}  # number of tiles along each side, whose modes span the datums
+# Side of a surface relative to the deviation of the Gaussian of the long waves, which are not used to refine its place.
+PLACE_WAVES = {1: 100, 2: 20}
+MIN_WAVE_SAMPLES = 10.0  # smallest such deviation of traces, in samples
+# Deviations of the Gaussians that smooth both surfaces in turn.
+REFINE_WIDTHS = (16, 8, 4, 3, 2, 1, 0, 0, 0)
+N_DATUMS = 300  # number of datums that are improved by concentration steps
+MAX_DATUMS = 3000  # number of datums through modes of tiles that are compared
+MAX_DATUM_SAMPLES = 2000  # number of heights from which the datum is found
+MIN_TILE_HEIGHTS = 4  # smallest number of known heights in a tile
+MIN_DETERMINANT = 1e-3  # smallest determinant of the places of tiles that show a datum
+MAX_SCALE = 4.0  # scale of a datum relative to the smallest one, up to which it is compared
+MIN_END_FRACTION = 0.7  # fraction of the heights at an end that agree, if the end is unworn
+MAX_AGREEING_DISTANCE = (
+    5.0  # distance from a datum, in its smallest scale, within which heights agree
+)
+MIN_GROWN_DISTANCE = 10.0  # distance, in the same scale, above which they have grown
+
+
+class Model:
+    """Depths (n,) at the `known` points of the own surface, which both surfaces show at the first place."""
+
+    def __init__(self, own: Raster, other: Raster, place: Place, stride: int = 1):
+        """Choose the common points at a place, of each `stride`-th own point."""
+        every = (slice(None, None, stride),) * own.z.ndim
+        self.own = Raster(own.z[every], own.origin, own.steps * stride)
+        self.n_axes = own.z.ndim
+        # Heights are known along the own surface: the depth is own minus other for scans, the reverse for traces.
+        self.sign = 1.0 if self.n_axes > 1 else -1.0
+        self.other = other
+        filled = fill_gaps(other.z)
+        self.spline = ndimage.spline_filter(filled)
+        self.gradient = [
+            np.gradient(filled, step, axis=axis) for axis, step in enumerate(other.steps)
+        ]
+        self.bend = ndimage.maximum_filter(np.abs(ndimage.laplace(filled)), KINK_SAMPLES)
+
+        grid = np.array(np.meshgrid(*self.own.axes, indexing="ij"))
+        self.middle = self._shape(own.middle)
+        self.points = grid - self.middle
+        unit = self.points / self._shape(own.lengths / 2)
+        columns = [np.ones(unit.shape[1:]), *unit[::-1]]
+        if self.n_axes == 1:
+            columns.append(unit[0] ** 2)
+        self.datum = np.array(columns)
+        self.start = np.concatenate((place.shift, [place.turn], np.zeros(len(columns))))
+        self.keep_common(self.start)
+
+    def _shape(self, values) -> np.ndarray:
+        """Return values (d,) in the shape of a factor of points (d, ...)."""
+        return np.reshape(values, (-1,) + (1,) * self.n_axes)
+
+    def keep_common(self, state) -> None:
+        """Keep the points that both surfaces show; `common` has those near the border of the other one too."""
+        pixels = self._map_pixels(state)
+        measured = np.isfinite(self.other.z).astype(float)
+        weights = ndimage.map_coordinates(measured, pixels, order=1, cval=0.0)
+        self.common = np.isfinite(self.own.z) & (weights > MIN_KNOWN_WEIGHT)
+        last = self._shape(self.other.z.shape) - 1 - BORDER_SAMPLES
+        self.known = self.common & ((pixels >= BORDER_SAMPLES) & (pixels <= last)).all(axis=0)
+
+    def _map_pixels(self, state) -> np.ndarray:
+        """Return the place (d, ...) of the points on the other surface, in its samples."""
+        turned = np.tensordot(make_matrix(state[self.n_axes], self.n_axes), self.points, 1)
+        start = self.middle + self._shape(state[: self.n_axes] - self.other.origin)
+        return (turned + start) / self._shape(self.other.steps)
+
+    def compute_depth(self, state) -> np.ndarray:
+        """Return the depth (n,) [m]."""
+        pixels = self._map_pixels(state)[:, self.known]
+        # The coefficients of a spline are those of a mirrored border.
+        other = ndimage.map_coordinates(self.spline, pixels, prefilter=False, mode="mirror")
+        datum = state[self.n_axes + 1 :] @ self.datum[:, self.known]
+        return self.sign * (self.own.z[self.known] - other) + datum
+
+    def compute_jacobian(self, state) -> np.ndarray:
+        """Return the derivative (n, d + 1 + k) of the depth by the state."""
+        pixels = self._map_pixels(state)[:, self.known]
+        slopes = np.array(
+            [
+                ndimage.map_coordinates(part, pixels, order=1, mode="nearest")
+                for part in self.gradient
+            ]
+        )
+        # A rotation turns further by a right angle; a stretch moves points along themselves.
+        turn = state[self.n_axes]
+        if self.n_axes > 1:
+            further = make_matrix(turn + np.pi / 2, self.n_axes)
+        else:
+            further = np.eye(1)
+        moved = (slopes * (further @ self.points[:, self.known])).sum(axis=0)
+        columns = np.vstack((-self.sign * slopes, -self.sign * moved, self.datum[:, self.known]))
+        return columns.T
+
+    def compute_noise_terms(self, state, jacobian) -> np.ndarray:
+        """Return terms (n, 3) of the variance: of the instrument, of positions on slopes, at kinks."""
+        slopes = (jacobian[:, : self.n_axes] ** 2).sum(axis=1)
+        pixels = self._map_pixels(state)[:, self.known]
+        kinks = ndimage.map_coordinates(self.bend, pixels, order=0, mode="nearest")
+        return np.column_stack((np.ones(slopes.size), slopes, kinks**2))
+
+    def draw(self, values, fill=np.nan) -> np.ndarray:
+        """Return values (n,) of the known points as a map in the shape of the surface."""
+        image = np.full(self.own.z.shape, fill, dtype=np.asarray(values).dtype)
+        image[self.known] = values
+        return image
+
+    def find_changed(self, depth, noise) -> np.ndarray:
+        """Return the points (n,) bool that noise does not explain, of positive depth."""
+        return find_changed(self.draw(depth), self.draw(noise))[self.known]
+
+    def refine_place(self) -> np.ndarray:
+        """Return the state with the place of the short waves.
+
+        Biweight steps on both surfaces, smoothed less and less, find it.
+        """
+        state = self.start.copy()
+        place = slice(0, self.n_axes + 1)
+        for width in REFINE_WIDTHS:
+            if 2 * width > self.smoothing.max():
+                continue
+            depth = self._filter(self.compute_depth(state), width)
+            columns = self.compute_jacobian(state)[:, place].T
+            jacobian = np.column_stack([self._filter(column, width) for column in columns])
+            sigma = max(robust_deviation(depth), 1e-15)
+            state[place] += solve_biweight_step(depth, jacobian, sigma)
+        return state
+
+    @cached_property
+    def smoothing(self) -> np.ndarray:
+        """Deviations (d,), in samples, of the Gaussian that removes the long waves of a refined place."""
+        sizes = np.array(self.own.z.shape) / PLACE_WAVES[self.n_axes]
+        return np.maximum(sizes, MIN_WAVE_SAMPLES) if self.n_axes == 1 else sizes
+
+    def _filter(self, values, width: float) -> np.ndarray:
+        """Return values (n,) smoothed and without their long waves."""
+        image = fill_gaps(self.draw(values))
+        return (smooth(image, width) - smooth(image, np.hypot(self.smoothing, width)))[self.known]
+
+    def find_datum(self, state, n_terms: int) -> np.ndarray:
+        """Return the state with the datum of some terms on which the unworn heights lie."""
+        numbers = self.draw(np.arange(self.known.sum()), -1)
+        edges = []
+        for indices in np.nonzero(self.known):
+            count = N_TILES[self.n_axes] + 1
+            edges.append(np.linspace(indices.min(), indices.max() + 1, count).astype(int))
+        tiles = []
+        for sides in product(*map(pairwise, edges)):
+            tile = numbers[tuple(slice(*side) for side in sides)]
+            tiles.append(tile[tile >= 0])
+        tiles = [tile for tile in tiles if tile.size >= MIN_TILE_HEIGHTS]
+        ends = [tiles[0], tiles[-1]] if self.n_axes == 1 else []
+        state = state.copy()
+        base = self.datum[:n_terms, self.known].T
+        first = self.n_axes + 1
+        state[first : first + n_terms] += find_datum(base, self.compute_depth(state), tiles, ends)
+        return state
+
+
+def find_datum(base, depth, tiles: list, ends: list) -> np.ndarray:
+    """Return the factors (k,) of the datum on which the unworn heights lie.
+
+    Datums through the modes of k tiles are improved by concentration steps of least trimmed squares (Rousseeuw and
+    Van Driessen 1999). Among those with a small scale, the best one has an unworn end, few heights above it, as wear
+    does not raise a surface, and many on it.
+
+    Parameters
+    ----------
+    base : (n, k) array
+        Functions of which the datum is a combination.
+    depth : (n,) array [m]
+        Depths without the datum.
+    tiles, ends : list
+        Indices of the heights of each tile, and of each end that may be unworn.
+    """
+    random = np.random.default_rng(0)
+    modes = np.array([find_mode(depth[tile]) for tile in tiles])
+    centers = np.array([base[tile].mean(axis=0) for tile in tiles])
+    subsets = np.array(list(combinations(range(len(tiles)), base.shape[1])))
+    subsets = subsets[random.permutation(len(subsets))[:MAX_DATUMS]]
+    subsets = subsets[np.abs(np.linalg.det(centers[subsets])) > MIN_DETERMINANT]
+    datums = np.linalg.solve(centers[subsets], -modes[subsets][..., None])[..., 0]
+
+    thin = np.arange(0, depth.size, max(depth.size // MAX_DATUM_SAMPLES, 1))
+    few_base = base[thin]
+    few = depth[thin]
+    datums = datums[np.argsort(_scale_datums(datums, few_base, few))[:N_DATUMS]]
+    for _ in range(2):
+        residual = np.abs(few + datums @ few_base.T)
+        nearest = np.argpartition(residual, few.size // 5, axis=1)[:, : few.size // 5]
+        rows = few_base[nearest]
+        normal = np.einsum("kni,knj->kij", rows, rows)
+        right = -np.einsum("kni,kn->ki", rows, few[nearest])
+        datums = np.linalg.solve(normal, right[..., None])[..., 0]
+
+    scales = _scale_datums(datums, few_base, few)
+    near = np.flatnonzero(scales <= MAX_SCALE * scales.min())
+    relative = (few + datums[near] @ few_base.T) / max(scales.min(), 1e-15)
+    agrees = np.abs(relative) < MAX_AGREEING_DISTANCE
+    has_end = np.zeros(near.size, bool)
+    for end in ends:
+        at_end = agrees[:, np.isin(thin, end)]
+        has_end |= at_end.sum(axis=1) > MIN_END_FRACTION * at_end.shape[1]
+    grown = np.round((relative < -MIN_GROWN_DISTANCE).mean(axis=1), 1)
+    return datums[near[np.lexsort((-agrees.mean(axis=1), grown, ~has_end))[0]]]
+
+
+def _scale_datums(datums, base, depth) -> np.ndarray:
+    """Return the distance (k,) [m] within which a fifth of the depths lie, for each datum."""
+    return np.quantile(np.abs(depth + datums @ base.T), 0.2, axis=1)

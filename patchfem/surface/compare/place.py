@@ -1,0 +1,157 @@
+"""Search for the place of a second surface on the first one, by the correlation of their short waves."""
+
+from itertools import product
+from typing import NamedTuple
+
+import numpy as np
+from scipy import fft, ndimage, signal
+
+from ..profile import robust_deviation
+from .raster import Raster, fill_gaps
+from .statistics import TINY, remove_long_waves, smooth
+
+# By number of axes: errors of length of a trace, and rotations of a scan [rad], the same turned by 180 degrees too.
+ANGLES = np.radians(np.arange(-6, 6.1, 0.5))
+TURNS = {1: np.linspace(-0.01, 0.01, 11), 2: np.concatenate((ANGLES, ANGLES + np.pi))}
+# How the second surface may have been measured: against the direction of x, as a replica with inverted heights.
+VARIANTS = {
+    1: ((False, False), (True, False)),
+    2: ((False, False), (True, False), (False, True), (True, True)),
+}
+MAX_PIXELS = {1: 4000, 2: 96}  # points along the longer side of the images that are correlated
+IMAGE_WAVES = {
+    1: 40,
+    2: 12,
+}  # side of an image relative to the deviation of the Gaussian of its long waves
+BORDER_FRACTION = 0.1  # part of a trace that falls to zero at its ends before it is whitened
+MIN_OVERLAP = 0.33  # smallest common part relative to the smaller image
+# Significance of a place beyond which no mirrored or inverted scan is tried.
+CLEAR_SIGNIFICANCE = 9.0
+
+
+class Place(NamedTuple):
+    """Place of the second surface: shift (d,) [m] and turn of the map from own to other points (`model`).
+
+    mirrored, inverted: how the second surface was measured. significance: of the correlation.
+    """
+
+    shift: np.ndarray
+    turn: float
+    mirrored: bool = False
+    inverted: bool = False
+    significance: float = np.inf
+
+
+def make_matrix(turn: float, n_axes: int) -> np.ndarray:
+    """Return the matrix (d, d) of the map from own to other points: a stretch of traces, a rotation of scans."""
+    if n_axes == 1:
+        return np.array([[1 + turn]])
+    cos = np.cos(turn)
+    sin = np.sin(turn)
+    return np.array([[cos, sin], [-sin, cos]])
+
+
+def change_second(second: Raster, *, mirrored: bool, inverted: bool) -> Raster:
+    """Undo a mirrored measurement and a replica.
+
+    Parameters
+    ----------
+    second : Raster
+        As it was measured.
+    mirrored, inverted : bool
+        Whether it was measured against the direction of x, and with inverted heights.
+    """
+    second = second.mirror() if mirrored else second
+    return second._replace(z=-second.z) if inverted else second
+
+
+def order(first: Raster, second: Raster) -> tuple[Raster, Raster]:
+    """Return own and other surface: depths stand at the samples of the second trace, or of the first scan."""
+    return (second, first) if first.z.ndim == 1 else (first, second)
+
+
+def find_place(first: Raster, second: Raster) -> Place:
+    """Find the place of the second surface with the most significant correlation.
+
+    The significance is Fisher's z times the root of the number of common points, relative to its scatter over all lags.
+    """
+    n_axes = first.z.ndim
+    longest = max(first.lengths.max(), second.lengths.max())
+    finest = min(first.steps.min(), second.steps.min())
+    pixel = max(finest, longest / MAX_PIXELS[n_axes])
+    best = Place(np.zeros(n_axes), 0.0, significance=-np.inf)
+    for mirrored, inverted in VARIANTS[n_axes]:
+        changed = change_second(second, mirrored=mirrored, inverted=inverted)
+        own, other = order(first, changed)
+        images = [_make_images(surface, pixel) for surface in (own, other)]
+        for turn, (image, other_image) in product(TURNS[n_axes], zip(*images)):
+            matrix = make_matrix(turn, n_axes)
+            center = (np.array(other_image.shape) - 1) / 2
+            offset = center - matrix @ center
+            turned = ndimage.affine_transform(other_image, matrix, offset, order=1)
+            significance = correlate(image, turned)
+            peak = np.unravel_index(np.argmax(significance), significance.shape)
+            if significance[peak] <= best.significance:
+                continue
+            lag = np.where(
+                np.array(peak) < image.shape, peak, np.subtract(peak, significance.shape)
+            )
+            # The middle of the own surface lies at this point of the turned image.
+            at = (own.middle - own.origin) / pixel - lag
+            place = other.origin + pixel * (center + matrix @ (at - center))
+            found = (float(turn), mirrored, inverted, float(significance[peak]))
+            best = Place(place - own.middle, *found)
+        if best.significance > CLEAR_SIGNIFICANCE and n_axes > 1:
+            break
+    return best
+
+
+def _make_images(surface: Raster, pixel: float) -> tuple[np.ndarray, ...]:
+    """Return the short waves on square pixels [m]: all, the valleys, which do not wear, and valleys of equal power.
+
+    Without their periods, turned surfaces differ from one feed to the next.
+    """
+    z = smooth(fill_gaps(surface.z), 0.4 * pixel / surface.steps)
+    shape = (surface.lengths / pixel).astype(int) + 1
+    z = ndimage.affine_transform(
+        z, pixel / surface.steps, output_shape=tuple(shape), order=1, mode="nearest"
+    )
+    z = remove_long_waves(z, IMAGE_WAVES[z.ndim])
+    whole = np.clip(z, -3 * z.std(), 3 * z.std())
+    valleys = np.minimum(whole, np.median(z))
+    valleys = valleys - valleys.mean()
+    images = (valleys, _whiten(valleys))
+    return images[1:] if z.ndim > 1 else (whole - whole.mean(), *images)
+
+
+def _whiten(z) -> np.ndarray:
+    """Return heights whose waves are equally high, so that a periodic lay does not hide the others.
+
+    Those of a trace fall to zero at its ends, whose jumps would be short waves that both traces share.
+    """
+    if z.ndim == 1:
+        z = z * signal.windows.tukey(z.size, BORDER_FRACTION)
+    spectrum = fft.rfftn(z)
+    size = np.abs(spectrum)
+    return fft.irfftn(spectrum / (size + np.median(size) + TINY), z.shape)
+
+
+def correlate(first, second) -> np.ndarray:
+    """Return the significance of the correlation of two images at each lag, negative lags at the end.
+
+    It is -inf where the images overlap too little.
+    """
+    size = [fft.next_fast_len(a + b, real=True) for a, b in zip(first.shape, second.shape)]
+    powers = [(z, z**2, np.ones(z.shape)) for z in (first, second)]
+    transforms, others = ([fft.rfftn(values, size) for values in group] for group in powers)
+    product, count, power1, power2 = (
+        fft.irfftn(transforms[i] * others[k].conj(), size)
+        for i, k in ((0, 0), (2, 2), (1, 2), (2, 1))
+    )
+    norm = np.sqrt(np.maximum(power1 * power2, 1e-12 * power1.max() * power2.max()))
+    fisher = np.arctanh(np.clip(product / (norm + TINY), -0.9999, 0.9999))
+    fisher *= np.sqrt(np.maximum(count, 0.0))
+    usable = count > MIN_OVERLAP * min(first.size, second.size)
+    known = fisher[usable]
+    scatter = max(robust_deviation(known - np.median(known)), 1e-12)
+    return np.where(usable, fisher / scatter, -np.inf)

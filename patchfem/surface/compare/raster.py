@@ -1,0 +1,115 @@
+"""Surfaces on an even raster of one axis (traces) or two axes (areal scans), in which both look alike."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ...core import PatchfemError
+from ..areal import Areal, fill_nearest, find_scan_spikes
+from ..profile import Profile, remove_spikes
+
+MIN_HEIGHTS = 40  # smallest number of heights of a trace that is compared
+MIN_SIDE = 16  # smallest number of points along each side of a scan
+MAX_GAP_STEPS = 2.5  # distance of two samples, in median steps, above which heights are missing
+MAX_UNEVEN = 0.1  # largest distance from even places, in steps, of a trace that is not resampled
+MAX_SAMPLES = 2_097_152  # largest number of samples in a resampled trace, which limits the memory
+
+
+class Raster(NamedTuple):
+    """Heights z (n,) or (m, n) [m], NaN where missing; first place and step (d,) [m] of each axis, y before x."""
+
+    z: np.ndarray
+    origin: np.ndarray
+    steps: np.ndarray
+
+    @property
+    def middle(self) -> np.ndarray:
+        """Place (d,) [m] of the middle."""
+        return self.origin + self.steps * (np.array(self.z.shape) - 1) / 2
+
+    @property
+    def lengths(self) -> np.ndarray:
+        """Length (d,) [m] along each axis."""
+        return self.steps * (np.array(self.z.shape) - 1)
+
+    @property
+    def axes(self) -> list[np.ndarray]:
+        """Places [m] along each axis."""
+        return [
+            start + step * np.arange(count)
+            for start, step, count in zip(self.origin, self.steps, self.z.shape)
+        ]
+
+    def mirror(self) -> "Raster":
+        """Return the surface measured against the direction of x, over the same range."""
+        return self._replace(z=self.z[..., ::-1])
+
+
+def fill_gaps(z) -> np.ndarray:
+    """Fill missing heights: of a trace (n,) by straight lines, of a scan (m, n) by the nearest height."""
+    missing = np.isnan(z)
+    if z.ndim > 1 or not missing.any():
+        return fill_nearest(z)
+    places = np.arange(z.size)
+    return np.interp(places, places[~missing], z[~missing])
+
+
+def clean_surface(surface: Profile | Areal, *, keep_spikes: bool = False) -> Profile | Areal:
+    """Mark spikes, dust and saturated heights as missing; raise PatchfemError if too few heights are left."""
+    if isinstance(surface, Areal):
+        if min(surface.z.shape) < MIN_SIDE:
+            rows, columns = surface.z.shape
+            raise PatchfemError(
+                f"compare: {surface.source}: {rows} x {columns} heights; a comparison of scans needs at least "
+                f"{MIN_SIDE} along each side"
+            )
+        is_bad = find_scan_spikes(surface)
+    else:
+        is_bad = remove_spikes(surface).missing
+    is_bad = is_bad | _find_saturated(surface.z)
+    z = surface.z if keep_spikes else np.where(is_bad, np.nan, surface.z)
+    count = np.isfinite(z).sum()
+    if count < MIN_HEIGHTS:
+        raise PatchfemError(
+            f"compare: {surface.source}: {count} heights; a comparison needs at least {MIN_HEIGHTS}"
+        )
+    if isinstance(surface, Areal):
+        return Areal(surface.x, surface.y, z, surface.source, surface.notes)
+    return Profile(surface.x, z, surface.source, surface.notes)
+
+
+def _find_saturated(z) -> np.ndarray:
+    """Return the heights, bool, at the end of the range of the instrument, far from all others."""
+    levels = np.unique(z[~np.isnan(z)])
+    is_saturated = np.zeros(z.shape, bool)
+    if levels.size < 4:
+        return is_saturated
+    inner = levels[1:-1]
+    for extreme, nearest in ((levels[0], levels[1]), (levels[-1], levels[-2])):
+        is_extreme = z == extreme
+        if is_extreme.sum() > 1 and abs(extreme - nearest) > np.ptp(inner) / 2:
+            is_saturated |= is_extreme
+    return is_saturated
+
+
+def make_raster(surface: Profile | Areal) -> Raster:
+    """Return a surface on an even raster; an uneven trace is resampled at the 10th percentile of its steps."""
+    if isinstance(surface, Areal):
+        axes = (surface.y, surface.x)
+        origin = np.array([axis[0] for axis in axes])
+        return Raster(surface.z, origin, np.array([np.diff(axis).mean() for axis in axes]))
+
+    known = ~surface.missing
+    x = surface.x[known]
+    distances = np.diff(x)
+    median = float(np.median(distances))
+    step = np.ptp(x) / round(np.ptp(x) / median)
+    places = (x - x[0]) / step
+    if np.abs(places - np.rint(places)).max() > MAX_UNEVEN:
+        step = max(float(np.percentile(distances, 10)), np.ptp(x) / MAX_SAMPLES)
+    grid = x[0] + step * np.arange(int(np.ptp(x) / step * (1 + 1e-9)) + 1)
+    z = np.interp(grid, x, surface.z[known])
+    after = np.clip(np.searchsorted(x, grid), 1, x.size - 1)
+    nearest = np.minimum(np.abs(grid - x[after - 1]), np.abs(x[after] - grid))
+    is_missing = (distances[after - 1] > MAX_GAP_STEPS * median) & (nearest > MAX_UNEVEN * step)
+    return Raster(np.where(is_missing, np.nan, z), x[:1], np.array([step]))

@@ -1,0 +1,269 @@
+"""Modes under normal force, moment and friction: closed forms, energy balances and independent
+computations."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from pressed import solve_forces
+from varying_load_cases import (
+    LAWS,
+    LOAD,
+    MASS,
+    MIXED,
+    STILL,
+    check_energy_of_random_march,
+    check_order_two,
+    crowned_contact,
+    make_contact,
+    make_modes,
+    march_pressed,
+    march_with_lift_off,
+    total_energy,
+)
+
+from patchfem.core import InitialState, SineDrive
+from patchfem.model.structure import compute_strip_slides
+from patchfem.slip.shear_modes import find_sufficient_modes, shear_modes
+
+# these laws share one compiled loop; Coulomb friction and the tanh law need others
+POINT_LAWS = [
+    "bonds",
+    "growing",
+    "plastic",
+]
+
+
+@pytest.mark.parametrize("row", [0, 1])
+def test_order_two_for_small_heave_and_pitch(row):
+    """On a flat full contact small heave and pitch are A cos(sqrt(omega^2 + K r^2/m) t) with the
+    normal or rotational stiffness K, and the error falls with the square of the step."""
+    sets = make_contact()
+    mode_component = [1.0, 300.0][row]
+    basis = make_modes(
+        [200.0], [0.0], [mode_component * (row == 0)], [mode_component * (row == 1)], base=[0.0]
+    )
+    stiffness = np.linalg.inv(sets.c)
+    k = stiffness.sum() if row == 0 else sets.x @ stiffness @ sets.x
+    omega = np.sqrt((400 * np.pi) ** 2 + k * mode_component**2 / MASS)
+    amplitude = 1e-8 / mode_component if row == 0 else 1e-8 / (mode_component * sets.x[-1])
+    errors = []
+    for steps in (200, 400, 800):
+        result = march_pressed(
+            basis,
+            SineDrive(0.0, 2000 * np.pi),
+            sets,
+            "plastic",
+            1,
+            steps,
+            start=InitialState([amplitude], [0.0]),
+        )
+        response = result.response
+        errors.append(
+            np.abs(response.modal[:, 0] - amplitude * np.cos(omega * response.time)).max()
+            / amplitude
+        )
+        force = (
+            LOAD - k * mode_component * response.modal[:, 0]
+            if row == 0
+            else -k * mode_component * response.modal[:, 0]
+        )
+        assert response.extra[("normal_load", "normal_moment")[row]] == pytest.approx(
+            force, rel=1e-9, abs=1e-12
+        )
+        assert result.outcome is None
+    rates = np.log2(np.array(errors[:-1]) / errors[1:])
+    assert errors[-1] <= 2e-2 and rates == pytest.approx([2, 2], abs=0.1)
+
+
+def test_exact_energy_of_bouncing_block_is_conserved():
+    """In 5000 steps of heave and pitch with repeated lift-off the energy is constant within
+    1e-12."""
+    basis = make_modes([150.0, 400.0, 300.0], [0, 0, 0], [1.0, 0.2, 0.0], [20.0, 0.0, 250.0])
+    result = march_pressed(
+        basis,
+        STILL,
+        crowned_contact(),
+        "plastic",
+        10,
+        500,
+        start=InitialState([12e-7, 0, 9e-7], [0.0, 15e-3, 6e-3]),
+    )
+    total = total_energy(result.response, basis)
+    force = result.response.extra["normal_load"]
+    assert np.ptp(total) <= 1e-12 * total[0] and result.outcome is None
+    assert (force == 0).sum() > 500 and force.max() > 2 * LOAD
+    assert np.count_nonzero(np.diff((force > 0).astype(int)) == 1) > 20
+
+
+def test_exact_nodal_forces_agree_with_unilateral_solution():
+    """At every snapshot of a slowly varying tilt the nodal forces agree within 1e-12 with a new
+    solution of the contact."""
+    sets = crowned_contact()
+    drive = SineDrive(200.0, 2 * np.pi * 2)
+    basis = make_modes([40.0], [1.0], [0.0], [400.0], 0.5)
+    result = march_pressed(basis, drive, sets, "plastic", 1, 200, frames=40)
+    contact_sets = set()
+    for snapshot in result.snapshots:
+        gap = sets.opening + snapshot.heave + snapshot.pitch * sets.x
+        expected = solve_forces(sets.c, sets.x, gap, np.zeros(0))[0]
+        assert np.abs(snapshot.nodal - expected).max() <= 1e-12 * LOAD
+        contact_sets.add((expected > 0).tobytes())
+    assert len(result.snapshots) == 40 and len(contact_sets) >= 4 and result.outcome is None
+
+
+def integrate_coulomb_block(basis, drive, stiffness, mu, start, cycles, steps):
+    """Return the slide of a Coulomb block under N = LOAD - stiffness h(t), with h in closed form.
+
+    Small semi-implicit steps are used, with friction as a projection of the speed.
+    """
+    dt = drive.period / steps
+    t = (np.arange(cycles * steps) + 0.5) * dt
+    load = np.maximum(
+        LOAD - stiffness * start * np.cos(np.sqrt(basis.omega[1] ** 2 + stiffness / MASS) * t), 0
+    )
+    force = -drive.acceleration * np.sin(drive.omega * t)
+    limit = mu * load / MASS * dt
+    w2 = basis.omega[0] ** 2
+    d = 2 * basis.zeta[0] * basis.omega[0]
+    q = 0.0
+    v = 0.0
+    slides = np.empty(cycles * steps)
+    for i in range(t.size):
+        trial_speed = v + dt * (force[i] - w2 * (q + 0.5 * dt * v) - d * v)
+        v = max(trial_speed - limit[i], 0.0) + min(trial_speed + limit[i], 0.0)
+        q += dt * v
+        slides[i] = q
+    return slides
+
+
+@pytest.mark.slow  # compiles its own loop
+def test_exact_coulomb_block_under_oscillating_load():
+    """A block that sticks and slips while its heave nearly unloads the contact agrees within 1e-3
+    with small steps of another method."""
+    sets = make_contact()
+    stiffness = float(np.linalg.inv(sets.c).sum())
+    basis = make_modes([143.0, 20.0], [1.0, 0.0], [0.0, 1.0], [0.0, 0.0], 0.02, [1.0, 0.0])
+    basis = replace(basis, zeta=np.array([0.02, 0.0]))
+    drive = SineDrive(8 * 9.80665 * 0.5, 2 * np.pi * 143)
+    start = 0.9 * LOAD / stiffness
+    expected = integrate_coulomb_block(basis, drive, stiffness, 0.3, start, 2, 100_000)
+    result = march_pressed(
+        basis,
+        drive,
+        sets,
+        "coulomb",
+        2,
+        6400,
+        start=InitialState([0.0, start], [0.0, 0.0]),
+    )
+    amplitude = np.abs(expected).max()
+    indices = np.round(result.response.time * 100_000 / drive.period).astype(int)[1:] - 1
+    assert np.abs(result.response.slide[1:] - expected[indices]).max() <= 1e-3 * amplitude
+    load = result.response.extra["normal_load"]
+    assert load.min() < 0.2 * LOAD and load.max() > 1.8 * LOAD
+    assert 0.02 < np.mean(np.diff(result.response.slide) == 0) < 0.9
+
+
+@pytest.mark.share(1)
+@pytest.mark.parametrize("name", ["tanh", "plastic"])
+def test_order_two_for_combined_slide_heave_and_pitch(name):
+    """With modes that combine slide, heave and pitch and a varying contact the march converges with
+    order two."""
+    check_order_two(name, 1600, 0.35)
+
+
+def test_order_output_acceleration_agrees_with_differences():
+    """The absolute acceleration of the output agrees with differences of the output rate plus the
+    base acceleration, and the error falls with the step."""
+    drive = SineDrive(40.0, 2 * np.pi * 143)
+    errors = []
+    for steps in (6400, 12800):
+        response = march_pressed(MIXED, drive, crowned_contact(), "plastic", 1, steps).response
+        expected = np.gradient(response.output_rate, response.time) + drive.values(response.time)
+        errors.append(
+            np.median(np.abs(response.acceleration - expected)[1:-1]) / np.abs(expected).max()
+        )
+    assert errors[1] <= 1e-4 and errors[0] / errors[1] > 3
+
+
+@pytest.mark.share(0)
+@pytest.mark.parametrize("laws", [POINT_LAWS, sorted(LAWS)], ids=["points", "all"])
+@given(st.data(), st.integers(0, 10**6), st.sampled_from([60, 200]))
+def test_always_no_energy_is_created(laws, data, seed, steps):
+    """No energy is created for random modes, initial states and drives, with coarse steps and
+    lift-off."""
+    check_energy_of_random_march(data.draw(st.sampled_from(laws)), seed, steps)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "law, seed, steps",
+    [
+        ("coulomb", 8413, 60),
+        ("coulomb", 140, 200),
+        ("weaker", 8413, 60),
+        ("weaker", 8413, 200),
+        ("weaker", 110, 60),
+    ],
+)
+def test_always_stops_under_varying_load_are_solved(law, seed, steps):
+    """Steps in which a stop depends on the varying load are solved, although no friction force with
+    such a stop is consistent with the load that it causes."""
+    check_energy_of_random_march(law, seed, steps)
+
+
+def test_exact_strip_slides_under_yaw():
+    """A rotation +yaw about z moves a strip at +y backwards by y yaw, and the sum of friction times
+    y is the yaw moment."""
+    basis = make_modes([100.0], [1.0], [0.0], [0.0])
+    yawing = replace(basis, normal=None, pitch=None, yaw=np.array([2.0]))
+    offsets = np.array([-1e-3, 0.0, 1e-3])
+    rows = compute_strip_slides(yawing, offsets)
+    assert rows[:, 0] == pytest.approx([1.002, 1.0, 0.998])
+    # the friction -f acts on the body at y: M_z = -sum(y (-f)) = sum y f
+    friction = np.array([1.0, 2.0, 5.0])
+    assert -(rows[:, 0] - 1) @ friction == pytest.approx(2.0 * (offsets @ friction))
+
+
+# ---- shear of the pieces
+
+
+def reduce_to_shear_modes(sets, count=None, depth: float = 3e-8):
+    """Return shear modes of the nodes of contact sets, as many as nodes by default."""
+    x = sets.x
+    compliance = depth * (0.5 * np.exp(-np.abs(x[:, None] - x) / 2e-3) + 0.3 * np.eye(x.size))
+    force = sets.force
+    limit = 0.3 * (force + force.sum() / x.size)
+    if count == 0:
+        return find_sufficient_modes(compliance, limit, 1e-6, 4, 1e-4)
+    return shear_modes(compliance, limit, 1e-6, count or x.size)
+
+
+def test_exact_separated_pieces_have_no_force():
+    """During lift-off there is no friction; the energy of pieces and bonds is lost, and none is created."""
+    for name in ("plastic", "bonds"):
+        result, imbalance = march_with_lift_off(name, reduce_to_shear_modes(crowned_contact()))
+        _, stored, _, created = result.response.extra["ledger"]
+        assert stored.min() >= 0 and imbalance <= 1e-11 and result.outcome is None
+        assert created[-1] <= 1e-3 * stored.max()
+
+
+@given(
+    st.sampled_from(["plastic", "bonds", "growing"]),
+    st.integers(0, 10**6),
+    st.sampled_from([60, 200]),
+    st.sampled_from([2, 6, 21]),
+    st.sampled_from([1e-9, 3e-8, 1.5e-7]),
+)
+def test_always_energy_of_shear_modes_balances(name, seed, steps, count, depth):
+    """The energy balances for random modes, initial states, drives and numbers of shear modes, with lift-off."""
+    shear = reduce_to_shear_modes(crowned_contact(), count, depth)
+    check_energy_of_random_march(name, seed, steps, shear)
+
+
+def test_order_two_with_shear_modes():
+    """With modes that combine slide, heave and pitch and a varying contact the march converges with order two."""
+    check_order_two("bonds", 800, 0.45, reduce_to_shear_modes(crowned_contact(), 8))

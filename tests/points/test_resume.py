@@ -1,0 +1,218 @@
+"""An interrupted time integration is resumed with bit-identical results, for every kind of run."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+import xarray as xr
+from command_line import run_cli
+from limits import limit_file_size
+from scene_texts import (
+    BENCH,
+    COATED,
+    DRIVE,
+    FORCED,
+    GROWING,
+    MODE,
+    NONLOCAL,
+    PAIR,
+    PLASTIC,
+    POINT,
+    SECOND,
+)
+
+from patchfem.export.folder import is_state
+from patchfem.points import checkpoint, time_march
+
+MARCH = '[accuracy]\nmethod = "march"\nsteps_per_cycle = 60\n'
+SHORT_DRIVE = DRIVE.replace("cycles = 30", "cycles = 16.3")
+RIGS = {
+    "one slide": POINT + PLASTIC + MODE + SECOND + SHORT_DRIVE + MARCH,
+    "a list of bonds": POINT + NONLOCAL + "order = 0.5\n" + MODE + SHORT_DRIVE + MARCH,
+    "bonds that grow": POINT + GROWING + MODE + SHORT_DRIVE + MARCH,
+    "joints": PAIR + FORCED.replace("cycles = 25", "cycles = 14") + MARCH,
+    "a load that swings": POINT
+    + 'amplitude = "20 N"\nfrequency = "50 Hz"\n'
+    + PLASTIC
+    + MODE
+    + SHORT_DRIVE
+    + MARCH,
+    "levels": POINT
+    + PLASTIC
+    + MODE
+    + DRIVE.replace("cycles = 30", "cycles = 8").replace(
+        'acceleration = "5 g"', 'waveform = "levels"\nlevels = ["3 g", "6 g", "4 g"]'
+    )
+    + MARCH,
+    "a patch that pitches": COATED.replace("0.5 mm", "1.5 mm")
+    + '[contact.crown]\nradius = "100 m"\n'
+    + PLASTIC
+    + MODE
+    + 'pitch = "1 rad/m"\n'
+    + SHORT_DRIVE.replace("16.3", "12")
+    + MARCH,
+}
+
+
+@pytest.fixture
+def save_counter(monkeypatch):
+    """Counter of saved states; marches save their state after every second cycle."""
+    monkeypatch.setattr(time_march, "MAX_CYCLES_AT_ONCE", 2)
+    saved = []
+    save = checkpoint.save_checkpoint
+
+    def save_and_count(*arguments):
+        saved.append(1)
+        save(*arguments)
+        if len(saved) == save_counter.stop:
+            raise KeyboardInterrupt
+
+    monkeypatch.setattr(checkpoint, "MIN_WRITE_INTERVAL", 0.0)
+    monkeypatch.setattr(checkpoint, "MAX_WRITE_FRACTION", np.inf)
+    monkeypatch.setattr(checkpoint, "save_checkpoint", save_and_count)
+    save_counter = type("Often", (), {"saved": saved, "stop": 0})()
+    return save_counter
+
+
+def assert_same_results(first, second) -> None:
+    """Assert that the result files of two runs are identical."""
+    with (
+        xr.open_dataset(first / "result.nc", engine="h5netcdf") as a,
+        xr.open_dataset(second / "result.nc", engine="h5netcdf") as b,
+    ):
+        assert a.sizes["time"] > 100
+        xr.testing.assert_identical(a, b)
+
+
+@pytest.mark.share(0, 3)
+@pytest.mark.parametrize(
+    "kind",
+    [pytest.param(kind, marks=[pytest.mark.slow] * (kind == "bonds that grow")) for kind in RIGS],
+)
+def test_exact_resumed_run_equals_uninterrupted_run(tmp_path, save_counter, kind):
+    """A run that is interrupted four times and resumed gives the same result file as an
+    uninterrupted run, and leaves no state file."""
+    scene = tmp_path / "scene.toml"
+    scene.write_text(RIGS[kind], "utf-8")
+    command = ("run", scene, "--no-page", "-o")
+    assert run_cli(*command, tmp_path / "whole").code == 0
+    n_saves = len(save_counter.saved)
+    assert n_saves >= 15 and sorted(path.name for path in tmp_path.iterdir()) == [
+        "scene.toml",
+        "whole",
+    ]
+    out = tmp_path / "out"
+    partial = tmp_path / "out.partial"
+    for stop in (1, n_saves // 3, 1, n_saves // 4):  # counted from the previous interruption
+        save_counter.saved.clear()
+        save_counter.stop = stop
+        answer = run_cli(*command, out, *["--resume"] * partial.is_dir())
+        assert answer.code == 130 and "out.partial, add --resume to the command" in answer.err, (
+            answer.err
+        )
+        assert partial.is_dir() and all(is_state(path.name) for path in partial.iterdir())
+    save_counter.saved.clear()
+    save_counter.stop = 0
+    assert run_cli(*command, out, "--resume").code == 0 and 0 < len(save_counter.saved) < n_saves
+    assert_same_results(out, tmp_path / "whole")
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["out", "scene.toml", "whole"]
+    assert not any(is_state(path.name) for path in out.iterdir())
+
+
+def test_refuses_to_resume_from_other_or_damaged_state(tmp_path, save_counter):
+    """A saved state of another scene or a damaged one is refused with a message. A complete run is
+    reported as complete."""
+    scene = tmp_path / "scene.toml"
+    scene.write_text(RIGS["one slide"], "utf-8")
+    command = ("run", scene, "--no-page", "-o", tmp_path / "out", "--resume")
+    answer = run_cli(*command)
+    assert (
+        answer.code == 2
+        and "out: this folder contains no interrupted run; run without --resume" in answer.err
+    )
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["scene.toml"]
+    save_counter.stop = 5
+    assert run_cli(*command[:-1]).code == 130
+    save_counter.stop = 0
+    state = tmp_path / "out.partial" / "march_1.npz"
+    for change in ("friction.static=0.31", "drive.cycles=20", "accuracy.steps_per_cycle=80"):
+        answer = run_cli(*command, "--set", change)
+        assert answer.code == 2 and "belongs to another scene or to another version" in answer.err
+    data = state.read_bytes()
+    for damaged in (data[:-100], b"", b"PK nothing", data[:2000]):
+        state.write_bytes(damaged)
+        answer = run_cli(*command)
+        assert (
+            answer.code == 2 and "cannot be read" in answer.err and "without --resume" in answer.err
+        )
+    state.write_bytes(data)
+    assert run_cli(*command).code == 0
+    answer = run_cli(*command)  # the message must not refer to out.partial, which no longer exists
+    assert (
+        answer.code == 0
+        and "out: this run is already complete" in answer.err
+        and ".partial" not in answer.err
+    )
+    assert json.loads(run_cli(*command, "--json").out) == json.loads(
+        (tmp_path / "out" / "summary.json").read_text("utf-8")
+    )
+    answer = run_cli(*command, "--set", "friction.static=0.31")
+    assert (
+        answer.code == 2
+        and "out: this folder has no interrupted run but the complete run of" in answer.err
+    )
+    scene.write_text(BENCH, "utf-8")
+    answer = run_cli(*command)
+    assert answer.code == 2 and "integrated in time" in answer.err
+
+
+def test_always_run_continues_without_disk_space_for_its_state(tmp_path, save_counter):
+    """A run continues if the disk has no space for its state, and fails only when it writes its
+    results."""
+    scene = tmp_path / "scene.toml"
+    scene.write_text(RIGS["one slide"], "utf-8")
+    save_counter.stop = 5
+    with limit_file_size(5000):
+        answer = run_cli("run", scene, "--no-page", "-o", tmp_path / "out")
+    # the results do not fit; the missing state alone does not end the run
+    assert answer.code == 4 and "result.nc: not enough space" in answer.err
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["scene.toml"]
+
+
+@pytest.mark.slow  # the torture campaigns of a normal run kill processes, too
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGKILL, signal.SIGHUP, signal.SIGINT])
+def test_exact_run_ended_by_signal_can_be_resumed(tmp_path, number):
+    """A run in its own process that is ended by a signal leaves its state and can be resumed. After
+    SIGKILL it prints nothing, and after the other signals one line."""
+    scene = tmp_path / "scene.toml"
+    out = tmp_path / "out"
+    scene.write_text(RIGS["one slide"].replace("cycles = 16.3", "cycles = 4000"), "utf-8")
+    code = (
+        "from patchfem.points import checkpoint as c; c.MIN_WRITE_INTERVAL = 0.05; c.MAX_WRITE_FRACTION = 1.0; "
+        "from patchfem.points import time_march; time_march.SAME_CYCLE = -1.0; "
+        "from patchfem.__main__ import main; main()"
+    )
+    command = [sys.executable, "-c", code, "run", scene, "--no-page", "-q", "-o", out]
+    process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
+    while not (tmp_path / "out.partial" / "march_1.npz").is_file() and process.poll() is None:
+        time.sleep(0.005)
+    process.send_signal(number)
+    message = process.communicate()[1]
+    remaining = {path.name for path in tmp_path.iterdir()} - {"scene.toml"}
+    if number == signal.SIGKILL:
+        assert process.returncode == -9 and remaining == {"out.partial", ".out.writer"}
+    else:
+        assert process.returncode == 130 and remaining == {"out.partial"}
+        assert message.strip().startswith("interrupted; no file was replaced; ")
+        assert (
+            message.strip().endswith("out.partial, add --resume to the command")
+            and len(message.splitlines()) == 1
+        )
+    assert run_cli("run", scene, "--no-page", "-q", "-o", out, "--resume").code == 0
+    assert {path.name for path in tmp_path.iterdir()} == {"scene.toml", "out"}
+    assert os.path.getsize(out / "result.nc") > 10_000

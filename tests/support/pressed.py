@@ -1,0 +1,87 @@
+"""Single patches pressed by a holder, as records of nodal stresses."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from patchfem.contact import Holder, StripCompliance, StripLayout, StripModel, press_strips
+from patchfem.contact.active_set import patch_problem
+from patchfem.contact.unilateral import solve
+from patchfem.core import Compliance, Outcome
+
+
+class PressedPatch(NamedTuple):
+    """Pressed patch: pressures (m,) [Pa], gap (m,) [m], motion and loads of the holder, and the check of the solution."""
+
+    sigma_n: np.ndarray
+    gap: np.ndarray
+    approach: float
+    rotation: float
+    load: float
+    moment: float
+    outcome: Outcome
+    iterations: int
+    residuals: dict
+
+
+def press_by_holder(pieces: Compliance, gap, holder: Holder) -> PressedPatch:
+    """Press two bare pieces by a holder."""
+    layout = StripLayout(pieces.interface.x, pieces.interface.weight, np.zeros(1))
+    state = press_strips(StripModel(StripCompliance(pieces.normal), layout), gap, holder)
+    return PressedPatch(
+        state.pressure[0],
+        state.gap[0],
+        state.position.delta,
+        state.position.theta,
+        state.load,
+        state.moment,
+        state.outcome,
+        state.iterations,
+        state.residuals,
+    )
+
+
+def press(pieces, gap, load, moment=None, rotation=0.0, spring=0.0) -> PressedPatch:
+    """Press two bare pieces under a load, and a moment about a free rotation."""
+    holder = Holder(load, moment=moment, rotation=rotation, spring=spring)
+    return press_by_holder(pieces, gap, holder)
+
+
+def press_to_approach(pieces, gap, approach, rotation=0.0) -> PressedPatch:
+    """Press two bare pieces to a prescribed approach."""
+    return press_by_holder(pieces, gap, Holder(approach=approach, rotation=rotation))
+
+
+class PlainSolution(NamedTuple):
+    """Contact solution of a patch as NumPy arrays, with the number of iterations."""
+
+    force: np.ndarray
+    motion: np.ndarray
+    n_iterations: int
+
+
+def solve_forces(c, x, gap, target, start=None, spring: float = 0.0) -> PlainSolution:
+    """Solve the contact problem of a patch that is given as NumPy arrays.
+
+    Parameters
+    ----------
+    c : (m, m) ndarray
+        Compliance [m/N].
+    x, gap : (m,) ndarray
+        Positions [m] and gap [m].
+    target : (0,), (1,) or (2,) ndarray
+        Nothing with the approach contained in the gap, load [N], or load and moment [N m].
+    start : (m,) bool ndarray, optional
+        Contact set of a similar problem.
+    spring : float
+        Stiffness of the holder [N m/rad].
+
+    Returns
+    -------
+    PlainSolution
+    """
+    touch_approach = gap.min() if target.size else 0.0
+    problem = patch_problem(x, gap - touch_approach, *map(float, target), spring=spring)
+    solution = solve(StripCompliance(c), problem, start)
+    solution.motion[:1] += touch_approach
+    return PlainSolution(solution.force, solution.motion, solution.n_iterations)
