@@ -14,9 +14,10 @@ import numpy as np
 
 from ..effects import find_waveform
 from .files import list_named_files, require_files
+from .keys.contact import MAX_SMALL_ANGLE
 from .lines import find_item, find_key_lines, split_key
 from .reader import apply_set
-from .rules.contact import MAX_SMALL_ANGLE, find_max_load
+from .rules.contact import find_max_load
 from .rules.scene_draft import SceneDraft
 from .rules.structure import MAX_USUAL_DAMPING
 from .rules.view import TableView

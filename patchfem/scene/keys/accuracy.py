@@ -2,7 +2,7 @@
 
 from typing import Literal
 
-from .types import Fraction, Table, key, number, whole_number
+from .types import Fraction, Table, key, number, optional, whole_number
 
 # Largest number of time steps per cycle; more would take days for a single cycle.
 MAX_STEPS_PER_CYCLE = 10_000_000
@@ -22,29 +22,29 @@ class Accuracy(Table):
         Literal["auto", "exact", "march", "harmonic"],
         "method that computes the motion; default: the program chooses a method for the scene",
     ) = "auto"
-    steps_per_cycle: key(
-        whole_number(4, MAX_STEPS_PER_CYCLE) | None,
+    steps_per_cycle: optional(
+        whole_number(4, MAX_STEPS_PER_CYCLE),
         "time steps per cycle; default: set by the tolerance",
-    ) = None
+    )
     quadrature: key(
         Literal["auto", "direct", "truncated", "merged", "recursion"],
         "method that computes the sum over bonds; default: the fastest method that meets the "
         "tolerance",
     ) = "auto"
-    tail: key(
-        Fraction | None,
+    tail: optional(
+        Fraction,
         "fraction of the bonds that `quadrature` 'truncated' neglects; default: set by the "
         "tolerance",
-    ) = None
-    merge: key(
-        Fraction | None,
+    )
+    merge: optional(
+        Fraction,
         "width, in bond lengths, within which bonds are merged; default: set by the tolerance",
-    ) = None
-    harmonics: key(
-        whole_number(1, MAX_MODES) | None,
+    )
+    harmonics: optional(
+        whole_number(1, MAX_MODES),
         "number of harmonics in the harmonic balance; default: set by the tolerance",
-    ) = None
-    shear_modes: key(
-        whole_number(1, MAX_MODES) | None,
+    )
+    shear_modes: optional(
+        whole_number(1, MAX_MODES),
         "number of shear modes of the pieces; default: set by the tolerance",
-    ) = None
+    )

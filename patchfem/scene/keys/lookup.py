@@ -152,8 +152,10 @@ def describe_error(key: Key, error: Any, value: Any) -> str:
     if error["type"] in LIMITS_BY_ERROR_TYPE:
         limit = LIMITS_BY_ERROR_TYPE[error["type"]]
         bound = error["ctx"][limit.name]
-        bound = bound if isinstance(bound, int) else f"{bound:g}"
-        return f"must be {limit.sign} {bound}, not {format_for_message(value)}; {needed}"
+        text = str(bound) if isinstance(bound, int) else f"{bound:g}"
+        if bound and key.kind:
+            text = quantities.format_si(bound, key.kind)
+        return f"must be {limit.sign} {text}, not {format_for_message(value)}; {needed}"
     if error["type"] == "too_short" and value and error["ctx"]["min_length"] > 1:
         return f"at least {error['ctx']['min_length']} values are needed, not {len(value)}"
     if error["type"] == "too_long":

@@ -153,6 +153,17 @@ def key(kind: Any, meaning: str, required: str = "") -> Any:
     return Annotated[kind, KeyRecord(meaning, required)]
 
 
+def optional(kind: Any, meaning: str, required: str = "") -> Any:
+    """Return the type of a key that may be left out, with its documentation; its value is None then.
+
+    Parameters
+    ----------
+    kind, meaning, required
+        As in `key`.
+    """
+    return Annotated[kind | None, KeyRecord(meaning, required), Field(default=None)]
+
+
 # Types that many keys share.
 Text = Annotated[str, Field(min_length=1), CheckAfter(_require_printable)]
 FileName = Annotated[Text, FILE_MARK]

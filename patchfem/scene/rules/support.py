@@ -24,6 +24,7 @@ from ...effects import (
 )
 from ..keys.contact import Contact
 from ..keys.tables import Friction
+from .facts import TableFacts
 from .methods import (
     check_method,
     describe_load_change,
@@ -31,7 +32,6 @@ from .methods import (
     find_yaw_key,
     list_lower_shapes,
 )
-from .rule_table import MistakeRule, TableFacts, apply_rules
 from .scene_draft import SceneDraft
 from .structure import find_instrument_key
 from .view import wrap_value
@@ -178,7 +178,7 @@ FEATURES = {
     "sensor apart from the output": Feature(lambda j: j.instrument_key, "{instrument_key}"),
     # the load
     "mode with heave or pitch": Feature(
-        lambda j: j.load_change[:9] == "structure", "{load_change}"
+        lambda j: j.load_change.startswith("structure"), "{load_change}"
     ),
     "changing load": Feature(
         lambda j: j.kind == "rig" and j.load_change, "{load_change}", "{load_change_description}"
@@ -380,35 +380,6 @@ SUPPORT = (
     ("sensor apart from the output, levels or sweep in time", AT_OUTPUT),
     ("wear, law of an averaged pressure", "leave out [wear] or use law 'coulomb'"),
 )
-JOINT_RULES = (
-    MistakeRule(
-        lambda j: j.kind == "rig" and j.yaw and not j.contact.strips,
-        "{yaw}",
-        "`yaw` rotates the patch about its normal; add [contact.strips], whose strips slide independently",
-    ),
-    MistakeRule(
-        lambda j: (
-            j.kind == "rig"
-            and not j.is_interface
-            and not j.contact
-            and j.load_change[:9] == "structure"
-        ),
-        "{load_change}",
-        "a single contact point cannot heave or pitch: use [contact] in place of [normal]",
-    ),
-    MistakeRule(
-        lambda j: (
-            j.compliance
-            and j.has_trait("bonds")
-            and j.reading == "report"
-            and -1 < j.order < 0
-            and j.initial_bonds
-        ),
-        "{table_key}.initial_bonds",
-        "{initial_bonds:g} with order = {order:g} and {compliance} gives points that no force can move: in the law as "
-        "printed in the report, (R/eps)^order is unbounded for bonds at rest; set initial_bonds = 0 or use order >= 0",
-    ),
-)
 
 
 def check_combinations(draft: SceneDraft, kind: str) -> None:
@@ -419,8 +390,10 @@ def check_combinations(draft: SceneDraft, kind: str) -> None:
         table = interface.table
         joints.append(Joint(draft, f"structure.interface.{index}", table, table.contact, kind))
     for joint in joints:
-        _check_shape_sides(joint)
-        apply_rules(draft, JOINT_RULES if joint.is_read else (), joint)
+        if joint.is_read:
+            _check_shape_sides(joint)
+            _check_modes(joint)
+            _check_initial_bonds(joint)
         # Many rows name the same feature, which is looked for only once.
         is_there = cache(lambda name, joint=joint: find_feature(name).is_there(joint))
         reported: set[str] = set()  # one mistake for each key is enough
@@ -450,10 +423,39 @@ def _check_shape_sides(joint: Joint) -> None:
     """Report shapes on different pieces."""
     shapes = joint.contact.table.shapes if joint.contact else {}
     sides = {f"{joint.patch_key}.{name}.on": shape.on for name, shape in shapes.items() if shape.on}
-    if len(set(sides.values())) > 1 and joint.is_read:
+    if len(set(sides.values())) > 1:
         key = next((key for key in reversed(sides) if joint.draft.has(key)), next(iter(sides)))
         names = " and ".join(f"contact.{key.split('.')[-2]}" for key in sides)
         message = describe_unsupported(
             f"{names} on different pieces", "put all shapes on one piece"
         )
         joint.draft.add_mistake(key, message)
+
+
+def _check_modes(joint: Joint) -> None:
+    """Report modes that rotate or lift a patch that cannot follow."""
+    if joint.kind != "rig":
+        return
+    if joint.yaw and not joint.contact.strips:
+        joint.draft.add_mistake(
+            joint.yaw,
+            "`yaw` rotates the patch about its normal; add [contact.strips], whose strips slide independently",
+        )
+    is_point = not joint.is_interface and not joint.contact
+    if is_point and joint.load_change.startswith("structure"):
+        joint.draft.add_mistake(
+            joint.load_change,
+            "a single contact point cannot heave or pitch: use [contact] in place of [normal]",
+        )
+
+
+def _check_initial_bonds(joint: Joint) -> None:
+    """Report bonds at rest that no force can move."""
+    is_unbounded = joint.has_trait("bonds") and joint.reading == "report" and -1 < joint.order < 0
+    if is_unbounded and joint.compliance and joint.initial_bonds:
+        joint.add_mistake(
+            "initial_bonds",
+            f"{joint.initial_bonds:g} with order = {joint.order:g} and {joint.compliance} gives points that no force can "
+            "move: in the law as printed in the report, (R/eps)^order is unbounded for bonds at rest; set "
+            "initial_bonds = 0 or use order >= 0",
+        )
