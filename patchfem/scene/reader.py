@@ -6,10 +6,14 @@ import re
 import tomllib
 from typing import Any
 
-from pydantic import ValidationError
-
 from ..effects import MAX_COORDINATES
-from .keys.lookup import LIMITS_BY_ERROR_TYPE, describe_error, find_key, format_for_message
+from .keys.lookup import (
+    LIMITS_BY_ERROR_TYPE,
+    describe_error,
+    find_key,
+    format_for_message,
+    validate_values,
+)
 from .keys.tables import Tables
 from .keys.types import Key, Table, advise_on_name, build_table, list_keys, list_required_keys
 from .lines import find_item, number_items_from_one, split_assignment, split_key
@@ -83,29 +87,22 @@ def _validate_values(
     draft: SceneDraft, model: type[Table], values: dict[str, Any], table_key: str
 ) -> dict[str, Any]:
     """Return the valid values by attribute; report the first mistake of every other key."""
-    valid: dict[str, Any] = {}
-    try:
-        model.model_validate(values, context=valid)
-    except ValidationError as caught:
-        reported = set()
-        # A key may accept several types; a value that only breaks a limit of one
-        # type was meant to be of this type.
-        errors = sorted(
-            caught.errors(include_url=False),
-            key=lambda error: error["type"] not in LIMITS_BY_ERROR_TYPE,
-        )
-        for error in errors:
-            key, *inside = error["loc"]
-            if key in reported or (error["type"] == "missing" and not inside):
-                continue
-            reported.add(key)
-            path = f"{table_key}.{key}" if table_key else str(key)
-            value = values.get(key)
-            index = next((part for part in inside if isinstance(part, int)), None)
-            if index is not None and isinstance(value, list) and index < len(value):
-                path = f"{path}.{index}"
-                value = value[index]
-            draft.add_mistake(path, describe_error(list_keys(model)[key], error, value))
+    valid, errors = validate_values(model, values)
+    reported = set()
+    # A key may accept several types; a value that only breaks a limit of one
+    # type was meant to be of this type.
+    for error in sorted(errors, key=lambda error: error["type"] not in LIMITS_BY_ERROR_TYPE):
+        key, *inside = error["loc"]
+        if key in reported or (error["type"] == "missing" and not inside):
+            continue
+        reported.add(key)
+        path = f"{table_key}.{key}" if table_key else str(key)
+        value = values.get(key)
+        index = next((part for part in inside if isinstance(part, int)), None)
+        if index is not None and isinstance(value, list) and index < len(value):
+            path = f"{path}.{index}"
+            value = value[index]
+        draft.add_mistake(path, describe_error(list_keys(model)[key], error, value))
     return valid
 
 

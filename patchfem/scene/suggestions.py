@@ -1,15 +1,12 @@
 """Sentences about an unknown key: the key or table that was probably meant, and what became of removed ones."""
 
 from collections.abc import Collection
-from contextlib import suppress
 from difflib import SequenceMatcher
 from typing import Any, NamedTuple
 
-from pydantic import ValidationError
-
 from ..effects import join_words
 from .keys.choices import find_selectors, split_keys
-from .keys.lookup import find_key
+from .keys.lookup import find_key, validate_values
 from .keys.removed import describe_removed
 from .keys.tables import Tables
 from .keys.types import (
@@ -201,10 +198,7 @@ def _rate_tables(model: type[Table], key: str, value: Any) -> dict[str, float]:
 
 def _accepts_value(model: type[Table], key: str, value: object) -> bool:
     """Return whether a key accepts a value."""
-    valid: dict[str, Any] = {}
-    with suppress(ValidationError):
-        model.model_validate({key: value}, context=valid)
-    return list_keys(model)[key].attribute in valid
+    return list_keys(model)[key].attribute in validate_values(model, {key: value})[0]
 
 
 def _list_missing_keys(

@@ -15,8 +15,7 @@ class Accuracy(Table):
 
     tolerance: key(
         number(gt=0, lt=1),
-        "largest relative error that is allowed in any measure; the numerical settings "
-        "follow from this tolerance",
+        "largest relative error that is allowed in any measure; the numerical settings follow from this tolerance",
     ) = 1e-3
     method: key(
         Literal["auto", "exact", "march", "harmonic"],
@@ -28,13 +27,11 @@ class Accuracy(Table):
     )
     quadrature: key(
         Literal["auto", "direct", "truncated", "merged", "recursion"],
-        "method that computes the sum over bonds; default: the fastest method that meets the "
-        "tolerance",
+        "method that computes the sum over bonds; default: the fastest method that meets the tolerance",
     ) = "auto"
     tail: optional(
         Fraction,
-        "fraction of the bonds that `quadrature` 'truncated' neglects; default: set by the "
-        "tolerance",
+        "fraction of the bonds that `quadrature` 'truncated' neglects; default: set by the tolerance",
     )
     merge: optional(
         Fraction,

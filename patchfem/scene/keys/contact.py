@@ -51,9 +51,8 @@ class Material(Table):
     density: key(quantity("density", gt=0), "mass per volume")
     yield_: key(
         quantity("pressure", gt=0) | None,
-        "yield strength in tension; a note appears where the von Mises "
-        "stress exceeds it; default: that of the named material in MATERIALS.md, if it has "
-        "one",
+        "yield strength in tension; a note appears where the von Mises stress exceeds it; default: that of the named "
+        "material in MATERIALS.md, if it has one",
     ) = Field(None, alias="yield")
 
 
@@ -98,18 +97,15 @@ class OnePiece(Table):
     substrate: optional(Substance, "material of this piece; default: `contact.substrate`")
     coating: optional(
         Coating | Literal["none"],
-        "coating of this piece, {material = ..., thickness = ...}, or "
-        '"none"; default: `contact.coating`',
+        'coating of this piece, {material = ..., thickness = ...}, or "none"; default: `contact.coating`',
     )
     chamfer: optional(
         Length,
-        "length along x of the 45 degree chamfer at both ends; the interface stops where the "
-        "chamfer starts",
+        "length along x of the 45 degree chamfer at both ends; the interface stops where the chamfer starts",
     )
     end_radius: optional(
         Length,
-        "radius of the rounded ends; the interface stops where the slope of the rounded "
-        "end exceeds 0.097",
+        "radius of the rounded ends; the interface stops where the slope of the rounded end exceeds 0.097",
     )
 
 
@@ -131,8 +127,7 @@ class LoadLine(Table):
 
     offset: optional(
         Position,
-        "distance of the load line from the middle of the patch; an offset > 0 moves the "
-        "pressure towards +x",
+        "distance of the load line from the middle of the patch; an offset > 0 moves the pressure towards +x",
     )
     moment: optional(
         quantity("moment"),
@@ -159,8 +154,7 @@ class Holder(Table):
     )
     tangential_stiffness: optional(
         quantity("stiffness", gt=0),
-        "stiffness along x of the spring between the far "
-        "face of the piece and its holder; default: rigid",
+        "stiffness along x of the spring between the far face of the piece and its holder; default: rigid",
     )
 
 
@@ -168,9 +162,8 @@ def require_convex_radius(value: object) -> object:
     """Return the radius of a crown; raise ValueError for the negative radius of a hollow."""
     if str(value).lstrip().startswith("-"):
         raise ValueError(
-            "a crown is convex, so its radius must be > 0; for a hollow surface leave out [contact.crown] "
-            'and give contact.profile.file, a file with the columns "x [mm],z [um]", where z = '
-            "x^2/(2 radius)"
+            "a crown is convex, so its radius must be > 0; for a hollow surface leave out [contact.crown] and give "
+            'contact.profile.file, a file with the columns "x [mm],z [um]", where z = x^2/(2 radius)'
         )
     return value
 
@@ -184,8 +177,7 @@ class Crown(Table):
     )
     on: key(
         Piece,
-        "piece that has the crown; during the slide the pressure distribution moves "
-        "with this piece",
+        "piece that has the crown; during the slide the pressure distribution moves with this piece",
     ) = "upper"
 
 
@@ -205,8 +197,7 @@ class ProfileFile(Table):
 
     file: key(
         FileName,
-        "file of one height trace along x: text with units in its header, or a file of a measuring "
-        "instrument",
+        "file of one height trace along x: text with units in its header, or a file of a measuring instrument",
     )
     heights: key(
         Literal["gap", "surface"],
@@ -215,8 +206,7 @@ class ProfileFile(Table):
     ) = "gap"
     on: key(
         Piece,
-        "piece that has the profile; during the slide the pressure distribution moves "
-        "with this piece",
+        "piece that has the profile; during the slide the pressure distribution moves with this piece",
     ) = "upper"
 
 
@@ -225,15 +215,13 @@ class Asperities(Table):
 
     law: key(
         Literal["linear", "exponential", "hertz"],
-        "how the pressure of the rough layer follows from its "
-        "compression: 'linear'; 'exponential'; or 'hertz', from spherical peaks whose heights have a Gaussian "
-        "distribution",
+        "how the pressure of the rough layer follows from its compression: 'linear'; 'exponential'; or 'hertz', from "
+        "spherical peaks whose heights have a Gaussian distribution",
     )
     normal_stiffness: optional(
         quantity("foundation stiffness", gt=0),
-        "pressure of the layer divided by its "
-        "compression; for law 'exponential', the slope of pressure over compression "
-        "at first touch",
+        "pressure of the layer divided by its compression; for law 'exponential', the slope of pressure over "
+        "compression at first touch",
     )
     decay_length: optional(
         Length,
@@ -252,9 +240,8 @@ class Asperities(Table):
     ) = Field(None, alias="from")
     rms_height: optional(
         Length,
-        "root mean square height of the rough piece; if both pieces are rough, the root of "
-        "the sum of the squares of their two values; the same rule holds for `rms_slope` and "
-        "`rms_curvature`",
+        "root mean square height of the rough piece; if both pieces are rough, the root of the sum of the squares of "
+        "their two values; the same rule holds for `rms_slope` and `rms_curvature`",
     )
     rms_slope: optional(Positive, "root mean square slope of the rough piece")
     rms_curvature: optional(
@@ -263,15 +250,13 @@ class Asperities(Table):
     )
     cutoff: optional(
         Length,
-        "wavelength that divides a trace (Gaussian filter of ISO 16610-21): longer waves "
-        "belong to [contact.profile], shorter waves to the asperities; default: with [contact.profile], 1/100 "
-        "of the length of the interface; without it, all waves of the trace in `from` belong to the "
-        "asperities",
+        "wavelength that divides a trace (Gaussian filter of ISO 16610-21): longer waves belong to [contact.profile], "
+        "shorter waves to the asperities; default: with [contact.profile], 1/100 of the length of the interface; "
+        "without it, all waves of the trace in `from` belong to the asperities",
     )
     tangential_ratio: optional(
         Positive,
-        "tangential stiffness of the rough layer divided by its normal stiffness; "
-        "default: the layer is rigid along x",
+        "tangential stiffness of the rough layer divided by its normal stiffness; default: the layer is rigid along x",
     )
 
 
@@ -285,8 +270,7 @@ class Grooves(Table):
     wavelength: key(Length, "wavelength of the grooves along x")
     amplitude: key(
         quantity("length", ge=0),
-        "half the height of the grooves from valley to peak; with amplitude 0 "
-        "the surfaces are flat",
+        "half the height of the grooves from valley to peak; with amplitude 0 the surfaces are flat",
     )
     phase: key(
         quantity("angle"),
@@ -318,8 +302,7 @@ class Strips(Table):
     ) = 0.0
     offset: optional(
         Position,
-        "lateral position of the load line; if this key is given, the upper piece is free to "
-        "rotate about x",
+        "lateral position of the load line; if this key is given, the upper piece is free to rotate about x",
     )
 
 
@@ -331,13 +314,11 @@ class Contact(Table):
     width: key(Length, "width of the patch perpendicular to the plane of the model")
     height: key(
         Length,
-        "height of each piece from the interface to the far face, which is fixed to the holder; "
-        "includes the coating",
+        "height of each piece from the interface to the far face, which is fixed to the holder; includes the coating",
     )
     load: optional(
         Force,
-        "total normal force on the interface, weight included; [contact.approach] may be given in "
-        "place of this key",
+        "total normal force on the interface, weight included; [contact.approach] may be given in place of this key",
     )
     pairs: key(
         whole_number(1, MAX_PAIRS),
@@ -352,8 +333,7 @@ class Contact(Table):
     )
     substrate: key(
         Substance,
-        "material of the pieces: a name from MATERIALS.md, or a table of young, poisson, "
-        "density and, if known, yield",
+        "material of the pieces: a name from MATERIALS.md, or a table of young, poisson, density and, if known, yield",
     )
     mesh: optional(
         FileName,

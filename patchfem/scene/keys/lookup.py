@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from functools import cache, lru_cache
 from typing import Any, NamedTuple, get_args, get_origin
 
@@ -11,16 +11,11 @@ from pydantic import ValidationError
 
 from ..lines import split_key
 from . import quantities
-from .contact import Material
+from .contact import MATERIAL_REQUIREMENT, Material
 from .tables import Tables
 from .types import Key, Table, advise_on_name, list_keys
 
 MAX_SHOWN_CHARACTERS = 60  # largest number of characters of a wrong value in a message
-MATERIAL_REQUIREMENT = (
-    'a material name or {young = "121 GPa", poisson = 0.32, density = "4370 kg/m^3"} is needed'
-)
-
-
 # Beginnings of requirements that do not tell what a key is.
 _UNSPECIFIC_REQUIREMENTS = ("a plain", "a whole", "a text", "plain", "whole", "two whole")
 
@@ -81,14 +76,23 @@ def validate_value(key: str, value: Any, ignored: Iterable[str] = ()) -> dict[st
         If the key does not accept the value; its text is the sentence for the user.
     """
     known = find_key(key)
-    valid = {}
-    try:
-        known.table.model_validate({known.name: value}, context=valid)
-    except ValidationError as caught:
-        for error in caught.errors(include_url=False):
-            if error["loc"][0] == known.name and error["type"] not in ("missing", *ignored):
-                raise ValueError(describe_error(known, error, value)) from None
+    valid, errors = validate_values(known.table, {known.name: value})
+    for error in errors:
+        if error["loc"][0] == known.name and error["type"] not in ("missing", *ignored):
+            raise ValueError(describe_error(known, error, value))
     return valid
+
+
+def validate_values(
+    model: type[Table], values: dict[str, Any]
+) -> tuple[dict[str, Any], Sequence[Any]]:
+    """Return the valid ones of the plain values of a table by attribute, and the errors of pydantic on the others."""
+    valid: dict[str, Any] = {}
+    try:
+        model.model_validate(values, context=valid)
+    except ValidationError as caught:
+        return valid, caught.errors(include_url=False)
+    return valid, ()
 
 
 @cache

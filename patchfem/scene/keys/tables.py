@@ -99,9 +99,8 @@ class Friction(Table):
     )
     stiffness: optional(
         quantity("stiffness", gt=0),
-        "initial slope of the friction force over the slide, for the "
-        "whole contact; in a patch, this stiffness is distributed over the points in proportion to their "
-        "normal force",
+        "initial slope of the friction force over the slide, for the whole contact; in a patch, this stiffness is "
+        "distributed over the points in proportion to their normal force",
     )
     chi: optional(
         number(gt=-1, le=0),
@@ -115,8 +114,7 @@ class Friction(Table):
     )
     exponent: key(
         Positive,
-        "exponent n of law 'bouc-wen': the larger n is, the sharper is the transition from stick "
-        "to slip",
+        "exponent n of law 'bouc-wen': the larger n is, the sharper is the transition from stick to slip",
     ) = 1.0
     shape: key(
         number(gt=0, le=1),
@@ -129,8 +127,7 @@ class Friction(Table):
     )
     micro_damping: key(
         quantity("damping", ge=0),
-        "damping force on the bristles divided by the rate of their "
-        "deflection, for the whole contact",
+        "damping force on the bristles divided by the rate of their deflection, for the whole contact",
     ) = 0.0
     viscous: key(
         quantity("damping", ge=0),
@@ -138,9 +135,8 @@ class Friction(Table):
     ) = 0.0
     reading: key(
         Literal["stretch", "report"],
-        "how equation 2.17 is read: 'stretch' separates the stretch of a bond "
-        "from its damage, so that no energy is created; 'report' uses equation 2.17 as printed in the "
-        "report",
+        "how equation 2.17 is read: 'stretch' separates the stretch of a bond from its damage, so that no energy is "
+        "created; 'report' uses equation 2.17 as printed in the report",
     ) = "stretch"
     order: key(
         number(le=100),
@@ -149,14 +145,12 @@ class Friction(Table):
     ) = 1.0
     rest_growth: optional(
         Acceleration,
-        "growth a_s of the bond length at rest (equation 2.10); without "
-        "`rest_growth` "
-        "and `slip_growth` the bond length is constant",
+        "growth a_s of the bond length at rest (equation 2.10); without `rest_growth` and `slip_growth` the bond "
+        "length is constant",
     )
     slip_growth: optional(
         Length,
-        "slip length l_k over which the bond length approaches its value in fast slip "
-        "(equation 2.10)",
+        "slip length l_k over which the bond length approaches its value in fast slip (equation 2.10)",
     )
     rest_speed: optional(
         Speed,
@@ -168,8 +162,7 @@ class Friction(Table):
     ) = 1.0
     spread: optional(
         Length,
-        "width rho of a bond perpendicular to the path (equation 2.15); default: this width is "
-        "ignored",
+        "width rho of a bond perpendicular to the path (equation 2.15); default: this width is ignored",
     )
     temperature: Temperature | None = None
 
@@ -179,9 +172,8 @@ class Slide(Table):
 
     kind: key(
         Literal["constant", "sine", "triangle", "dwell", "file"],
-        "prescribed motion: 'constant', motion at "
-        "constant speed; 'sine'; 'triangle'; 'dwell', a slide interrupted by a rest; 'file', a table of "
-        "positions",
+        "prescribed motion: 'constant', motion at constant speed; 'sine'; 'triangle'; 'dwell', a slide interrupted by "
+        "a rest; 'file', a table of positions",
     )
     amplitude: optional(
         Length,
@@ -191,9 +183,8 @@ class Slide(Table):
     speed: optional(Speed, "sliding speed")
     distance: optional(
         quantity("length", ge=0),
-        "for kind 'constant', the sliding distance; for kind 'dwell', the "
-        "distance before the rest; for kind 'triangle', the distance of a first slide before the cycles "
-        "(default: 0)",
+        "for kind 'constant', the sliding distance; for kind 'dwell', the distance before the rest; for kind "
+        "'triangle', the distance of a first slide before the cycles (default: 0)",
     )
     hold: optional(quantity("time", ge=0), "duration of the rest")
     distance_after: optional(
@@ -214,22 +205,19 @@ class Mode(Table):
     frequency: key(quantity("frequency", ge=0), "natural frequency; 0 Hz for a rigid mode")
     damping: key(
         number(gt=-1),
-        "damping ratio; a mode with a damping ratio below 0 gains energy, which friction must "
-        "dissipate (flutter)",
+        "damping ratio; a mode with a damping ratio below 0 gains energy, which friction must dissipate (flutter)",
     )
     slide: key(Number, "motion of the patch along x per unit of the modal coordinate")
     normal: key(
         Number,
-        "motion of the patch normal to the interface, positive where it opens, per unit of the modal "
-        "coordinate",
+        "motion of the patch normal to the interface, positive where it opens, per unit of the modal coordinate",
     ) = 0.0
     pitch: key(
         PerMetre, "rotation of the patch in the plane of the model per unit of the modal coordinate"
     ) = 0.0
     yaw: key(
         PerMetre,
-        "rotation of the patch about its normal per unit of the modal coordinate; needs "
-        "[contact.strips]",
+        "rotation of the patch about its normal per unit of the modal coordinate; needs [contact.strips]",
     ) = 0.0
     base: optional(
         Number,
@@ -305,8 +293,7 @@ class Interface(Friction):
     )
     load: optional(
         Force,
-        "normal force on the interface; a patch, [structure.interface.contact], may be given in "
-        "place of this key",
+        "normal force on the interface; a patch, [structure.interface.contact], may be given in place of this key",
         "unless [structure.interface.contact] is given",
     )
     contact: Contact | None = None
@@ -331,8 +318,7 @@ class Reduced(Table):
 
     stiffness: key(
         FileName,
-        "file of the stiffness matrix: Matrix Market or Abaqus text (.mtx), MATLAB (.mat), NumPy or "
-        "SciPy (.npz)",
+        "file of the stiffness matrix: Matrix Market or Abaqus text (.mtx), MATLAB (.mat), NumPy or SciPy (.npz)",
     )
     mass: key(FileName, "file of the mass matrix; may be the same file as for the stiffness matrix")
     damping: optional(
@@ -342,38 +328,33 @@ class Reduced(Table):
     )
     boundary: key(
         Annotated[tuple[Coordinate, ...], Field(min_length=1)],
-        "coordinates that are kept as boundary "
-        "coordinates: row numbers of the matrices, or node:direction, such as 1201:x, if the files name "
-        "nodes; interfaces, `drive.mass` and `structure.output_mass` refer to the boundary coordinates by "
-        "number, counted from 1",
+        "coordinates that are kept as boundary coordinates: row numbers of the matrices, or node:direction, such as "
+        "1201:x, if the files name nodes; interfaces, `drive.mass` and `structure.output_mass` refer to the boundary "
+        "coordinates by number, counted from 1",
     )
     modes: key(
         whole_number(0, 1000), "number of modes kept in addition to the boundary coordinates"
     ) = 12
     method: key(
         Literal["craig-bampton", "free-interface"],
-        "'craig-bampton': modes of the structure with the "
-        "boundary held; 'free-interface': modes of the free structure, with residual attachment modes, which "
-        "need fewer modes if the interfaces slide",
+        "'craig-bampton': modes of the structure with the boundary held; 'free-interface': modes of the free "
+        "structure, with residual attachment modes, which need fewer modes if the interfaces slide",
     ) = "craig-bampton"
     moved: optional(
         Annotated[tuple[Coordinate, ...], Field(min_length=1)],
-        "coordinates that a base drive moves "
-        "along x: row numbers, ranges of rows (a..b:n means n evenly spaced rows from a to b), nodes or "
-        "directions; default: all coordinates in direction x, or all coordinates if the files name no "
-        "directions",
+        "coordinates that a base drive moves along x: row numbers, ranges of rows (a..b:n means n evenly spaced rows "
+        "from a to b), nodes or directions; default: all coordinates in direction x, or all coordinates if the files "
+        "name no directions",
     )
     slide: optional(
         MassPair,
-        "numbers of the two boundary coordinates that the joint of [contact] or [normal] "
-        "connects, counted from 1; 0 is the base; the slide is the motion of the first minus the motion of the "
-        "second",
+        "numbers of the two boundary coordinates that the joint of [contact] or [normal] connects, counted from 1; 0 "
+        "is the base; the slide is the motion of the first minus the motion of the second",
         "with [friction]",
     )
     unit: key(
         Length,
-        'length unit of the files; the unit of force in the files must be N; "1 mm" means N, mm and '
-        "tonne",
+        'length unit of the files; the unit of force in the files must be N; "1 mm" means N, mm and tonne',
     ) = 1.0
 
 
@@ -397,15 +378,13 @@ class Structure(Table):
     moving_mass: optional(Mass, "modal mass, the same for every mode", "with modes")
     travel: optional(
         Length,
-        "displacement at which the flexure meets its stop; a larger displacement ends the run; "
-        "default: no stop",
+        "displacement at which the flexure meets its stop; a larger displacement ends the run; default: no stop",
     )
     mode: tuple[Mode, ...] = ()
     measured: key(
         Literal["free", "stuck"],
-        "'free': the modes are those of the rig without the joint; 'stuck': "
-        "frequencies and damping were measured with the joint bolted, and the stiffness of the joint is "
-        "subtracted from the stiffness of the modes",
+        "'free': the modes are those of the rig without the joint; 'stuck': frequencies and damping were measured "
+        "with the joint bolted, and the stiffness of the joint is subtracted from the stiffness of the modes",
     ) = "free"
     measured_joint: optional(
         Literal["written", "case"],
@@ -428,14 +407,12 @@ class Structure(Table):
     interface: tuple[Interface, ...] = ()
     file: optional(
         FileName,
-        "file of matrices, modes or measured responses (.npz, .mat, .uff); replaces the tables of "
-        "modes",
+        "file of matrices, modes or measured responses (.npz, .mat, .uff); replaces the tables of modes",
     )
     reduced: Reduced | None = None
     slide_at: optional(
         Text,
-        "node and direction, as named in the file (such as 12:+x), whose motion is the motion "
-        "of the patch along x",
+        "node and direction, as named in the file (such as 12:+x), whose motion is the motion of the patch along x",
     )
     output_at: optional(
         Text,
@@ -468,8 +445,7 @@ class Drive(Table):
     to: optional(Frequency, "end frequency of a sweep, or highest frequency of a random drive")
     spectrum: optional(
         quantity("acceleration spectrum", gt=0),
-        "one-sided spectral density of a random base "
-        "acceleration, constant between `from` and `to`",
+        "one-sided spectral density of a random base acceleration, constant between `from` and `to`",
     )
     seed: optional(whole_number(0, 2**32 - 1), "seed of the random record; default: 0")
     rate: optional(
@@ -487,10 +463,9 @@ class Drive(Table):
     )
     displacement: optional(
         quantity("length", ge=0),
-        "displacement of the base, zero to peak, in place of "
-        "`acceleration`; with kind 'free', the displacement of the output at release: a static force at "
-        "the output holds the structure, the interfaces free of force, and lets go; in a rig of masses, "
-        "and if `mass` is given, that mass or coordinate alone is displaced",
+        "displacement of the base, zero to peak, in place of `acceleration`; with kind 'free', the displacement of "
+        "the output at release: a static force at the output holds the structure, the interfaces free of force, and "
+        "lets go; in a rig of masses, and if `mass` is given, that mass or coordinate alone is displaced",
         "with kind `free`, unless [structure.start] is given; with kind `base`, as `acceleration`",
     )
     levels: optional(
@@ -540,8 +515,7 @@ class Drive(Table):
     )
     file: optional(
         FileName,
-        "file with a record of the drive, a table with units or UFF; for waveform 'random', a "
-        "table of the spectrum",
+        "file with a record of the drive, a table with units or UFF; for waveform 'random', a table of the spectrum",
     )
 
     @field_validator("levels", mode="before")
@@ -588,8 +562,7 @@ class Wear(Table):
     )
     jumps: key(
         Literal["auto"] | whole_number(1, 1_000_000),
-        "number of equal jumps into which the cycles of wear are "
-        "divided; default: set by the tolerance",
+        "number of equal jumps into which the cycles of wear are divided; default: set by the tolerance",
     ) = "auto"
     form: key(
         Literal["archard", "energy"],
@@ -617,10 +590,9 @@ class Measured(Table):
     displacement_gain: key(Positive, "ratio of the gauge reading to the true displacement") = 1.0
     reading: key(
         Literal["peak", "fundamental", "rms", "lowpass"],
-        "quantity that the accelerometer shows: 'peak', "
-        "the largest acceleration; 'fundamental', the component of the acceleration at the drive frequency; "
-        "'rms', the root mean square of the acceleration; 'lowpass', the largest acceleration after a "
-        "second-order low-pass filter",
+        "quantity that the accelerometer shows: 'peak', the largest acceleration; 'fundamental', the component of the "
+        "acceleration at the drive frequency; 'rms', the root mean square of the acceleration; 'lowpass', the largest "
+        "acceleration after a second-order low-pass filter",
     ) = "peak"
     reading_cutoff: optional(Frequency, "cut-off frequency of the low-pass filter")
 
