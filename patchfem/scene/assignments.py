@@ -17,8 +17,8 @@ from typing import Any, NamedTuple, get_origin
 
 from ..core import PatchfemError
 from .keys import quantities
-from .keys.lookup import LIMITS_BY_ERROR_TYPE, find_key, validate_value
-from .keys.types import list_keys, list_required_keys
+from .keys.lookup import LIMITS_BY_ERROR_TYPE, validate_value
+from .keys.types import Key, list_keys, list_required_keys
 from .lines import split_assignment, split_key
 from .reader import read_set_value
 from .suggestions import require_key
@@ -148,9 +148,8 @@ class Range:
     def make_axis(self, fractions: Iterable[float]) -> Axis:
         """Return the key with the values at the given fractions of its range."""
         texts = self.interval.list_texts(fractions)
-        return Axis(
-            self.key, texts, array("d", map(_make_value_reader(self.key), texts)), self.unit
-        )
+        values = array("d", map(_ValueReader(self.key, texts).read, texts))
+        return Axis(self.key, texts, values, self.unit)
 
 
 def read_assignments(
@@ -251,16 +250,14 @@ def make_axis(key: str, texts: Iterable[str], *, distinct: bool = True) -> Axis:
         With one line for each value that the key does not accept.
     """
     texts = tuple(texts)
-    _require_value_key(key, texts)
-    values, mistakes = _collect(_make_value_reader(key), texts)
-    if not mistakes and distinct and len(set(values)) < len(values):
+    reader = _ValueReader(key, texts)
+    values = _collect(reader.read, texts)
+    if distinct and len(set(values)) < len(values):
         twice = next(k for k, value in enumerate(values) if values.index(value) < k)
-        mistakes.append(f"{texts[twice]} is given twice")
-    if mistakes:
-        raise ValueError("\n".join(mistakes))
+        raise ValueError(f"{texts[twice]} is given twice")
     if all(isinstance(value, float) for value in values):
-        kind = find_key(key).kind
-        return Axis(key, texts, tuple(values), quantities.find_si_unit(kind))
+        unit = quantities.find_si_unit(reader.known.kind)
+        return Axis(key, texts, tuple(values), unit)
     return Axis(key, texts, texts, "")
 
 
@@ -282,21 +279,18 @@ def read_values(key: str, text: str, form: Form = LISTS) -> Axis | Range:
         With one line for each mistake.
     """
     pieces = _split_at_commas(text)
-    _require_value_key(key, pieces)
-    if not (form.has_lists or _holds_number(key)):
+    reader = _ValueReader(key, pieces)
+    if not (form.has_lists or reader.is_number):
         raise ValueError(
             "is not a number that can vary; only quantities and plain numbers can be free"
         )
     if form.has_ranges and len(pieces) == 1:
-        interval = _parse_interval(key, text.strip())
+        interval = reader.parse_interval(text.strip())
         if interval is not None:
-            return _make_range(key, interval, form)
+            return reader.make_range(interval, form)
     if not form.has_lists:
         raise ValueError(f"{text}: a range is needed, {form.usage}")
-    groups, mistakes = _collect(lambda piece: _list_texts(key, piece), pieces)
-    if mistakes:
-        raise ValueError("\n".join(mistakes))
-    return make_axis(key, chain.from_iterable(groups))
+    return make_axis(key, chain.from_iterable(_collect(reader.list_texts, pieces)))
 
 
 def _append_values(
@@ -309,8 +303,8 @@ def _append_values(
         mistakes += [f"{name}: {line}" if name else line for line in str(error).split("\n")]
 
 
-def _collect(read: Callable, texts: Iterable[str]) -> tuple[list, list[str]]:
-    """Apply a function to texts; return its results and the sentences of its ValueErrors."""
+def _collect(read: Callable, texts: Iterable[str]) -> list:
+    """Apply a function to texts and return its results; raise one ValueError with the sentences of all that it raises."""
     values = []
     mistakes = []
     for text in texts:
@@ -318,59 +312,138 @@ def _collect(read: Callable, texts: Iterable[str]) -> tuple[list, list[str]]:
             values.append(read(text))
         except ValueError as error:
             mistakes.append(str(error))
-    return values, mistakes
+    if mistakes:
+        raise ValueError("\n".join(mistakes))
+    return values
 
 
-def _list_texts(key: str, piece: str) -> list[str]:
-    """Return the values of one part of a list: those of a range, or a single value."""
-    if not piece:
-        raise ValueError("there is no value between two commas")
-    if about := _range_about(piece) if _holds_number(key) else "":
-        raise ValueError(
-            f"{piece}: write this range as {about}:9 for 9 values in it, or as {about} with --random"
+class _ValueReader:
+    """Reader of the values of one key.
+
+    - key: dotted key of a scene.
+    - known: record of the key.
+    - is_number: whether a value is a single number, with or without unit.
+
+    A key that no scene has, or that is a table, raises ValueError.
+    """
+
+    def __init__(self, key: str, texts: Sequence[str]) -> None:
+        self.key = key
+        self.known = _find_value_key(key, texts)
+        types = self.known.types
+        is_single = self.known.inner is None and tuple not in map(get_origin, types)
+        self.is_number = is_single and (float in types or int in types)
+        self.takes_float = float in types
+
+    def read(self, text: str) -> float | str:
+        """Convert a text to SI; a text that is not a number is unchanged. Raise ValueError for a wrong value."""
+        known = self.known
+        if self.is_number and known.kind is not None:
+            return quantities.parse_quantity(text, known.kind)
+        # Most drawn values are plain numbers; `read_set_value` is slow for thousands of them.
+        is_plain = self.is_number and self.takes_float
+        if is_plain and re.fullmatch(quantities.NUMBER_PATTERN, text):
+            return float(text)
+        value = quantities.read_percentage(read_set_value(self.key, text))
+        if isinstance(value, dict) and known.inner is not None:
+            return text
+        has_number = isinstance(value, int | float) and not isinstance(value, bool)
+        number = float(value) if has_number else text
+        validate_value(
+            self.key, number if has_number and self.takes_float else value, LIMITS_BY_ERROR_TYPE
         )
-    interval = _parse_interval(key, piece)
-    if interval is None:
-        return [piece]
-    if not 2 <= interval.count <= MAX_RANGE_VALUES:
-        raise ValueError(
-            f"{interval.text}: give the number of values after a colon, from 2 to {MAX_RANGE_VALUES}, such as :9"
-        )
-    return interval.list_texts(k / (interval.count - 1) for k in range(interval.count))
+        return number
 
+    def list_texts(self, piece: str) -> list[str]:
+        """Return the values of one part of a list: those of a range, or a single value."""
+        if not piece:
+            raise ValueError("there is no value between two commas")
+        if about := _range_about(piece) if self.is_number else "":
+            raise ValueError(
+                f"{piece}: write this range as {about}:9 for 9 values in it, or as {about} with --random"
+            )
+        interval = self.parse_interval(piece)
+        if interval is None:
+            return [piece]
+        if not 2 <= interval.count <= MAX_RANGE_VALUES:
+            raise ValueError(
+                f"{interval.text}: give the number of values after a colon, from 2 to {MAX_RANGE_VALUES}, such as :9"
+            )
+        return interval.list_texts(k / (interval.count - 1) for k in range(interval.count))
 
-def _parse_interval(key: str, piece: str) -> Interval | None:
-    """Parse a range such as ``1..9 mm:5`` or ``5 mm +- 1 mm``; return None for any other text."""
-    if not _holds_number(key):
-        return None
-    if about := _range_about(piece):
-        piece = f"{about}:lin"
-    match = _RANGE_PATTERN.fullmatch(piece)
-    if match is None:
-        return None
-    low, high, count, spacing = match.groups()
-    text = f"{low}..{high}"
-    # A bare number before the dots has the unit of the number after them, as in 1..9 mm.
-    units = [_QUANTITY_PATTERN.fullmatch(end) for end in (low, high)]
-    if all(units) and units[1][1] and not units[0][1]:
-        low = f"{low} {units[1][1]}"
+    def parse_interval(self, piece: str) -> Interval | None:
+        """Parse a range such as ``1..9 mm:5`` or ``5 mm +- 1 mm``; return None for any other text."""
+        if not self.is_number:
+            return None
+        if about := _range_about(piece):
+            piece = f"{about}:lin"
+        match = _RANGE_PATTERN.fullmatch(piece)
+        if match is None:
+            return None
+        low, high, count, spacing = match.groups()
+        text = f"{low}..{high}"
+        # A bare number before the dots has the unit of the number after them, as in 1..9 mm.
+        units = [_QUANTITY_PATTERN.fullmatch(end) for end in (low, high)]
+        if all(units) and units[1][1] and not units[0][1]:
+            low = f"{low} {units[1][1]}"
 
-    kind = find_key(key).kind
-    if kind is None:
-        low, high = (str(quantities.read_percentage(end)) for end in (low, high))
-        if any(re.fullmatch(quantities.NUMBER_PATTERN, end) is None for end in (low, high)):
-            raise ValueError(f"{text}: both ends of this range must be plain numbers")
-        factor = 1.0
+        # Both ends in the unit of the first one.
+        kind = self.known.kind
         unit = ""
-    else:
-        quantities.parse_quantity(low, kind)
-        high = str(quantities.parse_quantity(high, kind))
-        low, unit = quantities.split_quantity(low)
-        factor = quantities.UNIT_FACTORS[kind][quantities.normalize_unit(unit)]
-    ends = _round_digits(float(low)), _round_digits(float(high) / factor)
-    if ends[0] == ends[1]:
-        raise ValueError(f"{text}: both ends are the same value")
-    return Interval(text, *ends, unit, int(count or 0), _is_log(*ends, spacing))
+        if kind is None:
+            ends = [str(quantities.read_percentage(end)) for end in (low, high)]
+            if None in (re.fullmatch(quantities.NUMBER_PATTERN, end) for end in ends):
+                raise ValueError(f"{text}: both ends of this range must be plain numbers")
+        else:
+            in_si = [quantities.parse_quantity(end, kind) for end in (low, high)]
+            number, unit = quantities.split_quantity(low)
+            factor = quantities.UNIT_FACTORS[kind][quantities.normalize_unit(unit)]
+            ends = [number, in_si[1] / factor]
+        low, high = (_round_digits(float(end)) for end in ends)
+        if low == high:
+            raise ValueError(f"{text}: both ends are the same value")
+        return Interval(text, low, high, unit, int(count or 0), _is_log(low, high, spacing))
+
+    def make_range(self, interval: Interval, form: Form) -> Range:
+        """Return the range in which the key varies; raise ValueError if the key does not accept it."""
+        if not self.takes_float:
+            raise ValueError(
+                f"{interval.text}: a key that takes whole numbers takes no range; list the values, such as 1,2,3"
+            )
+        if interval.count:
+            raise ValueError(
+                f"{interval.text}:{interval.count}: the values lie anywhere between the ends; leave out "
+                f":{interval.count}"
+            )
+        texts = interval.list_texts((0, 1))
+        low, high = map(self.read, texts)
+        if not form.has_lists:
+            if not low < high:
+                raise ValueError(f"{interval.text}: the low bound must lie below the high bound")
+            for text, value in zip(texts, (low, high)):
+                validate_value(self.key, text if interval.unit else value)
+        return Range(self.key, low, high, self.known.kind, interval)
+
+
+def _find_value_key(key: str, texts: Sequence[str]) -> Key:
+    """Find a key; raise ValueError for an unknown key, or for values that are assigned to a table; suggest keys."""
+    first = texts[0].partition("..")[0] if texts else ""
+    known = require_key(key, read_set_value("", first))
+    if known.accepts_value or (texts and all(text[:1] in ("{", "[", '"', "'") for text in texts)):
+        return known
+    suggested = list(dict.fromkeys([*list_required_keys(known.inner), *list_keys(known.inner)]))
+    pieces = split_key(key)
+    if known.is_array:
+        # The last piece names the array, an item of it, or a key for which no item is named.
+        if pieces[-1] in suggested:
+            suggested = [pieces.pop()]
+        if pieces[-1] == known.name:
+            pieces.append("NAME")
+    table = ".".join(pieces)
+    raise ValueError(
+        "is a table without a value of its own; choose a key of this table: "
+        f"{', '.join(f'{table}.{inner_key}' for inner_key in suggested[:4])}"
+    )
 
 
 def _is_log(low: float, high: float, spacing: str | None) -> bool:
@@ -407,27 +480,6 @@ def _range_about(text: str) -> str:
     return "..".join(_format_with_unit(end, unit) for end in (middle - half, middle + half))
 
 
-def _make_range(key: str, interval: Interval, form: Form) -> Range:
-    """Return the range in which a key varies; raise ValueError if the key does not accept it."""
-    known = find_key(key)
-    if float not in known.types:
-        raise ValueError(
-            f"{interval.text}: a key that takes whole numbers takes no range; list the values, such as 1,2,3"
-        )
-    if interval.count:
-        raise ValueError(
-            f"{interval.text}:{interval.count}: the values lie anywhere between the ends; leave out :{interval.count}"
-        )
-    texts = [_format_with_unit(end, interval.unit) for end in interval[1:3]]
-    low, high = map(_make_value_reader(key), texts)
-    if not form.has_lists:
-        if not low < high:
-            raise ValueError(f"{interval.text}: the low bound must lie below the high bound")
-        for text, value in zip(texts, (low, high)):
-            validate_value(key, text if interval.unit else value)
-    return Range(key, low, high, known.kind, interval)
-
-
 def _flatten_table(table: dict, table_key: str = "") -> list[tuple[str, Any]]:
     """Return (dotted key, value) for a table whose keys may be dotted or quoted."""
     pairs = []
@@ -435,36 +487,6 @@ def _flatten_table(table: dict, table_key: str = "") -> list[tuple[str, Any]]:
         path = f"{table_key}.{key}" if table_key else key
         pairs += _flatten_table(value, path) if isinstance(value, dict) else [(path, value)]
     return pairs
-
-
-def _require_value_key(key: str, texts: Sequence[str]) -> None:
-    """Raise ValueError for an unknown key, or for values that are assigned to a table; suggest keys."""
-    first = re.split(r"\.\.", texts[0])[0] if texts else ""
-    known = require_key(key, read_set_value("", first))
-    if known.accepts_value:
-        return
-    if texts and all(text.startswith(("{", "[", '"', "'")) for text in texts):
-        return
-    suggested = list(dict.fromkeys([*list_required_keys(known.inner), *list_keys(known.inner)]))
-    pieces = split_key(key)
-    if known.is_array:
-        # The last piece names the array, an item of it, or a key for which no item is named.
-        if pieces[-1] in suggested:
-            suggested = [pieces.pop()]
-        if pieces[-1] == known.name:
-            pieces.append("NAME")
-    table = ".".join(pieces)
-    raise ValueError(
-        "is a table without a value of its own; choose a key of this table: "
-        f"{', '.join(f'{table}.{inner_key}' for inner_key in suggested[:4])}"
-    )
-
-
-def _holds_number(key: str) -> bool:
-    """Return whether the value of a key is a single number, with or without unit."""
-    known = find_key(key)
-    is_single = known.inner is None and tuple not in map(get_origin, known.types)
-    return is_single and (float in known.types or int in known.types)
 
 
 def _split_at_commas(text: str) -> list[str]:
@@ -491,34 +513,6 @@ def _split_at_commas(text: str) -> list[str]:
             pieces.append(text[start:index].strip())
             start = index + 1
     return [*pieces, text[start:].strip()]
-
-
-def _make_value_reader(key: str) -> Callable[[str], float | str]:
-    """Return a function that converts the string of a value to SI; a string that is not a number is unchanged.
-
-    The function raises ValueError if the key does not accept the text.
-    """
-    known = find_key(key)
-    kind = known.kind
-    is_number = _holds_number(key)
-    takes_float = float in known.types
-
-    def read_value(text: str) -> float | str:
-        if is_number and kind is not None:
-            return quantities.parse_quantity(text, kind)
-        # Most drawn values are plain numbers; `read_set_value` is slow for thousands of them.
-        if is_number and takes_float and re.fullmatch(quantities.NUMBER_PATTERN, text):
-            return float(text)
-        value = quantities.read_percentage(read_set_value(key, text))
-        if isinstance(value, dict) and known.inner is not None:
-            return text
-        has_number = isinstance(value, int | float) and not isinstance(value, bool)
-        validate_value(
-            key, float(value) if has_number and takes_float else value, LIMITS_BY_ERROR_TYPE
-        )
-        return float(value) if has_number else text
-
-    return read_value
 
 
 def _format_with_unit(value: float, unit: str) -> str:

@@ -12,7 +12,7 @@ import numpy as np
 from scipy.linalg import LinAlgError, cholesky, eigh, solve_triangular, svd
 
 from ..core import ModalBasis, PatchfemError, frozen_array
-from ..inputs.symmetric import symmetrize, to_real
+from ..inputs.symmetric import read_numbers, symmetrize
 
 # Round-off of an eigenvalue of an n x n matrix, divided by n and relative to the largest eigenvalue
 EIGENVALUE_TOL = 16 * np.finfo(float).eps
@@ -292,17 +292,10 @@ def _decouple_equal_frequencies(phi, omega, D) -> tuple:
 
 def _check_row(row, n: int, name: str) -> np.ndarray:
     """Check that a row has n finite real numbers; `slide` may have several rows."""
-    try:
-        row = np.asarray(to_real(row, f"{name}"), float)
-    except (TypeError, ValueError):
-        raise PatchfemError(f"{name} does not contain real numbers") from None
-    if row.ndim == 2 and 1 in row.shape and name != "slide":
-        row = row.ravel()
-    if row.shape[-1:] != (n,) or row.ndim > (2 if name == "slide" else 1):
-        raise PatchfemError(f"{name} has shape {row.shape}, but M has {n} coordinates")
-    if not np.isfinite(row).all():
-        raise PatchfemError(f"{name} contains values that are not finite")
-    return row
+    if name == "slide":
+        return read_numbers(row, name, (n,), (None, n))
+    is_column = np.ndim(row) == 2 and 1 in np.shape(row)
+    return read_numbers(np.ravel(row) if is_column else row, name, (n,))
 
 
 def _find_shape_signs(phi, output) -> np.ndarray:
