@@ -16,12 +16,12 @@ import numpy as np
 from numpy.lib import format as npy
 from scipy.sparse import issparse
 
-from ..core import ModalBasis, PatchfemError, frozen_array
+from ..core import ModalBasis, PatchfemError
 from ..effects import MAX_COORDINATES
 from ..inputs.matlab import read_variables
 from ..inputs.symmetric import read_numbers, to_real
 from . import masses, matrices
-from .modes import PATCH_MOTIONS
+from .modes import PATCH_MOTIONS, make_basis
 
 ARRAY_NAMES = (  # names of the arrays that are read from a file
     "M",
@@ -242,20 +242,18 @@ def _build_basis_from_modes(
     else:
         base = -(read_numbers(data["force"], "force", (n,)) if "force" in data else output)
     patch_motions = {
-        name: frozen_array(read_numbers(data[name], name, (n,)))
-        for name in PATCH_MOTIONS
-        if name in data and data[name].any()
+        name: read_numbers(data[name], name, (n,)) for name in PATCH_MOTIONS if name in data
     }
-    return ModalBasis(
-        names=_read_names(data, n) or tuple(f"mode {k + 1}" for k in range(n)),
-        omega=frozen_array(omega),
+    return make_basis(
+        _read_names(data, n) or tuple(f"mode {k + 1}" for k in range(n)),
+        mass,
+        omega=omega,
         zeta=zeta,
-        slide=frozen_array(faces[0]),
-        base=frozen_array(base),
-        output=frozen_array(output),
-        mass=mass,
+        slide=faces[0],
+        base=base,
+        output=output,
         damping=damping,
-        faces=frozen_array(faces) if len(faces) > 1 else None,
+        faces=faces if len(faces) > 1 else None,
         **patch_motions,
     )
 
@@ -267,7 +265,7 @@ def _read_damping(data: dict, omega) -> tuple:
     if damping.ndim == 1:
         if (damping < 0).any():
             raise PatchfemError(f"damping must be >= 0, not {damping.min():g}")
-        return frozen_array(damping), None
+        return damping, None
     lowest = np.linalg.eigvalsh(damping + damping.T).min()
     if lowest < matrices.MIN_DAMPING_EIGENVALUE * np.abs(damping).max():
         raise PatchfemError(

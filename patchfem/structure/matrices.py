@@ -11,8 +11,9 @@ the modes stay coupled by D.
 import numpy as np
 from scipy.linalg import LinAlgError, cholesky, eigh, solve_triangular, svd
 
-from ..core import ModalBasis, PatchfemError, frozen_array
+from ..core import ModalBasis, PatchfemError
 from ..inputs.symmetric import read_numbers, symmetrize
+from .modes import make_basis
 
 # Round-off of an eigenvalue of an n x n matrix, divided by n and relative to the largest eigenvalue
 EIGENVALUE_TOL = 16 * np.finfo(float).eps
@@ -109,23 +110,20 @@ def build_basis(
         base = np.ones(n) if base is None else _check_row(base, n, "base")
         participation = phi.T @ (M @ base)
     patch_motions = {
-        key: frozen_array(_check_row(row, n, key) @ phi)
-        for key, row in rows.items()
-        if row is not None and np.any(row)
+        key: _check_row(row, n, key) @ phi for key, row in rows.items() if row is not None
     }
-    slides = frozen_array(faces @ phi)
-    output_motion = frozen_array(output @ phi)
-    return ModalBasis(
-        names=tuple(names) if names is not None else tuple(str(k + 1) for k in range(n)),
-        omega=frozen_array(omega),
+    slides = faces @ phi
+    return make_basis(
+        tuple(names) if names is not None else tuple(str(k + 1) for k in range(n)),
+        1.0,
+        omega=omega,
         zeta=zeta,
-        slide=slides[0] if len(slides) else output_motion,
-        base=frozen_array(participation),
-        output=output_motion,
-        mass=1.0,
+        slide=slides[0] if len(slides) else output @ phi,
+        base=participation,
+        output=output @ phi,
         damping=damping,
         faces=None if len(slides) == 1 else slides,
-        shapes=frozen_array(phi),
+        shapes=phi,
         **patch_motions,
     )
 
@@ -138,7 +136,7 @@ def split_damping(D, omega) -> tuple:
     diagonal = np.diag(D)
     zeta = np.divide(diagonal, 2 * omega, out=np.zeros_like(diagonal), where=omega > 0)
     is_coupled = (D - np.diag(diagonal)).any() or diagonal[omega == 0].any()
-    return frozen_array(zeta), frozen_array(D) if is_coupled else None
+    return zeta, D if is_coupled else None
 
 
 def decouple_modes(rows) -> tuple:

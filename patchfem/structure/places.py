@@ -5,8 +5,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ..core import ModalBasis, PatchfemError, frozen_array
+from ..core import ModalBasis, PatchfemError
 from ..inputs.universal import DIRECTION_NAMES
+from .modes import make_basis
 
 # Pattern of a node with a direction, such as "12:+x"
 DIRECTION_PATTERN = re.compile(r"(\d+):([+-]?)(r?[xyz])")
@@ -131,20 +132,14 @@ def build_basis(shapes: MeasuredModes, mass: float, places: dict, *, is_forced: 
         )
     order = np.argsort(shapes.frequency, kind="stable")
     sign = np.where(output[order] < 0, -1.0, 1.0)
-    patch_motions = {}
-    for key in ("normal", "pitch"):
-        row = rows.get(f"{key}_at")
-        if row is not None and row.any():
-            patch_motions[key] = frozen_array(row[order] * sign)
-    return ModalBasis(
-        names=tuple(f"mode {k + 1}" for k in range(order.size)),
-        omega=frozen_array(2 * np.pi * shapes.frequency[order]),
-        zeta=frozen_array(shapes.zeta[order]),
-        slide=frozen_array(slide[order] * sign),
-        base=frozen_array(base[order] * sign),
-        output=frozen_array(output[order] * sign),
-        mass=float(mass),
-        **patch_motions,
+    motions = {"slide": slide, "base": base, "output": output}
+    motions |= {key: rows.get(f"{key}_at") for key in ("normal", "pitch")}
+    return make_basis(
+        tuple(f"mode {k + 1}" for k in range(order.size)),
+        mass,
+        omega=2 * np.pi * shapes.frequency[order],
+        zeta=shapes.zeta[order],
+        **{key: row[order] * sign for key, row in motions.items() if row is not None},
     )
 
 
