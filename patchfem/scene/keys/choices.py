@@ -39,13 +39,20 @@ _OTHER_WAVEFORM_KEYS = " ".join(
         re.findall(r"\w+", re.sub("acceleration[|]displacement|force", "", _WAVEFORM_KEYS))
     )
 )
+ALTERNATIVES = {  # keys of which a table always needs one
+    contact.Contact: "load|approach",
+    contact.LoadLine: "offset|moment",
+    contact.Holder: "rotational_stiffness/tangential_stiffness",
+    tables.Interface: "load|contact",
+    tables.Structure: "mode|masses|file|reduced",
+    tables.Start: "displacement/velocity",
+    tables.WornFriction: "coefficient_factor/bond_length_factor",
+}
 # A selector that an earlier one of the same table leaves unused does not count, and neither do the keys that the
 # earlier one leaves unused.
 SELECTORS = (
-    Selector(contact.Contact, "", {"": ("load|approach", "")}),
+    *(Selector(model, "", {"": (words, "")}) for model, words in ALTERNATIVES.items()),
     Selector(contact.OnePiece, "", {"": ("", "chamfer|end_radius")}),
-    Selector(contact.LoadLine, "", {"": ("offset|moment", "")}),
-    Selector(contact.Holder, "", {"": ("rotational_stiffness/tangential_stiffness", "")}),
     Selector(
         contact.Asperities,
         "law",
@@ -58,7 +65,6 @@ SELECTORS = (
             ),
         },
     ),
-    Selector(tables.Interface, "", {"": ("load|contact", "")}),
     Selector(
         tables.Friction,
         "law",
@@ -75,8 +81,6 @@ SELECTORS = (
             "file": ("file", ""),
         },
     ),
-    Selector(tables.Structure, "", {"": ("mode|masses|file|reduced", "")}),
-    Selector(tables.Start, "", {"": ("displacement/velocity", "")}),
     Selector(
         tables.Drive,
         "kind",
@@ -92,7 +96,6 @@ SELECTORS = (
         "onset",
         {"slip": ("", ""), "distortion": ("", ""), "gauge": ("onset_length", "")},
     ),
-    Selector(tables.WornFriction, "", {"": ("coefficient_factor/bond_length_factor", "")}),
     Selector(
         tables.Measured,
         "reading",

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cache, cached_property, reduce
+from itertools import chain, repeat
 from typing import Any, NamedTuple
 
 from ...effects import (
@@ -160,7 +161,26 @@ class Feature(NamedTuple):
     words: str = ""
 
 
+# Features that only the friction law has, with a function of the joint that tells whether it has them.
+LAW_FEATURES = {
+    "law for a constant load": lambda j: not j.has_trait("bonds") and j.lacks("varying-load"),
+    "law with memory for a constant pressure": lambda j: (
+        not j.has_trait("memoryless") and not j.has_trait("bonds") and j.lacks("varying-load")
+    ),
+    "law for rigid pieces": lambda j: (
+        not j.is_interface and not j.has_trait("bonds") and j.lacks("shear")
+    ),
+    "law without elements": lambda j: j.is_interface and j.lacks("pieces", "shear"),
+    "law for one interface": lambda j: j.lacks("joints"),
+    "law for flat faces": lambda j: not j.needs_list and j.lacks("grooves"),
+    "law without bonds": lambda j: not j.has_trait("bonds"),
+    "law of an averaged pressure": lambda j: j.has_trait("averaged"),
+    "law that sticks rigidly": lambda j: j.has_trait("set-valued") and j.supports("shear"),
+}
 FEATURES = {
+    name: Feature(is_there, "{table_key}.law", "{law_description}")
+    for name, is_there in LAW_FEATURES.items()
+} | {
     # kinds of scenes and drives
     "bench": Feature(lambda j: j.kind == "bench"),
     "rig": Feature(lambda j: j.kind == "rig"),
@@ -183,44 +203,7 @@ FEATURES = {
     "changing load": Feature(
         lambda j: j.kind == "rig" and j.load_change, "{load_change}", "{load_change_description}"
     ),
-    # the law
-    "law for a constant load": Feature(
-        lambda j: not j.has_trait("bonds") and j.lacks("varying-load"),
-        "{table_key}.law",
-        "law '{law}'",
-    ),
-    "law with memory for a constant pressure": Feature(
-        lambda j: (
-            not j.has_trait("memoryless") and not j.has_trait("bonds") and j.lacks("varying-load")
-        ),
-        "{table_key}.law",
-        "law '{law}'",
-    ),
-    "law for rigid pieces": Feature(
-        lambda j: not j.is_interface and not j.has_trait("bonds") and j.lacks("shear"),
-        "{table_key}.law",
-        "'{law}'",
-    ),
-    "law without elements": Feature(
-        lambda j: j.is_interface and j.lacks("pieces", "shear"),
-        "{table_key}.law",
-        "{law_description}",
-    ),
-    "law for one interface": Feature(
-        lambda j: j.lacks("joints"), "{table_key}.law", "{law_description}"
-    ),
-    "law for flat faces": Feature(
-        lambda j: not j.needs_list and j.lacks("grooves"), "{table_key}.law", "law '{law}'"
-    ),
-    "law without bonds": Feature(
-        lambda j: not j.has_trait("bonds"), "{table_key}.law", "law '{law}'"
-    ),
-    "law of an averaged pressure": Feature(
-        lambda j: j.has_trait("averaged"), "{table_key}.law", "law '{law}'"
-    ),
-    "law that sticks rigidly": Feature(
-        lambda j: j.has_trait("set-valued") and j.supports("shear"), "{table_key}.law", "'{law}'"
-    ),
+    # the law; LAW_FEATURES has more
     "kinetic below static": Feature(
         lambda j: j.has_trait("set-valued") and j.supports("shear") and -1 < j.kinetic < j.static,
         "{table_key}.kinetic",
@@ -284,101 +267,113 @@ WITHOUT_JOINT = (
     "the joint has no single stiffness to subtract from the modes: give the modes without the joint"
 )
 STEADY_ADVICE = "wear is computed from the last cycle of a steady motion: use"
-# Features that no run supports together, and what to do instead: a key of `effects.REMEDIES`, or the advice itself. A
-# mistake is reported at the key of the first feature.
-SUPPORT = (
-    ("law for a constant load, changing load", suggest_laws("varying-load")),
-    ("sum over all stretched bonds, changing load", "recursion"),
-    ("law that sticks rigidly, partial slip, changing load", "stiff"),
-    ("structure.stiffening, changing load", "either"),
-    ("structure.bonded.wavelength, changing load", "either"),
-    ("patch.strips, changing load", "either"),
-    ("patch.asperities.law=exponential, changing load", "linear"),
-    ("patch.asperities.law=hertz, changing load", "linear"),
-    ("shape on the lower piece, changing load", "shapes"),
-    (
+# Features that no run supports together, by what to do instead: a key of `effects.REMEDIES`, or the advice itself. A
+# mistake is reported at the key of the first feature, and only the first row of a key counts.
+COMBINATIONS = {
+    suggest_laws("varying-load"): (
+        "law for a constant load, changing load",
         "normal.amplitude, bench, law with memory for a constant pressure",
-        suggest_laws("varying-load"),
     ),
-    (
+    "recursion": (
+        "sum over all stretched bonds, changing load",
+        "sum over all bonds, grooves",
+    ),
+    "stiff": ("law that sticks rigidly, partial slip, changing load",),
+    "either": (
+        "structure.stiffening, changing load",
+        "structure.bonded.wavelength, changing load",
+        "patch.strips, changing load",
+        "patch.strips, strips that slip together, partial slip",
+        "grooves, patch.strips, mode with yaw",
+        "grooves, patch.strips, partial slip",
+        "normal.amplitude, grooves",
+        "mode with heave or pitch, grooves",
+        "structure.stiffening, grooves",
+        "structure.bonded.wavelength, grooves",
+    ),
+    "linear": (
+        "patch.asperities.law=exponential, changing load",
+        "patch.asperities.law=hertz, changing load",
+    ),
+    "shapes": (
+        "shape on the lower piece, changing load",
+        "shape on the lower piece, law without bonds, rig",
+        "shape on the lower piece, law without bonds, partial slip",
+        "shape on the lower piece, bench, law with memory for a constant pressure",
+        "shape on the lower piece, interface",
+        "shape on the lower piece, grooves",
+    ),
+    "use 'recursion' or 'auto'": (
         "named method of the sum, rig, sum by recursion, shape on the lower piece",
-        "use 'recursion' or 'auto'",
+        "named method of the sum, grooves",
     ),
-    (
+    SINGLE_SUMS: (
         "accuracy.quadrature=merged, bench, patch that slips as a whole, shape on the lower piece",
-        SINGLE_SUMS,
-    ),
-    (
         "accuracy.quadrature=merged, bench, patch that slips as a whole, normal.amplitude",
-        SINGLE_SUMS,
     ),
-    ("mode with yaw, patch.strips, rig, law for one interface", "{joints_advice}"),
-    ("patch.strips, law of an averaged pressure", "out"),
-    ("patch.strips, strips that slip together, partial slip", "either"),
-    ("law for rigid pieces, partial slip", f"leave out {{compliance}}, or {suggest_laws('shear')}"),
-    ("kinetic below static, partial slip", "kinetic"),
-    ("shape on the lower piece, law without bonds, rig", "shapes"),
-    ("shape on the lower piece, law without bonds, partial slip", "shapes"),
-    ("shape on the lower piece, bench, law with memory for a constant pressure", "shapes"),
-    ("shape on the lower piece, interface", "shapes"),
-    ("sum over all bonds, grooves", "recursion"),
-    ("law for flat faces, grooves", "{grooves_advice}"),
-    ("named method of the sum, grooves", "use 'recursion' or 'auto'"),
-    (
+    "{joints_advice}": (
+        "mode with yaw, patch.strips, rig, law for one interface",
+        "law for one interface, several interfaces",
+        "law for one interface, patch of an interface",
+    ),
+    "out": (
+        "patch.strips, law of an averaged pressure",
+        "patch.holder.tangential_stiffness, grooves",
+        "spread of the bonds, interface",
+        "patch.grooves, interface",
+    ),
+    f"leave out {{compliance}}, or {suggest_laws('shear')}": (
+        "law for rigid pieces, partial slip",
+    ),
+    "kinetic": ("kinetic below static, partial slip",),
+    "{grooves_advice}": ("law for flat faces, grooves",),
+    "leave `harmonics` out: the motion is integrated until it repeats": (
         "accuracy.harmonics, accuracy.method=harmonic, grooves",
-        "leave `harmonics` out: the motion is integrated until it repeats",
     ),
-    (
+    "leave `harmonics` out: the steady motion of all interfaces is found without it": (
         "accuracy.harmonics, accuracy.method=harmonic, several interfaces",
-        "leave `harmonics` out: the steady motion of all interfaces is found without it",
     ),
-    ("patch.holder.tangential_stiffness, grooves", "out"),
-    ("grooves, patch.strips, mode with yaw", "either"),
-    ("grooves, patch.strips, partial slip", "either"),
-    ("normal.amplitude, grooves", "either"),
-    ("mode with heave or pitch, grooves", "either"),
-    ("shape on the lower piece, grooves", "shapes"),
-    ("structure.stiffening, grooves", "either"),
-    ("structure.bonded.wavelength, grooves", "either"),
-    ("spread of the bonds, interface", "out"),
-    ("law for one interface, several interfaces", "{joints_advice}"),
-    ("law for one interface, patch of an interface", "{joints_advice}"),
-    (
+    f"leave out {{compliance}}, or {suggest_laws('pieces', 'shear')}": (
         "law without elements, partial slip",
-        f"leave out {{compliance}}, or {suggest_laws('pieces', 'shear')}",
     ),
-    ("patch.approach, interface", "give contact.load instead"),
-    ("patch.grooves, interface", "out"),
-    (
+    "give contact.load instead": ("patch.approach, interface",),
+    "a [normal] contact has no area, so its wear has no depth: use [contact]": (
         "wear, grooves, load on a point",
-        "a [normal] contact has no area, so its wear has no depth: use [contact]",
     ),
-    ("wear, patch.strips, partial slip", "leave out [wear] or {compliance}"),
-    ("wear, patch.strips, shape on the lower piece", "put all shapes on the upper piece"),
-    ("wear, patch.strips, wear.start", "leave out [wear] or leave out wear.start"),
-    ("wear, rig, normal.amplitude", "leave out [wear] or the amplitude"),
-    (
+    "leave out [wear] or {compliance}": ("wear, patch.strips, partial slip",),
+    "put all shapes on the upper piece": ("wear, patch.strips, shape on the lower piece",),
+    "leave out [wear] or leave out wear.start": ("wear, patch.strips, wear.start",),
+    "leave out [wear] or the amplitude": ("wear, rig, normal.amplitude",),
+    "leave out [wear] or describe a single interface by [friction] and [normal]": (
         "wear, structure.interface",
-        "leave out [wear] or describe a single interface by [friction] and [normal]",
     ),
-    ("wear, mode with heave or pitch", "leave out [wear] or this key"),
-    ("wear, rig, drive.kind=free", f"{STEADY_ADVICE} kind 'base' or 'force'"),
-    ("wear, rig, drive other than a sine", f"{STEADY_ADVICE} waveform 'sine'"),
-    ("wear, rig, accuracy.method=harmonic", "use 'auto', 'exact' or 'march'"),
-    ("structure.measured=stuck, structure.masses", ONLY_MODES),
-    ("structure.measured=stuck, structure.reduced", ONLY_MODES),
-    ("structure.measured=stuck, structure.bonded.wavelength", WITHOUT_JOINT),
-    ("structure.measured=stuck, contact.grooves", WITHOUT_JOINT),
-    ("structure.measured=stuck, normal.grooves", WITHOUT_JOINT),
-    ("structure.measured=stuck, normal.amplitude", WITHOUT_JOINT),
-    ("structure.measured=stuck, mode with heave or pitch", WITHOUT_JOINT),
-    ("structure.measured=stuck, mode with yaw", WITHOUT_JOINT),
-    ("structure.measured=stuck, patches of interfaces", WITHOUT_JOINT),
-    ("sensor apart from the output, structure.travel", AT_OUTPUT),
-    ("sensor apart from the output, structure.stiffening", AT_OUTPUT),
-    ("sensor apart from the output, drive.kind=free", AT_OUTPUT),
-    ("sensor apart from the output, levels or sweep in time", AT_OUTPUT),
-    ("wear, law of an averaged pressure", "leave out [wear] or use law 'coulomb'"),
+    "leave out [wear] or this key": ("wear, mode with heave or pitch",),
+    f"{STEADY_ADVICE} kind 'base' or 'force'": ("wear, rig, drive.kind=free",),
+    f"{STEADY_ADVICE} waveform 'sine'": ("wear, rig, drive other than a sine",),
+    "use 'auto', 'exact' or 'march'": ("wear, rig, accuracy.method=harmonic",),
+    ONLY_MODES: (
+        "structure.measured=stuck, structure.masses",
+        "structure.measured=stuck, structure.reduced",
+    ),
+    WITHOUT_JOINT: (
+        "structure.measured=stuck, structure.bonded.wavelength",
+        "structure.measured=stuck, contact.grooves",
+        "structure.measured=stuck, normal.grooves",
+        "structure.measured=stuck, normal.amplitude",
+        "structure.measured=stuck, mode with heave or pitch",
+        "structure.measured=stuck, mode with yaw",
+        "structure.measured=stuck, patches of interfaces",
+    ),
+    AT_OUTPUT: (
+        "sensor apart from the output, structure.travel",
+        "sensor apart from the output, structure.stiffening",
+        "sensor apart from the output, drive.kind=free",
+        "sensor apart from the output, levels or sweep in time",
+    ),
+    "leave out [wear] or use law 'coulomb'": ("wear, law of an averaged pressure",),
+}
+SUPPORT = tuple(
+    chain.from_iterable(zip(rows, repeat(instead)) for instead, rows in COMBINATIONS.items())
 )
 
 
