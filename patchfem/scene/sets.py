@@ -21,7 +21,7 @@ def format_assignments(sets: dict[str, Any]) -> tuple[str, ...]:
     and NumPy scalars and arrays are accepted too.
     """
     return tuple(
-        f"{key}={value if isinstance(value, str) else _format_toml(key, value)}"
+        f"{key}={value if isinstance(value, str) else format_toml_value(key, value)}"
         for key, value in sets.items()
     )
 
@@ -31,7 +31,9 @@ def format_scene(tables: dict[str, Any]) -> str:
 
     Texts are as in a scene, numbers are in SI.
     """
-    return "".join(f"{name} = {_format_toml(str(name), table)}\n" for name, table in tables.items())
+    return "".join(
+        f"{name} = {format_toml_value(str(name), table)}\n" for name, table in tables.items()
+    )
 
 
 def format_values(key: str, values: Any, separator: str = ",") -> str:
@@ -132,21 +134,35 @@ def _format_value(key: str, value: Any) -> str:
         if is_toml or not set(",\"'[{") & set(value):
             return value
         return json.dumps(value, ensure_ascii=False)
-    text = _format_toml(key, value)
+    text = format_toml_value(key, value)
     return text[1:-1] if text.startswith('"') else text
 
 
-def _format_toml(key: str, value: Any) -> str:
-    """Return a TOML value with all digits; if the key has a unit, a number becomes a string in SI."""
+def format_toml_value(key: str, value: Any, kind: str | None = None) -> str:
+    """Return a TOML value with all digits; if the key has a unit, a number becomes a string in SI.
+
+    Parameters
+    ----------
+    key : str
+        Dotted key of a scene.
+    value
+        Value of the key, or a table or list of values.
+    kind : str, optional
+        Kind of quantity of the value; default: that of the key.
+    """
     value = _to_plain_value(value)
     if isinstance(value, dict):
-        pairs = [f"{name} = {_format_toml(f'{key}.{name}', item)}" for name, item in value.items()]
+        pairs = [
+            f"{name} = {format_toml_value(f'{key}.{name}', item)}" for name, item in value.items()
+        ]
         return f"{{{', '.join(pairs)}}}"
     if isinstance(value, list | tuple):
-        items = [_format_toml(f"{key}.{index}", item) for index, item in enumerate(value)]
+        items = [
+            format_toml_value(f"{key}.{index}", item, kind) for index, item in enumerate(value)
+        ]
         return f"[{', '.join(items)}]"
     if isinstance(value, bool | str):
-        return json.dumps(value, ensure_ascii=False)
+        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
     if not isinstance(value, Real):
         raise SceneError(
             [
@@ -154,7 +170,7 @@ def _format_toml(key: str, value: Any) -> str:
                 "in SI units, a boolean, or a list of such values"
             ]
         )
-    kind = _find_kind(key)
+    kind = kind or _find_kind(key)
     if kind is not None:
         return json.dumps(format_si(value, kind))
     return repr(int(value) if isinstance(value, Integral) else float(value))

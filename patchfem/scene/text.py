@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import re
 from collections.abc import Iterator
 from typing import Any
@@ -10,9 +9,9 @@ from typing import Any
 from .keys.choices import find_choices, iterate_tables
 from .keys.contact import Material
 from .keys.memoize import memoize
-from .keys.quantities import format_si
 from .keys.tables import Accuracy, Drive, Measured, Tables
-from .keys.types import Key, Table, list_keys
+from .keys.types import Table, list_keys
+from .sets import format_toml_value
 
 _INTERFACE_PATCH_PATTERN = re.compile(r"structure\.interface\.\d+\.contact\b")
 _ITEM_PATTERN = re.compile(r"\.\d+")
@@ -75,38 +74,24 @@ def _format_lines(table: Table, table_key: str) -> Iterator[str]:
         if value in (None, ()) or name in unused:
             continue
         path = f"{table_key}.{name}" if table_key else name
+        header = _ITEM_PATTERN.sub("", path)
         if isinstance(value, tuple) and isinstance(value[0], Table):
-            inner += [(f"[[{path}]]", path, item) for item in value]
+            inner += [(f"[[{header}]]", f"{path}.{k}", item) for k, item in enumerate(value)]
         elif isinstance(value, Table) and not isinstance(value, Material):
-            inner.append((f"[{path}]", path, value))
+            inner.append((f"[{header}]", path, value))
         else:
-            yield f"{name} = {_format_value(value, _find_kind(table, key))}"
+            # The levels of a force drive are forces.
+            is_force = isinstance(table, Drive) and name == "levels" and table.kind == "force"
+            if isinstance(value, Material):
+                value = _list_values(value)
+            yield f"{name} = {format_toml_value(path, value, 'force' if is_force else None)}"
     for header, path, item in inner:
         yield ""
         yield header
         yield from _format_lines(item, path)
 
 
-def _find_kind(table: Table, key: Key) -> str | None:
-    """Return the kind of quantity of an attribute; the levels of a force drive are forces."""
-    is_force = isinstance(table, Drive) and key.name == "levels" and table.kind == "force"
-    return "force" if is_force else key.kind
-
-
-def _format_value(value: Any, kind: str | None) -> str:
-    """Format a value as TOML."""
-    if isinstance(value, Material):
-        given = {key: getattr(value, key.attribute) for key in list_keys(Material).values()}
-        pairs = [
-            f"{key.name} = {_format_value(item, key.kind)}"
-            for key, item in given.items()
-            if item is not None
-        ]
-        return f"{{{', '.join(pairs)}}}"
-    if isinstance(value, tuple):
-        return f"[{', '.join(_format_value(item, kind) for item in value)}]"
-    if kind is not None:
-        return f'"{format_si(value, kind)}"'
-    if isinstance(value, str):
-        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
-    return repr(value)
+def _list_values(table: Table) -> dict[str, Any]:
+    """Return the values of a table by the names of their keys, without missing ones."""
+    values = {name: getattr(table, key.attribute) for name, key in list_keys(type(table)).items()}
+    return {name: value for name, value in values.items() if value is not None}
