@@ -21,7 +21,7 @@ def format_assignments(sets: dict[str, Any]) -> tuple[str, ...]:
     and NumPy scalars and arrays are accepted too.
     """
     return tuple(
-        f"{key}={value if isinstance(value, str) else format_toml_value(key, value)}"
+        f"{key}={value if isinstance(value, str) else write_value(key, value)}"
         for key, value in sets.items()
     )
 
@@ -31,9 +31,7 @@ def format_scene(tables: dict[str, Any]) -> str:
 
     Texts are as in a scene, numbers are in SI.
     """
-    return "".join(
-        f"{name} = {format_toml_value(str(name), table)}\n" for name, table in tables.items()
-    )
+    return "".join(f"{name} = {write_value(str(name), table)}\n" for name, table in tables.items())
 
 
 def format_values(key: str, values: Any, separator: str = ",") -> str:
@@ -134,11 +132,11 @@ def _format_value(key: str, value: Any) -> str:
         if is_toml or not set(",\"'[{") & set(value):
             return value
         return json.dumps(value, ensure_ascii=False)
-    text = format_toml_value(key, value)
+    text = write_value(key, value)
     return text[1:-1] if text.startswith('"') else text
 
 
-def format_toml_value(key: str, value: Any, kind: str | None = None) -> str:
+def write_value(key: str, value: Any, kind: str | None = None) -> str:
     """Return a TOML value with all digits; if the key has a unit, a number becomes a string in SI.
 
     Parameters
@@ -152,14 +150,10 @@ def format_toml_value(key: str, value: Any, kind: str | None = None) -> str:
     """
     value = _to_plain_value(value)
     if isinstance(value, dict):
-        pairs = [
-            f"{name} = {format_toml_value(f'{key}.{name}', item)}" for name, item in value.items()
-        ]
+        pairs = [f"{name} = {write_value(f'{key}.{name}', item)}" for name, item in value.items()]
         return f"{{{', '.join(pairs)}}}"
     if isinstance(value, list | tuple):
-        items = [
-            format_toml_value(f"{key}.{index}", item, kind) for index, item in enumerate(value)
-        ]
+        items = [write_value(f"{key}.{index}", item, kind) for index, item in enumerate(value)]
         return f"[{', '.join(items)}]"
     if isinstance(value, bool | str):
         return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")

@@ -11,7 +11,7 @@ from .keys.contact import Material
 from .keys.memoize import memoize
 from .keys.tables import Accuracy, Drive, Measured, Tables
 from .keys.types import Table, list_keys
-from .sets import format_toml_value
+from .sets import write_value
 
 _INTERFACE_PATCH_PATTERN = re.compile(r"structure\.interface\.\d+\.contact\b")
 _ITEM_PATTERN = re.compile(r"\.\d+")
@@ -84,7 +84,7 @@ def _format_lines(table: Table, table_key: str) -> Iterator[str]:
             is_force = isinstance(table, Drive) and name == "levels" and table.kind == "force"
             if isinstance(value, Material):
                 value = _list_values(value)
-            yield f"{name} = {format_toml_value(path, value, 'force' if is_force else None)}"
+            yield f"{name} = {write_value(path, value, 'force' if is_force else None)}"
     for header, path, item in inner:
         yield ""
         yield header

@@ -24,11 +24,10 @@ def make_basis(names: tuple, mass: float, **arrays: np.ndarray | None) -> ModalB
     **arrays
         Other fields of `core.ModalBasis`; None for one without a value.
     """
-    frozen = {
-        key: frozen_array(values)
-        for key, values in arrays.items()
-        if values is not None and (key not in PATCH_MOTIONS or np.any(values))
-    }
+    frozen = {}
+    for key, values in arrays.items():
+        if values is not None and (key not in PATCH_MOTIONS or np.any(values)):
+            frozen[key] = frozen_array(values)
     return ModalBasis(names=names, mass=float(mass), **frozen)
 
 
