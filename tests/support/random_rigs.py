@@ -250,3 +250,9 @@ def compare_harmonic_rig(seed: int, folder: Path, earlier: dict | None = None) -
     """Compare the rig of a seed if its scene names harmonic balance, else return None; see `campaigns`."""
     s = draw_spec(seed)
     return compare_spec(s, folder, earlier) if s.get("method") == "harmonic" else None
+
+
+def compare_marched_rig(seed: int, folder: Path, earlier: dict | None = None) -> dict | None:
+    """Compare the rig of a seed in time steps, unless its scene names a method."""
+    s = draw_spec(seed)
+    return None if s.get("method") else compare_spec(s | {"method": "march"}, folder, earlier)

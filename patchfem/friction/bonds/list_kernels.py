@@ -12,10 +12,11 @@ from math import expm1, log1p
 from typing import NamedTuple
 
 import numpy as np
+from numba import uint64
 
 from ...compiled.jit import njit
 from ..flags_kernels import NJIT_KERNEL, NJIT_NO_REFCOUNT
-from .list_math_kernels import fast_exp, power
+from .list_math_kernels import LONG_RULE, MAX_SHORT_PANEL, SHORT_RULE, fast_exp, power
 from .list_rows_kernels import (
     FORM_GROWING,
     FORM_REPORT,
@@ -30,8 +31,8 @@ from .list_rows_kernels import (
     STRIP,
 )
 from .list_sum_kernels import (
-    GAUSS_RULE_5,
     MIN_LENGTH_RATIO,
+    MIN_POSITIVE,
     BondSum,
     PathValues,
     average_formed,
@@ -66,7 +67,7 @@ MIN_ENERGY_STEP_SPREAD = 1e-6
 # Largest increment in bond lengths for which Simpson's rule is accurate enough
 MAX_SIMPSON_STEP = 0.1
 MAX_SIMPSON_STEP_STEEP = 0.03  # the same limit for an order below 1
-MAX_PANEL_LENGTH = 0.5  # largest length of the first panel of five Gauss points, in bond lengths
+MAX_PANEL_LENGTH = 0.5  # largest length of the first panel of Gauss points, in bond lengths
 # Increment [bond lengths] at which the slope of the force at rest is the mean of both directions
 SLOPE_INCREMENT_RATIO = 1e-9
 
@@ -299,7 +300,6 @@ def list_mean_and_slope(increment, bonds, v0, dt):
     mean = list_mean(increment, bonds, v0, dt)
     small = SLOPE_INCREMENT_RATIO * bonds.law[LAW.length]
     if abs(increment) > small:
-        sum_list(1.0, increment, bonds, v0, dt)
         return MeanForce(mean, (total(STRIP.force, 0, bonds) - mean) / increment)
     sum_list(1.0, small, bonds, v0, dt)
     forward = total(STRIP.force, 0, bonds)
@@ -315,7 +315,7 @@ def list_mean(increment, bonds, v0, dt):
     fraction dR/eps of the stored energy, and the mean force is this loss plus the gain in stored energy, per increment.
     For reading="report" it is the mean of the force; the part of the initial bonds has a closed form.
 
-    The row `STRIP.mean` receives the part of every strip.
+    The row `STRIP.mean` receives the part of every strip, and the rows of the sum those at the end of the increment.
 
     Parameters
     ----------
@@ -326,7 +326,7 @@ def list_mean(increment, bonds, v0, dt):
     -------
     float
     """
-    if increment == 0:
+    if abs(increment) < MIN_POSITIVE:
         return bonds.status[STATUS.force]
     strips = bonds.bondlist
     first = int(bonds.status[STATUS.room_start])
@@ -352,10 +352,11 @@ def list_mean(increment, bonds, v0, dt):
         _add_to_mean(4 * share * loss / 6, row, bonds)
     if share < 1:
         _integrate_panels((1 - share) * loss, row, increment, bonds, v0, dt)
-    _add_to_mean(-gain, present_row, bonds)
+    if gain != 0:
+        _add_to_mean(-gain, present_row, bonds)
+    sum_list(1.0, increment, bonds, v0, dt)
     end_weight = gain + share * loss / 6
     if end_weight != 0:
-        sum_list(1.0, increment, bonds, v0, dt)
         _add_to_mean(end_weight, row, bonds)
 
     # A closed form replaces the rule, but not for the new bonds of reading="report": their steep force at the start of
@@ -371,16 +372,17 @@ def list_mean(increment, bonds, v0, dt):
 @njit(**NJIT_KERNEL)
 def _add_to_mean(weight, row, bonds):
     """Add a row of all bonds, times a weight, to the row of the mean force."""
-    strips = bonds.bondlist
-    first = int(bonds.status[STATUS.room_start])
-    strips[STRIP.mean, first] += weight * strips[row, first]
-    for k in range(int(bonds.status[STATUS.head]), int(bonds.status[STATUS.end]) + 1):
-        strips[STRIP.mean, k] += weight * strips[row, k]
+    first = uint64(bonds.status[STATUS.room_start])
+    mean = bonds.bondlist[STRIP.mean]
+    values = bonds.bondlist[row]
+    mean[first] += weight * values[first]
+    for k in range(uint64(bonds.status[STATUS.head]), uint64(bonds.status[STATUS.end] + 1)):
+        mean[k] += weight * values[k]
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def _integrate_panels(weight, row, increment, bonds, v0, dt):
-    """Add a row, averaged over an increment by panels of five Gauss points, to the row of the mean force.
+    """Add a row, averaged over an increment by panels of Gauss points, to the row of the mean force.
 
     Each panel is twice as long as the one before. The last one may be short, so that the mean force depends continuously
     on the increment.
@@ -389,7 +391,9 @@ def _integrate_panels(weight, row, increment, bonds, v0, dt):
     low = 0.0
     high = min(MAX_PANEL_LENGTH / path, 1.0)
     while low < 1:
-        for point, point_weight in GAUSS_RULE_5:
+        is_short = path * (high - low) <= MAX_SHORT_PANEL and bonds.law[LAW.order] >= 0
+        rule = SHORT_RULE if is_short else LONG_RULE
+        for point, point_weight in zip(rule[0], rule[1]):
             fraction = low + (high - low) * (1 + point) / 2
             sum_list(fraction, increment, bonds, v0, dt)
             _add_to_mean(weight * (high - low) * point_weight / 2, row, bonds)

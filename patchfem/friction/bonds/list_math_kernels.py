@@ -1,10 +1,11 @@
-"""Exponential, logarithm, power and incomplete gamma function for the compiled sums over bonds.
+"""Exponential, logarithm, power, incomplete gamma function and Gauss rules for the compiled sums over bonds.
 
 `fast_exp` and `fast_log` have no branches: a loop that calls them takes 0.5 ns per exponential and
 1 ns per power.
 """
 
 import numpy as np
+from numpy.polynomial.legendre import leggauss
 
 from ...compiled.jit import njit
 from ..flags_kernels import NJIT_NO_REFCOUNT
@@ -13,6 +14,11 @@ from .list_rows_kernels import N_TABLE_STEPS
 N_SERIES_TERMS = (
     22  # number of terms of the series of P(p + 1, x) that are above round-off for x < 1
 )
+
+# Gauss rules of the panels of an increment: points in (-1, 1) and weights (2, k)
+MAX_SHORT_PANEL = 0.1  # largest length of a panel with fewer points, in bond lengths
+SHORT_RULE = np.array(leggauss(3))
+LONG_RULE = np.array(leggauss(5))
 
 
 @njit(error_model="numpy", fastmath={"contract"}, **NJIT_NO_REFCOUNT)

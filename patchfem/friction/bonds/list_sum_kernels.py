@@ -49,13 +49,6 @@ MAX_PIECE_DAMAGE = 0.07
 MAX_PIECES = 4
 # Ratio of u to the length of a piece from which two Gauss points are more exact than a difference of powers
 FAR_RATIO = 30.0
-GAUSS_RULE_5 = (  # five Gauss points in (-1, 1), each with its weight
-    (-0.906179845938664, 0.23692688505618908),
-    (-0.5384693101056831, 0.47862867049936647),
-    (0.0, 0.5688888888888889),
-    (0.5384693101056831, 0.47862867049936647),
-    (0.906179845938664, 0.23692688505618908),
-)
 
 
 class BondSum(NamedTuple):

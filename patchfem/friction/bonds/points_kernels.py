@@ -11,6 +11,7 @@ from ...compiled.jit import njit
 from ..flags_kernels import NJIT_NO_REFCOUNT
 from . import list_kernels, list_step_kernels
 from .list_rows_kernels import LAW, STATUS, STRIP, BondList
+from .list_sum_kernels import MIN_POSITIVE
 from .point_kernels import bond_mean, bond_step, grow, press_point
 
 
@@ -79,6 +80,8 @@ def advance_list(bonds, increment, before, after, dt, out):
     strips = bonds.bondlist
     status = bonds.status
     speed = abs(increment) / dt if dt > 0 else 0.0
+    if abs(increment) < MIN_POSITIVE:
+        increment = 0.0
     new = int(status[STATUS.end])
     status[STATUS.pressure] = 0.0
     for j in range(before.size):

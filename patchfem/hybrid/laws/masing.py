@@ -75,10 +75,10 @@ def force_and_rates(p, memory, point, s, rates):
         force = p[values] + slope * (x - p[first])
 
     slipping = force - x * slope
-    speed = direction * point.velocity
-    return Friction(
-        start_force + direction / half * force, slipping / p[2] * point.velocity, slipping * speed
-    )
+    # Elements without a slip force hold nothing, so that the whole displacement is slip.
+    fraction = slipping / p[2] if p[2] > 0 else 1.0
+    loss = slipping * direction * point.velocity
+    return Friction(start_force + direction / half * force, fraction * point.velocity, loss)
 
 
 def write_margins(p, memory, point, s, margins):

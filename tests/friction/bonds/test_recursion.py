@@ -9,7 +9,7 @@ from friction_paths import (
     reference_traction,
     upper_pressure,
 )
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from patchfem.friction import Bonds, FirstOrderBonds, ListedBonds
@@ -104,6 +104,7 @@ def test_exact_slope_equals_derivative_of_mean():
 
 
 @given(st.lists(st.floats(-3, 3), min_size=1, max_size=15), growth_parameters())
+@example([2e-309], {})
 def test_always_sum_over_bonds_is_passive(steps, growth):
     """Dissipated and stored energy of the sum over bonds are never negative."""
     law = ListedBonds(Bonds(1.0, 1.0, **growth), tail=0.0)
