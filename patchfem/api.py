@@ -63,7 +63,6 @@ from .runs.run import run as run_plan
 from .scene import assignments, starting
 from .scene.backbone_scene import BackboneTables
 from .scene.files import require_files
-from .scene.keys import removed
 from .scene.keys.quantities import parse_quantity
 from .scene.overrides import BaseScene
 from .scene.scene import Scene, SceneError, loads, remember_written
@@ -144,21 +143,6 @@ def _strip_file_and_line_from_errors(function: Callable) -> Callable:
             raise
 
     return call_with_short_errors
-
-
-def _reject_removed_options(function: Callable) -> Callable:
-    """Decorate a function so that removed options raise a PatchfemError with advice."""
-
-    @wraps(function)
-    def check_options_and_call(*args: Any, **keywords: Any) -> Any:
-        """Call the function, unless a keyword is a removed option."""
-        verb = function.__name__
-        for name in keywords:
-            if sentence := removed.describe_removed(f"{verb} --{name}", f"{verb}: {name}"):
-                raise PatchfemError(sentence)
-        return function(*args, **keywords)
-
-    return check_options_and_call
 
 
 @_strip_file_and_line_from_errors
@@ -884,7 +868,6 @@ def _format_bounds(key: str, ends: Any) -> str:
     return f"{key}={format_values(key, ends, '..')}"
 
 
-@_reject_removed_options
 def profile(
     *files: str | Path,
     cutoff: float | str | None = None,
@@ -943,7 +926,6 @@ def profile(
     return roughness.answer_files(paths, units, cutoff=length, window=limits).details
 
 
-@_reject_removed_options
 def report(folders: str | Path | Iterable[str | Path], /, out: str | Path | None = None) -> Path:
     """Make the page of a results folder again, or a page that shows several folders side by side.
 

@@ -26,7 +26,7 @@ from import_graph import (
 from patchfem.exceptions import PatchfemError
 from patchfem.scene import Material, Tables
 from patchfem.scene.keys.contact import OnePiece
-from patchfem.scene.keys.types import find_inner_table, is_array_attribute, list_allowed_values
+from patchfem.scene.keys.types import list_keys
 from patchfem.scene.text import EFFECT_KEYS
 
 HERE = Path(__file__).parents[1]
@@ -279,16 +279,13 @@ def effect_names(model, key):
     if not selectors:
         yield key
     for selector in selectors:
-        for value in list_allowed_values(model, selector):
+        for value in list_keys(model)[selector].allowed:
             yield f"{key}.{selector}={value}"
-    for name in () if issubclass(model, OnePiece) else model.model_fields:
-        inner = find_inner_table(model, name)
-        if inner is not None and not issubclass(inner, Material):
-            for effect in effect_names(inner, f"{key}.{name}"):
+    for name, inside in () if issubclass(model, OnePiece) else list_keys(model).items():
+        if inside.inner is not None and not issubclass(inside.inner, Material):
+            for effect in effect_names(inside.inner, f"{key}.{name}"):
                 # an array of tables has effects only for the values of its selectors
-                if not is_array_attribute(model, name) or (
-                    "=" in effect and ".contact" not in effect
-                ):
+                if not inside.is_array or ("=" in effect and ".contact" not in effect):
                     yield effect
 
 
@@ -296,8 +293,8 @@ def test_always_scene_tables_have_effects():
     """Every table of a scene and every value of its selectors has an entry in the table of effects, which `plan` prints."""
     from patchfem.effects import EFFECTS, list_absent_effects
 
-    tables = [key for key in Tables.model_fields if find_inner_table(Tables, key)]
-    names = {name for key in tables for name in effect_names(find_inner_table(Tables, key), key)}
+    tables = [key for key in list_keys(Tables).values() if key.inner]
+    names = {name for key in tables for name in effect_names(key.inner, key.name)}
     assert len(names) > 50
     # the defaults of these keys have no effect, see patchfem/scene/text.py
     missing = names - set(EFFECTS) - {"accuracy", "measured.reading=peak"}

@@ -1,4 +1,4 @@
-"""Each feature removed in patchfem 1.0, 1.1 or 2.0 is refused with one sentence that names its replacement."""
+"""Each feature removed in patchfem 2.0 is refused with one sentence that names its replacement."""
 
 import re
 from functools import partial
@@ -47,11 +47,6 @@ def run_failing_command(words: tuple, folder) -> None:
     raise pf.PatchfemError(answer.err)
 
 
-def call(function, name: str, folder) -> None:
-    """Call a function with one keyword argument that was removed."""
-    function(folder, **{name: "5 um"})
-
-
 def read_file(reader, name: str, folder) -> None:
     """Write a file with the given name and read it."""
     path = folder / name
@@ -85,51 +80,13 @@ def write_rig(folder):
 
 
 TRIED = {  # removed feature -> (function that uses it, replacement that the message names)
-    **{
-        f"method {name}": (partial(load, RIG, {"accuracy.method": name}), "use 'march'")
-        for name in ("duhamel", "newmark", "euler")
-    },
-    **{
-        key: (
-            partial(
-                load,
-                WORN if key.startswith("wear.") else RIG,
-                {key.replace(".mode.", ".mode.axial."): value},
-            ),
-            instead,
-        )
-        for key, value, instead in (
-            ("accuracy.convergence", "force", "use method 'march' without it"),
-            ("accuracy.convergence_tolerance", 1e-4, "use method 'march' without it"),
-            ("accuracy.stick_speed", "1 mm/s", "use method 'march' without it"),
-            ("wear.scheme", "explicit", "contact and wear are always solved together"),
-            ("structure.mode.lateral", 0.2, "the patch slides along x alone"),
-            ("friction.breakaway", 0.2, "law 'iwan' or 'elastic-plastic' does not creep"),
-        )
-    },
-    "quadrature exponential": (
-        partial(load, BONDS, {"accuracy.quadrature": "exponential"}),
-        "use 'merged'",
+    "structure.mode.lateral": (
+        partial(load, RIG, {"structure.mode.axial.lateral": 0.2}),
+        "the patch slides along x alone",
     ),
-    "profile --level": (
-        partial(run_failing_command, ("profile", "a.csv", "--level=1 um")),
-        "Abbott curve of the page",
-    ),
-    "profile --ratios": (
-        partial(run_failing_command, ("profile", "a.csv", "--ratios", "5,50")),
-        "Abbott curve of the page",
-    ),
-    "profile --tip": (
-        partial(run_failing_command, ("profile", "a.csv", "--tip", "5 um")),
-        "compare the tip radius with",
-    ),
-    "report --measured": (
-        partial(run_failing_command, ("report", "out", "--measured", "a.csv")),
-        "`patchfem import FILE",
-    ),
-    "sweep --device": (
-        partial(run_failing_command, ("sweep", "a.toml", "--device=cuda")),
-        "-j N or --executor dask",
+    "friction.breakaway": (
+        partial(load, RIG, {"friction.breakaway": 0.2}),
+        "law 'iwan' or 'elastic-plastic' does not creep",
     ),
     "fit --placebo": (
         partial(run_failing_command, ("fit", "a.toml", "--placebo", "friction.static=0.3")),
@@ -153,8 +110,6 @@ TRIED = {  # removed feature -> (function that uses it, replacement that the mes
     ),
     "export of a structure as .npz": (export_structure, "exported as .mat"),
     "export of a script for ParaView": (export_script, "write .pvd for older versions"),
-    "profile(tip=)": (partial(call, pf.profile, "tip"), "compare the tip radius with"),
-    "report(measured=)": (partial(call, pf.report, "measured"), "`patchfem import FILE"),
     "backbone by decay": (
         lambda folder: pf.backbone(write_rig(folder), method="decay"),
         'drive.kind = "free"',
@@ -190,16 +145,13 @@ def test_refuses_removed_feature(tmp_path, name):
     with pytest.raises(pf.PatchfemError) as refused:
         attempt(tmp_path)
     sentence = str(refused.value)
-    assert re.search(r"removed in patchfem (1\.[01]|2\.0)\b", sentence) and instead in sentence
+    assert re.search(r"removed in patchfem (1\.0|2\.0)\b", sentence) and instead in sentence
     assert len(sentence.strip().splitlines()) == 1
 
 
 def test_always_all_removed_features_are_tested():
-    """Every removed option, key and quadrature rule is among the tested features."""
-    names = {name.replace("accuracy.quadrature=", "quadrature ") for name in removed.REMOVED_NAMES}
-    assert {name for name in names if "accuracy.method=" not in name} - {"files of Nastran"} <= set(
-        TRIED
-    )
+    """Every removed option and key is among the tested features."""
+    assert set(removed.REMOVED_NAMES) - {"files of Nastran"} <= set(TRIED)
 
 
 @pytest.mark.skipif(

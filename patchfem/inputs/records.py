@@ -59,7 +59,7 @@ class Records:
     channel_list: str = ""
 
 
-def check_file(path: Path, remedy: str, location: str = "") -> None:
+def check_file(path: Path, remedy: str) -> None:
     """Raise Missing if the file does not exist, and PatchfemError if it is too large.
 
     Parameters
@@ -67,13 +67,11 @@ def check_file(path: Path, remedy: str, location: str = "") -> None:
     path : Path
     remedy : str
         What to do with a file that is too large.
-    location : str
-        Beginning of the message.
     """
     if not path.is_file():
-        raise Missing(f"{location}{path}: there is no such file")
+        raise Missing(f"{path}: there is no such file")
     if path.stat().st_size > MAX_BYTES:
-        raise PatchfemError(f"{location}{path}: more than {MAX_BYTES >> 20} MiB; {remedy}")
+        raise PatchfemError(f"{path}: more than {MAX_BYTES >> 20} MiB; {remedy}")
 
 
 def parse_requests(texts: Iterable, quantities: Iterable = CHANNEL_UNITS) -> list[RequestedChannel]:

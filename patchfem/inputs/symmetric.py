@@ -1,4 +1,4 @@
-"""Checks of the matrices of a structure, full or sparse: real, square, finite and symmetric."""
+"""Checks of the arrays of a structure: real, finite, of the right shape; matrices also square and symmetric."""
 
 import numpy as np
 from scipy import sparse
@@ -44,6 +44,35 @@ def to_real(values, subject: str):
     raise PatchfemError(
         f"{subject} is complex (imaginary parts are up to {ratio:.2g} times the real parts); "
         f"motion in time needs real matrices{remedy}"
+    )
+
+
+def read_numbers(values, subject: str, *shapes: tuple) -> np.ndarray:
+    """Return an array as finite real numbers; raise PatchfemError if it holds anything else.
+
+    Parameters
+    ----------
+    values : array_like
+    subject : str
+        Name of the array, at the beginning of messages.
+    *shapes : tuple of int or None
+        Shapes that are allowed; None stands for any length. The last length of the first one is the number of
+        coordinates. Without a shape the array is flattened.
+    """
+    values = np.asarray(to_real(values, subject))
+    if values.dtype.kind not in "iufb":
+        raise PatchfemError(f"{subject} does not contain real numbers")
+    values = values.astype(float)
+    if not np.isfinite(values).all():
+        raise PatchfemError(f"{subject} contains values that are not finite")
+    if not shapes:
+        return values.ravel()
+    for shape in shapes:
+        lengths = zip(shape, values.shape)
+        if len(shape) == values.ndim and all(length in (None, size) for length, size in lengths):
+            return values
+    raise PatchfemError(
+        f"{subject} has shape {values.shape}, but there are {shapes[0][-1]} coordinates or modes"
     )
 
 

@@ -37,14 +37,12 @@ class FunctionType(IntEnum):
     FREQUENCY_RESPONSE = 4
 
 
-def read_datasets(path, location: str = "") -> list[dict]:
+def read_datasets(path) -> list[dict]:
     """Read the datasets 55, 58 and 164 of a universal file in order, as pyuff returns them.
 
     Parameters
     ----------
     path : path-like
-    location : str
-        Beginning of the error messages.
 
     Returns
     -------
@@ -61,19 +59,18 @@ def read_datasets(path, location: str = "") -> list[dict]:
         import pyuff
     except ImportError:
         raise Missing(
-            f"{location}reading universal files needs the package pyuff; run pip install "
-            "'patchfem[lab]'"
+            "reading universal files needs the package pyuff; run pip install 'patchfem[lab]'"
         ) from None
     path = Path(path)
-    check_file(path, "export fewer channels or a part of the record", location)
-    with refuse_damage(f"{location}{path}: cannot be read as a universal file"):
+    check_file(path, "export fewer channels or a part of the record")
+    with refuse_damage(f"{path}: cannot be read as a universal file"):
         file = pyuff.UFF(str(path))
         types = [int(kind) for kind in file.get_set_types()]
         numbers = [number for number, kind in enumerate(types) if kind in (55, 58, 164)]
         datasets = [file.read_sets(number) for number in numbers]
     if not datasets:
         raise PatchfemError(
-            f"{location}{path}: no dataset 55 (modes) or 58 (records, frequency responses); its datasets: "
+            f"{path}: no dataset 55 (modes) or 58 (records, frequency responses); its datasets: "
             f"{', '.join(map(str, types)) or 'none'}"
         )
     return datasets

@@ -2,12 +2,13 @@
 
 from pathlib import Path
 
-from ..core import ModalBasis, PatchfemError
+from ..core import ModalBasis
 from ..effects import find_waveform, import_effect
 from ..inputs import signals
 from ..structure import drives
 from ..structure.drive_sizes import DriveKeys, find_first_period
 from .file_cache import cache_by_file
+from .source import name_key
 
 
 def build_signal(scene, modes: ModalBasis):
@@ -27,14 +28,12 @@ def build_signal(scene, modes: ModalBasis):
 
 
 def _read_recorded_drive(scene) -> tuple:
-    """Read the columns of the file drive.file; an error names the line of this key."""
-    try:
-        path = scene.resolve_path(scene.drive.file)
+    """Read the columns of the file drive.file."""
+    path = scene.resolve_path(scene.drive.file)
+    with name_key("drive.file"):
         if find_waveform(scene.drive).is_random:
             return signals.read_spectrum(path)
         return read_drive_file(path, scene.drive.kind)
-    except PatchfemError as error:
-        raise type(error)(f"{scene.where('drive.file')}: {error}") from None
 
 
 @cache_by_file

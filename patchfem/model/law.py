@@ -15,10 +15,9 @@ from ..core import PatchfemError
 from ..effects import import_effect, law_takes_stiffness_or_length
 from ..friction.bonds import parameters, spread
 from . import patch as patch_models
+from .source import name_key
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from ..scene.keys.tables import Friction
     from ..scene.scene import Scene
     from .patch import PatchModel
@@ -63,9 +62,7 @@ class InterfaceLaw:
         return FrictionLimits(law.static * load, kinetic * load)
 
 
-def make_effective_law(
-    law: Friction, width: float | None, locate_key: Callable, load: float | None = None
-) -> Friction:
+def make_effective_law(law: Friction, width: float | None, load: float | None = None) -> Friction:
     """Return the keys of a friction law after applying the effects that change its parameters.
 
     `rest_growth` and `slip_growth` are taken at the surface temperature; `static` and `kinetic` are
@@ -76,8 +73,6 @@ def make_effective_law(
     law : Friction
     width : float or None
         Width [m] of the contact across the path.
-    locate_key : callable
-        Function of a key that returns file and line for a message.
     load : float, optional
         Normal load [N].
 
@@ -94,7 +89,7 @@ def make_effective_law(
         return complete_bond_length(law, load)
     changes = {"temperature": None, "spread": None}
     if law.temperature is not None and law.rest_growth is not None:
-        rest_growth, slip_growth = _scale_growth_rates(law, locate_key)
+        rest_growth, slip_growth = _scale_growth_rates(law)
         changes |= {"rest_growth": rest_growth, "slip_growth": slip_growth}
     if law.spread is not None:
         factor = spread.carried_fraction(width, law.spread)
@@ -103,10 +98,10 @@ def make_effective_law(
     return complete_bond_length(law.model_copy(update=changes), load)
 
 
-def _scale_growth_rates(law: Friction, locate_key: Callable) -> tuple:
+def _scale_growth_rates(law: Friction) -> tuple:
     """Return the growth rates of bonds, at rest and during slip, at the surface temperature."""
     heat = law.temperature
-    try:
+    with name_key("friction.temperature"):
         return import_effect("friction.temperature").growth_at_temperature(
             law.rest_growth,
             law.slip_growth,
@@ -115,8 +110,6 @@ def _scale_growth_rates(law: Friction, locate_key: Callable) -> tuple:
             heat.rest_activation,
             heat.slip_activation,
         )
-    except PatchfemError as error:
-        raise PatchfemError(f"{locate_key('friction.temperature')}: {error}") from None
 
 
 def complete_bond_length(law: Friction, load) -> Friction:
@@ -175,9 +168,7 @@ def build_interface_laws(scene: Scene) -> tuple:
         return tuple(_build_interface(scene, number) for number in range(len(tables)))
     if scene.friction is None:
         return ()
-    law = make_effective_law(
-        scene.friction, find_pad_width(scene), scene.where, find_normal_load(scene)
-    )
+    law = make_effective_law(scene.friction, find_pad_width(scene), find_normal_load(scene))
     return (InterfaceLaw("friction", law, None),)
 
 
@@ -186,7 +177,7 @@ def _build_interface(scene: Scene, number: int) -> InterfaceLaw:
     table = scene.structure.interface[number]
     return InterfaceLaw(
         key=f"structure.interface.{number}",
-        numbers=make_effective_law(table, None, scene.where, table.normal_load),
+        numbers=make_effective_law(table, None, table.normal_load),
         load=table.normal_load,
         patch=_build_interface_patch(scene, number),
     )

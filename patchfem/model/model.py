@@ -190,17 +190,26 @@ def build(scene: Scene) -> Model:
         If a file or a value cannot be used (with the line of its key), or if the scene has a
         [sweep] and so means many models.
     """
+    with locate_errors(scene):
+        return _build(scene)
+
+
+def _build(scene: Scene) -> Model:
+    """Build the model of a scene; a PatchfemError has the key at fault."""
     if scene.sweep:
         _refuse_sweep(scene)
+
+    # Patch, point and slide.
     patch_model = None
     if scene.contact is not None:
-        with locate_errors(scene):
-            patch_model = patch.build_patch(scene.contact, scene.kind, scene.resolve_path)
+        patch_model = patch.build_patch(scene.contact, scene.kind, scene.resolve_path)
     point = grooves = None
     if scene.friction is not None or (scene.structure is not None and scene.structure.interface):
         point = load.build_point_load(scene)
         grooves = load.build_grooves(scene)
     path = slide.build_slide(scene) if scene.slide is not None else None
+
+    # Rig and law; the mesh of the patch follows from what moves it.
     rig_model = None
     if scene.structure is not None:
         rig_model = rig.build_rig(scene)
@@ -211,6 +220,8 @@ def build(scene: Scene) -> Model:
         patch_model = patch_model.with_mesh(edge_motion=edge_motion)
         if path is not None and grooves is None:
             patch_model = _request_slip_mesh(patch_model, path, law.friction)
+
+    # The source is added last, because the resolved scene has defaults that follow from the model.
     effects = tuple(scene.effect_names())
     model = Model(
         source=None,
@@ -263,8 +274,9 @@ def _refuse_sweep(scene: Scene) -> None:
     count = prod(len(axis.texts) for axis in scene.sweep)
     first = " ".join(f'--set "{axis.key}={axis.texts[0]}"' for axis in scene.sweep)
     raise PatchfemError(
-        f"{scene.where('sweep')}: has {count} cases, but a single run computes only one; use "
-        f"`patchfem sweep`, or choose a case, such as the first: {first}"
+        f"has {count} cases, but a single run computes only one; use `patchfem sweep`, or choose a "
+        f"case, such as the first: {first}",
+        "sweep",
     )
 
 
@@ -295,7 +307,7 @@ def _build_law(scene: Scene, rig_model: Rig | None) -> _SceneLaw:
     if rig_model is not None:
         friction = rig_model.friction.interfaces[0].numbers
     else:
-        friction = make_effective_law(law, pad, scene.where, find_normal_load(scene))
+        friction = make_effective_law(law, pad, find_normal_load(scene))
     return _SceneLaw(friction, law.temperature, law.spread, pad)
 
 

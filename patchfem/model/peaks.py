@@ -8,6 +8,7 @@ from ..scene.keys.contact import Asperities
 from ..surface.files.read import read_profile
 from ..surface.roughness.peaks import Moments, TraceMoments, gaussian_peaks, trace_moments
 from .file_cache import cache_by_file
+from .source import name_key
 
 KEY_PREFIX = "contact.asperities."  # prefix of the keys in messages
 
@@ -45,10 +46,8 @@ def complete_asperities(
         moments = read_spectral_moments(path, cutoff).fine
         squares = {f"rms_{name}": value for name, value in moments._asdict().items()}
         table = table.model_copy(update={"from_": str(path), "cutoff": cutoff, **squares})
-    try:
+    with name_key(KEY_PREFIX + key):
         peaks = gaussian_peaks(Moments(table.rms_height, table.rms_slope, table.rms_curvature))
-    except PatchfemError as error:
-        raise PatchfemError(str(error), KEY_PREFIX + key) from None
     changes = {
         "radius": peaks.radius,
         "density": peaks.density,

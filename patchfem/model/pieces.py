@@ -9,6 +9,7 @@ from ..mesh import files
 from ..mesh.grid import ROW_SLOPE, TensorGrid, graded_grid, row_scale
 from ..scene.keys.quantities import UNIT_FACTORS
 from .patch import PatchModel, PatchPiece, PatchPieces
+from .source import name_key
 
 # Largest difference of equal sizes, as a fraction of the interface length; mesh files
 # contain coordinates of few digits.
@@ -102,11 +103,8 @@ def make_piece_meshes(patch: PatchModel) -> tuple:
         lower = _make_flat_grid(patch, pieces.lower)
         return lower, None if pieces.are_alike else _make_flat_grid(patch, pieces.upper)
 
-    try:
+    with name_key("contact.mesh"):
         pair = files.read_pieces(*patch.mesh.file)
-    except PatchfemError as error:
-        error.key = error.key or "contact.mesh"
-        raise
     check_mesh_size(pieces, pair.lower, pair.upper, patch.mesh.file.unit)
     return pair.lower, pair.upper
 

@@ -15,6 +15,7 @@ from ..surface.nodes import MEANS_OVER_WAVES, average_at_nodes, place_over_patch
 from ..surface.profile import Profile, clean, level, resample_evenly
 from ..surface.roughness.filter import mean_line
 from .file_cache import cache_by_file
+from .source import name_key
 
 CURVE_POINTS_PER_CELL = 16  # number of line segments per cell that represent a smooth profile
 # Standard deviation of heights [m] below which they are round-off of a straight line.
@@ -115,10 +116,8 @@ def read_trace(path: Path) -> Profile:
 
     A PatchfemError names the key of the file.
     """
-    try:
+    with name_key("contact.profile.file"):
         return _read_profile(path)
-    except PatchfemError as error:
-        raise type(error)(str(error), "contact.profile.file") from None
 
 
 def find_sample_spacing(path: Path) -> float:

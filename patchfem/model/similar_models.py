@@ -19,6 +19,7 @@ from .law import complete_bond_length, find_normal_load
 from .load import build_point_load
 from .model import Model, write_resolved
 from .rig import build_rig
+from .source import locate_errors
 
 if TYPE_CHECKING:
     from ..scene.keys.tables import Drive, Friction, Structure
@@ -112,7 +113,8 @@ def replace_numbers(
         changes["patch"] = patches.replace_loading_and_shapes(model.patch, scene.contact)
     if "structure" in tables and scene.structure.bonded is not None:
         # The bonded spring couples the modes of the scene, so they are computed anew.
-        rig = build_rig(scene)
+        with locate_errors(scene):
+            rig = build_rig(scene)
         changes["point"] = build_point_load(scene)
         changes["friction"] = rig.friction.interfaces[0].numbers
     else:

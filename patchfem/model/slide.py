@@ -7,9 +7,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..core import Missing, PatchfemError
+from ..core import Missing
 from ..inputs import slides
 from .file_cache import cache_by_file
+from .source import name_key
 
 # Smallest number of steps per straight leg; the coarsest run of the
 # error estimate keeps two of them.
@@ -185,10 +186,8 @@ def build_slide(scene) -> SlidePath:
     corners = None
     amplitude = keys.amplitude or keys.distance
     if keys.kind == "file":
-        try:
+        with name_key("slide.file"):
             corners = read_path_file(scene.resolve_path(keys.file))
-        except PatchfemError as error:
-            raise type(error)(f"{scene.where('slide.file')}: {error}") from None
         amplitude = float(np.ptp(corners[1])) / 2
     elif keys.kind == "dwell":
         corners = _list_dwell_corners(keys)

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from pathlib import Path
 
 from ..core import NotConverged, PatchfemError
@@ -15,7 +15,7 @@ class Source:
 
     - path: scene file.
     - text: text of the scene as it was read.
-    - write: function that returns `resolved`; its last argument is the model.
+    - write: function that returns `resolved`.
     - effects: effects that the scene names.
     - remarks: sentences about keys without effect.
     - sets: ``key=value`` strings that were given in addition to the text.
@@ -31,12 +31,6 @@ class Source:
     sets: tuple = ()
     notes: tuple = ()
 
-    def describes(self, model) -> bool:
-        """Return whether a model is unchanged since it was built from the scene."""
-        built = self.write.args[-1]
-        names = [part.name for part in fields(built) if part.name != "source"]
-        return all(getattr(model, name) is getattr(built, name) for name in names)
-
     @property
     def resolved(self) -> str:
         """Scene as TOML in SI units with all defaults; it is written on demand."""
@@ -45,6 +39,19 @@ class Source:
     def where(self, key: str) -> str:
         """Return file, line and key as text for a message."""
         return locate_key(self.path, self.text, key)
+
+
+@contextmanager
+def name_key(key: str) -> Iterator[None]:
+    """Give a key of the scene to each PatchfemError that is raised in the block and names none.
+
+    Functions of this folder do not know the lines of a scene; `locate_errors` of `build` adds them.
+    """
+    try:
+        yield
+    except PatchfemError as error:
+        error.key = error.key or key
+        raise
 
 
 @contextmanager

@@ -18,6 +18,7 @@ from ..structure import masses, starts
 from ..structure import modes as listed_modes
 from . import structure_files, structure_reduced
 from .law import InterfaceLaw, build_interface_laws, find_normal_load
+from .source import name_key
 
 # Fraction of the squared motion of the output below which a mode
 # moves the output by round-off only.
@@ -59,9 +60,9 @@ def build_modes(scene, own_modes: ModalBasis | None = None) -> ModalBasis:
         return modes
     if len(modes.interfaces) != 1 and not scene.structure.mode:
         raise PatchfemError(
-            f"{scene.where('structure.bonded')}: applies only to a single contact, but the rig has "
-            f"{len(modes.interfaces)} interfaces; instead write a spring between the two places that "
-            "an interface joins"
+            f"applies only to a single contact, but the rig has {len(modes.interfaces)} interfaces; "
+            "instead write a spring between the two places that an interface joins",
+            "structure.bonded",
         )
     return import_effect("structure.bonded").add_spring(modes, bonded.stiffness, bonded.damping)
 
@@ -96,9 +97,9 @@ def build_own_modes(scene, joint: float | None = None) -> ModalBasis:
         if slides and "`slide`" in str(error):
             key = f"structure.mode.{int(np.argmax(slides))}.slide"
         raise PatchfemError(
-            f"{scene.where(key)}: {error}; or give the frequencies of the bolted rig, "
-            "give a softer joint, or leave `measured` out if the frequencies were measured without the "
-            "joint"
+            f"{error}; or give the frequencies of the bolted rig, give a softer joint, or leave "
+            "`measured` out if the frequencies were measured without the joint",
+            key,
         ) from None
 
 
@@ -126,10 +127,7 @@ def compute_joint_stiffnesses(scene) -> list:
     stiffnesses = []
     for interface in build_interface_laws(scene):
         load = scene_load if interface.load is None else interface.load
-        try:
-            stiffnesses.append(compute_sticking_stiffness(interface, load))
-        except PatchfemError as error:
-            raise PatchfemError(f"{scene.where('structure.measured')}: {error}") from None
+        stiffnesses.append(compute_sticking_stiffness(interface, load))
     return stiffnesses
 
 
@@ -169,14 +167,15 @@ def _build_given_modes(scene) -> ModalBasis:
         return structure_reduced.build_reduced_modes(scene).modes
     if not structure.masses:
         return structure_files.read_scene_modes(scene).modes
-    return masses.build_basis(
-        structure.masses,
-        [(spring.between, spring.stiffness) for spring in structure.spring],
-        [(damper.between, damper.coefficient) for damper in structure.damper],
-        structure_reduced.list_slide_pairs(structure),
-        structure.output_mass or 1,
-        _find_driven_mass(scene) if scene.drive.kind == "force" else None,
-    )
+    with name_key("structure"):
+        return masses.build_basis(
+            structure.masses,
+            [(spring.between, spring.stiffness) for spring in structure.spring],
+            [(damper.between, damper.coefficient) for damper in structure.damper],
+            structure_reduced.list_slide_pairs(structure),
+            structure.output_mass or 1,
+            _find_driven_mass(scene) if scene.drive.kind == "force" else None,
+        )
 
 
 def _split_into_strips(scene, modes: ModalBasis) -> ModalBasis:
@@ -213,8 +212,8 @@ def build_start(scene, modes: ModalBasis) -> InitialState | None:
     travel = scene.structure.travel
     if travel is not None and abs(float(modes.output @ start.z)) > travel:
         raise PatchfemError(
-            f"{scene.where('structure.travel')}: the motion starts beyond this travel; raise "
-            "structure.travel or start nearer to the middle"
+            "the motion starts beyond this travel; raise structure.travel or start nearer to the middle",
+            "structure.travel",
         )
     return start if start.z.any() or start.v.any() else None
 
@@ -231,20 +230,14 @@ def compute_initial_state(scene, modes: ModalBasis) -> InitialState:
     if structure.start is not None:
         displacement = _extend_boundary_values(structure, modes, structure.start.displacement)
         velocity = _extend_boundary_values(structure, modes, structure.start.velocity)
-        try:
-            return starts.start_from_values(modes, displacement, velocity)
-        except PatchfemError as error:
-            text = str(error).removeprefix("structure.start: ")
-            raise PatchfemError(f"{scene.where('structure.start')}: {text}") from None
+        return starts.start_from_values(modes, displacement, velocity)
     if drive.kind == "free":
         if structure.masses is None and drive.mass is None:
             return starts.start_from_output_displacement(modes, drive.displacement)
         displacement = np.zeros(len(modes.names))
         mass = _find_driven_mass(scene)
         if mass > displacement.size:
-            raise PatchfemError(
-                f"{scene.where('drive.mass')}: the rig has only {displacement.size} coordinates"
-            )
+            raise PatchfemError(f"the rig has only {displacement.size} coordinates", "drive.mass")
         displacement[mass - 1] = drive.displacement
         return starts.start_from_values(modes, displacement)
     if drive.kind == "base" and find_waveform(drive).is_step and drive.displacement is not None:

@@ -7,6 +7,7 @@ from ..core import ModalBasis, PatchfemError
 from ..scene.rules.structure import LOCATION_KEYS, UNIVERSAL_EXTENSIONS
 from ..structure import arrays, places, universal
 from .file_cache import cache_by_file
+from .source import name_key
 
 
 class FileModes(NamedTuple):
@@ -17,12 +18,9 @@ class FileModes(NamedTuple):
 
 
 def read_scene_modes(scene) -> FileModes:
-    """Read the modes from structure.file; an error names the line of the key that cannot be used."""
+    """Read the modes from structure.file; the key of an error is the key at fault."""
     path = scene.resolve_path(scene.structure.file)
-    try:
-        return read_modes(path, scene.structure, scene.drive, needs_interface=scene.kind == "rig")
-    except PatchfemError as error:
-        raise type(error)(f"{scene.where(error.key)}: {error}") from None
+    return read_modes(path, scene.structure, scene.drive, needs_interface=scene.kind == "rig")
 
 
 def read_modes(path: Path, structure, drive, *, needs_interface: bool) -> FileModes:
@@ -46,25 +44,14 @@ def read_modes(path: Path, structure, drive, *, needs_interface: bool) -> FileMo
         If the file cannot be used; its `key` is the key at fault.
     """
     mass = None if drive.kind == "base" else drive.mass
-    try:
-        # Raises OSError for a file that cannot be found.
-        path.stat()
+    with name_key("structure.file"):
         return _build_modes(path, structure, drive.kind, mass, needs_interface)
-    except OSError as error:
-        raise PatchfemError(f"{path} cannot be read ({error.strerror})", "structure.file") from None
-    except PatchfemError as error:
-        key, _, message = str(error).partition(": ")
-        if key.startswith(("structure.", "drive.")):
-            raise type(error)(message, key) from None
-        raise type(error)(str(error), "structure.file") from None
 
 
 def read_content(path: Path):
     """Read a file but build no modes: return arrays by name, or the shapes of a universal file."""
-    try:
+    with name_key("structure.file"):
         return _read_file(path)
-    except PatchfemError as error:
-        raise type(error)(str(error).removeprefix("structure.file: "), "structure.file") from None
 
 
 def is_universal_file(path: Path) -> bool:
@@ -89,7 +76,8 @@ def _build_modes(
         return _build_modes_from_arrays(content, structure, is_forced, mass, needs_interface)
     if mass is not None:
         raise PatchfemError(
-            "drive.mass: a universal file has no numbered masses; use structure.force_at or output_at"
+            "a universal file has no numbered masses; use structure.force_at or output_at",
+            "drive.mass",
         )
     place_texts = {key: getattr(structure, key) for key in LOCATION_KEYS}
     modes = places.build_basis(content, structure.moving_mass, place_texts, is_forced=is_forced)
@@ -108,7 +96,7 @@ def _build_modes_from_arrays(
     )
     if needs_interface and not len(modes.interfaces):
         raise PatchfemError(
-            "structure.file: lacks `slide`, the motion at the patch; add `slide` to the file, or write "
+            "lacks `slide`, the motion at the patch; add `slide` to the file, or write "
             "[[structure.interface]]"
         )
     return FileModes(modes, [])

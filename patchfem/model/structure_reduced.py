@@ -13,6 +13,7 @@ from ..inputs import matrices
 from ..scene.rules.structure import MATRIX_KEYS
 from ..structure import reduced
 from ..structure.places import DIRECTION_NAMES
+from .source import name_key
 
 # Smallest relative uncertainty of a frequency that is reported.
 MIN_REPORTED_UNCERTAINTY = 1e-5
@@ -54,12 +55,12 @@ class _Coordinates(NamedTuple):
 
 
 def build_reduced_modes(scene) -> ReducedModes:
-    """Reduce the structure of a scene; a PatchfemError names the line of the key that cannot be used."""
+    """Reduce the structure of a scene; the key of a PatchfemError is the key at fault."""
     structure = scene.structure
     table = structure.reduced
     is_base_driven = scene.drive.kind == "base"
     output = structure.output_mass or 1
-    try:
+    with name_key("structure.reduced"):
         files = _find_files(table, scene.resolve_path)
         reduction, notes = _reduce(
             files,
@@ -85,8 +86,6 @@ def build_reduced_modes(scene) -> ReducedModes:
         keeps_all = reduction.modes.is_complete and table.modes >= n_computed
         counts = [] if keeps_all else [n_computed, table.modes // 2][: 1 + (table.modes > 1)]
         other_modes = tuple(build(count) for count in counts)
-    except PatchfemError as error:
-        raise type(error)(f"{scene.where(error.key or 'structure.reduced')}: {error}") from None
     notes = [*notes, _describe_reduction(reduction, modes, table)]
     max_modes = n_computed
     if not reduction.modes.is_complete:
@@ -145,10 +144,8 @@ def _find_file(key: str, path: Path) -> _MatrixFile:
 @lru_cache(maxsize=4)
 def _read_matrix(file: _MatrixFile) -> matrices.Matrix:
     """Read a matrix file; a file that has not changed is read only once."""
-    try:
+    with name_key(f"structure.reduced.{file.key}"):
         return matrices.read_matrix(file.path, file.key)
-    except PatchfemError as error:
-        raise PatchfemError(str(error), f"structure.reduced.{file.key}") from None
 
 
 @lru_cache(maxsize=4)
@@ -233,10 +230,8 @@ def _locate_coordinates(
     matrix_list: list, boundary: tuple, moved: tuple | None, is_base_driven: bool
 ) -> _Coordinates:
     """Find the rows of the boundary coordinates, and of those that move with the base."""
-    try:
+    with name_key("structure.reduced.mass"):
         stiffness = matrices.align_rows(*matrix_list)[0]
-    except PatchfemError as error:
-        raise PatchfemError(str(error), "structure.reduced.mass") from None
     if len(matrix_list) > 1 and not abs(matrix_list[0].values - matrix_list[1].values).nnz:
         raise PatchfemError(
             "contains the same numbers as the stiffness; give the file of the mass",

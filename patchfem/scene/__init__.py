@@ -58,7 +58,7 @@ PUBLIC = {
         "Tables",
         "Temperature",
     ),
-    "keys.types": ("find_meaning",),
+    "keys.types": ("Key", "list_keys"),
     "lines": (
         "locate_key",
         "number_items_from_one",

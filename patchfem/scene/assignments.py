@@ -12,26 +12,13 @@ from array import array
 from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
-from fractions import Fraction
 from itertools import chain
 from typing import Any, NamedTuple, get_origin
 
 from ..core import PatchfemError
 from .keys import quantities
-from .keys.lookup import (
-    LIMITS_BY_ERROR_TYPE,
-    find_key,
-    is_table_or_value,
-    validate_value,
-)
-from .keys.types import (
-    attributes_by_key,
-    find_inner_table,
-    find_quantity_kind,
-    is_array_attribute,
-    list_key_types,
-    list_required_keys,
-)
+from .keys.lookup import LIMITS_BY_ERROR_TYPE, validate_value
+from .keys.types import Key, list_keys, list_required_keys
 from .lines import split_assignment, split_key
 from .reader import read_set_value
 from .suggestions import require_key
@@ -85,32 +72,6 @@ BOUNDS = Form(
 )
 
 
-class FormattedNumbers(Sequence):
-    """Sequence of numbers, each formatted as text only when it is accessed.
-
-    Parameters
-    ----------
-    numbers : array of float64
-        Numbers in this unit.
-    unit : str
-        Unit of the scene; "" for plain numbers.
-    """
-
-    __slots__ = "numbers", "unit"
-
-    def __init__(self, numbers: array, unit: str):
-        self.numbers = numbers
-        self.unit = unit
-
-    def __len__(self) -> int:
-        return len(self.numbers)
-
-    def __getitem__(self, index: int | slice) -> str | list[str]:
-        if isinstance(index, slice):
-            return [_format_with_unit(number, self.unit) for number in self.numbers[index]]
-        return _format_with_unit(self.numbers[index], self.unit)
-
-
 @dataclass(frozen=True, slots=True)
 class Axis:
     """Swept key with its values.
@@ -143,28 +104,19 @@ class Interval(NamedTuple):
     """
 
     text: str
-    low: Fraction
-    high: Fraction
+    low: float
+    high: float
     unit: str
     count: int
     is_log: bool
 
-    def interpolate(self, fraction: Fraction | float) -> float:
-        """Return the value at a given fraction of the range."""
-        if not self.is_log:
-            return float(self.low + (self.high - self.low) * fraction)
-        if fraction in (0, 1):
-            return float(self.high if fraction else self.low)
-        return float(self.low) * (float(self.high) / float(self.low)) ** float(fraction)
-
-    def list_texts(self) -> list[str]:
-        """Return the values of the range as a scene writes them."""
-        if not 2 <= self.count <= MAX_RANGE_VALUES:
-            raise ValueError(
-                f"{self.text}: give the number of values after a colon, from 2 to {MAX_RANGE_VALUES}, such as :9"
-            )
-        fractions = (Fraction(k, self.count - 1) for k in range(self.count))
-        return [_format_with_unit(self.interpolate(part), self.unit) for part in fractions]
+    def list_texts(self, fractions: Iterable[float]) -> list[str]:
+        """Return the values at the given fractions of the range, as a scene writes them."""
+        if self.is_log:
+            numbers = (self.low ** (1 - part) * self.high**part for part in fractions)
+        else:
+            numbers = (self.low * (1 - part) + self.high * part for part in fractions)
+        return [_format_with_unit(number, self.unit) for number in numbers]
 
 
 @dataclass(frozen=True, slots=True)
@@ -195,11 +147,9 @@ class Range:
 
     def make_axis(self, fractions: Iterable[float]) -> Axis:
         """Return the key with the values at the given fractions of its range."""
-        numbers = array("d", map(self.interval.interpolate, fractions))
-        texts = FormattedNumbers(numbers, self.interval.unit)
-        return Axis(
-            self.key, texts, array("d", map(_make_value_reader(self.key), texts)), self.unit
-        )
+        texts = self.interval.list_texts(fractions)
+        values = array("d", map(_ValueReader(self.key, texts).read, texts))
+        return Axis(self.key, texts, values, self.unit)
 
 
 def read_assignments(
@@ -300,16 +250,14 @@ def make_axis(key: str, texts: Iterable[str], *, distinct: bool = True) -> Axis:
         With one line for each value that the key does not accept.
     """
     texts = tuple(texts)
-    _require_value_key(key, texts)
-    values, mistakes = _collect(_make_value_reader(key), texts)
-    if not mistakes and distinct and len(set(values)) < len(values):
+    reader = _ValueReader(key, texts)
+    values = _collect(reader.read, texts)
+    if distinct and len(set(values)) < len(values):
         twice = next(k for k, value in enumerate(values) if values.index(value) < k)
-        mistakes.append(f"{texts[twice]} is given twice")
-    if mistakes:
-        raise ValueError("\n".join(mistakes))
+        raise ValueError(f"{texts[twice]} is given twice")
     if all(isinstance(value, float) for value in values):
-        kind = find_quantity_kind(*find_key(key))
-        return Axis(key, texts, tuple(values), quantities.find_si_unit(kind))
+        unit = quantities.find_si_unit(reader.known.kind)
+        return Axis(key, texts, tuple(values), unit)
     return Axis(key, texts, texts, "")
 
 
@@ -331,21 +279,18 @@ def read_values(key: str, text: str, form: Form = LISTS) -> Axis | Range:
         With one line for each mistake.
     """
     pieces = _split_at_commas(text)
-    _require_value_key(key, pieces)
-    if not (form.has_lists or _holds_number(key)):
+    reader = _ValueReader(key, pieces)
+    if not (form.has_lists or reader.is_number):
         raise ValueError(
             "is not a number that can vary; only quantities and plain numbers can be free"
         )
     if form.has_ranges and len(pieces) == 1:
-        interval = _parse_interval(key, text.strip())
+        interval = reader.parse_interval(text.strip())
         if interval is not None:
-            return _make_range(key, interval, form)
+            return reader.make_range(interval, form)
     if not form.has_lists:
         raise ValueError(f"{text}: a range is needed, {form.usage}")
-    groups, mistakes = _collect(lambda piece: _list_texts(key, piece), pieces)
-    if mistakes:
-        raise ValueError("\n".join(mistakes))
-    return make_axis(key, chain.from_iterable(groups))
+    return make_axis(key, chain.from_iterable(_collect(reader.list_texts, pieces)))
 
 
 def _append_values(
@@ -358,8 +303,8 @@ def _append_values(
         mistakes += [f"{name}: {line}" if name else line for line in str(error).split("\n")]
 
 
-def _collect(read: Callable, texts: Iterable[str]) -> tuple[list, list[str]]:
-    """Apply a function to texts; return its results and the sentences of its ValueErrors."""
+def _collect(read: Callable, texts: Iterable[str]) -> list:
+    """Apply a function to texts and return its results; raise one ValueError with the sentences of all that it raises."""
     values = []
     mistakes = []
     for text in texts:
@@ -367,64 +312,145 @@ def _collect(read: Callable, texts: Iterable[str]) -> tuple[list, list[str]]:
             values.append(read(text))
         except ValueError as error:
             mistakes.append(str(error))
-    return values, mistakes
+    if mistakes:
+        raise ValueError("\n".join(mistakes))
+    return values
 
 
-def _list_texts(key: str, piece: str) -> list[str]:
-    """Return the values of one part of a list: those of a range, or a single value."""
-    if not piece:
-        raise ValueError("there is no value between two commas")
-    if about := _range_about(piece) if _holds_number(key) else "":
-        raise ValueError(
-            f"{piece}: write this range as {about}:9 for 9 values in it, or as {about} with --random"
+class _ValueReader:
+    """Reader of the values of one key.
+
+    - key: dotted key of a scene.
+    - known: record of the key.
+    - is_number: whether a value is a single number, with or without unit.
+
+    A key that no scene has, or that is a table, raises ValueError.
+    """
+
+    def __init__(self, key: str, texts: Sequence[str]) -> None:
+        self.key = key
+        self.known = _find_value_key(key, texts)
+        types = self.known.types
+        is_single = self.known.inner is None and tuple not in map(get_origin, types)
+        self.is_number = is_single and (float in types or int in types)
+        self.takes_float = float in types
+
+    def read(self, text: str) -> float | str:
+        """Convert a text to SI; a text that is not a number is unchanged. Raise ValueError for a wrong value."""
+        known = self.known
+        if self.is_number and known.kind is not None:
+            return quantities.parse_quantity(text, known.kind)
+        # Most drawn values are plain numbers; `read_set_value` is slow for thousands of them.
+        is_plain = self.is_number and self.takes_float
+        if is_plain and re.fullmatch(quantities.NUMBER_PATTERN, text):
+            return float(text)
+        value = quantities.read_percentage(read_set_value(self.key, text))
+        if isinstance(value, dict) and known.inner is not None:
+            return text
+        has_number = isinstance(value, int | float) and not isinstance(value, bool)
+        number = float(value) if has_number else text
+        validate_value(
+            self.key, number if has_number and self.takes_float else value, LIMITS_BY_ERROR_TYPE
         )
-    interval = _parse_interval(key, piece)
-    return [piece] if interval is None else interval.list_texts()
+        return number
 
+    def list_texts(self, piece: str) -> list[str]:
+        """Return the values of one part of a list: those of a range, or a single value."""
+        if not piece:
+            raise ValueError("there is no value between two commas")
+        if about := _range_about(piece) if self.is_number else "":
+            raise ValueError(
+                f"{piece}: write this range as {about}:9 for 9 values in it, or as {about} with --random"
+            )
+        interval = self.parse_interval(piece)
+        if interval is None:
+            return [piece]
+        if not 2 <= interval.count <= MAX_RANGE_VALUES:
+            raise ValueError(
+                f"{interval.text}: give the number of values after a colon, from 2 to {MAX_RANGE_VALUES}, such as :9"
+            )
+        return interval.list_texts(k / (interval.count - 1) for k in range(interval.count))
 
-def _parse_interval(key: str, piece: str) -> Interval | None:
-    """Parse a range such as ``1..9 mm:5`` or ``5 mm +- 1 mm``; return None for any other text."""
-    if not _holds_number(key):
-        return None
-    if about := _range_about(piece):
-        piece = f"{about}:lin"
-    match = _RANGE_PATTERN.fullmatch(piece)
-    if match is None:
-        return None
-    low, high, count, spacing = match.groups()
-    text = f"{low}..{high}"
-    # A bare number before the dots has the unit of the number after them, as in 1..9 mm.
-    units = [_QUANTITY_PATTERN.fullmatch(end) for end in (low, high)]
-    if all(units) and units[1][1] and not units[0][1]:
-        low = f"{low} {units[1][1]}"
+    def parse_interval(self, piece: str) -> Interval | None:
+        """Parse a range such as ``1..9 mm:5`` or ``5 mm +- 1 mm``; return None for any other text."""
+        if not self.is_number:
+            return None
+        if about := _range_about(piece):
+            piece = f"{about}:lin"
+        match = _RANGE_PATTERN.fullmatch(piece)
+        if match is None:
+            return None
+        low, high, count, spacing = match.groups()
+        text = f"{low}..{high}"
+        # A bare number before the dots has the unit of the number after them, as in 1..9 mm.
+        units = [_QUANTITY_PATTERN.fullmatch(end) for end in (low, high)]
+        if all(units) and units[1][1] and not units[0][1]:
+            low = f"{low} {units[1][1]}"
 
-    kind = find_quantity_kind(*find_key(key))
-    if kind is None:
-        low, high = (str(quantities.read_percentage(end)) for end in (low, high))
-        if any(re.fullmatch(quantities.NUMBER_PATTERN, end) is None for end in (low, high)):
-            raise ValueError(f"{text}: both ends of this range must be plain numbers")
-        ends = Fraction(low), Fraction(high)
+        # Both ends in the unit of the first one.
+        kind = self.known.kind
         unit = ""
-    else:
-        for end in (low, high):
-            quantities.parse_quantity(end, kind)
-        (low, unit), (high, high_unit) = map(quantities.split_quantity, (low, high))
-        factor = Fraction(_find_factor(high_unit, kind)) / Fraction(_find_factor(unit, kind))
-        ends = Fraction(low), Fraction(high) * factor
-    if ends[0] == ends[1]:
-        raise ValueError(f"{text}: both ends are the same value")
-    return Interval(text, *ends, unit, int(count or 0), _is_log(*ends, spacing))
+        if kind is None:
+            ends = [str(quantities.read_percentage(end)) for end in (low, high)]
+            if None in (re.fullmatch(quantities.NUMBER_PATTERN, end) for end in ends):
+                raise ValueError(f"{text}: both ends of this range must be plain numbers")
+        else:
+            in_si = [quantities.parse_quantity(end, kind) for end in (low, high)]
+            number, unit = quantities.split_quantity(low)
+            factor = quantities.UNIT_FACTORS[kind][quantities.normalize_unit(unit)]
+            ends = [number, in_si[1] / factor]
+        low, high = (_round_digits(float(end)) for end in ends)
+        if low == high:
+            raise ValueError(f"{text}: both ends are the same value")
+        return Interval(text, low, high, unit, int(count or 0), _is_log(low, high, spacing))
+
+    def make_range(self, interval: Interval, form: Form) -> Range:
+        """Return the range in which the key varies; raise ValueError if the key does not accept it."""
+        if not self.takes_float:
+            raise ValueError(
+                f"{interval.text}: a key that takes whole numbers takes no range; list the values, such as 1,2,3"
+            )
+        if interval.count:
+            raise ValueError(
+                f"{interval.text}:{interval.count}: the values lie anywhere between the ends; leave out "
+                f":{interval.count}"
+            )
+        texts = interval.list_texts((0, 1))
+        low, high = map(self.read, texts)
+        if not form.has_lists:
+            if not low < high:
+                raise ValueError(f"{interval.text}: the low bound must lie below the high bound")
+            for text, value in zip(texts, (low, high)):
+                validate_value(self.key, text if interval.unit else value)
+        return Range(self.key, low, high, self.known.kind, interval)
 
 
-def _find_factor(unit: str, kind: str) -> str:
-    return repr(quantities.UNIT_FACTORS[kind][quantities.normalize_unit(unit)])
+def _find_value_key(key: str, texts: Sequence[str]) -> Key:
+    """Find a key; raise ValueError for an unknown key, or for values that are assigned to a table; suggest keys."""
+    first = texts[0].partition("..")[0] if texts else ""
+    known = require_key(key, read_set_value("", first))
+    if known.accepts_value or (texts and all(text[:1] in ("{", "[", '"', "'") for text in texts)):
+        return known
+    suggested = list(dict.fromkeys([*list_required_keys(known.inner), *list_keys(known.inner)]))
+    pieces = split_key(key)
+    if known.is_array:
+        # The last piece names the array, an item of it, or a key for which no item is named.
+        if pieces[-1] in suggested:
+            suggested = [pieces.pop()]
+        if pieces[-1] == known.name:
+            pieces.append("NAME")
+    table = ".".join(pieces)
+    raise ValueError(
+        "is a table without a value of its own; choose a key of this table: "
+        f"{', '.join(f'{table}.{inner_key}' for inner_key in suggested[:4])}"
+    )
 
 
-def _is_log(low: Fraction, high: Fraction, spacing: str | None) -> bool:
+def _is_log(low: float, high: float, spacing: str | None) -> bool:
     """Return whether the values of a range are spaced logarithmically."""
     is_positive = low > 0 and high > 0
     if spacing is None and is_positive:
-        return max(low / high, high / low) >= MIN_LOG_RATIO
+        return _round_digits(max(low / high, high / low)) >= MIN_LOG_RATIO
     if spacing == "log" and not is_positive:
         raise ValueError("a logarithmic range needs both ends > 0")
     return spacing == "log"
@@ -440,8 +466,8 @@ def _range_about(text: str) -> str:
         return ""
     number, unit, width, width_unit = match.groups()
     try:
-        middle = Fraction(number)
-        half = Fraction(width)
+        middle = float(number)
+        half = float(width)
     except ValueError:  # the string is not a number, such as 1.2.3
         return ""
     if width_unit not in ("%", "", unit):
@@ -451,28 +477,7 @@ def _range_about(text: str) -> str:
         )
     if width_unit == "%":
         half = abs(middle) * half / 100
-    return "..".join(_format_with_unit(float(end), unit) for end in (middle - half, middle + half))
-
-
-def _make_range(key: str, interval: Interval, form: Form) -> Range:
-    """Return the range in which a key varies; raise ValueError if the key does not accept it."""
-    definition = find_key(key)
-    if float not in list_key_types(*definition):
-        raise ValueError(
-            f"{interval.text}: a key that takes whole numbers takes no range; list the values, such as 1,2,3"
-        )
-    if interval.count:
-        raise ValueError(
-            f"{interval.text}:{interval.count}: the values lie anywhere between the ends; leave out :{interval.count}"
-        )
-    texts = [_format_with_unit(float(end), interval.unit) for end in interval[1:3]]
-    low, high = map(_make_value_reader(key), texts)
-    if not form.has_lists:
-        if not low < high:
-            raise ValueError(f"{interval.text}: the low bound must lie below the high bound")
-        for text, value in zip(texts, (low, high)):
-            validate_value(key, text if interval.unit else value)
-    return Range(key, low, high, find_quantity_kind(*definition), interval)
+    return "..".join(_format_with_unit(end, unit) for end in (middle - half, middle + half))
 
 
 def _flatten_table(table: dict, table_key: str = "") -> list[tuple[str, Any]]:
@@ -482,42 +487,6 @@ def _flatten_table(table: dict, table_key: str = "") -> list[tuple[str, Any]]:
         path = f"{table_key}.{key}" if table_key else key
         pairs += _flatten_table(value, path) if isinstance(value, dict) else [(path, value)]
     return pairs
-
-
-def _require_value_key(key: str, texts: Sequence[str]) -> None:
-    """Raise ValueError for an unknown key, or for values that are assigned to a table; suggest keys."""
-    first = re.split(r"\.\.", texts[0])[0] if texts else ""
-    model, name = require_key(key, read_set_value("", first))
-    inner = find_inner_table(model, name)
-    if inner is None or is_table_or_value(model, name):
-        return
-    if texts and all(text.startswith(("{", "[", '"', "'")) for text in texts):
-        return
-    required = list_required_keys(inner)
-    suggested = [
-        *required,
-        *(inner_key for inner_key in attributes_by_key(inner) if inner_key not in required),
-    ]
-    pieces = split_key(key)
-    if is_array_attribute(model, name):
-        # The last piece names the array, an item of it, or a key for which no item is named.
-        if pieces[-1] in suggested:
-            suggested = [pieces.pop()]
-        if pieces[-1] == name:
-            pieces.append("NAME")
-    table = ".".join(pieces)
-    raise ValueError(
-        "is a table without a value of its own; choose a key of this table: "
-        f"{', '.join(f'{table}.{inner_key}' for inner_key in suggested[:4])}"
-    )
-
-
-def _holds_number(key: str) -> bool:
-    """Return whether the value of a key is a single number, with or without unit."""
-    place = find_key(key)
-    types = list_key_types(*place)
-    is_single = find_inner_table(*place) is None and tuple not in map(get_origin, types)
-    return is_single and (float in types or int in types)
 
 
 def _split_at_commas(text: str) -> list[str]:
@@ -546,36 +515,12 @@ def _split_at_commas(text: str) -> list[str]:
     return [*pieces, text[start:].strip()]
 
 
-def _make_value_reader(key: str) -> Callable[[str], float | str]:
-    """Return a function that converts the string of a value to SI; a string that is not a number is unchanged.
-
-    The function raises ValueError if the key does not accept the text.
-    """
-    place = find_key(key)
-    kind = find_quantity_kind(*place)
-    is_number = _holds_number(key)
-    takes_float = float in list_key_types(*place)
-
-    def read_value(text: str) -> float | str:
-        if is_number and kind is not None:
-            return quantities.parse_quantity(text, kind)
-        # Most drawn values are plain numbers; `read_set_value` is slow for thousands of them.
-        if is_number and takes_float and re.fullmatch(quantities.NUMBER_PATTERN, text):
-            return float(text)
-        value = quantities.read_percentage(read_set_value(key, text))
-        if isinstance(value, dict) and find_inner_table(*place) is not None:
-            return text
-        has_number = isinstance(value, int | float) and not isinstance(value, bool)
-        validate_value(
-            key, float(value) if has_number and takes_float else value, LIMITS_BY_ERROR_TYPE
-        )
-        return float(value) if has_number else text
-
-    return read_value
-
-
 def _format_with_unit(value: float, unit: str) -> str:
     """Format a value of a swept key with its unit."""
-    number = float(f"{value:.{SIGNIFICANT_DIGITS}g}")
     # repr writes whole numbers below 1e16 without an exponent.
-    return f"{repr(number).removesuffix('.0')} {unit}".rstrip()
+    return f"{repr(_round_digits(value)).removesuffix('.0')} {unit}".rstrip()
+
+
+def _round_digits(value: float) -> float:
+    """Return a number rounded to SIGNIFICANT_DIGITS."""
+    return float(f"{value:.{SIGNIFICANT_DIGITS}g}")

@@ -2,24 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from typing import Any
 
-from ..effects import law_takes_key
 from .keys import tables
 from .keys.choices import find_choices
+from .keys.contact import Contact
 from .keys.memoize import memoize
-from .keys.types import attributes_by_key
+from .keys.types import Table, list_keys
 from .rules.accuracy import find_unused_settings
-from .rules.friction import is_kinetic_unused, is_rest_speed_unused, is_temperature_unused
+from .rules.friction import find_unused_law_keys
 from .rules.methods import list_unused_methods
 from .rules.structure import default_output
-
-SLIDE_DEFAULTS = {  # default values of the keys that each slide.kind uses
-    "sine": {"cycles": 1.0},
-    "triangle": {"cycles": 1.0, "distance": 0.0},
-    "dwell": {"distance_after": 0.0},
-}
 
 
 def complete_tables(scene: tables.Tables, kind: str) -> tables.Tables:
@@ -27,86 +20,76 @@ def complete_tables(scene: tables.Tables, kind: str) -> tables.Tables:
     unused = list(find_unused_settings(scene, kind))
     if scene.accuracy.method in list_unused_methods(kind):
         unused.append("method")
-    changed = {"accuracy": _reset_unused_keys(scene.accuracy, unused)} if unused else {}
-    for name, complete_table in (
-        ("contact", _complete_contact),
-        ("friction", _complete_law),
-        ("slide", _complete_slide),
-        ("structure", _complete_structure),
-        ("drive", _complete_drive),
-    ):
-        table = getattr(scene, name)
-        if table is not None:
-            changed[name] = complete_table(table)
+    changed = _complete_inner_tables(scene)
+    if unused:
+        accuracy = _find_default_values(scene.accuracy, unused)
+        changed["accuracy"] = scene.accuracy.model_copy(update=accuracy)
     return scene.model_copy(update=changed)
 
 
 @memoize
-def _complete_slide(slide: tables.Slide) -> tables.Slide:
-    slide = _reset_unused_keys(slide, find_choices(slide).unused)
-    return _fill_missing_values(slide, SLIDE_DEFAULTS.get(slide.kind, {}))
+def complete_table(table: Table) -> Table:
+    """Return a table with defaults filled in and unused keys reset to them, and so for the tables inside it."""
+    meaningless = find_choices(table).unused
+    idle = _list_idle_keys(table)
+    changed = _complete_inner_tables(table)
+    changed |= _find_default_values(table, [*meaningless, *idle])
+    for key, value in _list_defaults(table).items():
+        if key not in meaningless and (key in idle or getattr(table, key) is None):
+            changed[key] = value
+    if isinstance(table, tables.Structure):
+        changed["mode"] = tuple(map(_complete_mode, table.mode, range(len(table.mode))))
+    return table.model_copy(update=changed) if changed else table
 
 
-@memoize
-def _complete_structure(structure: tables.Structure) -> tables.Structure:
-    changed: dict[str, Any] = {
-        "mode": tuple(_complete_mode(mode, index) for index, mode in enumerate(structure.mode)),
-        "interface": tuple(map(_complete_interface, structure.interface)),
-    }
-    if (structure.masses or structure.reduced) and structure.output_mass is None:
-        changed["output_mass"] = 1
-    return structure.model_copy(update=changed)
+def _complete_inner_tables(table: Table) -> dict[str, Any]:
+    """Return the tables inside a table that differ after their completion, by attribute."""
+    changed = {}
+    for key in list_keys(type(table)).values():
+        value = getattr(table, key.attribute)
+        if isinstance(value, Table):
+            completed = complete_table(value)
+        elif isinstance(value, tuple) and key.inner is not None:
+            completed = tuple(map(complete_table, value))
+        else:
+            continue
+        if completed is not value:
+            changed[key.attribute] = completed
+    return changed
 
 
-def _complete_interface(interface: tables.Interface) -> tables.Interface:
-    interface = _complete_law(interface)
-    if interface.contact is None:
-        return interface
-    return interface.model_copy(update={"contact": _complete_contact(interface.contact)})
+def _list_defaults(table: Table) -> dict[str, Any]:
+    """Return the default values of a table that follow from its other keys."""
+    if isinstance(table, tables.Friction):
+        return {"kinetic": table.static}
+    if isinstance(table, tables.Slide):
+        return {"cycles": 1.0, "distance": 0.0, "distance_after": 0.0}
+    if isinstance(table, tables.Structure) and (table.masses or table.reduced):
+        return {"output_mass": 1}
+    return {}
+
+
+def _list_idle_keys(table: Table) -> list[str]:
+    """Return the keys of a table without effect beside its other keys, besides those that `choices` finds."""
+    if isinstance(table, tables.Friction):
+        return find_unused_law_keys(table)
+    return ["element_size"] if isinstance(table, Contact) and table.mesh else []
 
 
 def _complete_mode(mode: tables.Mode, index: int) -> tables.Mode:
-    mode = _fill_missing_values(
-        mode, {"base": 0.0 if index else mode.slide, "output": default_output(index)}
-    )
-    return _fill_missing_values(mode, {"accelerometer": mode.output, "gauge": mode.output})
-
-
-@memoize
-def _complete_drive(drive: tables.Drive) -> tables.Drive:
-    return _reset_unused_keys(drive, find_choices(drive).unused)
-
-
-@memoize
-def _complete_contact(contact: tables.Contact) -> tables.Contact:
-    if contact.asperities:
-        asperities = _reset_unused_keys(contact.asperities, find_choices(contact.asperities).unused)
-        contact = contact.model_copy(update={"asperities": asperities})
-    return _reset_unused_keys(contact, ["element_size"]) if contact.mesh else contact
-
-
-@memoize
-def _complete_law(law: tables.Friction) -> tables.Friction:
-    without_effect = {
-        "kinetic": is_kinetic_unused(law),
-        "rest_speed": is_rest_speed_unused(law),
-        "temperature": is_temperature_unused(law),
+    """Return a mode whose participations are filled in; those of the first mode have other defaults."""
+    output = default_output(index) if mode.output is None else mode.output
+    defaults = {
+        "base": 0.0 if index else mode.slide,
+        "output": output,
+        "accelerometer": output,
+        "gauge": output,
     }
-    unused = [key for key, is_unused in without_effect.items() if is_unused]
-    law = _reset_unused_keys(law, {*find_choices(law).unused, *unused})
-    if law_takes_key(law.law, "kinetic"):
-        return _fill_missing_values(law, {"kinetic": law.static})
-    return law
+    missing = {name: value for name, value in defaults.items() if getattr(mode, name) is None}
+    return mode.model_copy(update=missing)
 
 
-def _fill_missing_values(table: Any, values: dict[str, Any]) -> Any:
-    """Return a copy of a table in which missing values are replaced by the given ones."""
-    missing = {name: value for name, value in values.items() if getattr(table, name) is None}
-    return table.model_copy(update=missing)
-
-
-def _reset_unused_keys(table: Any, unused: Iterable[str]) -> Any:
-    """Return a copy of a table in which the given keys have their default values."""
-    fields = type(table).model_fields
-    names = attributes_by_key(type(table))
-    return table.model_copy(update={names[key]: fields[names[key]].default for key in unused})
+def _find_default_values(table: Table, keys: list[str]) -> dict[str, Any]:
+    """Return the default values of the given keys, by attribute."""
+    known = [list_keys(type(table))[key] for key in keys]
+    return {key.attribute: key.field.default for key in known}

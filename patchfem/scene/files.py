@@ -6,50 +6,30 @@ import os
 from pathlib import Path
 from typing import Any
 
+from .keys.choices import find_choices, iterate_tables
+from .keys.tables import Tables
+from .keys.types import list_keys
 from .lines import find_key_lines
 from .rules.scene_draft import SceneDraft
-from .rules.structure import MATRIX_KEYS
-from .rules.view import wrap_value
 
 
 def list_named_files(tables: Any) -> list[tuple[str, str]]:
-    """Return (dotted key, file) for every file that a scene, or its tables, names."""
-    scene = {name: wrap_value(getattr(tables, name)) for name in _TABLES_WITH_FILES}
-    structure = scene["structure"]
-    faces = structure.interface or ()
-    keys_and_files = [
-        *_list_patch_files("contact", scene["contact"]),
-        *(
-            file
-            for index, face in enumerate(faces)
-            for file in _list_patch_files(f"structure.interface.{index}.contact", face.contact)
-        ),
-        ("slide.file", scene["slide"].file),
-        ("drive.file", scene["drive"].file),
-        ("structure.file", structure.file),
-        # Damping may also be a ratio, which is not the name of a file.
-        *(
-            (f"structure.reduced.{key}", structure.reduced[key])
-            for key in MATRIX_KEYS
-            if structure.reduced
-        ),
-        ("measured.file", scene["measured"].file),
-        ("wear.start", scene["wear"].start),
-    ]
-    return [(key, file) for key, file in keys_and_files if isinstance(file, str) and file]
+    """Return (dotted key, file) for every file that a scene, or its tables, names.
 
-
-_TABLES_WITH_FILES = ("contact", "slide", "structure", "drive", "measured", "wear")
-
-
-def _list_patch_files(table_key: str, contact: Any) -> list[tuple[str, Any]]:
-    """List the file keys in the table of a patch, each with its file or UNKNOWN_VALUE."""
-    asperities = contact.asperities
-    return [
-        (f"{table_key}.mesh", contact.mesh),
-        (f"{table_key}.profile.file", contact.profile.file),
-        (f"{table_key}.asperities.from", asperities.law == "hertz" and asperities.from_),
-    ]
+    Keys without meaning for the law of the asperities or the like are left out.
+    """
+    if not isinstance(tables, Tables):
+        tables = tables.tables()
+    named = []
+    for table_key, table in iterate_tables(tables):
+        keys = [key for key in list_keys(type(table)).values() if key.names_file]
+        unused = find_choices(table).unused if keys else ()
+        for key in keys:
+            value = getattr(table, key.attribute)
+            # The damping of a reduced structure may also be a ratio.
+            if isinstance(value, str) and key.name not in unused:
+                named.append((f"{table_key}.{key.name}", value))
+    return named
 
 
 def file_exists(path: Path) -> bool:

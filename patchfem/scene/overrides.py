@@ -14,9 +14,10 @@ import numpy as np
 
 from ..effects import find_waveform
 from .files import list_named_files, require_files
+from .keys.contact import MAX_SMALL_ANGLE
 from .lines import find_item, find_key_lines, split_key
 from .reader import apply_set
-from .rules.contact import MAX_SMALL_ANGLE, find_max_load
+from .rules.contact import find_max_load
 from .rules.scene_draft import SceneDraft
 from .rules.structure import MAX_USUAL_DAMPING
 from .rules.view import TableView
@@ -106,7 +107,7 @@ class BaseScene:
             "friction", {}
         )
         is_reduced = scene.structure is not None and scene.structure.reduced is not None
-        if has_own_kinetic or is_reduced or not (_is_plain_point(scene) or _is_plain_patch(scene)):
+        if has_own_kinetic or is_reduced or not _is_plain(scene):
             return None
         limits = dict(_find_plain_key(scene, key) for key in keys)
         # Two keys may name the same number, one of them by the name of its mode.
@@ -176,40 +177,35 @@ def find_scene_value(scene: Scene, key: str) -> tuple[str, Any]:
     return ".".join(pieces), value
 
 
-def _is_plain_point(scene: Scene) -> bool:
-    """Return whether a scene is a rig of modes, one contact point and sinusoidal base motion.
+def _is_plain(scene: Scene) -> bool:
+    """Return whether PLAIN_KEYS holds in a scene.
 
-    In such a scene PLAIN_KEYS holds.
-    """
-    if scene.kind != "rig" or scene.contact or scene.wear or not scene.normal:
-        return False
-    has_plain_tables = not scene.normal.grooves and not list_named_files(scene)
-    return has_plain_tables and _is_plain_motion(scene)
-
-
-def _is_plain_patch(scene: Scene) -> bool:
-    """Return whether a scene is a loaded patch, alone or in a rig with sinusoidal base motion.
-
-    In such a scene, without a load line, strips, grooves and files but [measured], PLAIN_KEYS holds.
+    Such a scene is a loaded patch, alone or in a rig, or a rig with one contact point. The rig has modes and a sinusoidal
+    base motion. There is no wear, load line, holder, strip or groove, no law with a temperature, and no file, but for that
+    of [measured] with a patch.
     """
     contact = TableView(scene.contact)
-    if scene.kind not in ("patch", "rig") or not contact.load or scene.normal or scene.wear:
+    names = [key for key, _ in list_named_files(scene)]
+    has_files = names not in ([], ["measured.file"]) or (names and scene.normal)
+    if scene.kind not in ("patch", "rig") or scene.wear or has_files:
         return False
-    if contact.load_line or contact.strips or contact.grooves or contact.holder:
-        return False
-    if any(key != "measured.file" for key, _ in list_named_files(scene)):
-        return False
-    return scene.kind == "patch" or (not scene.structure.bonded and _is_plain_motion(scene))
+    if scene.normal:
+        is_loaded = scene.kind == "rig" and not scene.contact and not scene.normal.grooves
+    else:
+        is_coupled = contact.load_line or contact.strips or contact.grooves or contact.holder
+        is_loaded = contact.load and not is_coupled
+    if scene.kind == "patch" or not is_loaded:
+        return bool(is_loaded)
 
-
-def _is_plain_motion(scene: Scene) -> bool:
-    """Return whether a rig of modes has sinusoidal base motion and a law without temperature."""
+    # The motion of the rig.
     law = TableView(scene.friction)
     structure = scene.structure
     drive = scene.drive
     has_modes = structure.mode and not structure.interface and structure.measured == "free"
     has_sine = drive.kind == "base" and find_waveform(drive).is_sine and drive.duration is None
-    return bool(has_modes and has_sine and law.law and not law.temperature and not law.spread)
+    is_linear = scene.normal or not structure.bonded
+    has_plain_law = law.law and not law.temperature and not law.spread
+    return bool(has_modes and has_sine and is_linear and has_plain_law)
 
 
 def _find_plain_key(scene: Scene, key: str) -> tuple[str | None, float]:

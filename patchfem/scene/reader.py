@@ -6,27 +6,16 @@ import re
 import tomllib
 from typing import Any
 
-from pydantic import ValidationError
-
+from ..effects import MAX_COORDINATES
 from .keys.lookup import (
     LIMITS_BY_ERROR_TYPE,
-    KeyDefinition,
     describe_error,
     find_key,
     format_for_message,
-    is_table_or_value,
+    validate_values,
 )
 from .keys.tables import Tables
-from .keys.types import (
-    Table,
-    advise_on_name,
-    attributes_by_key,
-    build_table,
-    find_inner_table,
-    is_array_attribute,
-    list_key_types,
-    list_required_keys,
-)
+from .keys.types import Key, Table, advise_on_name, build_table, list_keys, list_required_keys
 from .lines import find_item, number_items_from_one, split_assignment, split_key
 from .rules.scene_draft import SceneDraft, list_item_names
 from .suggestions import describe_unknown_key
@@ -46,36 +35,47 @@ def _read_table(draft: SceneDraft, model: type[Table], raw: dict[str, Any], tabl
     """Read one table of a scene, and report missing or wrong values."""
     if id(raw) in draft.read_before:
         return draft.read_before[id(raw)]
-    names = attributes_by_key(model)
+    # Inner tables are read first; the rest is left to the validator of the table.
+    keys = list_keys(model)
     values = {}
-    for key, value in raw.items():
-        path = f"{table_key}.{key}" if table_key else key
-        if key not in names:
-            _report_unknown(draft, model, raw, key, table_key)
+    for name, value in raw.items():
+        path = f"{table_key}.{name}" if table_key else name
+        key = keys.get(name)
+        if key is None:
+            _report_unknown(draft, model, raw, name, table_key)
             continue
-        inner = find_inner_table(model, names[key])
-        is_value = not isinstance(value, dict) and is_table_or_value(model, names[key])
-        if inner is not None and not is_value:
-            value = _read_inner(draft, KeyDefinition(model, names[key]), value, path)
+        if key.inner is not None and (isinstance(value, dict) or not key.accepts_value):
+            value = _read_inner(draft, key, value, path)
         if value is not None:
-            values[key] = value
+            values[name] = value
     valid = _validate_values(draft, model, values, table_key)
-    for key in list_required_keys(model):
-        if key not in raw:
-            draft.add_missing(f"{table_key}.{key}", "")
-    unknown = {names[key]: None for key in (*raw, *list_required_keys(model)) if key in names}
+
+    # A missing or invalid value is None, so that the rules can go on.
+    for name in list_required_keys(model):
+        if name not in raw:
+            draft.add_missing(f"{table_key}.{name}", "")
+    unknown = {
+        keys[name].attribute: None for name in (*raw, *list_required_keys(model)) if name in keys
+    }
     return build_table(model, unknown | valid)
 
 
-def _read_inner(draft: SceneDraft, definition: KeyDefinition, value: Any, path: str) -> Any:
+def _read_inner(draft: SceneDraft, key: Key, value: Any, path: str) -> Any:
     """Read a table or an array of tables inside a table."""
-    inner = find_inner_table(*definition)
-    if not is_array_attribute(*definition):
+    if not key.is_array:
         if isinstance(value, dict):
-            return _read_table(draft, inner, value, path)
+            return _read_table(draft, key.inner, value, path)
         draft.add_mistake(path, f"a table [{path}] is needed, not {format_for_message(value)}")
+    elif isinstance(value, list) and len(value) > MAX_COORDINATES:
+        draft.add_mistake(
+            path,
+            f"{len(value)} tables are too many; at most {MAX_COORDINATES} are possible; many modes or masses belong "
+            "into a file of arrays that structure.file names",
+        )
     elif isinstance(value, list) and value and all(isinstance(item, dict) for item in value):
-        return tuple(_read_table(draft, inner, item, f"{path}.{k}") for k, item in enumerate(value))
+        return tuple(
+            _read_table(draft, key.inner, item, f"{path}.{k}") for k, item in enumerate(value)
+        )
     else:
         draft.add_mistake(
             path, f"an array of tables [[{path}]] is needed, not {format_for_message(value)}"
@@ -87,32 +87,22 @@ def _validate_values(
     draft: SceneDraft, model: type[Table], values: dict[str, Any], table_key: str
 ) -> dict[str, Any]:
     """Return the valid values by attribute; report the first mistake of every other key."""
-    valid: dict[str, Any] = {}
-    try:
-        model.model_validate(values, context=valid)
-    except ValidationError as caught:
-        reported = set()
-        # A key may accept several types; a value that only breaks a limit of one
-        # type was meant to be of this type.
-        errors = sorted(
-            caught.errors(include_url=False),
-            key=lambda error: error["type"] not in LIMITS_BY_ERROR_TYPE,
-        )
-        for error in errors:
-            key, *inside = error["loc"]
-            if key in reported or (error["type"] == "missing" and not inside):
-                continue
-            reported.add(key)
-            path = f"{table_key}.{key}" if table_key else str(key)
-            value = values.get(key)
-            index = next((part for part in inside if isinstance(part, int)), None)
-            if index is not None and isinstance(value, list) and index < len(value):
-                path = f"{path}.{index}"
-                value = value[index]
-            draft.add_mistake(
-                path,
-                describe_error(KeyDefinition(model, attributes_by_key(model)[key]), error, value),
-            )
+    valid, errors = validate_values(model, values)
+    reported = set()
+    # A key may accept several types; a value that only breaks a limit of one
+    # type was meant to be of this type.
+    for error in sorted(errors, key=lambda error: error["type"] not in LIMITS_BY_ERROR_TYPE):
+        key, *inside = error["loc"]
+        if key in reported or (error["type"] == "missing" and not inside):
+            continue
+        reported.add(key)
+        path = f"{table_key}.{key}" if table_key else str(key)
+        value = values.get(key)
+        index = next((part for part in inside if isinstance(part, int)), None)
+        if index is not None and isinstance(value, list) and index < len(value):
+            path = f"{path}.{index}"
+            value = value[index]
+        draft.add_mistake(path, describe_error(list_keys(model)[key], error, value))
     return valid
 
 
@@ -144,6 +134,8 @@ def apply_set(draft: SceneDraft, assignment: str) -> None:
             f"{assignment}: table.key=value is needed, such as contact.load=26 lbf"
         )
         return
+
+    # Walk to the table of the key, and make the tables that are not there.
     holder: Any = draft.raw
     for depth, piece in enumerate(pieces):
         path = ".".join(pieces[: depth + 1])
@@ -172,12 +164,8 @@ def apply_set(draft: SceneDraft, assignment: str) -> None:
 
 def _is_array_of_tables(key: str) -> bool:
     """Return whether a dotted key names an array of tables, such as structure.mode."""
-    place = find_key(key)
-    return (
-        place.model is not None
-        and is_array_attribute(*place)
-        and find_inner_table(*place) is not None
-    )
+    known = find_key(key)
+    return known is not None and known.is_array and known.inner is not None
 
 
 def _find_item(draft: SceneDraft, items: list[Any], path: str, written_key: str) -> int | None:
@@ -215,8 +203,8 @@ def _find_item(draft: SceneDraft, items: list[Any], path: str, written_key: str)
 
 def read_set_value(key: str, text: str) -> Any:
     """Parse the value of a --set option as TOML; return it as a string if it is not valid TOML."""
-    model, name = find_key(key)
-    is_text_key = model is not None and str in list_key_types(model, name)
+    known = find_key(key)
+    is_text_key = known is not None and str in known.types
     if _PLAIN_TEXT_PATTERN.fullmatch(text):
         return text[1:-1]
     try:

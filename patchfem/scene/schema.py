@@ -13,11 +13,10 @@ from .keys.quantities import NUMBER_PATTERN, PERCENTAGE_PATTERN, UNIT_FACTORS, f
 from .keys.tables import Tables
 from .keys.types import (
     TABLE_WORD,
+    Key,
     Table,
-    attributes_by_key,
-    find_inner_table,
-    find_meaning,
-    find_quantity_kind,
+    list_inner_tables,
+    list_keys,
 )
 
 SCHEMA_DIALECT = "https://json-schema.org/draft/2020-12/schema"
@@ -29,7 +28,7 @@ UNIT_SPELLINGS = {"u": "[uµμ]", "^2": "(?:\\^2|²)", "^3": "(?:\\^3|³)", " ":
 
 def make_schema() -> dict:
     """Return the JSON schema (draft 2020-12) of a scene: meaning, limits, default, unit of keys."""
-    tables = sorted(_list_inner_models(Tables), key=lambda model: model.__name__)
+    tables = sorted(set(list_inner_tables(Tables).values()), key=lambda model: model.__name__)
     definitions = {model.__name__: _describe_table(model) for model in tables}
     definitions[Material.__name__] = _describe_material(definitions[Material.__name__])
     scene = _describe_table(Tables)
@@ -40,27 +39,22 @@ def make_schema() -> dict:
     return json.loads(text)
 
 
-def _list_inner_models(model: type[Table]) -> set[type[Table]]:
-    """Return the models of all tables inside a table, at any depth."""
-    inner = {find_inner_table(model, name) for name in attributes_by_key(model).values()} - {None}
-    return inner.union(*map(_list_inner_models, inner))
-
-
 def _describe_table(model: type[Table]) -> dict:
     """Return the schema of a table: the meaning and default of each key; null is not allowed."""
     raw = model.model_json_schema(by_alias=True)
     properties = raw.get("properties", {})
-    keys = attributes_by_key(model)
     schema = {
         "type": "object",
         "description": " ".join((model.__doc__ or "").split()),
         "additionalProperties": False,
-        "properties": {key: _describe_key(model, key, properties[key]) for key in keys},
+        "properties": {
+            name: _describe_key(key, properties[name]) for name, key in list_keys(model).items()
+        },
     }
     return schema | ({"required": raw["required"]} if raw.get("required") else {})
 
 
-def _describe_key(model: type[Table], key: str, raw: dict) -> dict:
+def _describe_key(key: Key, raw: dict) -> dict:
     """Return the schema of a key, based on the one that pydantic makes."""
     schema = {word: raw[word] for word in raw if word not in ("title", "anyOf", "default")}
     types = [choice for choice in raw.get("anyOf", []) if choice.get("type") != "null"]
@@ -71,14 +65,13 @@ def _describe_key(model: type[Table], key: str, raw: dict) -> dict:
     default = raw.get("default")
     if default not in (None, "", []) and not isinstance(default, dict):
         schema["default"] = default
-    name = attributes_by_key(model)[key]
-    if kind := find_quantity_kind(model, name):
-        _add_units(schema, kind)
+    if key.kind:
+        _add_units(schema, key.kind)
     elif schema.get("type") == "number":
         number = {word: schema.pop(word) for word in NUMBER_WORDS if word in schema}
         schema["anyOf"] = [number, {"type": "string", "pattern": f"^{PERCENTAGE_PATTERN}$"}]
-    if find_inner_table(model, name) in (None, Material):
-        clauses = (find_meaning(model, key), _describe_selection(model, key))
+    if key.inner in (None, Material):
+        clauses = (key.record.meaning, _describe_selection(key.table, key.name))
         schema["description"] = "; ".join(filter(None, clauses))
     return schema
 

@@ -9,7 +9,6 @@ from typing import Any
 
 from .keys.lookup import find_key
 from .keys.quantities import format_si
-from .keys.types import find_quantity_kind
 from .rules.scene_draft import SceneError
 
 MAX_JOINT_LENGTH = 1.0  # largest length of a joint [m]; of its lengths, only a radius can be larger
@@ -22,7 +21,7 @@ def format_assignments(sets: dict[str, Any]) -> tuple[str, ...]:
     and NumPy scalars and arrays are accepted too.
     """
     return tuple(
-        f"{key}={value if isinstance(value, str) else _format_toml(key, value)}"
+        f"{key}={value if isinstance(value, str) else write_value(key, value)}"
         for key, value in sets.items()
     )
 
@@ -32,7 +31,7 @@ def format_scene(tables: dict[str, Any]) -> str:
 
     Texts are as in a scene, numbers are in SI.
     """
-    return "".join(f"{name} = {_format_toml(str(name), table)}\n" for name, table in tables.items())
+    return "".join(f"{name} = {write_value(str(name), table)}\n" for name, table in tables.items())
 
 
 def format_values(key: str, values: Any, separator: str = ",") -> str:
@@ -122,8 +121,8 @@ def _to_plain_value(value: Any) -> Any:
 
 def _find_kind(key: str) -> str | None:
     """Return the kind of quantity of a key, or None for a number without unit and an unknown key."""
-    place = find_key(key)
-    return find_quantity_kind(*place) if place.model is not None else None
+    known = find_key(key)
+    return known.kind if known is not None else None
 
 
 def _format_value(key: str, value: Any) -> str:
@@ -133,21 +132,31 @@ def _format_value(key: str, value: Any) -> str:
         if is_toml or not set(",\"'[{") & set(value):
             return value
         return json.dumps(value, ensure_ascii=False)
-    text = _format_toml(key, value)
+    text = write_value(key, value)
     return text[1:-1] if text.startswith('"') else text
 
 
-def _format_toml(key: str, value: Any) -> str:
-    """Return a TOML value with all digits; if the key has a unit, a number becomes a string in SI."""
+def write_value(key: str, value: Any, kind: str | None = None) -> str:
+    """Return a TOML value with all digits; if the key has a unit, a number becomes a string in SI.
+
+    Parameters
+    ----------
+    key : str
+        Dotted key of a scene.
+    value
+        Value of the key, or a table or list of values.
+    kind : str, optional
+        Kind of quantity of the value; default: that of the key.
+    """
     value = _to_plain_value(value)
     if isinstance(value, dict):
-        pairs = [f"{name} = {_format_toml(f'{key}.{name}', item)}" for name, item in value.items()]
+        pairs = [f"{name} = {write_value(f'{key}.{name}', item)}" for name, item in value.items()]
         return f"{{{', '.join(pairs)}}}"
     if isinstance(value, list | tuple):
-        items = [_format_toml(f"{key}.{index}", item) for index, item in enumerate(value)]
+        items = [write_value(f"{key}.{index}", item, kind) for index, item in enumerate(value)]
         return f"[{', '.join(items)}]"
     if isinstance(value, bool | str):
-        return json.dumps(value, ensure_ascii=False)
+        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
     if not isinstance(value, Real):
         raise SceneError(
             [
@@ -155,7 +164,7 @@ def _format_toml(key: str, value: Any) -> str:
                 "in SI units, a boolean, or a list of such values"
             ]
         )
-    kind = _find_kind(key)
+    kind = kind or _find_kind(key)
     if kind is not None:
         return json.dumps(format_si(value, kind))
     return repr(int(value) if isinstance(value, Integral) else float(value))

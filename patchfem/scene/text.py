@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-import json
+import re
 from collections.abc import Iterator
-from functools import cache
-from typing import Any, NamedTuple
+from typing import Any
 
-from .keys.choices import find_choices
-from .keys.contact import Material, OnePiece
+from .keys.choices import find_choices, iterate_tables
+from .keys.contact import Material
 from .keys.memoize import memoize
-from .keys.quantities import format_si
-from .keys.tables import Accuracy, Drive, Interface, Measured, Tables
-from .keys.types import Table, attributes_by_key, find_inner_table, find_quantity_kind
+from .keys.tables import Accuracy, Drive, Measured, Tables
+from .keys.types import Table, list_keys
+from .sets import write_value
 
+_INTERFACE_PATCH_PATTERN = re.compile(r"structure\.interface\.\d+\.contact\b")
+_ITEM_PATTERN = re.compile(r"\.\d+")
 EFFECT_KEYS = ("kind", "law", "reading", "waveform")  # keys whose values are effects
 
 
@@ -27,109 +28,70 @@ def list_named_effects(tables: Any) -> list[str]:
     named: dict[str, None] = {}
     for name in Tables.model_fields:
         table = getattr(tables, name)
-        if table is not None:
+        if isinstance(table, Table):
             named |= dict.fromkeys(_list_table_effects(table, name))
     return list(named)
 
 
 @memoize
 def _list_table_effects(table: Any, table_key: str) -> tuple[str, ...]:
-    return tuple(dict.fromkeys(_iterate_effects(table, table_key)))
+    """Return the effects of a table and of the tables inside it; those of patches of interfaces come last."""
+    named: dict[str, None] = {}
+    of_patches: dict[str, None] = {}
+    for key, inner in iterate_tables(table, table_key):
+        effects = of_patches if _INTERFACE_PATCH_PATTERN.match(key) else named
+        effects |= dict.fromkeys(_name_effects(key, inner))
+    return tuple(named | of_patches)
 
 
-def _iterate_effects(table: Any, table_key: str) -> Iterator[str]:
-    """Yield the effects that a table, an array of tables or a value contains."""
+def _name_effects(key: str, table: Any) -> list[str]:
+    """Return the names of the effects that a table contains, without those of the tables inside it.
+
+    The patch of an interface has the effects of [contact], and the item of an array only those of its selectors.
+    """
+    path = _INTERFACE_PATCH_PATTERN.sub("contact", key)
+    name = _ITEM_PATTERN.sub("", path)
+    is_piece_part = ".upper." in path or ".lower." in path
+    if is_piece_part or isinstance(table, Material):
+        return []
     if isinstance(table, Accuracy):
-        if table.method != "auto":
-            yield f"{table_key}.method={table.method}"
-    elif isinstance(table, Measured):
-        yield table_key
-        if table.reading != "peak":
-            yield f"{table_key}.reading={table.reading}"
-    elif isinstance(table, tuple):
-        yield from _iterate_effects_of_items(table, table_key)
-    elif isinstance(table, Table) and not isinstance(table, Material):
-        sources = _find_effect_sources(type(table))
-        unused = find_choices(table).unused if sources.selectors else ()
-        selectors = [key for key in sources.selectors if key not in unused]
-        yield from (f"{table_key}.{key}={getattr(table, key)}" for key in selectors)
-        if not selectors:
-            yield table_key
-        for name in sources.tables:
-            inner = getattr(table, name)
-            if inner is not None:
-                yield from _iterate_effects(inner, f"{table_key}.{name}")
+        return [] if table.method == "auto" else [f"{name}.method={table.method}"]
+    if isinstance(table, Measured):
+        return [name] if table.reading == "peak" else [name, f"{name}.reading={table.reading}"]
 
-
-def _iterate_effects_of_items(items: tuple, table_key: str) -> Iterator[str]:
-    """Yield the effects of an array of tables; patches have the effects of [contact]."""
-    for item in items:
-        for effect in _iterate_effects(item, table_key):
-            if "=" in effect and ".contact" not in effect:
-                yield effect
-    for item in items:
-        if isinstance(item, Interface) and item.contact is not None:
-            yield from _iterate_effects(item.contact, "contact")
-
-
-class _EffectSources(NamedTuple):
-    """Attributes of a table from which the names of effects follow."""
-
-    selectors: list[str]
-    tables: list[str]
-
-
-@cache
-def _find_effect_sources(model: type[Table]) -> _EffectSources:
-    names = list(model.model_fields)
-    selectors = [key for key in EFFECT_KEYS if key in names]
-    if issubclass(model, OnePiece):
-        return _EffectSources(selectors, [])
-    return _EffectSources(selectors, [name for name in names if find_inner_table(model, name)])
+    selectors = [word for word in EFFECT_KEYS if word in type(table).model_fields]
+    unused = find_choices(table).unused if selectors else ()
+    named = [f"{name}.{word}={getattr(table, word)}" for word in selectors if word not in unused]
+    return named or ([name] if name == path else [])
 
 
 def _format_lines(table: Table, table_key: str) -> Iterator[str]:
     """Yield the TOML lines of a table and of the tables inside it."""
     unused = find_choices(table).unused
     inner = []
-    for key, name in attributes_by_key(type(table)).items():
-        value = getattr(table, name)
-        if value in (None, ()) or key in unused:
+    for name, key in list_keys(type(table)).items():
+        value = getattr(table, key.attribute)
+        if value in (None, ()) or name in unused:
             continue
-        path = f"{table_key}.{key}" if table_key else key
+        path = f"{table_key}.{name}" if table_key else name
+        header = _ITEM_PATTERN.sub("", path)
         if isinstance(value, tuple) and isinstance(value[0], Table):
-            inner += [(f"[[{path}]]", path, item) for item in value]
+            inner += [(f"[[{header}]]", f"{path}.{k}", item) for k, item in enumerate(value)]
         elif isinstance(value, Table) and not isinstance(value, Material):
-            inner.append((f"[{path}]", path, value))
+            inner.append((f"[{header}]", path, value))
         else:
-            yield f"{key} = {_format_value(value, _find_kind(table, name))}"
+            # The levels of a force drive are forces.
+            is_force = isinstance(table, Drive) and name == "levels" and table.kind == "force"
+            if isinstance(value, Material):
+                value = _list_values(value)
+            yield f"{name} = {write_value(path, value, 'force' if is_force else None)}"
     for header, path, item in inner:
         yield ""
         yield header
         yield from _format_lines(item, path)
 
 
-def _find_kind(table: Table, name: str) -> str | None:
-    """Return the kind of quantity of an attribute; the levels of a force drive are forces."""
-    if isinstance(table, Drive) and name == "levels" and table.kind == "force":
-        return "force"
-    return find_quantity_kind(type(table), name)
-
-
-def _format_value(value: Any, kind: str | None) -> str:
-    """Format a value as TOML."""
-    if isinstance(value, Material):
-        record = {key: getattr(value, name) for key, name in attributes_by_key(Material).items()}
-        pairs = [
-            f"{key} = {_format_value(item, find_quantity_kind(Material, attributes_by_key(Material)[key]))}"
-            for key, item in record.items()
-            if item is not None
-        ]
-        return f"{{{', '.join(pairs)}}}"
-    if isinstance(value, tuple):
-        return f"[{', '.join(_format_value(item, kind) for item in value)}]"
-    if kind is not None:
-        return f'"{format_si(value, kind)}"'
-    if isinstance(value, str):
-        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
-    return repr(value)
+def _list_values(table: Table) -> dict[str, Any]:
+    """Return the values of a table by the names of their keys, without missing ones."""
+    values = {name: getattr(table, key.attribute) for name, key in list_keys(type(table)).items()}
+    return {name: value for name, value in values.items() if value is not None}

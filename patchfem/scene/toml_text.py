@@ -8,16 +8,13 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from ..disk.open_with_timeout import open_for_reading
-from ..effects import MAX_COORDINATES
 from .lines import MAX_KEY_PARTS, TooManyKeyParts, find_key_lines
-from .rules.scene_draft import SceneDraft, SceneError
+from .rules.scene_draft import SceneError
 
 # Largest size of a scene file in bytes; larger data belong in files that the scene names.
-MAX_BYTES = 32 * 2**20
+MAX_BYTES = 4 * 2**20
 # Largest number of characters of a value in the advice on missing quotes.
 MAX_QUOTED_CHARACTERS = 60
-BYTES_PER_ENTRY = 8  # memory of an entry of a matrix in bytes; n modes need three (n, n) matrices
-SECONDS_PER_CUBED_MODE = 1.5e-9  # time to compute n modes on one core, divided by n^3 [s]
 # Key with a value that opens neither quotes nor a bracket.
 _BARE_VALUE_PATTERN = re.compile(r"\s*([\w.-]+)\s*=\s*([^#\"'\[{]+)")
 _DECIMAL_POINT_PATTERN = re.compile(r"([-+]?)(\d*)\.(\d*)((?:[eE][-+]?\d+)?)")
@@ -45,6 +42,8 @@ def read_text(path: str | Path) -> str:
         reason = getattr(error, "strerror", None) or str(error)
         advice = "; give a scene file, such as rig.toml" if Path(path).is_dir() else ""
         raise SceneError([f"{path}: cannot be read: {reason}{advice}"]) from None
+
+    # A large file would take minutes to read.
     if len(content) > MAX_BYTES:
         raise SceneError(
             [
@@ -63,45 +62,17 @@ def read_text(path: str | Path) -> str:
 
 
 def parse_text(text: str, path: str | Path) -> ParsedText:
-    """Return the values of a TOML text and the lines of its keys.
-
-    Raises SceneError if the text is not TOML, or lists more masses or modes than any run can use.
-    """
+    """Return the values of a TOML text and the lines of its keys; raise SceneError if the text is not TOML."""
     try:
         if any(line.count(".") > MAX_KEY_PARTS for line in text.split("\n")):
             # Refuses a key with very many parts, which tomllib would take minutes to read.
             find_key_lines(text)
         values = tomllib.loads(text)
-        _refuse_too_many_coordinates(values, text, path)
         return ParsedText(values, find_key_lines(text))
     except TooManyKeyParts as error:
         raise SceneError([f"{path}:{error.line}: {error}"]) from None
     except (ValueError, RecursionError) as error:
         raise SceneError([_describe_syntax(error, text, path)]) from None
-
-
-def _refuse_too_many_coordinates(values: dict, text: str, path: str | Path) -> None:
-    """Raise SceneError for more masses or modes than any run can use, before reading them."""
-    structure = values.get("structure")
-    if not isinstance(structure, dict):
-        return
-    for key, form in (("masses", r"masses\s*="), ("mode", r"\[\[\s*structure\s*\.\s*mode\s*\]\]")):
-        items = structure.get(key)
-        count = len(items) if isinstance(items, list) else 0
-        if count <= MAX_COORDINATES:
-            continue
-        # The lines of all keys of such a text would take more memory than the text.
-        match = re.search(rf"^[ \t]*{form}", text, re.MULTILINE)
-        line = text.count("\n", 0, match.start()) + 1 if match else 0
-        draft = SceneDraft(str(path), {f"structure.{key}": line} if line else {}, {})
-        draft.add_mistake(
-            f"structure.{key}",
-            f"{count} entries are more than the limit of {MAX_COORDINATES}; solving their modes as one full matrix "
-            f"would take {1e-9 * BYTES_PER_ENTRY * 3 * count**2:.2g} GB of memory and about "
-            f"{SECONDS_PER_CUBED_MODE * count**3:.2g} s of computing time; give fewer entries, or give the modes themselves "
-            "in structure.file",
-        )
-        draft.raise_mistakes()
 
 
 def _describe_syntax(error: Exception, text: str, path: str | Path) -> str:

@@ -16,12 +16,12 @@ import numpy as np
 from numpy.lib import format as npy
 from scipy.sparse import issparse
 
-from ..core import ModalBasis, PatchfemError, frozen_array
+from ..core import ModalBasis, PatchfemError
 from ..effects import MAX_COORDINATES
 from ..inputs.matlab import read_variables
-from ..inputs.symmetric import to_real
+from ..inputs.symmetric import read_numbers, to_real
 from . import masses, matrices
-from .modes import PATCH_MOTIONS
+from .modes import PATCH_MOTIONS, make_basis
 
 ARRAY_NAMES = (  # names of the arrays that are read from a file
     "M",
@@ -62,11 +62,11 @@ def read_arrays(path: Path) -> dict:
         return {name: _drop_dimensions(variables[name]) for name in names}
     except PatchfemError as error:
         reason = str(error).removeprefix(f"{path}: ")
-        raise PatchfemError(f"structure.file: {path} cannot be read ({reason})") from None
+        raise PatchfemError(f"{path} cannot be read ({reason})") from None
     except Exception as error:
         # NumPy and zipfile raise errors of many types for a damaged file.
         raise PatchfemError(
-            f"structure.file: {path} cannot be read ({error}); plain arrays are needed, not objects"
+            f"{path} cannot be read ({error}); plain arrays are needed, not objects"
         ) from None
 
 
@@ -127,13 +127,9 @@ def build_basis(
     PatchfemError
         If an array is missing or wrong; the message names it.
     """
-    try:
-        if "M" in data or "K" in data:
-            return _build_basis_from_matrices(data, pairs, driven_mass, is_forced)
-        return _build_basis_from_modes(data, pairs, driven_mass, is_forced, mass)
-    except PatchfemError as error:
-        message = str(error).removeprefix("structure: ")
-        raise PatchfemError(f"structure.file: {message}") from None
+    if "M" in data or "K" in data:
+        return _build_basis_from_matrices(data, pairs, driven_mass, is_forced)
+    return _build_basis_from_modes(data, pairs, driven_mass, is_forced, mass)
 
 
 def _refuse_missing(data: dict, missing_name: str) -> None:
@@ -213,9 +209,9 @@ def _build_basis_from_modes(
             "drive.mass need; give `slide` and `force` in the file"
         )
     if "omega" in data:
-        omega = _read_numbers(data, "omega")
+        omega = read_numbers(data["omega"], "omega")
     elif "frequency" in data:
-        omega = 2 * np.pi * _read_numbers(data, "frequency")
+        omega = 2 * np.pi * read_numbers(data["frequency"], "frequency")
     else:
         _refuse_missing(data, "M and K, or omega [rad/s] or frequency [Hz] of modes")
     n = omega.size
@@ -224,7 +220,7 @@ def _build_basis_from_modes(
         if name not in data:
             _refuse_missing(data, f"{name} of the modes")
     if mass is None and "moving_mass" in data:
-        mass = float(_read_numbers(data, "moving_mass")[0])
+        mass = float(read_numbers(data["moving_mass"], "moving_mass")[0])
     if mass is None or not mass > 0:
         raise PatchfemError(
             "lacks moving_mass > 0, the modal mass [kg]; give moving_mass in the file or in "
@@ -232,11 +228,11 @@ def _build_basis_from_modes(
         )
     if (omega < 0).any():
         raise PatchfemError(f"frequencies must be >= 0, not {omega.min():g}")
-    faces = np.atleast_2d(_read_numbers(data, "slide", (n,), (None, n)))
+    faces = np.atleast_2d(read_numbers(data["slide"], "slide", (n,), (None, n)))
     zeta, damping = _read_damping(data, omega)
-    output = _read_numbers(data, "output", (n,)) if "output" in data else faces[0]
+    output = read_numbers(data["output"], "output", (n,)) if "output" in data else faces[0]
     if not is_forced:
-        base = _read_numbers(data, "base", (n,))
+        base = read_numbers(data["base"], "base", (n,))
         mass_fraction = np.sum(base**2)
         if mass_fraction > MAX_MASS_FRACTION:
             raise PatchfemError(
@@ -244,22 +240,20 @@ def _build_basis_from_modes(
                 "possible"
             )
     else:
-        base = -(_read_numbers(data, "force", (n,)) if "force" in data else output)
+        base = -(read_numbers(data["force"], "force", (n,)) if "force" in data else output)
     patch_motions = {
-        name: frozen_array(_read_numbers(data, name, (n,)))
-        for name in PATCH_MOTIONS
-        if name in data and data[name].any()
+        name: read_numbers(data[name], name, (n,)) for name in PATCH_MOTIONS if name in data
     }
-    return ModalBasis(
-        names=_read_names(data, n) or tuple(f"mode {k + 1}" for k in range(n)),
-        omega=frozen_array(omega),
+    return make_basis(
+        _read_names(data, n) or tuple(f"mode {k + 1}" for k in range(n)),
+        mass,
+        omega=omega,
         zeta=zeta,
-        slide=frozen_array(faces[0]),
-        base=frozen_array(base),
-        output=frozen_array(output),
-        mass=mass,
+        slide=faces[0],
+        base=base,
+        output=output,
         damping=damping,
-        faces=frozen_array(faces) if len(faces) > 1 else None,
+        faces=faces if len(faces) > 1 else None,
         **patch_motions,
     )
 
@@ -267,49 +261,17 @@ def _build_basis_from_modes(
 def _read_damping(data: dict, omega) -> tuple:
     """Read damping ratios (n,), and the damping matrix (n, n) [1/s] if it is not diagonal."""
     n = omega.size
-    damping = _read_numbers(data, "damping", (n,), (n, n))
+    damping = read_numbers(data["damping"], "damping", (n,), (n, n))
     if damping.ndim == 1:
         if (damping < 0).any():
             raise PatchfemError(f"damping must be >= 0, not {damping.min():g}")
-        return frozen_array(damping), None
+        return damping, None
     lowest = np.linalg.eigvalsh(damping + damping.T).min()
     if lowest < matrices.MIN_DAMPING_EIGENVALUE * np.abs(damping).max():
         raise PatchfemError(
             "the damping matrix adds energy; a positive semidefinite matrix D [1/s] is needed"
         )
     return matrices.split_damping(damping, omega)
-
-
-def _read_numbers(data: dict, name: str, *shapes) -> np.ndarray:
-    """Convert an array from a file to finite real numbers.
-
-    Parameters
-    ----------
-    data : dict
-    name : str
-    *shapes : tuple of int or None
-        Shapes that are allowed, beginning with (n,); None stands for any length. Without a shape the
-        array is flattened.
-    """
-    values = to_real(data[name], name)
-    if values.dtype.kind not in "iufb":
-        raise PatchfemError(f"{name} does not contain real numbers")
-    values = values.astype(float)
-    if not shapes:
-        values = values.ravel()
-    if not np.isfinite(values).all():
-        raise PatchfemError(f"{name} contains values that are not finite")
-    if shapes and not any(_has_shape(values, shape) for shape in shapes):
-        n = shapes[0][0]
-        raise PatchfemError(f"{name} has shape {values.shape}, but there are {n} modes")
-    return values
-
-
-def _has_shape(values, shape: tuple) -> bool:
-    """Return whether an array has a given shape, in which None stands for any length."""
-    if len(shape) != values.ndim:
-        return False
-    return all(length in (None, size) for length, size in zip(shape, values.shape))
 
 
 def _read_names(data: dict, n: int) -> tuple | None:

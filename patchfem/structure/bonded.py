@@ -4,8 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..core import ModalBasis, PatchfemError, frozen_array
+from ..core import ModalBasis, PatchfemError
 from .matrices import decouple_modes, split_damping, trim_round_off
+from .modes import make_basis
 
 # Smallest squared frequency of an elastic mode relative to the largest one; a mode with a smaller
 # one is rigid
@@ -126,16 +127,13 @@ def _change_coordinates(basis: ModalBasis, omega, shapes, damper) -> ModalBasis:
     D = shapes.T @ (basis.damping_matrix + damper) @ shapes
     scale = size.T @ (np.abs(basis.damping_matrix) + np.abs(damper)) @ size
     zeta, damping = split_damping(trim_round_off(D, scale), omega)
-    rows = {}
-    for key in (*PARTICIPATION_FIELDS, "faces"):
-        row = getattr(basis, key)
-        if row is not None:
-            rows[key] = frozen_array(row @ shapes)
-    return replace(
-        basis,
-        omega=frozen_array(omega),
+    rows = {key: getattr(basis, key) for key in (*PARTICIPATION_FIELDS, "faces")}
+    return make_basis(
+        basis.names,
+        basis.mass,
+        omega=omega,
         zeta=zeta,
         damping=damping,
-        shapes=frozen_array(shapes if basis.shapes is None else basis.shapes @ shapes),
-        **rows,
+        shapes=shapes if basis.shapes is None else basis.shapes @ shapes,
+        **{key: row @ shapes for key, row in rows.items() if row is not None},
     )

@@ -14,9 +14,6 @@ without segments also has:
 - max_frequency_ratio: highest frequency over that of its cycle.
 - duration [s], after which it ends.
 - breaks: times (k,) [s] at which its formula changes.
-- phase(t): phase [rad] in its cycle.
-- rate [1/s]: the Taylor series in time of the drive is exact to round-off with 27 terms for steps up to
-  2/rate.
 
 `DRIVE_BUILDERS` maps each waveform to the function that builds its drive from `DriveKeys`.
 """
@@ -27,10 +24,6 @@ import numpy as np
 
 from ..core import DriveSegment, PatchfemError
 from .drive_sizes import DriveKeys, count_cycles_per_level
-
-# Smallest product of rate and duration of a sweep; with it, a Taylor series covers at most 1/20 of
-# the sweep
-MIN_TAYLOR_RATE = 40
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -146,16 +139,6 @@ class SweepDrive:
         return np.array([self.duration])
 
     @property
-    def rate(self) -> float:
-        """Largest rate of change [1/s] of the drive signal, which limits the step of a Taylor series.
-
-        It is the highest circular frequency, or a larger rate if the sweep is short.
-        """
-        change = abs(np.log(self.high / self.low)) if self.logarithmic else 1.0
-        sweep_rate = MIN_TAYLOR_RATE * max(1.0, change) / self.duration
-        return max(2 * np.pi * max(self.low, self.high), sweep_rate)
-
-    @property
     def period(self) -> float:
         """Period [s] at the end of the sweep."""
         return 1 / self.high
@@ -229,15 +212,6 @@ class RecordedDrive:
     def breaks(self) -> np.ndarray:
         """Times [s] at which the slope changes, which are those of all rows except the first."""
         return self.time[1:]
-
-    @property
-    def rate(self) -> float:
-        """Zero, because the Taylor series of a linear function has only two terms."""
-        return 0.0
-
-    def phase(self, t):
-        """Evaluate the phase 2 pi t/period [rad] at times t (k,) [s]."""
-        return 2 * np.pi * np.asarray(t, float) / self.period
 
     @property
     def max_acceleration(self) -> float:

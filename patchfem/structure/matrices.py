@@ -11,8 +11,9 @@ the modes stay coupled by D.
 import numpy as np
 from scipy.linalg import LinAlgError, cholesky, eigh, solve_triangular, svd
 
-from ..core import ModalBasis, PatchfemError, frozen_array
-from ..inputs.symmetric import symmetrize, to_real
+from ..core import ModalBasis, PatchfemError
+from ..inputs.symmetric import read_numbers, symmetrize
+from .modes import make_basis
 
 # Round-off of an eigenvalue of an n x n matrix, divided by n and relative to the largest eigenvalue
 EIGENVALUE_TOL = 16 * np.finfo(float).eps
@@ -109,23 +110,20 @@ def build_basis(
         base = np.ones(n) if base is None else _check_row(base, n, "base")
         participation = phi.T @ (M @ base)
     patch_motions = {
-        key: frozen_array(_check_row(row, n, key) @ phi)
-        for key, row in rows.items()
-        if row is not None and np.any(row)
+        key: _check_row(row, n, key) @ phi for key, row in rows.items() if row is not None
     }
-    slides = frozen_array(faces @ phi)
-    output_motion = frozen_array(output @ phi)
-    return ModalBasis(
-        names=tuple(names) if names is not None else tuple(str(k + 1) for k in range(n)),
-        omega=frozen_array(omega),
+    slides = faces @ phi
+    return make_basis(
+        tuple(names) if names is not None else tuple(str(k + 1) for k in range(n)),
+        1.0,
+        omega=omega,
         zeta=zeta,
-        slide=slides[0] if len(slides) else output_motion,
-        base=frozen_array(participation),
-        output=output_motion,
-        mass=1.0,
+        slide=slides[0] if len(slides) else output @ phi,
+        base=participation,
+        output=output @ phi,
         damping=damping,
         faces=None if len(slides) == 1 else slides,
-        shapes=frozen_array(phi),
+        shapes=phi,
         **patch_motions,
     )
 
@@ -138,7 +136,7 @@ def split_damping(D, omega) -> tuple:
     diagonal = np.diag(D)
     zeta = np.divide(diagonal, 2 * omega, out=np.zeros_like(diagonal), where=omega > 0)
     is_coupled = (D - np.diag(diagonal)).any() or diagonal[omega == 0].any()
-    return frozen_array(zeta), frozen_array(D) if is_coupled else None
+    return zeta, D if is_coupled else None
 
 
 def decouple_modes(rows) -> tuple:
@@ -193,7 +191,7 @@ def _compute_modes(root, K) -> tuple:
     min_square = len(K) * EIGENVALUE_TOL * np.abs(squares).max(initial=0.0)
     if squares[0] < -min_square:
         raise PatchfemError(
-            "structure: K is not positive semidefinite: for one motion the stiffness divided by the "
+            "K is not positive semidefinite: for one motion the stiffness divided by the "
             f"mass is {squares[0]:.3g} 1/s^2, which is {squares[0] / squares[-1]:.2g} times the largest "
             "such quotient; make the springs symmetric and >= 0, and write the matrix with all its "
             "digits"
@@ -204,9 +202,7 @@ def _compute_modes(root, K) -> tuple:
 def _require_finite(per_mass) -> np.ndarray:
     """Raise PatchfemError if the stiffness divided by the mass has overflowed."""
     if not np.isfinite(per_mass).all():
-        raise PatchfemError(
-            "structure: K/M is too large to compute; check that K and M are in SI units"
-        )
+        raise PatchfemError("K/M is too large to compute; check that K and M are in SI units")
     return per_mass
 
 
@@ -227,7 +223,7 @@ def _factor_mass(M):
         massless = np.flatnonzero(diagonal <= 0)
         example = f" (coordinate {massless[0] + 1} has none)" if massless.size else ""
         raise PatchfemError(
-            f"structure: M is not positive definite: every coordinate needs mass{example}; condense out "
+            f"M is not positive definite: every coordinate needs mass{example}; condense out "
             "the coordinates without mass, or give each of these coordinates a mass"
         )
     return root
@@ -247,11 +243,10 @@ def _check_matrix(matrix, name: str, shape=None) -> np.ndarray:
     """Return a matrix in full that is symmetric and has the shape of the mass matrix."""
     if hasattr(matrix, "toarray"):
         matrix = matrix.toarray()
-    matrix = symmetrize(matrix, f"structure: {name}")
+    matrix = symmetrize(matrix, f"{name}")
     if shape is not None and matrix.shape != shape:
         raise PatchfemError(
-            f"structure: {name} is {matrix.shape[0]} x {matrix.shape[0]} but M is "
-            f"{shape[0]} x {shape[0]}"
+            f"{name} is {matrix.shape[0]} x {matrix.shape[0]} but M is {shape[0]} x {shape[0]}"
         )
     return matrix
 
@@ -263,7 +258,7 @@ def _project_damping_matrix(phi, C) -> np.ndarray:
     values = eigh(D, eigvals_only=True)
     if values[0] < MIN_DAMPING_EIGENVALUE * max(abs(values[-1]), abs(values[0])):
         raise PatchfemError(
-            "structure: C adds energy: for one motion the damping divided by the mass is "
+            "C adds energy: for one motion the damping divided by the mass is "
             f"{values[0]:.3g} 1/s; dampers >= 0 are needed"
         )
     return D
@@ -295,17 +290,10 @@ def _decouple_equal_frequencies(phi, omega, D) -> tuple:
 
 def _check_row(row, n: int, name: str) -> np.ndarray:
     """Check that a row has n finite real numbers; `slide` may have several rows."""
-    try:
-        row = np.asarray(to_real(row, f"structure: {name}"), float)
-    except (TypeError, ValueError):
-        raise PatchfemError(f"structure: {name} does not contain real numbers") from None
-    if row.ndim == 2 and 1 in row.shape and name != "slide":
-        row = row.ravel()
-    if row.shape[-1:] != (n,) or row.ndim > (2 if name == "slide" else 1):
-        raise PatchfemError(f"structure: {name} has shape {row.shape}, but M has {n} coordinates")
-    if not np.isfinite(row).all():
-        raise PatchfemError(f"structure: {name} contains values that are not finite")
-    return row
+    if name == "slide":
+        return read_numbers(row, name, (n,), (None, n))
+    is_column = np.ndim(row) == 2 and 1 in np.shape(row)
+    return read_numbers(np.ravel(row) if is_column else row, name, (n,))
 
 
 def _find_shape_signs(phi, output) -> np.ndarray:

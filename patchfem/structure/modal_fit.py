@@ -42,33 +42,26 @@ MIN_DRIVEN_RESIDUE = 1e-6
 MAX_MISFIT = 0.5  # largest relative residual; a fit with a larger one is rejected
 
 
-class Columns(NamedTuple):
-    """Columns of the linear fit of residues: modes, lower residual and upper residual.
-
-    - design: real columns (2q, n + 2) of norm 1.
-    - by_frequency, by_damping: derivatives (2q, n) over ln w_r and ln zeta_r.
-    - scale: norms (n + 2,) of the columns before they were divided by them.
-    """
-
-    design: np.ndarray
-    by_frequency: np.ndarray
-    by_damping: np.ndarray
-    scale: np.ndarray
-
-
 class LinearFit(NamedTuple):
     """Solution of the linear fit of residues for given poles.
 
-    - residual: weighted residual (2q, p), real parts before imaginary ones.
+    Its columns are those of the n modes, of the lower residual and of the upper residual; real parts stand before
+    imaginary ones.
+
+    - residual: weighted residual (2q, p).
     - coefficients: coefficients (n + 2, p) of the columns.
     - basis: orthonormal basis (2q, n + 2) of the columns.
-    - columns: the columns.
+    - design: columns (2q, n + 2) of norm 1.
+    - slopes: derivatives (2q, 2n) of the columns of the modes over ln w_r, then over ln zeta_r.
+    - scale: norms (n + 2,) of the columns before they were divided by them.
     """
 
     residual: np.ndarray
     coefficients: np.ndarray
     basis: np.ndarray
-    columns: Columns
+    design: np.ndarray
+    slopes: np.ndarray
+    scale: np.ndarray
 
 
 class FittedPoles(NamedTuple):
@@ -126,7 +119,7 @@ class ModalFit:
     def __init__(self, omega, data, power):
         if np.unique(power).size != 1:
             raise PatchfemError(
-                "structure.file: responses of displacement, velocity and acceleration are mixed; use "
+                "responses of displacement, velocity and acceleration are mixed; use "
                 "responses of one kind"
             )
         self.omega = omega
@@ -144,32 +137,31 @@ class ModalFit:
         self.target = _stack_real(self.weight[:, None] * self.data)
         self.norm = np.linalg.norm(self.target)
 
-    def columns(self, theta) -> Columns:
-        """Compute the columns of the linear fit and their derivatives."""
+    def solve(self, theta) -> LinearFit:
+        """Solve the linear fit of residues for given poles."""
+        # The column of a mode is b/(w^2 - s^2 + 2i z w s) at the frequencies s, with the weights b.
         w, z = np.exp(np.split(theta, 2))
         s = self.omega[:, None]
         base = (self.weight * self.derivative)[:, None]
-        pole = base / (w**2 - s**2 + 2j * z * w * s)
-        by_frequency = -(pole**2) / base * (2 * w**2 + 2j * z * w * s)
-        by_damping = -(pole**2) / base * (2j * z * w * s)
-        residuals = np.hstack([base / -((s / self.max_omega) ** 2), base])
-        design = _stack_real(np.hstack([pole, residuals]))
-        scale = np.linalg.norm(design, axis=0)
-        mode_scale = scale[: w.size]
-        return Columns(
-            design / scale,
-            _stack_real(by_frequency) / mode_scale,
-            _stack_real(by_damping) / mode_scale,
-            scale,
-        )
+        damping = 2j * z * w * s
+        pole = base / (w**2 - s**2 + damping)
+        columns = _stack_real(np.hstack([pole, base / -((s / self.max_omega) ** 2), base]))
+        by_denominator = -(pole**2) / base
+        slopes = np.hstack([by_denominator * (2 * w**2 + damping), by_denominator * damping])
 
-    def solve(self, theta) -> LinearFit:
-        """Solve the linear fit of residues for given poles."""
-        columns = self.columns(theta)
-        q, r = np.linalg.qr(columns.design)
-        coefficients = np.linalg.lstsq(r, q.T @ self.target, rcond=1e-13)[0]
-        residual = columns.design @ coefficients - self.target
-        return LinearFit(residual, coefficients, q, columns)
+        # The least-squares solution by QR factors of columns of norm 1.
+        scale = np.linalg.norm(columns, axis=0)
+        design = columns / scale
+        basis, triangle = np.linalg.qr(design)
+        coefficients = np.linalg.lstsq(triangle, basis.T @ self.target, rcond=1e-13)[0]
+        return LinearFit(
+            residual=design @ coefficients - self.target,
+            coefficients=coefficients,
+            basis=basis,
+            design=design,
+            slopes=_stack_real(slopes) / np.tile(scale[: w.size], 2),
+            scale=scale,
+        )
 
     def residual(self, theta):
         """Compute the weighted residual (2q p,), flattened."""
@@ -181,13 +173,9 @@ class ModalFit:
         Each is the change of one column outside the span of all columns, times its coefficients.
         """
         linear = self.solve(theta)
-        q = linear.basis
-        changes = []
-        for slope in (linear.columns.by_frequency, linear.columns.by_damping):
-            for k in range(slope.shape[1]):
-                outside = slope[:, k] - q @ (q.T @ slope[:, k])
-                changes.append(np.outer(outside, linear.coefficients[k]).ravel())
-        return np.stack(changes, axis=1)
+        outside = linear.slopes - linear.basis @ (linear.basis.T @ linear.slopes)
+        coefficients = np.tile(linear.coefficients[:-2], (2, 1))
+        return (outside[:, None, :] * coefficients.T).reshape(-1, theta.size)
 
     def refine(self, theta, tolerance=1e-6) -> tuple:
         """Minimize the residual from starting values of the poles.
@@ -231,13 +219,13 @@ class ModalFit:
         """Compute the unweighted contribution (q, n, p) of each mode to the responses."""
         linear = self.solve(theta)
         n = theta.size // 2
-        modes = _join_complex(linear.columns.design[:, :n]) / self.weight[:, None]
+        modes = _join_complex(linear.design[:, :n]) / self.weight[:, None]
         return modes[:, :, None] * linear.coefficients[None, :n]
 
     def compute_residues(self, theta) -> Residues:
         """Compute the residues in units of the receptance."""
         linear = self.solve(theta)
-        unscaled = linear.coefficients / linear.columns.scale[:, None] * self.size
+        unscaled = linear.coefficients / linear.scale[:, None] * self.size
         return Residues(unscaled[:-2], unscaled[-2] * self.max_omega**2, unscaled[-1])
 
 
@@ -274,7 +262,9 @@ def fit_poles(omega, data, power) -> FittedPoles:
     cost = np.sum(fit.residual(theta) ** 2)
     n_responses = data.shape[1]
     while theta.size < 2 * MAX_MODES and np.sqrt(cost) > MIN_MISFIT * fit.norm:
-        attempts = [fit.refine(add_mode(theta, *start)) for start in _find_starts(fit, theta)]
+        ends = [theta.size // 2, theta.size]
+        starts = [np.insert(theta, ends, np.log(start)) for start in _find_starts(fit, theta)]
+        attempts = list(map(fit.refine, starts))
         if not attempts:
             break
         new_theta, new_cost = min(attempts, key=lambda attempt: attempt[1])
@@ -288,31 +278,12 @@ def fit_poles(omega, data, power) -> FittedPoles:
     theta = _remove_weak_modes(fit, _refine_with_noise(fit, theta, cost))
     if not theta.size:
         raise PatchfemError(
-            "structure.file: no mode is visible in the frequency responses; responses that include a "
+            "no mode is visible in the frequency responses; responses that include a "
             "resonance are needed"
         )
     w, zeta = np.exp(np.split(theta, 2))
     order = np.argsort(w)
     return FittedPoles(w[order], zeta[order], fit)
-
-
-def add_mode(theta, w: float, zeta: float) -> np.ndarray:
-    """Add a mode to the parameters (2n,) of a fit.
-
-    Parameters
-    ----------
-    theta : (2n,) ndarray
-    w : float
-        Natural frequency [rad/s].
-    zeta : float
-        Damping ratio.
-
-    Returns
-    -------
-    (2n + 2,) ndarray
-    """
-    log_w, log_zeta = np.split(theta, 2)
-    return np.concatenate([log_w, [np.log(w)], log_zeta, [np.log(zeta)]])
 
 
 def _refine_with_noise(fit: ModalFit, theta, cost):
@@ -429,14 +400,14 @@ def identify_modes(frequency, measured: dict, notes: list) -> MeasuredModes:
     is_positive = frequency > 0
     omega = 2 * np.pi * frequency[is_positive]
     if omega.size < 8 or (np.diff(omega) <= 0).any():
-        raise PatchfemError("structure.file: at least 8 frequencies in rising order are needed")
+        raise PatchfemError("at least 8 frequencies in rising order are needed")
     data = np.stack(
         [measured[direction, reference][0][is_positive] for direction in places], axis=1
     )
     is_moving = np.abs(data).max(axis=0) > 0
     if not is_moving[driven]:
         raise PatchfemError(
-            f"structure.file: the response at the driven point itself, {_format_direction(reference)}, is zero"
+            f"the response at the driven point itself, {_format_direction(reference)}, is zero"
         )
     power = np.array([measured[direction, reference][1] for direction in places])
     poles = fit_poles(omega, data[:, is_moving], power[is_moving])
@@ -456,7 +427,7 @@ def identify_modes(frequency, measured: dict, notes: list) -> MeasuredModes:
     ]
     if not is_scaled.any():
         raise PatchfemError(
-            f"structure.file: no mode moves the driven point {_format_direction(reference)} in the direction of the "
+            f"no mode moves the driven point {_format_direction(reference)} in the direction of the "
             "force; check the sign of the response"
         )
     notes += _note_modes_below(poles, data[0, is_moving])
@@ -472,7 +443,7 @@ def _check_misfit(poles: FittedPoles, n_modes: int) -> list:
     misfit = np.linalg.norm(fit.residual(poles.theta)) / fit.norm
     if not np.isfinite(misfit) or misfit > MAX_MISFIT:
         raise NotConverged(
-            f"structure.file: the modes found leave {100 * misfit:.0f} % of the responses unexplained"
+            f"the modes found leave {100 * misfit:.0f} % of the responses unexplained"
         )
     if misfit <= 0.05:
         return []
@@ -510,7 +481,7 @@ def _choose_reference(measured: dict):
         references = sorted({reference for _, reference in measured})
         names = ", ".join(_format_direction(reference) for reference in references)
         raise PatchfemError(
-            f"structure.file: a response at the driven point itself ({names}) is missing, and without "
+            f"a response at the driven point itself ({names}) is missing, and without "
             "this response the mode shapes have no scale; measure the response at the driven point"
         )
     return max(candidates, key=lambda ref: sum(reference == ref for _, reference in measured))

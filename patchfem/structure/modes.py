@@ -12,6 +12,25 @@ from ..core import ModalBasis, frozen_array
 PATCH_MOTIONS = ("normal", "pitch", "yaw")
 
 
+def make_basis(names: tuple, mass: float, **arrays: np.ndarray | None) -> ModalBasis:
+    """Make a modal basis whose arrays are read-only copies; a motion of the patch that no mode has is left out.
+
+    Parameters
+    ----------
+    names : tuple of str
+        Names of the modes or masses.
+    mass : float
+        Modal mass [kg].
+    **arrays
+        Other fields of `core.ModalBasis`; None for one without a value.
+    """
+    frozen = {}
+    for key, values in arrays.items():
+        if values is not None and (key not in PATCH_MOTIONS or np.any(values)):
+            frozen[key] = frozen_array(values)
+    return ModalBasis(names=names, mass=float(mass), **frozen)
+
+
 def build_basis(structure, drive_kind: str) -> ModalBasis:
     """Build the modal basis from the modes that a scene lists.
 
@@ -35,18 +54,18 @@ def build_basis(structure, drive_kind: str) -> ModalBasis:
     """
 
     def column(key: str) -> np.ndarray:
-        return frozen_array([getattr(mode, key) for mode in structure.mode])
+        return np.array([getattr(mode, key) for mode in structure.mode], float)
 
     output = column("accelerometer")
     gauge = column("gauge")
-    return ModalBasis(
-        names=tuple(mode.name for mode in structure.mode),
-        omega=frozen_array(2 * np.pi * column("frequency")),
+    return make_basis(
+        tuple(mode.name for mode in structure.mode),
+        structure.moving_mass,
+        omega=2 * np.pi * column("frequency"),
         zeta=column("damping"),
         slide=column("slide"),
-        base=frozen_array(-column("output")) if drive_kind == "force" else column("base"),
+        base=-column("output") if drive_kind == "force" else column("base"),
         output=output,
-        mass=float(structure.moving_mass),
         gauge=None if np.array_equal(output, gauge) else gauge,
-        **{key: column(key) for key in PATCH_MOTIONS if column(key).any()},
+        **{key: column(key) for key in PATCH_MOTIONS},
     )

@@ -5,8 +5,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ..core import ModalBasis, PatchfemError, frozen_array
+from ..core import ModalBasis, PatchfemError
 from ..inputs.universal import DIRECTION_NAMES
+from .modes import make_basis
 
 # Pattern of a node with a direction, such as "12:+x"
 DIRECTION_PATTERN = re.compile(r"(\d+):([+-]?)(r?[xyz])")
@@ -60,15 +61,17 @@ class MeasuredModes:
             match = DIRECTION_PATTERN.fullmatch(part.strip())
             if match is None:
                 raise PatchfemError(
-                    f"structure.{key}: '{text}' is not a node with a direction; write node:direction, "
-                    'such as "12:+x", or "12:+x, 13:-x" for the motion of 12 relative to 13'
+                    f"'{text}' is not a node with a direction; write node:direction, such as "
+                    '"12:+x", or "12:+x, 13:-x" for the motion of 12 relative to 13',
+                    f"structure.{key}",
                 )
             node = int(match[1])
             axis = DIRECTION_NAMES.index(match[3])
             if (node, axis) not in self.motion:
                 raise PatchfemError(
-                    f"structure.{key}: the file has no motion of {node}:{match[3]}; the file has "
-                    f"{_list_directions(self.motion)}"
+                    f"the file has no motion of {node}:{match[3]}; the file has "
+                    f"{_list_directions(self.motion)}",
+                    f"structure.{key}",
                 )
             sign = -1.0 if match[2] == "-" else 1.0
             total += sign * self.motion[node, axis]
@@ -116,33 +119,27 @@ def build_basis(shapes: MeasuredModes, mass: float, places: dict, *, is_forced: 
         if text is not None:
             rows[key] = np.sqrt(mass) * shapes.motion_at(text, key)
             if key in ("slide_at", "output_at") and not rows[key].any():
-                raise PatchfemError(f"structure.{key}: no mode of the file moves '{text}'")
+                raise PatchfemError(f"no mode of the file moves '{text}'", f"structure.{key}")
     slide = rows["slide_at"]
     output = rows.get("output_at", slide)
     base = -rows.get("force_at", output) if is_forced else rows.get("base_at", slide)
     mass_fraction = float(np.sum(base**2))
     if not is_forced and mass_fraction > MAX_MASS_FRACTION:
         raise PatchfemError(
-            f"structure.base_at: at this place the modes contain {mass_fraction:.4g} times "
-            "structure.moving_mass, but at most 1 is possible; lower structure.moving_mass, or give "
-            "the place of the moving mass"
+            f"at this place the modes contain {mass_fraction:.4g} times structure.moving_mass, but at "
+            "most 1 is possible; lower structure.moving_mass, or give the place of the moving mass",
+            "structure.base_at",
         )
     order = np.argsort(shapes.frequency, kind="stable")
     sign = np.where(output[order] < 0, -1.0, 1.0)
-    patch_motions = {}
-    for key in ("normal", "pitch"):
-        row = rows.get(f"{key}_at")
-        if row is not None and row.any():
-            patch_motions[key] = frozen_array(row[order] * sign)
-    return ModalBasis(
-        names=tuple(f"mode {k + 1}" for k in range(order.size)),
-        omega=frozen_array(2 * np.pi * shapes.frequency[order]),
-        zeta=frozen_array(shapes.zeta[order]),
-        slide=frozen_array(slide[order] * sign),
-        base=frozen_array(base[order] * sign),
-        output=frozen_array(output[order] * sign),
-        mass=float(mass),
-        **patch_motions,
+    motions = {"slide": slide, "base": base, "output": output}
+    motions |= {key: rows.get(f"{key}_at") for key in ("normal", "pitch")}
+    return make_basis(
+        tuple(f"mode {k + 1}" for k in range(order.size)),
+        mass,
+        omega=2 * np.pi * shapes.frequency[order],
+        zeta=shapes.zeta[order],
+        **{key: row[order] * sign for key, row in motions.items() if row is not None},
     )
 
 

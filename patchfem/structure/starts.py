@@ -43,8 +43,8 @@ def _convert_to_coordinates(basis: ModalBasis, values) -> np.ndarray:
     n_named = n if basis.shapes is None else len(basis.shapes)
     if values.shape != (n_named,):
         raise PatchfemError(
-            f"structure.start: {values.size} values are given for {n_named} modes or masses; one value for "
-            "each is needed"
+            f"{values.size} values are given for {n_named} modes or masses; one value for each is needed",
+            "structure.start",
         )
     if basis.shapes is None:
         return values
@@ -74,8 +74,9 @@ def start_from_output_displacement(basis: ModalBasis, displacement: float) -> In
     output = float(shape @ basis.output)
     if output == 0:
         raise PatchfemError(
-            "structure: no mode moves the output point, so the structure cannot be released from a "
-            "displacement of this point; give [structure.start]"
+            "no mode moves the output point, so the structure cannot be released from a displacement "
+            "of this point; give [structure.start]",
+            "structure",
         )
     return InitialState(
         frozen_array(displacement / output * shape), frozen_array(np.zeros(shape.size))

@@ -60,7 +60,7 @@ def read_universal(path: Path) -> MeasuredModes:
     PatchfemError
         If the file contains neither modes nor frequency responses, or if they lack something.
     """
-    datasets = read_datasets(path, "structure.file: ")
+    datasets = read_datasets(path)
     modes = [dataset for dataset in datasets if _is_mode(dataset)]
     responses = [dataset for dataset in datasets if dataset.get("type") == 58]
     units = [dataset for dataset in datasets if dataset.get("type") == 164]
@@ -73,7 +73,7 @@ def read_universal(path: Path) -> MeasuredModes:
         return _fit_responses(responses, factors)
     types = sorted({str(dataset.get("type", "?")) for dataset in datasets})
     raise PatchfemError(
-        f"structure.file: {path} has neither mode shapes (dataset 55, normal or complex modes) nor "
+        f"{path} has neither mode shapes (dataset 55, normal or complex modes) nor "
         f"frequency responses (58); its datasets: {', '.join(types) or 'none'}"
     )
 
@@ -98,13 +98,13 @@ def _read_modes(datasets: list, factors: _UnitFactors) -> MeasuredModes:
         modal_mass = mode.modal_mass * factors.length / factors.force
         if not modal_mass > 0:
             raise PatchfemError(
-                f"structure.file: mode {number} ({mode.frequency:.5g} Hz) has no modal mass, so its shape has no "
+                f"mode {number} ({mode.frequency:.5g} Hz) has no modal mass, so its shape has no "
                 "scale; export the modal mass (dataset 55: record 8; complex modes: modal A), or "
                 "frequency responses"
             )
         if mode.zeta < 0 or mode.frequency < 0:
             raise PatchfemError(
-                f"structure.file: mode {number} has frequency {mode.frequency:.5g} Hz and damping {mode.zeta:.3g}; both "
+                f"mode {number} has frequency {mode.frequency:.5g} Hz and damping {mode.zeta:.3g}; both "
                 "must be >= 0"
             )
         modes.append(mode)
@@ -156,7 +156,7 @@ def _read_complex_mode(number: int, dataset: dict, values) -> _Mode:
     eigenvalue = dataset["eig"]
     if not eigenvalue.imag:
         raise PatchfemError(
-            f"structure.file: mode {number} has the real eigenvalue {eigenvalue.real:.5g} 1/s; only "
+            f"mode {number} has the real eigenvalue {eigenvalue.real:.5g} 1/s; only "
             "vibrating modes can be converted to real ones"
         )
     omega = abs(eigenvalue)
@@ -178,7 +178,7 @@ def _fit_responses(datasets: list, factors: _UnitFactors) -> MeasuredModes:
     ]
     if not datasets:
         raise PatchfemError(
-            "structure.file: dataset 58 contains no frequency response function (function type 4); its "
+            "dataset 58 contains no frequency response function (function type 4); its "
             f"types: {', '.join(sorted(kinds))}"
         )
     notes = []
@@ -205,7 +205,7 @@ def _check_response(dataset: dict, name: str, frequency) -> int:
     input_kind = dataset["orddenom_spec_data_type"]
     if kind not in DERIVATIVE_ORDERS or input_kind not in FORCE_TYPES:
         raise PatchfemError(
-            f"structure.file: {name} is a response of type {kind} per input of type {input_kind}; "
+            f"{name} is a response of type {kind} per input of type {input_kind}; "
             "displacement (8), velocity (11) or acceleration (12) per force (13) is needed"
         )
     own_frequency = dataset["x"]
@@ -213,13 +213,11 @@ def _check_response(dataset: dict, name: str, frequency) -> int:
         own_frequency, frequency, rtol=MAX_FREQUENCY_CHANGE, atol=0
     ):
         raise PatchfemError(
-            f"structure.file: {name} is given at other frequencies than the first response; all "
+            f"{name} is given at other frequencies than the first response; all "
             "responses need the same frequencies"
         )
     if not np.isfinite(dataset["data"]).all() or not np.iscomplexobj(dataset["data"]):
-        raise PatchfemError(
-            f"structure.file: {name} contains values that are not finite or not complex"
-        )
+        raise PatchfemError(f"{name} contains values that are not finite or not complex")
     return DERIVATIVE_ORDERS[kind]
 
 
@@ -239,7 +237,7 @@ def _find_direction(node: int, direction: int) -> tuple:
     """Return the sign and the (node, axis) for a direction +-1 to +-6 in a universal file."""
     if not 1 <= abs(direction) <= len(DIRECTION_NAMES):
         raise PatchfemError(
-            f"structure.file: direction {direction} of node {node} is unknown; +-1 to +-6 for x, y, z, "
+            f"direction {direction} of node {node} is unknown; +-1 to +-6 for x, y, z, "
             "rx, ry, rz is needed"
         )
     return (1.0 if direction > 0 else -1.0), (int(node), abs(direction) - 1)

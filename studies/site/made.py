@@ -28,8 +28,7 @@ from patchfem.effects import EFFECTS, LAWS
 from patchfem.formatting import format_value
 from patchfem.response.rows import ROWS as MOTION
 from patchfem.runs.results.patch_rows import ROWS as STATIC
-from patchfem.scene import find_meaning
-from patchfem.scene.keys.types import attributes_by_key
+from patchfem.scene.keys.types import list_keys
 
 ROOT = Path(__file__).parents[2]
 GLOSSARY = ROOT / "patchfem/scene/GLOSSARY.md"
@@ -138,7 +137,7 @@ def about(effect: str) -> str:
     for row in re.findall(r"^\| (.+?) \| (.+) \|$", guide(), re.M):
         if row[0] in (f"`{value}`", f'`{key} = "{value}"`'):
             return remove_links(row[1][:1].upper() + row[1][1:].rstrip(".") + ".")
-    return f"One value of `{key}`: {find_meaning(TABLES[table], key)}."
+    return f"One value of `{key}`: {list_keys(TABLES[table])[key].record.meaning}."
 
 
 def guide_files() -> list:
@@ -280,12 +279,10 @@ def key_rows(name: str) -> list:
     model = TABLES[table]
     choices = next((one.choices for one in keys_page.find_selectors(model) if one.key == key), {})
     used = re.findall(r"\w+", " ".join(choices.get(value, ("", ""))))
-    named = [key, *used] if value else list(attributes_by_key(model))
+    keys = list_keys(model)
+    named = [key, *used] if value else list(keys)
     rows = [
-        keys_page._format_row(model, one)
-        for one in named
-        if one in attributes_by_key(model)
-        and not keys_page._is_table(model, attributes_by_key(model)[one])
+        keys_page.format_row(keys[one]) for one in named if one in keys and keys[one].accepts_value
     ]
     head = ("key", "kind", "default", "required", "meaning")
     return [keys_page.format_table(head, rows)] if rows else ["This effect has no keys."]

@@ -10,21 +10,16 @@ from patchfem.export.quantities import QUANTITIES
 from patchfem.response import INTERNAL_VALUES
 from patchfem.response import TABLE as MOTION
 from patchfem.runs import TABLE as STATIC
-from patchfem.scene import MATERIALS, UNIT_FACTORS, find_meaning, loads, parse_quantity
-from patchfem.scene.keys.lookup import is_table_or_value
-from patchfem.scene.keys.types import attributes_by_key, find_inner_table, find_key_record
+from patchfem.scene import MATERIALS, UNIT_FACTORS, loads, parse_quantity
+from patchfem.scene.keys.types import list_keys
 
 PAGE = text()
 
 
 def value_keys() -> list:
-    """Return (model, key) of all keys that hold a value instead of a table."""
-    return [
-        (model, key)
-        for _, model in iterate_tables()
-        for key, name in attributes_by_key(model).items()
-        if find_inner_table(model, name) is None or is_table_or_value(model, name)
-    ]
+    """Return all keys that hold a value instead of a table."""
+    tables = (list_keys(model).values() for _, model in iterate_tables())
+    return [key for keys in tables for key in keys if key.accepts_value]
 
 
 def test_exact_committed_pages_agree_with_records():
@@ -36,19 +31,14 @@ def test_exact_committed_pages_agree_with_records():
 
 def test_always_every_key_has_description():
     """Every key has a description without a full stop; a required key has no condition."""
-    for model, key in value_keys():
-        description = find_meaning(model, key)
-        assert (
-            description and not description.endswith(".") and description == description.strip()
-        ), (model, key)
-        condition = find_key_record(model, key).required
+    for key in value_keys():
+        description = key.record.meaning
+        place = (key.table, key.name)
+        assert description and not description.endswith("."), place
+        assert description == description.strip(), place
+        condition = key.record.required
         assert condition == condition.strip().rstrip(".")
-        assert not (
-            condition and model.model_fields[attributes_by_key(model)[key]].is_required()
-        ), (
-            model,
-            key,
-        )
+        assert not (condition and key.field.is_required()), place
 
 
 def test_exact_reference_is_complete():

@@ -25,7 +25,7 @@ from patchfem.core import Missing, NotConverged, PatchfemError
 from patchfem.runs.plan import plan
 from patchfem.runs.run import run
 from patchfem.scene import UNIT_FACTORS, Tables, loads
-from patchfem.scene.keys.types import find_inner_table
+from patchfem.scene.keys.types import list_keys
 from patchfem.scene.scene import SceneError
 
 FLAT = PIECE + 'load = "26 lbf"\nelement_size = "2 mm"\nsubstrate = "Ti-8Al-1Mo-1V"\n'
@@ -84,7 +84,7 @@ NEVER = (
 )
 
 
-def list_keys() -> list:
+def list_tried_keys() -> list:
     """Return (path, values to try) of every key of the schema that names no file."""
     return [
         (path, trial_values(path, kind))
@@ -104,8 +104,8 @@ def trial_values(path: tuple, kind: str | None) -> list:
         )
     model = Tables
     for key in path[:-1]:
-        model = find_inner_table(model, key) if isinstance(key, str) else model
-    field = next(one for name, one in model.model_fields.items() if (one.alias or name) == path[-1])
+        model = list_keys(model)[key].inner if isinstance(key, str) else model
+    field = list_keys(model)[path[-1]].field
     words = [
         one
         for part in (field.annotation, *get_args(field.annotation))
@@ -152,7 +152,7 @@ def keys_without_effect(scene: str) -> list:
     tables = tomllib.loads(SCENES[scene])
     base = run_and_collect(to_toml(tables))
     out = []
-    for path, tried in list_keys():
+    for path, tried in list_tried_keys():
         name = ".".join(map(str, path))
         is_silent = False
         for value in tried:

@@ -6,7 +6,7 @@ import pytest
 from scene_texts import BENCH, COULOMB, PATCH, POINT, RIG, STRUCTURE, list_mistakes
 
 from patchfem.scene import Tables
-from patchfem.scene.keys.types import attributes_by_key, find_inner_table, iterate_annotation_parts
+from patchfem.scene.keys.types import list_keys
 
 
 def test_exact_every_whole_number_has_an_upper_bound():
@@ -16,18 +16,16 @@ def test_exact_every_whole_number_has_an_upper_bound():
 
 def unbounded_keys(model, at):
     """Yield the keys of whole numbers without an upper bound in a table."""
-    for key, name in attributes_by_key(model).items():
-        inner = find_inner_table(model, name)
-        if inner is not None:
-            yield from unbounded_keys(inner, f"{at}{key}.")
+    for name, key in list_keys(model).items():
+        if key.inner is not None:
+            yield from unbounded_keys(key.inner, f"{at}{name}.")
             continue
-        field = model.model_fields[name]
-        found = [field.annotation, *field.metadata, *iterate_annotation_parts(field.annotation)]
+        found = [*key.types, *key.field.metadata]
         inside = [
             limit for one in found for limit in (one, *(getattr(one, "metadata", None) or ()))
         ]
         if int in found and not any(getattr(one, "le", None) for one in inside):
-            yield f"{at}{key}"
+            yield f"{at}{name}"
 
 
 @pytest.mark.parametrize("size", [10**21, int("9" * 400)])

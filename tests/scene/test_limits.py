@@ -89,7 +89,7 @@ REFUSED = [
         PAIR + FORCED,
         [STEADY, "accuracy.harmonics=9"],
         "accuracy.harmonics",
-        "with accuracy.method 'harmonic' and other interfaces; leave `harmonics` out",
+        "with accuracy.method = 'harmonic' and other interfaces; leave `harmonics` out",
     ),
 ]
 PLAIN = [

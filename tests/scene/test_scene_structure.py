@@ -160,9 +160,9 @@ def test_exact_initial_conditions_of_scene():
     (["structure.damper.0.between=[0, 0]"], "structure.damper[1].between", "joins the base to itself"),
     (["structure.interface.0.load=-1 N"], "structure.interface[1].load", "must be >= 0"),
     (["structure.output_mass=3"], "structure.output_mass", "there is no mass 3"),
-    (["structure.masses=[]"], "structure.masses", "at least one mass is needed"),
-    (["structure.start.displacement=['1 mm']"], "structure.start.displacement", "1 value for 2 masses; give one value "
-                                                                                "for each"),
+    (["structure.masses=[]"], "structure.masses", "not an empty array"),
+    (["structure.start.displacement=['1 mm']"], "structure.start.displacement", "the number of values is 1, but one "
+                                                                                "value for each mass"),
     (["structure.start={}"], "structure.start.displacement", "this key or velocity is needed"),
     (["structure.slide_at=12:+x"], "structure.slide_at", "names a place in a file"),
     (["drive={kind = 'force', mass = 3, force = '1 N', frequency = '1 Hz', cycles = 9}"], "drive.mass", "no mass 3"),
@@ -181,7 +181,7 @@ def test_refuses_unknown_masses(sets, key, says):
     (MASSES + '[structure.bonded]\nstiffness = "1 N/m"\n', "structure.bonded", "there are 0 interfaces"),
     (RUB + RUB + MASSES + '[structure.bonded]\nstiffness = "1 N/m"\n', "structure.bonded", "there are 2 interfaces"),
     (STRUCTURE + '[structure.start]\nvelocity = ["1 m/s", "2 m/s"]\n', "structure.start.velocity",
-     "2 values for 1 mode; give one value for each"),
+     "the number of values is 2, but one value for each mode is needed"),
     (STRUCTURE.replace("cycles", "mass = 1\ncycles").replace('"base"', '"force"').replace(
         "acceleration", 'force = "1 N"\nacceleration'), "drive.mass", "leave drive.mass out"),
     (STRUCTURE[:STRUCTURE.index("[[")].replace("moving", 'file = "rig.csv"\nmoving') +

@@ -94,7 +94,7 @@ def test_refuses_invalid_matrices(M, K, C, message):
 
 
 @pytest.mark.parametrize("rows, message", [
-    ({"faces": np.ones(3)}, "slide has shape (3,), but M has 2"),
+    ({"faces": np.ones(3)}, "slide has shape (3,), but there are 2"),
     ({"output": [1.0, np.inf]}, "output contains values that are not finite"),
     ({"faces": np.full(2, 1j)}, "slide is complex"),
 ])  # fmt: skip

@@ -17,7 +17,6 @@ from ...campaigns.sweeps.peaks import PeakOnLine
 from ...campaigns.sweeps.sweep_table import SweepTable, SweptKey
 from ...core import PatchfemError
 from ...runs.results.result import describe_measure
-from ...scene.keys import types
 from ...scene.keys.lookup import find_key
 from ..answer import Answer, Quantity, Remarks, Variable
 from ..runs import list_versions
@@ -192,7 +191,7 @@ def _make_data(table: SweepTable, case_folders: Sequence[str]) -> dict[str, Vari
 def _describe_key(key: SweptKey) -> str:
     """Return the dotted name of a key and its meaning."""
     try:
-        return f"{key.key}: {types.find_meaning(*find_key(key.key))}"
+        return f"{key.key}: {find_key(key.key).record.meaning}"
     except KeyError:
         return key.key
 

@@ -9,18 +9,19 @@ about keys and options of earlier versions.
 How to add a key
 ----------------
 1. Write the attribute into its table. The type gives the unit and the limits (`gt`, `ge`, `lt` and `le`, in SI), the
-   text is the help, and the value behind `=` is the default in SI; a key without default is required, and a key with
-   the default None may be left out::
+   text is the help, and the value behind `=` is the default in SI. A key without default is required; `optional` in
+   place of `key` makes a key that may be left out, and whose value is None then::
 
-       spacing: key(quantity("length", gt=0) | None, "distance between two bolts; default: one bolt") = None
+       spacing: optional(quantity("length", gt=0), "distance between two bolts; default: one bolt")
 
    If the help text or the `required` text of another key lists the kinds or waveforms with which a key is used, extend
    these texts by hand. A new kind of quantity needs its units and an example in units.toml.
-2. If the value of the key must agree with another key, add a row to the rules of its table in `scene.rules`; the rules
-   of [normal], [slide] and [measured] stand in `rules.check`, those of the other tables in the module of their name. The
-   condition reads the values of the table in SI and the sentence names them in braces::
+2. If the value of the key must agree with another key, add a rule to its table in `scene.rules`; the rules of [normal],
+   [slide] and [measured] stand in `rules.check`, those of the other tables in the module of their name. The condition
+   reads the values of the table in SI, and is false while a value is missing::
 
-       MistakeRule(lambda p: p.spacing < p.length, "contact.spacing", "{spacing:g} m is less than contact.length")
+       if patch.spacing < patch.length:
+           patch.add_mistake("spacing", f"{patch.spacing:g} m is less than contact.length")
 
    If the table always needs the key or an alternative, or if only some values of a selector such as `slide.kind` use it,
    add it to `SELECTORS` of `choices`; the keys of friction laws and waveforms stand in `effects`. A key that another key
@@ -32,8 +33,8 @@ How to add a key
    (`model.similar_models`), so their formulas must take arrays as well.
 4. Run `python tests/support/reference`, which writes the key into the pages of the reference, and add a test that the
    key changes an answer and that a wrong value is refused (`tests/scene`). `tests/scene/test_every_key.py` fails for a
-   key that changes no result and causes no sentence; such a key needs a `RemarkRule` in its rules. `patchfem run` prints
-   remarks, `patchfem plan` does not.
+   key that changes no result and causes no sentence; such a key needs a remark (`add_remark`) in its rules. `patchfem
+   run` prints remarks, `patchfem plan` does not.
 
 A key that is removed gets a row in `removed.REMOVED_NAMES` with the sentence that the user reads.
 """

@@ -1,11 +1,8 @@
 """The table [accuracy] of a scene."""
 
-from typing import Annotated, Literal
+from typing import Literal
 
-from pydantic import BeforeValidator
-
-from .removed import describe_removed
-from .types import Fraction, Table, key, number, whole_number
+from .types import Fraction, Table, key, number, optional, whole_number
 
 # Largest number of time steps per cycle; more would take days for a single cycle.
 MAX_STEPS_PER_CYCLE = 10_000_000
@@ -13,55 +10,38 @@ MAX_STEPS_PER_CYCLE = 10_000_000
 MAX_MODES = 10_000
 
 
-def _refuse_removed(value: object) -> object:
-    """Return a value of a key; raise ValueError for a removed value, with the replacement."""
-    for name in ("accuracy.method", "accuracy.quadrature"):
-        if sentence := describe_removed(f"{name}={value}", f"'{value}'"):
-            raise ValueError(sentence)
-    return value
-
-
-Quadrature = Annotated[
-    Literal["auto", "direct", "truncated", "merged", "recursion"], BeforeValidator(_refuse_removed)
-]
-Method = Annotated[Literal["auto", "exact", "march", "harmonic"], BeforeValidator(_refuse_removed)]
-
-
 class Accuracy(Table):
     """Tolerance and numerical settings. A setting that is not given follows from the tolerance."""
 
     tolerance: key(
         number(gt=0, lt=1),
-        "largest relative error that is allowed in any measure; the numerical settings "
-        "follow from this tolerance",
+        "largest relative error that is allowed in any measure; the numerical settings follow from this tolerance",
     ) = 1e-3
     method: key(
-        Method,
+        Literal["auto", "exact", "march", "harmonic"],
         "method that computes the motion; default: the program chooses a method for the scene",
     ) = "auto"
-    steps_per_cycle: key(
-        whole_number(4, MAX_STEPS_PER_CYCLE) | None,
+    steps_per_cycle: optional(
+        whole_number(4, MAX_STEPS_PER_CYCLE),
         "time steps per cycle; default: set by the tolerance",
-    ) = None
+    )
     quadrature: key(
-        Quadrature,
-        "method that computes the sum over bonds; default: the fastest method that meets the "
-        "tolerance",
+        Literal["auto", "direct", "truncated", "merged", "recursion"],
+        "method that computes the sum over bonds; default: the fastest method that meets the tolerance",
     ) = "auto"
-    tail: key(
-        Fraction | None,
-        "fraction of the bonds that `quadrature` 'truncated' neglects; default: set by the "
-        "tolerance",
-    ) = None
-    merge: key(
-        Fraction | None,
+    tail: optional(
+        Fraction,
+        "fraction of the bonds that `quadrature` 'truncated' neglects; default: set by the tolerance",
+    )
+    merge: optional(
+        Fraction,
         "width, in bond lengths, within which bonds are merged; default: set by the tolerance",
-    ) = None
-    harmonics: key(
-        whole_number(1, MAX_MODES) | None,
+    )
+    harmonics: optional(
+        whole_number(1, MAX_MODES),
         "number of harmonics in the harmonic balance; default: set by the tolerance",
-    ) = None
-    shear_modes: key(
-        whole_number(1, MAX_MODES) | None,
+    )
+    shear_modes: optional(
+        whole_number(1, MAX_MODES),
         "number of shear modes of the pieces; default: set by the tolerance",
-    ) = None
+    )

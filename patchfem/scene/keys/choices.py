@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 
 from ... import effects
 from . import contact, tables
-from .types import Table, attributes_by_key, find_inner_table
+from .types import Table, list_keys
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -39,13 +39,20 @@ _OTHER_WAVEFORM_KEYS = " ".join(
         re.findall(r"\w+", re.sub("acceleration[|]displacement|force", "", _WAVEFORM_KEYS))
     )
 )
+ALTERNATIVES = {  # keys of which a table always needs one
+    contact.Contact: "load|approach",
+    contact.LoadLine: "offset|moment",
+    contact.Holder: "rotational_stiffness/tangential_stiffness",
+    tables.Interface: "load|contact",
+    tables.Structure: "mode|masses|file|reduced",
+    tables.Start: "displacement/velocity",
+    tables.WornFriction: "coefficient_factor/bond_length_factor",
+}
 # A selector that an earlier one of the same table leaves unused does not count, and neither do the keys that the
 # earlier one leaves unused.
 SELECTORS = (
-    Selector(contact.Contact, "", {"": ("load|approach", "")}),
+    *(Selector(model, "", {"": (words, "")}) for model, words in ALTERNATIVES.items()),
     Selector(contact.OnePiece, "", {"": ("", "chamfer|end_radius")}),
-    Selector(contact.LoadLine, "", {"": ("offset|moment", "")}),
-    Selector(contact.Holder, "", {"": ("rotational_stiffness/tangential_stiffness", "")}),
     Selector(
         contact.Asperities,
         "law",
@@ -58,7 +65,6 @@ SELECTORS = (
             ),
         },
     ),
-    Selector(tables.Interface, "", {"": ("load|contact", "")}),
     Selector(
         tables.Friction,
         "law",
@@ -75,8 +81,6 @@ SELECTORS = (
             "file": ("file", ""),
         },
     ),
-    Selector(tables.Structure, "", {"": ("mode|masses|file|reduced", "")}),
-    Selector(tables.Start, "", {"": ("displacement/velocity", "")}),
     Selector(
         tables.Drive,
         "kind",
@@ -92,7 +96,6 @@ SELECTORS = (
         "onset",
         {"slip": ("", ""), "distortion": ("", ""), "gauge": ("onset_length", "")},
     ),
-    Selector(tables.WornFriction, "", {"": ("coefficient_factor/bond_length_factor", "")}),
     Selector(
         tables.Measured,
         "reading",
@@ -194,11 +197,11 @@ def find_choices(table: Table) -> TableChoices:
 def iterate_tables(table: Table, table_key: str = "") -> Iterator[tuple[str, Any]]:
     """Yield (dotted key, table) for a table and all tables inside it."""
     yield table_key, table
-    for key, name in attributes_by_key(type(table)).items():
-        value = getattr(table, name)
-        path = f"{table_key}.{key}" if table_key else key
+    for name, key in list_keys(type(table)).items():
+        value = getattr(table, key.attribute)
+        path = f"{table_key}.{name}" if table_key else name
         if isinstance(value, Table):
             yield from iterate_tables(value, path)
-        elif isinstance(value, tuple) and find_inner_table(type(table), name) is not None:
+        elif isinstance(value, tuple) and key.inner is not None:
             for index, item in enumerate(value):
                 yield from iterate_tables(item, f"{path}.{index}")

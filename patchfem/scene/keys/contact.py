@@ -6,23 +6,23 @@ As in `tables`, each model is a table and each attribute is a key.
 from __future__ import annotations
 
 from functools import cache
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Literal
 
 from pydantic import BeforeValidator, Field
 
 from .materials import MATERIALS, advise_on_material, find_material_name
 from .quantities import UNIT_FACTORS
 from .types import (
+    FileName,
     Force,
     Length,
     Position,
     Positive,
     Table,
-    Text,
-    attributes_by_key,
-    find_inner_table,
     key,
+    list_inner_tables,
     number,
+    optional,
     quantity,
     whole_number,
 )
@@ -32,6 +32,9 @@ LengthUnit = Literal[tuple(UNIT_FACTORS["length"])]
 MAX_PAIRS = 1_000_000  # largest number of equal patches, far more than any joint has
 # Largest number of strips over the width; the pressures of more strips do not fit into memory.
 MAX_STRIPS = 10_000
+# Largest angle [rad] between the pieces; the gap is angle * x, which differs from tan(angle) * x by 0.3 % there.
+MAX_SMALL_ANGLE = 0.1
+SmallAngle = quantity("angle", ge=-MAX_SMALL_ANGLE, le=MAX_SMALL_ANGLE)
 MATERIAL_REQUIREMENT = (
     'a material name or {young = "121 GPa", poisson = 0.32, density = "4370 kg/m^3"} is needed'
 )
@@ -40,15 +43,16 @@ MATERIAL_REQUIREMENT = (
 class Material(Table):
     """Elastic constants and density of a piece or a coating, given as values or by the name of a material."""
 
-    name: key(str | None, "name of a material that is listed in MATERIALS.md") = None
+    has_name: ClassVar[bool] = True
+
+    name: optional(str, "name of a material that is listed in MATERIALS.md")
     young: key(quantity("pressure", gt=0), "Young's modulus")
     poisson: key(number(gt=-1, lt=0.5), "Poisson's ratio")
     density: key(quantity("density", gt=0), "mass per volume")
     yield_: key(
         quantity("pressure", gt=0) | None,
-        "yield strength in tension; a note appears where the von Mises "
-        "stress exceeds it; default: that of the named material in MATERIALS.md, if it has "
-        "one",
+        "yield strength in tension; a note appears where the von Mises stress exceeds it; default: that of the named "
+        "material in MATERIALS.md, if it has one",
     ) = Field(None, alias="yield")
 
 
@@ -84,34 +88,34 @@ class Coating(Table):
 class OnePiece(Table):
     """Properties of one piece that differ from the properties in [contact]; `coating = "none"` removes the coating."""
 
-    height: key(Length | None, "height of this piece; default: `contact.height`") = None
-    length: key(
-        Length | None,
+    height: optional(Length, "height of this piece; default: `contact.height`")
+    length: optional(
+        Length,
         "length of this piece, centred at x = 0; default: `contact.length`; the interface has "
         "the length of the shorter piece",
-    ) = None
-    substrate: key(Substance | None, "material of this piece; default: `contact.substrate`") = None
-    coating: key(
-        Coating | Literal["none"] | None,
-        "coating of this piece, {material = ..., thickness = ...}, or "
-        '"none"; default: `contact.coating`',
-    ) = None
-    chamfer: key(
-        Length | None,
-        "length along x of the 45 degree chamfer at both ends; the interface stops where the "
-        "chamfer starts",
-    ) = None
-    end_radius: key(
-        Length | None,
-        "radius of the rounded ends; the interface stops where the slope of the rounded "
-        "end exceeds 0.097",
-    ) = None
+    )
+    substrate: optional(Substance, "material of this piece; default: `contact.substrate`")
+    coating: optional(
+        Coating | Literal["none"],
+        'coating of this piece, {material = ..., thickness = ...}, or "none"; default: `contact.coating`',
+    )
+    chamfer: optional(
+        Length,
+        "length along x of the 45 degree chamfer at both ends; the interface stops where the chamfer starts",
+    )
+    end_radius: optional(
+        Length,
+        "radius of the rounded ends; the interface stops where the slope of the rounded end exceeds 0.097",
+    )
 
 
 class Tilt(Table):
     """A prescribed angle between the pieces; `on` names the piece that is tilted."""
 
-    angle: key(quantity("angle"), "angle between the pieces; an angle > 0 opens the gap at +x")
+    angle: key(
+        SmallAngle,
+        "angle between the pieces; an angle > 0 opens the gap at +x; the gap is this angle times x, so it must be small",
+    )
     on: key(
         Piece,
         "piece that is tilted; during the slide the pressure distribution moves with this piece",
@@ -121,15 +125,14 @@ class Tilt(Table):
 class LoadLine(Table):
     """An off-centre load, given by its offset or its moment; the upper piece is free to rotate."""
 
-    offset: key(
-        Position | None,
-        "distance of the load line from the middle of the patch; an offset > 0 moves the "
-        "pressure towards +x",
-    ) = None
-    moment: key(
-        quantity("moment") | None,
+    offset: optional(
+        Position,
+        "distance of the load line from the middle of the patch; an offset > 0 moves the pressure towards +x",
+    )
+    moment: optional(
+        quantity("moment"),
         "moment of the load about the middle of the patch, in place of `offset`",
-    ) = None
+    )
 
 
 class Approach(Table):
@@ -145,24 +148,22 @@ class Approach(Table):
 class Holder(Table):
     """Springs between the far face of a piece and its holder."""
 
-    rotational_stiffness: key(
-        quantity("rotational stiffness", gt=0) | None,
+    rotational_stiffness: optional(
+        quantity("rotational stiffness", gt=0),
         "rotational stiffness of the spring between the far face of the piece and its holder",
-    ) = None
-    tangential_stiffness: key(
-        quantity("stiffness", gt=0) | None,
-        "stiffness along x of the spring between the far "
-        "face of the piece and its holder; default: rigid",
-    ) = None
+    )
+    tangential_stiffness: optional(
+        quantity("stiffness", gt=0),
+        "stiffness along x of the spring between the far face of the piece and its holder; default: rigid",
+    )
 
 
 def require_convex_radius(value: object) -> object:
     """Return the radius of a crown; raise ValueError for the negative radius of a hollow."""
     if str(value).lstrip().startswith("-"):
         raise ValueError(
-            "a crown is convex, so its radius must be > 0; for a hollow surface leave out [contact.crown] "
-            'and give contact.profile.file, a file with the columns "x [mm],z [um]", where z = '
-            "x^2/(2 radius)"
+            "a crown is convex, so its radius must be > 0; for a hollow surface leave out [contact.crown] and give "
+            'contact.profile.file, a file with the columns "x [mm],z [um]", where z = x^2/(2 radius)'
         )
     return value
 
@@ -176,8 +177,7 @@ class Crown(Table):
     )
     on: key(
         Piece,
-        "piece that has the crown; during the slide the pressure distribution moves "
-        "with this piece",
+        "piece that has the crown; during the slide the pressure distribution moves with this piece",
     ) = "upper"
 
 
@@ -196,9 +196,8 @@ class ProfileFile(Table):
     """Measured heights that are added to the gap."""
 
     file: key(
-        Text,
-        "file of one height trace along x: text with units in its header, or a file of a measuring "
-        "instrument",
+        FileName,
+        "file of one height trace along x: text with units in its header, or a file of a measuring instrument",
     )
     heights: key(
         Literal["gap", "surface"],
@@ -207,8 +206,7 @@ class ProfileFile(Table):
     ) = "gap"
     on: key(
         Piece,
-        "piece that has the profile; during the slide the pressure distribution moves "
-        "with this piece",
+        "piece that has the profile; during the slide the pressure distribution moves with this piece",
     ) = "upper"
 
 
@@ -217,54 +215,49 @@ class Asperities(Table):
 
     law: key(
         Literal["linear", "exponential", "hertz"],
-        "how the pressure of the rough layer follows from its "
-        "compression: 'linear'; 'exponential'; or 'hertz', from spherical peaks whose heights have a Gaussian "
-        "distribution",
+        "how the pressure of the rough layer follows from its compression: 'linear'; 'exponential'; or 'hertz', from "
+        "spherical peaks whose heights have a Gaussian distribution",
     )
-    normal_stiffness: key(
-        quantity("foundation stiffness", gt=0) | None,
-        "pressure of the layer divided by its "
-        "compression; for law 'exponential', the slope of pressure over compression "
-        "at first touch",
-    ) = None
-    decay_length: key(
-        Length | None,
+    normal_stiffness: optional(
+        quantity("foundation stiffness", gt=0),
+        "pressure of the layer divided by its compression; for law 'exponential', the slope of pressure over "
+        "compression at first touch",
+    )
+    decay_length: optional(
+        Length,
         "compression over which the pressure of law 'exponential' grows by the factor e = 2.718",
-    ) = None
-    radius: key(
-        Length | None,
+    )
+    radius: optional(
+        Length,
         "tip radius of the peaks",
-    ) = None
-    density: key(quantity("areal density", gt=0) | None, "number of peaks per area") = None
-    height_deviation: key(Length | None, "standard deviation of the peak heights") = None
+    )
+    density: optional(quantity("areal density", gt=0), "number of peaks per area")
+    height_deviation: optional(Length, "standard deviation of the peak heights")
     from_: key(
-        Text | None,
+        FileName | None,
         "file of a height trace of a rough piece, from which the peaks are computed; the other "
         "piece is taken as smooth",
     ) = Field(None, alias="from")
-    rms_height: key(
-        Length | None,
-        "root mean square height of the rough piece; if both pieces are rough, the root of "
-        "the sum of the squares of their two values; the same rule holds for `rms_slope` and "
-        "`rms_curvature`",
-    ) = None
-    rms_slope: key(Positive | None, "root mean square slope of the rough piece") = None
-    rms_curvature: key(
-        quantity("curvature", gt=0) | None,
+    rms_height: optional(
+        Length,
+        "root mean square height of the rough piece; if both pieces are rough, the root of the sum of the squares of "
+        "their two values; the same rule holds for `rms_slope` and `rms_curvature`",
+    )
+    rms_slope: optional(Positive, "root mean square slope of the rough piece")
+    rms_curvature: optional(
+        quantity("curvature", gt=0),
         "root mean square curvature of the rough piece",
-    ) = None
-    cutoff: key(
-        Length | None,
-        "wavelength that divides a trace (Gaussian filter of ISO 16610-21): longer waves "
-        "belong to [contact.profile], shorter waves to the asperities; default: with [contact.profile], 1/100 "
-        "of the length of the interface; without it, all waves of the trace in `from` belong to the "
-        "asperities",
-    ) = None
-    tangential_ratio: key(
-        Positive | None,
-        "tangential stiffness of the rough layer divided by its normal stiffness; "
-        "default: the layer is rigid along x",
-    ) = None
+    )
+    cutoff: optional(
+        Length,
+        "wavelength that divides a trace (Gaussian filter of ISO 16610-21): longer waves belong to [contact.profile], "
+        "shorter waves to the asperities; default: with [contact.profile], 1/100 of the length of the interface; "
+        "without it, all waves of the trace in `from` belong to the asperities",
+    )
+    tangential_ratio: optional(
+        Positive,
+        "tangential stiffness of the rough layer divided by its normal stiffness; default: the layer is rigid along x",
+    )
 
 
 class Shear(Table):
@@ -277,8 +270,7 @@ class Grooves(Table):
     wavelength: key(Length, "wavelength of the grooves along x")
     amplitude: key(
         quantity("length", ge=0),
-        "half the height of the grooves from valley to peak; with amplitude 0 "
-        "the surfaces are flat",
+        "half the height of the grooves from valley to peak; with amplitude 0 the surfaces are flat",
     )
     phase: key(
         quantity("angle"),
@@ -305,14 +297,13 @@ class Strips(Table):
 
     count: key(whole_number(1, MAX_STRIPS), "number of equal parallel strips over the width")
     roll: key(
-        quantity("angle"),
+        SmallAngle,
         "angle by which the holder is rotated about x, which shifts the pressure sideways",
     ) = 0.0
-    offset: key(
-        Position | None,
-        "lateral position of the load line; if this key is given, the upper piece is free to "
-        "rotate about x",
-    ) = None
+    offset: optional(
+        Position,
+        "lateral position of the load line; if this key is given, the upper piece is free to rotate about x",
+    )
 
 
 class Contact(Table):
@@ -323,38 +314,33 @@ class Contact(Table):
     width: key(Length, "width of the patch perpendicular to the plane of the model")
     height: key(
         Length,
-        "height of each piece from the interface to the far face, which is fixed to the holder; "
-        "includes the coating",
+        "height of each piece from the interface to the far face, which is fixed to the holder; includes the coating",
     )
-    load: key(
-        Force | None,
-        "total normal force on the interface, weight included; [contact.approach] may be given in "
-        "place of this key",
-    ) = None
+    load: optional(
+        Force,
+        "total normal force on the interface, weight included; [contact.approach] may be given in place of this key",
+    )
     pairs: key(
         whole_number(1, MAX_PAIRS),
         "number of equal patches that share the load; forces and stiffnesses are reported "
         "for all these patches together",
     ) = 1
     plane: key(Literal["strain", "stress"], "plane strain or plane stress in the pieces") = "strain"
-    element_size: key(
-        Length | None,
+    element_size: optional(
+        Length,
         "length of the elements along the interface in a uniform mesh; with half this length the elements are "
         "half as long in depth as well; default: a graded mesh that meets the tolerance",
-    ) = None
+    )
     substrate: key(
         Substance,
-        "material of the pieces: a name from MATERIALS.md, or a table of young, poisson, "
-        "density and, if known, yield",
+        "material of the pieces: a name from MATERIALS.md, or a table of young, poisson, density and, if known, yield",
     )
-    mesh: key(
-        Text | None,
+    mesh: optional(
+        FileName,
         "file with a mesh of both pieces, which needs the tags listed in MESH.md; default: a mesh "
         "is made from the dimensions",
-    ) = None
-    mesh_unit: key(
-        LengthUnit | None, "unit of the coordinates in the file of `mesh`; default: m"
-    ) = None
+    )
+    mesh_unit: optional(LengthUnit, "unit of the coordinates in the file of `mesh`; default: m")
     coating: Coating | None = None
     upper: OnePiece | None = None
     lower: OnePiece | None = None
@@ -391,6 +377,5 @@ class Contact(Table):
 @cache
 def _list_shape_names() -> tuple[str, ...]:
     """Return the names of the tables in [contact] that have a key `on`."""
-    models = {name: find_inner_table(Contact, name) for name in Contact.model_fields}
-    tables = {name: model for name, model in models.items() if model is not None}
-    return tuple(name for name, model in tables.items() if "on" in attributes_by_key(model))
+    tables = list_inner_tables(Contact).items()
+    return tuple(name for name, model in tables if "on" in model.model_fields)

@@ -1,36 +1,21 @@
-"""Dotted keys: the table and attribute of a key, valid values, and messages about wrong values."""
+"""Dotted keys: the key that one names, its valid values, and messages about wrong values."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from functools import cache, lru_cache
-from typing import Any, Literal, NamedTuple, get_args, get_origin
+from typing import Any, NamedTuple, get_args, get_origin
 
 from pydantic import ValidationError
 
 from ..lines import split_key
 from . import quantities
-from .contact import Material
+from .contact import MATERIAL_REQUIREMENT, Material
 from .tables import Tables
-from .types import (
-    Table,
-    advise_on_name,
-    attributes_by_key,
-    find_inner_table,
-    find_key_record,
-    find_quantity_kind,
-    is_array_attribute,
-    list_allowed_values,
-    list_key_types,
-)
+from .types import Key, Table, advise_on_name, list_keys
 
 MAX_SHOWN_CHARACTERS = 60  # largest number of characters of a wrong value in a message
-MATERIAL_REQUIREMENT = (
-    'a material name or {young = "121 GPa", poisson = 0.32, density = "4370 kg/m^3"} is needed'
-)
-
-
 # Beginnings of requirements that do not tell what a key is.
 _UNSPECIFIC_REQUIREMENTS = ("a plain", "a whole", "a text", "plain", "whole", "two whole")
 
@@ -50,30 +35,22 @@ LIMITS_BY_ERROR_TYPE = {  # limit that a value breaks, by the type of the pydant
 }
 
 
-class KeyDefinition(NamedTuple):
-    """Table and attribute of a key, or (None, "") if no scene has this key."""
-
-    model: type[Table] | None
-    name: str
-
-
 @lru_cache(1024)
-def find_key(key: str) -> KeyDefinition:
-    """Find the table and the attribute that a dotted key names, with items by name or number."""
+def find_key(dotted_key: str) -> Key | None:
+    """Find the key that a dotted key names, with items by name or number; return None if no scene has it."""
+    key = None
     model: type[Table] | None = Tables
-    name = ""
     is_item = False
-    for piece in split_key(key):
+    for piece in split_key(dotted_key):
         if piece.isdigit() or is_item:
             is_item = False
             continue
-        if name:
-            model = find_inner_table(model, name)
-        name = attributes_by_key(model).get(piece, "") if model else ""
-        if not name:
-            return KeyDefinition(None, "")
-        is_item = find_inner_table(model, name) is not None and is_array_attribute(model, name)
-    return KeyDefinition(model, name)
+        key = list_keys(model).get(piece) if model else None
+        if key is None:
+            return None
+        model = key.inner
+        is_item = model is not None and key.is_array
+    return key
 
 
 def validate_value(key: str, value: Any, ignored: Iterable[str] = ()) -> dict[str, Any]:
@@ -98,45 +75,49 @@ def validate_value(key: str, value: Any, ignored: Iterable[str] = ()) -> dict[st
     ValueError
         If the key does not accept the value; its text is the sentence for the user.
     """
-    model, name = find_key(key)
-    alias = model.model_fields[name].alias or name
-    valid = {}
-    try:
-        model.model_validate({alias: value}, context=valid)
-    except ValidationError as caught:
-        for error in caught.errors(include_url=False):
-            if error["loc"][0] == alias and error["type"] not in ("missing", *ignored):
-                raise ValueError(describe_error(KeyDefinition(model, name), error, value)) from None
+    known = find_key(key)
+    valid, errors = validate_values(known.table, {known.name: value})
+    for error in errors:
+        if error["loc"][0] == known.name and error["type"] not in ("missing", *ignored):
+            raise ValueError(describe_error(known, error, value))
     return valid
 
 
-@cache
-def is_table_or_value(model: type[Table], name: str) -> bool:
-    """Return whether a key that holds a table also accepts a single value, as a material or a coating does."""
-    inner = list_key_types(model, name)[1:]
-    return find_inner_table(model, name) is Material or any(
-        get_origin(part) is Literal for part in inner
-    )
+def validate_values(
+    model: type[Table], values: dict[str, Any]
+) -> tuple[dict[str, Any], Sequence[Any]]:
+    """Return the valid ones of the plain values of a table by attribute, and the errors of pydantic on the others."""
+    valid: dict[str, Any] = {}
+    try:
+        model.model_validate(values, context=valid)
+    except ValidationError as caught:
+        return valid, caught.errors(include_url=False)
+    return valid, ()
 
 
 @cache
-def describe_requirement(model: type[Table] | None, name: str) -> str:
+def describe_requirement(key: Key | None) -> str:
     """Describe what a key requires, as a clause of a message, or return "" for a table and an unknown key."""
-    if model is None:
+    if key is None:
         return ""
-    types = list_key_types(model, name)
+    types = key.types
     holds_array = tuple in map(get_origin, types)
-    if kind := find_quantity_kind(model, name):
+
+    # A quantity needs its unit, also in an array.
+    if key.kind:
         if holds_array:
-            return f"an array of quantities is needed, such as ['{quantities.EXAMPLE_QUANTITIES[kind]}']"
-        return quantities.describe_requirement(kind)
+            example = quantities.EXAMPLE_QUANTITIES[key.kind]
+            return f"an array of quantities is needed, such as ['{example}']"
+        return quantities.describe_requirement(key.kind)
+
+    # Of several types of a key, the most specific one is named.
     if Material in types:
         return MATERIAL_REQUIREMENT
-    if allowed := list_allowed_values(model, name):
+    if key.allowed:
         number = " (or a whole number)" if int in types else ""
-        return f"one of {', '.join(allowed)} is needed{number}"
+        return f"one of {', '.join(key.allowed)} is needed{number}"
     if holds_array:
-        return "" if find_inner_table(model, name) else _describe_array_requirement(types)
+        return "" if key.inner else _describe_array_requirement(types)
     if float in types:
         return "a plain number is needed"
     if int in types:
@@ -144,13 +125,12 @@ def describe_requirement(model: type[Table] | None, name: str) -> str:
     return "a text in quotes is needed"
 
 
-def describe_missing_key(model: type[Table] | None, name: str) -> str:
+def describe_missing_key(key: Key | None) -> str:
     """Describe the value that a missing key needs; the meaning of the key follows where its type says too little."""
-    needed = describe_requirement(model, name)
-    if model is None or not needed.startswith(_UNSPECIFIC_REQUIREMENTS):
+    needed = describe_requirement(key)
+    if not (needed.startswith(_UNSPECIFIC_REQUIREMENTS) and key.record.meaning):
         return needed
-    record = find_key_record(model, model.model_fields[name].alias or name)
-    return f"{needed} ({re.split('[;:]', record.meaning)[0]})" if record else needed
+    return f"{needed} ({re.split('[;:]', key.record.meaning)[0]})"
 
 
 def _describe_array_requirement(types: tuple) -> str:
@@ -161,30 +141,34 @@ def _describe_array_requirement(types: tuple) -> str:
     return f"{'' if is_open else 'two '}whole numbers are needed, such as [1, 2]"
 
 
-def describe_error(definition: KeyDefinition, error: Any, value: Any) -> str:
+def describe_error(key: Key, error: Any, value: Any) -> str:
     """Return the message for a validation error of pydantic.
 
     Parameters
     ----------
-    definition : KeyDefinition
+    key : Key
     error : dict
         One of `ValidationError.errors()`.
     value
         The wrong value as it is written.
     """
-    needed = describe_requirement(*definition)
+    needed = describe_requirement(key)
     if error["type"] in LIMITS_BY_ERROR_TYPE:
         limit = LIMITS_BY_ERROR_TYPE[error["type"]]
         bound = error["ctx"][limit.name]
-        bound = bound if isinstance(bound, int) else f"{bound:g}"
-        return f"must be {limit.sign} {bound}, not {format_for_message(value)}; {needed}"
+        text = str(bound) if isinstance(bound, int) else f"{bound:g}"
+        if bound and key.kind:
+            text = quantities.format_si(bound, key.kind)
+        return f"must be {limit.sign} {text}, not {format_for_message(value)}; {needed}"
     if error["type"] == "too_short" and value and error["ctx"]["min_length"] > 1:
         return f"at least {error['ctx']['min_length']} values are needed, not {len(value)}"
+    if error["type"] == "too_long":
+        most = error["ctx"]["max_length"]
+        return f"{len(value)} values are too many; at most {most} are possible"
     if error["type"] == "value_error":
         return str(error["ctx"]["error"])
-    allowed = list_allowed_values(*definition)
-    if allowed and isinstance(value, str):
-        return f"unknown value {format_for_message(value)}; {advise_on_name(value, allowed)}"
+    if key.allowed and isinstance(value, str):
+        return f"unknown value {format_for_message(value)}; {advise_on_name(value, key.allowed)}"
     return f"{needed or 'another value is needed'}, not {format_for_message(value)}"
 
 

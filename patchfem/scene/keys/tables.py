@@ -10,7 +10,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, field_validator
 
-from ...effects import LAWS, WAVEFORMS
+from ...effects import LAWS, MAX_COORDINATES, WAVEFORMS
 from .accuracy import Accuracy
 from .contact import Contact, Grooves
 from .quantities import format_si, parse_quantity
@@ -18,6 +18,7 @@ from .types import (
     AbsoluteTemperature,
     Acceleration,
     Duration,
+    FileName,
     Force,
     Fraction,
     Frequency,
@@ -33,6 +34,7 @@ from .types import (
     Title,
     key,
     number,
+    optional,
     quantity,
     whole_number,
 )
@@ -47,18 +49,18 @@ class Normal(Table):
     """A normal load on a single contact point, constant or oscillating."""
 
     load: key(Force, "normal force on the point; for an oscillating load, the mean of this force")
-    amplitude: key(
-        Force | None,
+    amplitude: optional(
+        Force,
         "amplitude of the oscillating load `load` + `amplitude` cos(2 pi `frequency` t + "
         "`phase`); while this expression is negative, the load is 0",
-    ) = None
-    frequency: key(Frequency | None, "frequency of the oscillating load") = None
-    phase: key(quantity("angle") | None, "phase of the oscillating load at t = 0") = None
-    width: key(
-        Length | None,
+    )
+    frequency: optional(Frequency, "frequency of the oscillating load")
+    phase: optional(quantity("angle"), "phase of the oscillating load at t = 0")
+    width: optional(
+        Length,
         "width of the contact perpendicular to the path; needed for the key `friction.spread`",
         "with `friction.spread`",
-    ) = None
+    )
     grooves: Grooves | None = None
 
 
@@ -70,14 +72,14 @@ class Temperature(Table):
         AbsoluteTemperature,
         "absolute temperature for which `rest_growth` and `slip_growth` are given",
     )
-    rest_activation: key(
-        quantity("temperature", ge=0) | None,
+    rest_activation: optional(
+        quantity("temperature", ge=0),
         "activation temperature of the growth of bonds at rest; default: 0",
-    ) = None
-    slip_activation: key(
-        quantity("temperature", ge=0) | None,
+    )
+    slip_activation: optional(
+        quantity("temperature", ge=0),
         "activation temperature of the growth of bonds in slip; default: 0",
-    ) = None
+    )
 
 
 class Friction(Table):
@@ -85,52 +87,47 @@ class Friction(Table):
 
     law: key(LawName, "the friction law")
     static: key(NonNegative, "coefficient of static friction mu_s")
-    kinetic: key(
-        NonNegative | None,
+    kinetic: optional(
+        NonNegative,
         "coefficient of kinetic friction mu_k, at most `static`; default: `static`",
-    ) = None
-    reference_speed: key(
-        Speed | None, "sliding speed v_0 of law 'tanh', in F = mu N tanh(v/v_0)"
-    ) = None
-    bond_length: key(
-        Length | None,
+    )
+    reference_speed: optional(Speed, "sliding speed v_0 of law 'tanh', in F = mu N tanh(v/v_0)")
+    bond_length: optional(
+        Length,
         "bond length eps_0 at rest: the length of slide over which a bond forms and "
         "breaks; with law 'elastic-plastic' the key `stiffness` may be given in place of this key",
-    ) = None
-    stiffness: key(
-        quantity("stiffness", gt=0) | None,
-        "initial slope of the friction force over the slide, for the "
-        "whole contact; in a patch, this stiffness is distributed over the points in proportion to their "
-        "normal force",
-    ) = None
-    chi: key(
-        number(gt=-1, le=0) | None,
+    )
+    stiffness: optional(
+        quantity("stiffness", gt=0),
+        "initial slope of the friction force over the slide, for the whole contact; in a patch, this stiffness is "
+        "distributed over the points in proportion to their normal force",
+    )
+    chi: optional(
+        number(gt=-1, le=0),
         "exponent of the distribution of the sliders of law 'iwan': in micro-slip "
         "the energy dissipated per cycle grows with the force amplitude to the power chi + 3",
-    ) = None
-    beta: key(
-        NonNegative | None,
+    )
+    beta: optional(
+        NonNegative,
         "stiffness of the slider of law 'iwan' that slips last, divided by the stiffness of "
         "all other sliders together",
-    ) = None
+    )
     exponent: key(
         Positive,
-        "exponent n of law 'bouc-wen': the larger n is, the sharper is the transition from stick "
-        "to slip",
+        "exponent n of law 'bouc-wen': the larger n is, the sharper is the transition from stick to slip",
     ) = 1.0
     shape: key(
         number(gt=0, le=1),
         "parameter s of law 'bouc-wen' for the shape of unloading: with s = 1/2 unloading "
         "follows the elastic line; with s >= 1/2 the law creates no energy",
     ) = 0.5
-    stribeck_speed: key(
-        Speed | None,
+    stribeck_speed: optional(
+        Speed,
         "sliding speed v_s over which the friction coefficient falls from `static` to `kinetic`",
-    ) = None
+    )
     micro_damping: key(
         quantity("damping", ge=0),
-        "damping force on the bristles divided by the rate of their "
-        "deflection, for the whole contact",
+        "damping force on the bristles divided by the rate of their deflection, for the whole contact",
     ) = 0.0
     viscous: key(
         quantity("damping", ge=0),
@@ -138,39 +135,35 @@ class Friction(Table):
     ) = 0.0
     reading: key(
         Literal["stretch", "report"],
-        "how equation 2.17 is read: 'stretch' separates the stretch of a bond "
-        "from its damage, so that no energy is created; 'report' uses equation 2.17 as printed in the "
-        "report",
+        "how equation 2.17 is read: 'stretch' separates the stretch of a bond from its damage, so that no energy is "
+        "created; 'report' uses equation 2.17 as printed in the report",
     ) = "stretch"
     order: key(
         number(le=100),
         "power p with which the strength of a bond rises along its path; must be > -1, and >= "
         "0 with reading 'stretch'",
     ) = 1.0
-    rest_growth: key(
-        Acceleration | None,
-        "growth a_s of the bond length at rest (equation 2.10); without "
-        "`rest_growth` "
-        "and `slip_growth` the bond length is constant",
-    ) = None
-    slip_growth: key(
-        Length | None,
-        "slip length l_k over which the bond length approaches its value in fast slip "
-        "(equation 2.10)",
-    ) = None
-    rest_speed: key(
-        Speed | None,
+    rest_growth: optional(
+        Acceleration,
+        "growth a_s of the bond length at rest (equation 2.10); without `rest_growth` and `slip_growth` the bond "
+        "length is constant",
+    )
+    slip_growth: optional(
+        Length,
+        "slip length l_k over which the bond length approaches its value in fast slip (equation 2.10)",
+    )
+    rest_speed: optional(
+        Speed,
         "lower limit v_h of the sliding speed |v| in the term a_s/|v| (equation 2.10); "
         "default: 1e-3 of the largest sliding speed",
-    ) = None
+    )
     initial_bonds: key(
         Fraction, "fraction m_0 of all bonds that already exist when the run begins"
     ) = 1.0
-    spread: key(
-        Length | None,
-        "width rho of a bond perpendicular to the path (equation 2.15); default: this width is "
-        "ignored",
-    ) = None
+    spread: optional(
+        Length,
+        "width rho of a bond perpendicular to the path (equation 2.15); default: this width is ignored",
+    )
     temperature: Temperature | None = None
 
 
@@ -179,33 +172,29 @@ class Slide(Table):
 
     kind: key(
         Literal["constant", "sine", "triangle", "dwell", "file"],
-        "prescribed motion: 'constant', motion at "
-        "constant speed; 'sine'; 'triangle'; 'dwell', a slide interrupted by a rest; 'file', a table of "
-        "positions",
+        "prescribed motion: 'constant', motion at constant speed; 'sine'; 'triangle'; 'dwell', a slide interrupted by "
+        "a rest; 'file', a table of positions",
     )
-    amplitude: key(
-        Length | None,
+    amplitude: optional(
+        Length,
         "half the peak-to-peak motion; the motion starts in the middle, in the positive direction",
-    ) = None
-    frequency: key(Frequency | None, "frequency of kind 'sine'") = None
-    speed: key(Speed | None, "sliding speed") = None
-    distance: key(
-        quantity("length", ge=0) | None,
-        "for kind 'constant', the sliding distance; for kind 'dwell', the "
-        "distance before the rest; for kind 'triangle', the distance of a first slide before the cycles "
-        "(default: 0)",
-    ) = None
-    hold: key(quantity("time", ge=0) | None, "duration of the rest") = None
-    distance_after: key(
-        quantity("length", ge=0) | None, "sliding distance after the rest; default: 0"
-    ) = None
-    cycles: key(Positive | None, "number of cycles, not necessarily a whole number; default: 1") = (
-        None
     )
-    file: key(
-        Text | None,
+    frequency: optional(Frequency, "frequency of kind 'sine'")
+    speed: optional(Speed, "sliding speed")
+    distance: optional(
+        quantity("length", ge=0),
+        "for kind 'constant', the sliding distance; for kind 'dwell', the distance before the rest; for kind "
+        "'triangle', the distance of a first slide before the cycles (default: 0)",
+    )
+    hold: optional(quantity("time", ge=0), "duration of the rest")
+    distance_after: optional(
+        quantity("length", ge=0), "sliding distance after the rest; default: 0"
+    )
+    cycles: optional(Positive, "number of cycles, not necessarily a whole number; default: 1")
+    file: optional(
+        FileName,
         "table with the columns time and displacement",
-    ) = None
+    )
 
 
 class Mode(Table):
@@ -216,41 +205,38 @@ class Mode(Table):
     frequency: key(quantity("frequency", ge=0), "natural frequency; 0 Hz for a rigid mode")
     damping: key(
         number(gt=-1),
-        "damping ratio; a mode with a damping ratio below 0 gains energy, which friction must "
-        "dissipate (flutter)",
+        "damping ratio; a mode with a damping ratio below 0 gains energy, which friction must dissipate (flutter)",
     )
     slide: key(Number, "motion of the patch along x per unit of the modal coordinate")
     normal: key(
         Number,
-        "motion of the patch normal to the interface, positive where it opens, per unit of the modal "
-        "coordinate",
+        "motion of the patch normal to the interface, positive where it opens, per unit of the modal coordinate",
     ) = 0.0
     pitch: key(
         PerMetre, "rotation of the patch in the plane of the model per unit of the modal coordinate"
     ) = 0.0
     yaw: key(
         PerMetre,
-        "rotation of the patch about its normal per unit of the modal coordinate; needs "
-        "[contact.strips]",
+        "rotation of the patch about its normal per unit of the modal coordinate; needs [contact.strips]",
     ) = 0.0
-    base: key(
-        Number | None,
+    base: optional(
+        Number,
         "participation of the mode in the base motion; default: the value of `slide` for the "
         "first mode, 0 for the others; the sum of the squares over all modes must be at most 1",
-    ) = None
-    output: key(
-        Number | None,
+    )
+    output: optional(
+        Number,
         "motion of the output point per unit of the modal coordinate: a force drive, a release and `travel` refer to "
         "this point, and accelerometer and gauge are placed there; default: 1 for the first mode, 0 for the others",
-    ) = None
-    accelerometer: key(
-        Number | None,
+    )
+    accelerometer: optional(
+        Number,
         "motion of the accelerometer per unit of the modal coordinate; default: `output`",
-    ) = None
-    gauge: key(
-        Number | None,
+    )
+    gauge: optional(
+        Number,
         "motion of the displacement gauge per unit of the modal coordinate; default: `output`",
-    ) = None
+    )
 
 
 class Stiffening(Table):
@@ -271,11 +257,11 @@ class Bonded(Table):
     damping: key(
         quantity("damping", ge=0), "damping coefficient of a damper in parallel with this spring"
     ) = 0.0
-    wavelength: key(
-        Length | None,
+    wavelength: optional(
+        Length,
         "period of an interlocking spring, whose force is k wavelength/(2 pi) sin(2 pi "
         "x/wavelength), where x is the slide; default: a linear spring",
-    ) = None
+    )
 
 
 MassPair = tuple[whole_number(0, MAX_MASS_NUMBER), whole_number(0, MAX_MASS_NUMBER)]
@@ -305,12 +291,11 @@ class Interface(Friction):
         "numbers of the two masses that rub, counted from 1; 0 is the base; the slide is the motion "
         "of the first mass minus the motion of the second",
     )
-    load: key(
-        Force | None,
-        "normal force on the interface; a patch, [structure.interface.contact], may be given in "
-        "place of this key",
+    load: optional(
+        Force,
+        "normal force on the interface; a patch, [structure.interface.contact], may be given in place of this key",
         "unless [structure.interface.contact] is given",
-    ) = None
+    )
     contact: Contact | None = None
 
     @property
@@ -332,129 +317,115 @@ class Reduced(Table):
     """Matrices of a finite-element program, reduced to boundary coordinates and a few modes."""
 
     stiffness: key(
-        Text,
-        "file of the stiffness matrix: Matrix Market or Abaqus text (.mtx), MATLAB (.mat), NumPy or "
-        "SciPy (.npz)",
+        FileName,
+        "file of the stiffness matrix: Matrix Market or Abaqus text (.mtx), MATLAB (.mat), NumPy or SciPy (.npz)",
     )
-    mass: key(Text, "file of the mass matrix; may be the same file as for the stiffness matrix")
-    damping: key(
-        number(ge=0, lt=1) | Text | None,
+    mass: key(FileName, "file of the mass matrix; may be the same file as for the stiffness matrix")
+    damping: optional(
+        number(ge=0, lt=1) | FileName,
         "damping ratio of every mode of the structure with free "
         "interfaces, or a file of the damping matrix; default: no damping",
-    ) = None
+    )
     boundary: key(
         Annotated[tuple[Coordinate, ...], Field(min_length=1)],
-        "coordinates that are kept as boundary "
-        "coordinates: row numbers of the matrices, or node:direction, such as 1201:x, if the files name "
-        "nodes; interfaces, `drive.mass` and `structure.output_mass` refer to the boundary coordinates by "
-        "number, counted from 1",
+        "coordinates that are kept as boundary coordinates: row numbers of the matrices, or node:direction, such as "
+        "1201:x, if the files name nodes; interfaces, `drive.mass` and `structure.output_mass` refer to the boundary "
+        "coordinates by number, counted from 1",
     )
     modes: key(
         whole_number(0, 1000), "number of modes kept in addition to the boundary coordinates"
     ) = 12
     method: key(
         Literal["craig-bampton", "free-interface"],
-        "'craig-bampton': modes of the structure with the "
-        "boundary held; 'free-interface': modes of the free structure, with residual attachment modes, which "
-        "need fewer modes if the interfaces slide",
+        "'craig-bampton': modes of the structure with the boundary held; 'free-interface': modes of the free "
+        "structure, with residual attachment modes, which need fewer modes if the interfaces slide",
     ) = "craig-bampton"
-    moved: key(
-        Annotated[tuple[Coordinate, ...], Field(min_length=1)] | None,
-        "coordinates that a base drive moves "
-        "along x: row numbers, ranges of rows (a..b:n means n evenly spaced rows from a to b), nodes or "
-        "directions; default: all coordinates in direction x, or all coordinates if the files name no "
-        "directions",
-    ) = None
-    slide: key(
-        MassPair | None,
-        "numbers of the two boundary coordinates that the joint of [contact] or [normal] "
-        "connects, counted from 1; 0 is the base; the slide is the motion of the first minus the motion of the "
-        "second",
+    moved: optional(
+        Annotated[tuple[Coordinate, ...], Field(min_length=1)],
+        "coordinates that a base drive moves along x: row numbers, ranges of rows (a..b:n means n evenly spaced rows "
+        "from a to b), nodes or directions; default: all coordinates in direction x, or all coordinates if the files "
+        "name no directions",
+    )
+    slide: optional(
+        MassPair,
+        "numbers of the two boundary coordinates that the joint of [contact] or [normal] connects, counted from 1; 0 "
+        "is the base; the slide is the motion of the first minus the motion of the second",
         "with [friction]",
-    ) = None
+    )
     unit: key(
         Length,
-        'length unit of the files; the unit of force in the files must be N; "1 mm" means N, mm and '
-        "tonne",
+        'length unit of the files; the unit of force in the files must be N; "1 mm" means N, mm and tonne',
     ) = 1.0
 
 
 class Start(Table):
     """Displacements and velocities at t = 0, one for each mode or mass."""
 
-    displacement: key(
-        Annotated[tuple[quantity("length"), ...], Field(min_length=1)] | None,
+    displacement: optional(
+        Annotated[tuple[quantity("length"), ...], Field(min_length=1)],
         "displacements at t = 0, one for each mode or mass; default: 0",
-    ) = None
-    velocity: key(
-        Annotated[tuple[quantity("velocity"), ...], Field(min_length=1)] | None,
+    )
+    velocity: optional(
+        Annotated[tuple[quantity("velocity"), ...], Field(min_length=1)],
         "velocities at t = 0, one for each mode or mass; default: 0",
-    ) = None
+    )
 
 
 class Structure(Table):
     """The rig: modes, masses with springs, or a file. The keys that end in `_at` name a place in a file of measured
     modes."""
 
-    moving_mass: key(Mass | None, "modal mass, the same for every mode", "with modes") = None
-    travel: key(
-        Length | None,
-        "displacement at which the flexure meets its stop; a larger displacement ends the run; "
-        "default: no stop",
-    ) = None
+    moving_mass: optional(Mass, "modal mass, the same for every mode", "with modes")
+    travel: optional(
+        Length,
+        "displacement at which the flexure meets its stop; a larger displacement ends the run; default: no stop",
+    )
     mode: tuple[Mode, ...] = ()
     measured: key(
         Literal["free", "stuck"],
-        "'free': the modes are those of the rig without the joint; 'stuck': "
-        "frequencies and damping were measured with the joint bolted, and the stiffness of the joint is "
-        "subtracted from the stiffness of the modes",
+        "'free': the modes are those of the rig without the joint; 'stuck': frequencies and damping were measured "
+        "with the joint bolted, and the stiffness of the joint is subtracted from the stiffness of the modes",
     ) = "free"
-    measured_joint: key(
-        Literal["written", "case"] | None,
+    measured_joint: optional(
+        Literal["written", "case"],
         "which joint is subtracted in a sweep, fit or backbone that changes the joint: 'written' (the default): in "
         "every case that of the scene as written, before --set, --over and --free; 'case': in each case its own, as "
         "if each joint had been measured bolted with these frequencies",
-    ) = None
+    )
     stiffening: Stiffening | None = None
     bonded: Bonded | None = None
-    masses: key(
-        tuple[Mass, ...] | None,
+    masses: optional(
+        Annotated[tuple[Mass, ...], Field(min_length=1, max_length=MAX_COORDINATES)],
         "masses that are connected by springs; these masses replace the modes",
-    ) = None
-    output_mass: key(
-        whole_number(1, MAX_MASS_NUMBER) | None,
+    )
+    output_mass: optional(
+        whole_number(1, MAX_MASS_NUMBER),
         "number of the mass that carries the accelerometer; default: 1",
-    ) = None
+    )
     spring: tuple[Spring, ...] = ()
     damper: tuple[Damper, ...] = ()
     interface: tuple[Interface, ...] = ()
-    file: key(
-        Text | None,
-        "file of matrices, modes or measured responses (.npz, .mat, .uff); replaces the tables of "
-        "modes",
-    ) = None
+    file: optional(
+        FileName,
+        "file of matrices, modes or measured responses (.npz, .mat, .uff); replaces the tables of modes",
+    )
     reduced: Reduced | None = None
-    slide_at: key(
-        Text | None,
-        "node and direction, as named in the file (such as 12:+x), whose motion is the motion "
-        "of the patch along x",
-    ) = None
-    output_at: key(
-        Text | None,
+    slide_at: optional(
+        Text,
+        "node and direction, as named in the file (such as 12:+x), whose motion is the motion of the patch along x",
+    )
+    output_at: optional(
+        Text,
         "node and direction, as named in the file, at which the accelerometer is placed",
-    ) = None
-    base_at: key(
-        Text | None, "node and direction, as named in the file, that is driven as the base"
-    ) = None
-    force_at: key(
-        Text | None, "node and direction, as named in the file, on which the force acts"
-    ) = None
-    normal_at: key(
-        Text | None, "node and direction, as named in the file, whose motion opens the contact"
-    ) = None
-    pitch_at: key(
-        Text | None, "node and direction, as named in the file, whose motion rotates the patch"
-    ) = None
+    )
+    base_at: optional(Text, "node and direction, as named in the file, that is driven as the base")
+    force_at: optional(Text, "node and direction, as named in the file, on which the force acts")
+    normal_at: optional(
+        Text, "node and direction, as named in the file, whose motion opens the contact"
+    )
+    pitch_at: optional(
+        Text, "node and direction, as named in the file, whose motion rotates the patch"
+    )
     start: Start | None = None
 
 
@@ -467,57 +438,53 @@ class Drive(Table):
         "force; 'free', no drive: the rig is released from a given state",
     )
     waveform: key(WaveName, "waveform of the drive over time") = "sine"
-    frequency: key(Frequency | None, "frequency of waveform 'sine' or 'levels'") = None
+    frequency: optional(Frequency, "frequency of waveform 'sine' or 'levels'")
     from_: key(
         Frequency | None, "start frequency of a sweep, or lowest frequency of a random drive"
     ) = Field(None, alias="from")
-    to: key(
-        Frequency | None, "end frequency of a sweep, or highest frequency of a random drive"
-    ) = None
-    spectrum: key(
-        quantity("acceleration spectrum", gt=0) | None,
-        "one-sided spectral density of a random base "
-        "acceleration, constant between `from` and `to`",
-    ) = None
-    seed: key(whole_number(0, 2**32 - 1) | None, "seed of the random record; default: 0") = None
-    rate: key(
-        quantity("sweep rate", gt=0) | None,
+    to: optional(Frequency, "end frequency of a sweep, or highest frequency of a random drive")
+    spectrum: optional(
+        quantity("acceleration spectrum", gt=0),
+        "one-sided spectral density of a random base acceleration, constant between `from` and `to`",
+    )
+    seed: optional(whole_number(0, 2**32 - 1), "seed of the random record; default: 0")
+    rate: optional(
+        quantity("sweep rate", gt=0),
         "rate at which the frequency of a linear sweep changes",
-    ) = None
-    log_rate: key(
-        quantity("logarithmic sweep rate", gt=0) | None,
+    )
+    log_rate: optional(
+        quantity("logarithmic sweep rate", gt=0),
         "rate of a logarithmic sweep, in octaves per unit of time",
-    ) = None
-    acceleration: key(
-        quantity("acceleration", ge=0) | None,
+    )
+    acceleration: optional(
+        quantity("acceleration", ge=0),
         "amplitude of the base acceleration, zero to peak",
         "with kind `base` and waveform `sine`, `step` or `sweep`, unless `displacement` is given",
-    ) = None
-    displacement: key(
-        quantity("length", ge=0) | None,
-        "displacement of the base, zero to peak, in place of "
-        "`acceleration`; with kind 'free', the displacement of the output at release: a static force at "
-        "the output holds the structure, the interfaces free of force, and lets go; in a rig of masses, "
-        "and if `mass` is given, that mass or coordinate alone is displaced",
+    )
+    displacement: optional(
+        quantity("length", ge=0),
+        "displacement of the base, zero to peak, in place of `acceleration`; with kind 'free', the displacement of "
+        "the output at release: a static force at the output holds the structure, the interfaces free of force, and "
+        "lets go; in a rig of masses, and if `mass` is given, that mass or coordinate alone is displaced",
         "with kind `free`, unless [structure.start] is given; with kind `base`, as `acceleration`",
-    ) = None
-    levels: key(
-        Annotated[tuple[quantity("acceleration", ge=0), ...], Field(min_length=1)] | None,
+    )
+    levels: optional(
+        Annotated[tuple[quantity("acceleration", ge=0), ...], Field(min_length=1)],
         "amplitudes of the base acceleration, or of the force with kind 'force', applied one after the other; "
         "each level starts from the final state of the previous level",
-    ) = None
-    frequencies: key(
-        Annotated[tuple[Frequency, ...], Field(min_length=2, max_length=100)] | None,
+    )
+    frequencies: optional(
+        Annotated[tuple[Frequency, ...], Field(min_length=2, max_length=100)],
         "frequencies of the sines of waveform 'tones', which act at the same time",
-    ) = None
-    accelerations: key(
-        Annotated[tuple[quantity("acceleration", ge=0), ...], Field(min_length=2)] | None,
+    )
+    accelerations: optional(
+        Annotated[tuple[quantity("acceleration", ge=0), ...], Field(min_length=2)],
         "amplitude of the base acceleration of each sine, zero to peak",
-    ) = None
-    phases: key(
-        Annotated[tuple[quantity("angle"), ...], Field(min_length=2)] | None,
+    )
+    phases: optional(
+        Annotated[tuple[quantity("angle"), ...], Field(min_length=2)],
         "phase of each sine at the start of the run; default: 0",
-    ) = None
+    )
     onset: key(
         Literal["slip", "distortion", "gauge"],
         "event that counts as the onset of slip in the measure "
@@ -525,32 +492,31 @@ class Drive(Table):
         "of its elastic range). 'distortion': the third harmonic of the acceleration exceeds 3 % of the first "
         "harmonic. 'gauge': half the peak-to-peak motion at the output exceeds `onset_length`",
     ) = "distortion"
-    onset_length: key(
-        Length | None,
+    onset_length: optional(
+        Length,
         "smallest motion at the output that the gauge can show, half peak-to-peak",
-    ) = None
-    force: key(
-        Force | None,
+    )
+    force: optional(
+        Force,
         "amplitude of the force, zero to peak",
         "with kind `force` and waveform `sine`, `step` or `sweep`",
-    ) = None
-    mass: key(
-        whole_number(1, MAX_MASS_NUMBER) | None,
+    )
+    mass: optional(
+        whole_number(1, MAX_MASS_NUMBER),
         "number of the mass on which the force acts; default: the force acts at the output",
-    ) = None
-    cycles: key(
-        Positive | None,
+    )
+    cycles: optional(
+        Positive,
         "length of the run, or of each level, in cycles of the drive; with kind 'free', in "
         "cycles of the first mode that is not rigid",
-    ) = None
-    duration: key(
-        Duration | None, "length of the run, or of each level, as a time; replaces `cycles`"
-    ) = None
-    file: key(
-        Text | None,
-        "file with a record of the drive, a table with units or UFF; for waveform 'random', a "
-        "table of the spectrum",
-    ) = None
+    )
+    duration: optional(
+        Duration, "length of the run, or of each level, as a time; replaces `cycles`"
+    )
+    file: optional(
+        FileName,
+        "file with a record of the drive, a table with units or UFF; for waveform 'random', a table of the spectrum",
+    )
 
     @field_validator("levels", mode="before")
     @classmethod
@@ -570,14 +536,14 @@ class WornFriction(Table):
         "mean worn depths, rising from "
         "0; the mean worn depth is the worn volume of both pieces divided by the area of the patch",
     )
-    coefficient_factor: key(
-        Annotated[tuple[Positive, ...], Field(min_length=2)] | None,
+    coefficient_factor: optional(
+        Annotated[tuple[Positive, ...], Field(min_length=2)],
         "factor on `static` and `kinetic` at each depth; must be 1 at depth 0",
-    ) = None
-    bond_length_factor: key(
-        Annotated[tuple[Positive, ...], Field(min_length=2)] | None,
+    )
+    bond_length_factor: optional(
+        Annotated[tuple[Positive, ...], Field(min_length=2)],
         "factor on `bond_length` at each depth; must be 1 at depth 0",
-    ) = None
+    )
 
 
 class Wear(Table):
@@ -596,19 +562,18 @@ class Wear(Table):
     )
     jumps: key(
         Literal["auto"] | whole_number(1, 1_000_000),
-        "number of equal jumps into which the cycles of wear are "
-        "divided; default: set by the tolerance",
+        "number of equal jumps into which the cycles of wear are divided; default: set by the tolerance",
     ) = "auto"
     form: key(
         Literal["archard", "energy"],
         "'archard': the worn depth is proportional to pressure times slip path; "
         "'energy': the worn depth is proportional to the friction work per area",
     ) = "archard"
-    start: key(
-        Text | None,
+    start: optional(
+        FileName,
         "file result.nc of an earlier run with [wear], such as out/before/result.nc; the new run "
         "starts from the worn depth of the earlier run; default: the pieces are new",
-    ) = None
+    )
     friction: WornFriction | None = None
 
 
@@ -616,7 +581,7 @@ class Measured(Table):
     """Measurements that are plotted together with the results."""
 
     file: key(
-        Text,
+        FileName,
         "table of measurements with the columns frequency, input, acceleration, displacement and flag",
     )
     acceleration_gain: key(
@@ -625,12 +590,11 @@ class Measured(Table):
     displacement_gain: key(Positive, "ratio of the gauge reading to the true displacement") = 1.0
     reading: key(
         Literal["peak", "fundamental", "rms", "lowpass"],
-        "quantity that the accelerometer shows: 'peak', "
-        "the largest acceleration; 'fundamental', the component of the acceleration at the drive frequency; "
-        "'rms', the root mean square of the acceleration; 'lowpass', the largest acceleration after a "
-        "second-order low-pass filter",
+        "quantity that the accelerometer shows: 'peak', the largest acceleration; 'fundamental', the component of the "
+        "acceleration at the drive frequency; 'rms', the root mean square of the acceleration; 'lowpass', the largest "
+        "acceleration after a second-order low-pass filter",
     ) = "peak"
-    reading_cutoff: key(Frequency | None, "cut-off frequency of the low-pass filter") = None
+    reading_cutoff: optional(Frequency, "cut-off frequency of the low-pass filter")
 
 
 class Tables(Table):

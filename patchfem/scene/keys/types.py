@@ -7,7 +7,7 @@ from contextvars import ContextVar
 from dataclasses import dataclass
 from difflib import get_close_matches
 from functools import cache, partial
-from typing import Annotated, Any, Literal, get_args, get_origin
+from typing import Annotated, Any, ClassVar, Literal, get_args, get_origin
 from unicodedata import category
 
 from pydantic import BaseModel, ConfigDict, Field, Strict, WithJsonSchema, field_validator
@@ -61,6 +61,10 @@ CheckAfter = partial(Check, core_schema.no_info_after_validator_function)
 
 class Kind(str):
     """Annotation of a key whose value is a quantity of this kind (see `quantities.UNIT_FACTORS`)."""
+
+
+# Annotation of a key that names a file.
+FILE_MARK = object()
 
 
 def _require_magnitude(value: float, smallest: float) -> float:
@@ -149,8 +153,20 @@ def key(kind: Any, meaning: str, required: str = "") -> Any:
     return Annotated[kind, KeyRecord(meaning, required)]
 
 
+def optional(kind: Any, meaning: str, required: str = "") -> Any:
+    """Return the type of a key that may be left out, with its documentation; its value is None then.
+
+    Parameters
+    ----------
+    kind, meaning, required
+        As in `key`.
+    """
+    return Annotated[kind | None, KeyRecord(meaning, required), Field(default=None)]
+
+
 # Types that many keys share.
 Text = Annotated[str, Field(min_length=1), CheckAfter(_require_printable)]
+FileName = Annotated[Text, FILE_MARK]
 Title = Annotated[str, CheckAfter(_require_printable)]
 Number = number()
 Fraction = number(ge=0, le=1)
@@ -181,6 +197,8 @@ class Table(BaseModel):
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True, defer_build=True)
+    # Whether a name may stand in place of the table.
+    has_name: ClassVar[bool] = False
 
     @classmethod
     def __get_pydantic_core_schema__(cls, source: Any, handler: Callable) -> Any:
@@ -240,20 +258,6 @@ def advise_on_name(written_name: str, names: Iterable[str]) -> str:
     return f"{question}use one of {', '.join(known)}"
 
 
-@cache
-def attributes_by_key(model: type[BaseModel]) -> dict[str, str]:
-    """Return a dict that maps each key of a table to its attribute; they differ for reserved words of Python."""
-    return {field.alias or name: name for name, field in model.model_fields.items()}
-
-
-@cache
-def list_required_keys(model: type[BaseModel]) -> list[str]:
-    """Return the keys that every table of this model must have."""
-    fields = model.model_fields
-    names = attributes_by_key(model)
-    return [key for key, name in names.items() if fields[name].is_required()]
-
-
 def iterate_annotation_parts(annotation: Any) -> Iterator[Any]:
     """Yield all parts of an annotation: types, metadata such as Kind, values of a Literal."""
     for part in (*getattr(annotation, "__metadata__", ()), *get_args(annotation)):
@@ -261,51 +265,67 @@ def iterate_annotation_parts(annotation: Any) -> Iterator[Any]:
         yield from iterate_annotation_parts(part)
 
 
-@cache
-def list_key_types(model: type[BaseModel], name: str) -> tuple[Any, ...]:
-    """Return the annotation of an attribute and all its parts."""
-    annotation = model.model_fields[name].annotation
-    return (annotation, *iterate_annotation_parts(annotation))
+class Key:
+    """A key of a table, with all that its type says about its value.
+
+    - table: model of the table.
+    - name, attribute: the key in a scene and in Python; they differ for reserved words of Python.
+    - field: field of the pydantic model.
+    - types: annotation of the attribute, and all its parts.
+    - inner: model of the table, or of the tables, that the key holds; None for a value.
+    - is_array: whether the key holds an array, of values or of tables.
+    - allowed: the words of a key that accepts one of a few.
+    - accepts_value: whether the key accepts a value, as a material or a coating does in place of its table.
+    - kind: kind of quantity of the value or of its items; None without unit.
+    - names_file: whether a text of this key is the name of a file.
+    - record: documentation; that of a table is empty.
+    """
+
+    def __init__(self, table: type[Table], attribute: str) -> None:
+        field = table.model_fields[attribute]
+        self.table = table
+        self.attribute = attribute
+        self.name: str = field.alias or attribute
+        self.field = field
+        self.is_array = get_origin(field.annotation) is tuple
+
+        # A type such as a quantity or None has its marks inside the annotation.
+        self.types = (field.annotation, *iterate_annotation_parts(field.annotation))
+        marks = (*field.metadata, *self.types)
+        models = [part for part in self.types if isinstance(part, type) and issubclass(part, Table)]
+        literals = [part for part in self.types if get_origin(part) is Literal]
+        self.inner: type[Table] | None = next(iter(models), None)
+        self.allowed: tuple[str, ...] = get_args(literals[0]) if literals else ()
+        self.accepts_value = self.inner is None or self.inner.has_name or bool(literals)
+        self.kind = next((str(mark) for mark in marks if isinstance(mark, Kind)), None)
+        self.names_file = FILE_MARK in marks
+        self.record = next(filter(_is_record, field.metadata), KeyRecord(""))
 
 
-def find_key_record(model: type[BaseModel], written_name: str) -> KeyRecord | None:
-    """Return the documentation of a key of a scene, or None for a table, which has no documentation."""
-    marks = model.model_fields[attributes_by_key(model)[written_name]].metadata
-    return next((mark for mark in marks if isinstance(mark, KeyRecord)), None)
-
-
-def find_meaning(model: type[BaseModel], written_name: str) -> str:
-    """Return the meaning of a key of a table; raise KeyError if the key is not documented."""
-    record = find_key_record(model, written_name)
-    if record is None:
-        raise KeyError(
-            f"no record of {model.__name__}.{written_name}: write its type as key(type, meaning)"
-        )
-    return record.meaning
-
-
-@cache
-def find_quantity_kind(model: type[BaseModel], name: str) -> str | None:
-    """Return the kind of quantity that an attribute or its items hold, or None if they have no unit."""
-    marks = (*model.model_fields[name].metadata, *list_key_types(model, name))
-    return next((str(mark) for mark in marks if isinstance(mark, Kind)), None)
-
-
-@cache
-def find_inner_table(model: type[BaseModel], name: str) -> type[Table] | None:
-    """Return the model of an attribute that holds a table or array of tables, or None if it holds a value."""
-    types = (part for part in list_key_types(model, name) if isinstance(part, type))
-    return next((part for part in types if issubclass(part, Table)), None)
-
-
-@cache
-def is_array_attribute(model: type[BaseModel], name: str) -> bool:
-    """Return whether an attribute holds an array, of values or of tables."""
-    return get_origin(model.model_fields[name].annotation) is tuple
+def _is_record(mark: Any) -> bool:
+    return isinstance(mark, KeyRecord)
 
 
 @cache
-def list_allowed_values(model: type[BaseModel], name: str) -> tuple[str, ...]:
-    """Return the values of an attribute that accepts one of a few words, or () for any other attribute."""
-    literals = (part for part in list_key_types(model, name) if get_origin(part) is Literal)
-    return get_args(next(literals, None)) or ()
+def list_keys(model: type[Table]) -> dict[str, Key]:
+    """Return the keys of a table, by their names in a scene."""
+    keys = [Key(model, attribute) for attribute in model.model_fields]
+    return {key.name: key for key in keys}
+
+
+@cache
+def list_required_keys(model: type[Table]) -> list[str]:
+    """Return the names of the keys that every table of this model must have."""
+    return [name for name, key in list_keys(model).items() if key.field.is_required()]
+
+
+@cache
+def list_inner_tables(model: type[Table]) -> dict[str, type[Table]]:
+    """Return a dict that maps the dotted key of every table inside a table, at any depth, to its model."""
+    tables = {}
+    for name, key in list_keys(model).items():
+        if key.inner is not None:
+            tables[name] = key.inner
+            inside = list_inner_tables(key.inner)
+            tables |= {f"{name}.{deeper}": last for deeper, last in inside.items()}
+    return tables

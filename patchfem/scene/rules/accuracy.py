@@ -7,8 +7,8 @@ from typing import Any, NamedTuple
 from ...effects import LAWS, law_has_trait, needs_bond_list
 from ..keys.accuracy import Accuracy
 from ..keys.tables import Tables
+from .facts import TableFacts
 from .methods import MotionFeatures, find_motion_features
-from .rule_table import MistakeRule, RemarkRule, TableFacts, apply_rules
 from .scene_draft import SceneDraft
 
 
@@ -56,63 +56,30 @@ def list_fixed_settings(accuracy: Accuracy) -> list[str]:
     return [setting for setting in SETTING_SCOPES if getattr(accuracy, setting) is not None]
 
 
-class QuadratureFacts(TableFacts):
-    """Properties of the scene that the checks of the sum over bonds use."""
-
-    def __init__(self, draft: SceneDraft, kind: str) -> None:
-        super().__init__(draft, "accuracy", draft.tables.accuracy)
-        self.kind = kind
-        self.law = draft.tables.friction
-
-    @property
-    def is_named(self) -> bool:
-        """Whether accuracy.quadrature is set to a method instead of "auto"."""
-        return bool(self.quadrature) and self.quadrature != "auto"
-
-    @property
-    def has_sum(self) -> bool:
-        """Whether the run computes a sum over bonds."""
-        return (
-            self.law is not None
-            and law_has_trait(self.law.law, "bonds")
-            and self.kind in ("bench", "rig")
-        )
-
-    @property
-    def has_recursion(self) -> bool:
-        """Whether the sum can be computed by recursion."""
-        return self.law.reading == "stretch" and self.law.order == 1
-
-
-QUADRATURE_RULES = (
-    RemarkRule(
-        lambda q: q.is_named and not q.has_sum,
-        "accuracy.quadrature",
-        "= '{quadrature}' has no meaning without law 'nonlocal' and is not used",
-    ),
-    MistakeRule(
-        lambda q: q.has_sum and q.quadrature == "recursion" and not q.has_recursion,
-        "accuracy.quadrature",
-        "'recursion' can be used only with reading = 'stretch' and order = 1; use 'auto' or 'merged'",
-    ),
-    MistakeRule(
-        lambda q: (
-            q.is_named
-            and q.has_sum
-            and q.quadrature != "recursion"
-            and q.compliance
-            and q.has_recursion
-        ),
-        "accuracy.quadrature",
-        "'{quadrature}' cannot be used with {compliance}, because each point of the interface then slips differently; "
-        "use 'recursion' or 'auto'",
-    ),
-)
-
-
 def check_quadrature(draft: SceneDraft, kind: str) -> None:
     """Report a quadrature that does not fit the sum over bonds; add a remark if there is no such sum."""
-    apply_rules(draft, QUADRATURE_RULES, QuadratureFacts(draft, kind))
+    accuracy = TableFacts(draft, "accuracy", draft.tables.accuracy)
+    quadrature = accuracy.quadrature
+    if not quadrature or quadrature == "auto":
+        return
+    law = draft.values.friction
+    if not law_has_trait(law.law, "bonds") or kind not in ("bench", "rig"):
+        accuracy.add_remark(
+            "quadrature", f"= '{quadrature}' has no meaning without law 'nonlocal' and is not used"
+        )
+        return
+    has_recursion = law.reading == "stretch" and law.order == 1
+    if quadrature == "recursion" and not has_recursion:
+        accuracy.add_mistake(
+            "quadrature",
+            "'recursion' can be used only with reading = 'stretch' and order = 1; use 'auto' or 'merged'",
+        )
+    if quadrature != "recursion" and has_recursion and accuracy.compliance:
+        accuracy.add_mistake(
+            "quadrature",
+            f"'{quadrature}' cannot be used with {accuracy.compliance}, because each point of the interface then slips "
+            "differently; use 'recursion' or 'auto'",
+        )
 
 
 def check_settings(draft: SceneDraft, kind: str) -> None:

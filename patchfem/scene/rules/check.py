@@ -6,74 +6,28 @@ A rule sees the tables as far as they could be read and is silent about values t
 from __future__ import annotations
 
 from ...effects import find_waveform, law_has_trait
-from ..keys.tables import Friction
 from .accuracy import check_quadrature, check_settings
 from .contact import check_patches
 from .drive import check_drive, check_length
+from .facts import TableFacts
 from .friction import check_laws
 from .grooves import check_grooves
 from .needed_keys import check_needed_keys
-from .rule_table import MistakeRule, RemarkRule, Rule, TableFacts, apply_rules
 from .scene_draft import SceneDraft
-from .structure import advise_modes, check_energy_gain, check_structure
+from .structure import MODES_ADVICE, check_energy_gain, check_structure
 from .wear import check_wear
 
 RUN_TABLES = ("contact", "normal", "friction", "slide", "structure", "drive", "wear")
-
-
-class SimpleFacts(TableFacts):
-    """Properties of the scene that the checks of small tables use."""
-
-    @property
-    def is_sine(self) -> bool:
-        """Whether the drive signal is a sine."""
-        return find_waveform(self.draft.tables.drive).is_sine
-
-    @property
-    def is_law_independent_of_rest_time(self) -> bool:
-        """Whether the friction force does not depend on the time at rest."""
-        law = self.draft.tables.friction
-        return law is not None and _is_independent_of_rest_time(law)
-
-
-NORMAL_RULES = (
-    RemarkRule(
-        lambda n: n.has("width") and not n.draft.has("friction.spread"),
-        "normal.width",
-        "has no meaning without friction.spread and is not used",
-    ),
-)
-MEASURED_RULES = (
-    RemarkRule(
-        lambda m: m.reading in ("fundamental", "rms", "lowpass") and not m.is_sine,
-        "measured.reading",
-        "has a meaning only under a sine drive and is not used",
-    ),
-)
-SLIDE_RULES = (
-    MistakeRule(
-        lambda s: s.kind in ("constant", "dwell") and s.distance == 0.0,
-        "slide.distance",
-        "must be > 0 m for kind '{kind}'",
-    ),
-    RemarkRule(
-        lambda s: s.kind == "dwell" and s.hold and s.is_law_independent_of_rest_time,
-        "slide.hold",
-        "has no effect, because no bond grows at rest; add friction.rest_growth and slip_growth to law 'nonlocal'",
-    ),
-)
 
 
 def check_scene(draft: SceneDraft) -> str:
     """Report all mistakes of a scene; return the kind of scene, or "" if the tables define none."""
     check_needed_keys(draft)
     check_patches(draft)
-    _check_table(draft, "normal", NORMAL_RULES)
     check_laws(draft)
-    _check_table(draft, "slide", SLIDE_RULES)
     check_structure(draft)
     check_drive(draft)
-    _check_table(draft, "measured", MEASURED_RULES)
+    _check_small_tables(draft)
     kind = _find_kind(draft)
     for check_table in (
         check_quadrature,
@@ -89,20 +43,31 @@ def check_scene(draft: SceneDraft) -> str:
     return kind
 
 
-def _check_table(draft: SceneDraft, name: str, rules: tuple[Rule, ...]) -> None:
-    """Report mistakes in one of the tables [normal], [slide] or [measured]."""
-    table = getattr(draft.tables, name)
-    if table is None:
-        return
-    facts = SimpleFacts(draft, name, table)
-    apply_rules(draft, rules, facts)
+def _check_small_tables(draft: SceneDraft) -> None:
+    """Report mistakes inside [normal], [slide] and [measured]."""
+    scene = draft.values
+    if scene.normal and draft.has("normal.width") and not draft.has("friction.spread"):
+        draft.add_remark("normal.width", "has no meaning without friction.spread and is not used")
+    reading = scene.measured.reading
+    if (
+        reading in ("fundamental", "rms", "lowpass")
+        and not find_waveform(draft.tables.drive).is_sine
+    ):
+        draft.add_remark(
+            "measured.reading", "has a meaning only under a sine drive and is not used"
+        )
 
-
-def _is_independent_of_rest_time(law: Friction) -> bool:
-    """Return whether the force of a law does not depend on the time at rest."""
-    return law_has_trait(law.law, "timeless") or (
-        law_has_trait(law.law, "bonds") and law.rest_growth is None
-    )
+    slide = scene.slide
+    if slide.kind in ("constant", "dwell") and slide.distance == 0:
+        draft.add_mistake("slide.distance", f"must be > 0 m for kind '{slide.kind}'")
+    law = scene.friction
+    grows_at_rest = law_has_trait(law.law, "bonds") and law.rest_growth
+    is_timeless = law_has_trait(law.law, "timeless") or law_has_trait(law.law, "bonds")
+    if slide.kind == "dwell" and slide.hold and is_timeless and not grows_at_rest:
+        draft.add_remark(
+            "slide.hold",
+            "has no effect, because no bond grows at rest; add friction.rest_growth and slip_growth to law 'nonlocal'",
+        )
 
 
 def _find_kind(draft: SceneDraft) -> str:
@@ -130,7 +95,8 @@ def _find_kind(draft: SceneDraft) -> str:
             "[contact] and [normal] exclude each other: keep one source of the normal load",
         )
         tables.discard("normal")
-    if "slide" in tables and tables & {"structure", "drive"}:
+    has_rig = bool(tables & {"structure", "drive"})
+    if "slide" in tables and has_rig:
         draft.add_mistake(
             "slide",
             "[slide] prescribes the motion, but [structure] with [drive] computes the motion: keep only [slide], or "
@@ -139,82 +105,80 @@ def _find_kind(draft: SceneDraft) -> str:
         return ""
     if tables == {"contact"}:
         return "patch"
-    if tables == {"structure", "drive"}:
-        return "linear"
-    return _find_moving_kind(draft, tables)
-
-
-def _find_moving_kind(draft: SceneDraft, tables: set[str]) -> str:
-    """Return whether a scene with friction is a bench or a rig; report missing tables."""
+    _require_tables(draft, tables)
     if not tables:
-        draft.add_missing_table(
-            "contact",
-            "a scene needs [contact] (pressed pieces), or [structure] with [drive] (a vibrating structure); with "
-            "[friction] a scene needs a load and a motion",
-        )
         return ""
+    if "slide" in tables:
+        return "bench"
+    return "linear" if tables == {"structure", "drive"} else "rig"
+
+
+def _require_tables(draft: SceneDraft, tables: set[str]) -> None:
+    """Report tables that a run lacks, and masses that cannot rub."""
     has_rig = bool(tables & {"structure", "drive"})
-    if has_rig and "drive" not in tables:
-        draft.add_missing_table("drive", "[structure] needs this table")
-    if has_rig and "structure" not in tables:
-        draft.add_missing_table("structure", "[drive] needs this table")
+    others = ", ".join(f"[{name}]" for name in sorted(tables))
+    needed = {
+        "drive": "[structure] needs this table" if has_rig else "",
+        "structure": "[drive] needs this table" if has_rig else "",
+    }
     if tables - {"structure", "drive"}:
-        _require_friction(draft, tables, has_rig)
-    return "bench" if "slide" in tables else "rig"
-
-
-def _require_friction(draft: SceneDraft, tables: set[str], has_rig: bool) -> None:
-    """Report tables that a run with friction lacks."""
-    if "friction" not in tables:
-        others = ", ".join(f"[{name}]" for name in sorted(tables))
-        draft.add_missing_table("friction", f"a run with {others} also needs this table")
-    if draft.has("structure.masses") and not draft.has("structure.interface"):
-        if "contact" in tables:
-            draft.add_mistake(
-                "structure.masses",
-                f"structure.masses cannot be used with [contact]; {advise_modes(draft)}, or keep the masses, write the "
-                "friction law in [[structure.interface]] and the patch in [structure.interface.contact]",
+        needed["friction"] = f"a run with {others} also needs this table"
+        if not tables & {"contact", "normal"}:
+            needed["contact"] = "friction needs a normal load, [contact] or [normal]"
+        if not has_rig:
+            needed["slide"] = (
+                "friction needs a motion, [slide] or [structure] with [drive]; only `patchfem backbone` needs neither"
             )
-        else:
-            draft.add_missing(
-                "structure.interface",
-                "friction between masses needs an interface: write [[structure.interface]] with `law` and `load` "
-                "instead of [friction]",
-            )
-    if not tables & {"contact", "normal"}:
-        draft.add_missing_table("contact", "friction needs a normal load, [contact] or [normal]")
-    if not has_rig and "slide" not in tables:
-        draft.add_missing_table(
-            "slide",
-            "friction needs a motion, [slide] or [structure] with [drive]; only `patchfem backbone` needs neither",
+    elif not tables:
+        needed["contact"] = (
+            "a scene needs [contact] (pressed pieces), or [structure] with [drive] (a vibrating structure); with "
+            "[friction] a scene needs a load and a motion"
+        )
+    for name, reason in needed.items():
+        if reason and name not in tables:
+            draft.add_missing_table(name, reason)
+
+    # Friction between masses belongs to an interface.
+    rubs = bool(tables - {"structure", "drive"})
+    if not rubs or not draft.has("structure.masses") or draft.has("structure.interface"):
+        return
+    if "contact" in tables:
+        draft.add_mistake(
+            "structure.masses",
+            f"structure.masses cannot be used with [contact]; {MODES_ADVICE}, or keep the masses, write the friction "
+            "law in [[structure.interface]] and the patch in [structure.interface.contact]",
+        )
+    else:
+        draft.add_missing(
+            "structure.interface",
+            "friction between masses needs an interface: write [[structure.interface]] with `law` and `load` instead "
+            "of [friction]",
         )
 
 
 def _remark_unused(draft: SceneDraft, kind: str) -> None:
     """Add remarks on keys that have no effect because the scene has no sliding or no friction."""
-    if kind == "patch" and draft.tables.contact is not None:
-        shapes = draft.tables.contact.shapes.items()
+    if kind == "patch":
+        patch = TableFacts(draft, "contact", draft.tables.contact)
+        shapes = patch.table.shapes.items() if patch.table is not None else ()
         keys = [f"{name}.on" for name, shape in shapes if shape.on == "lower" and name != "tilt"]
-        if draft.has("contact.holder.tangential_stiffness"):
-            keys.insert(0, "holder.tangential_stiffness")
+        keys += filter(patch.has, ["holder.tangential_stiffness"])
         for key in keys:
-            draft.add_remark(
-                f"contact.{key}",
-                "has no meaning in a patch scene, where nothing slides, and is not used",
+            patch.add_remark(
+                key, "has no meaning in a patch scene, where nothing slides, and is not used"
             )
-    if kind == "linear":
+    for index, mode in enumerate(draft.values.structure.mode if kind == "linear" else ()):
         for key in ("normal", "pitch", "yaw"):
-            for index, mode in enumerate(draft.values.structure.mode):
-                if mode[key]:
-                    draft.add_remark(
-                        f"structure.mode.{index}.{key}",
-                        "has no meaning in a linear scene, which has no friction, and is not used",
-                    )
+            if mode[key]:
+                draft.add_remark(
+                    f"structure.mode.{index}.{key}",
+                    "has no meaning in a linear scene, which has no friction, and is not used",
+                )
 
 
 def _check_sliding(draft: SceneDraft, kind: str) -> None:
     """Report a rig in which no mode moves the patch."""
-    modes = draft.values.structure.mode if kind == "rig" else ()
+    modes = tuple(draft.values.structure.mode) if kind == "rig" else ()
     if modes and all(mode.slide == 0 for mode in modes):
         draft.add_mistake(
             "structure.mode.0.slide",

@@ -2,194 +2,113 @@
 
 from __future__ import annotations
 
-from ...effects import (
-    law_has_trait,
-    law_takes_key,
-    law_takes_stiffness_or_length,
-)
-from ..keys.contact import Contact
+from ...effects import law_has_trait, law_takes_key, law_takes_stiffness_or_length
 from ..keys.tables import Friction
+from .facts import TableFacts
 from .methods import find_climbed_grooves
-from .rule_table import MissingKeyRule, MistakeRule, RemarkRule, TableFacts, apply_rules
 from .scene_draft import SceneDraft
-from .view import UNKNOWN_VALUE, TableView
-
-
-class LawFacts(TableFacts):
-    """Properties of the scene that the checks of a friction law use."""
-
-    def __init__(
-        self, draft: SceneDraft, table_key: str, law: Friction, contact: Contact | None
-    ) -> None:
-        super().__init__(draft, table_key, law)
-        self.contact = TableView(contact)
-
-    def has_key(self, key: str) -> bool:
-        """Return whether the friction law has a given key."""
-        return law_takes_key(self.table.law, key)
-
-    def has_trait(self, trait: str) -> bool:
-        """Return whether the law has a trait of `effects.LAWS[...].traits`."""
-        return law_has_trait(self.table.law, trait)
-
-    @property
-    def normal_load(self) -> float:
-        """Mean normal load [N] of the contact, or UNKNOWN_VALUE if the scene prescribes its approach."""
-        own = self.load if self.table_key != "friction" else UNKNOWN_VALUE
-        return own or self.contact.load or self.scene.normal.load
-
-    @property
-    def has_unsupported_kinetic(self) -> bool:
-        """Whether the scene gives a kinetic coefficient for a law that does not use one."""
-        return self.has("kinetic") and not self.has_key("kinetic")
-
-    @property
-    def is_kinetic_larger(self) -> bool:
-        """Whether the kinetic coefficient is larger than the static one."""
-        return not self.has_unsupported_kinetic and self.kinetic > self.static
-
-    @property
-    def order_requirement(self) -> str:
-        """Condition on the bond order, as text for a message."""
-        if self.has_trait("averaged"):
-            return "> -1"
-        return (
-            ">= 0 (reading 'stretch')" if self.reading == "stretch" else "> -1 (reading 'report')"
-        )
-
-    @property
-    def is_order_wrong(self) -> bool:
-        """Whether the bond order is too small for the law."""
-        is_strict = self.reading == "stretch" and not self.has_trait("averaged")
-        return self.order <= -1 or (is_strict and self.order < 0)
-
-    @property
-    def missing_temperature_keys(self) -> str:
-        """Missing keys without which a surface temperature has no effect, as a clause of a message."""
-        if not self.rest_growth:
-            return "keys for the growth of the bonds; add rest_growth and slip_growth"
-        return "activation temperatures; add rest_activation, slip_activation or both"
-
-    @property
-    def has_unknown_springs(self) -> bool:
-        """Whether `stiffness` is given for a law whose number of springs depends on the load."""
-        return law_takes_stiffness_or_length(self.table.law) and bool(self.stiffness)
-
-    @property
-    def load_change_description(self) -> str:
-        """Cause of the changing normal load, as text for a message."""
-        return self.load_change or find_climbed_grooves(self.draft.tables)
-
-
-LAW_RULES = (
-    MistakeRule(
-        lambda law: law.is_kinetic_larger,
-        "{table_key}.kinetic",
-        "{kinetic} is larger than static = {static}; kinetic <= static is needed",
-    ),
-    RemarkRule(
-        lambda law: (
-            not law.has_unsupported_kinetic
-            and not law.is_kinetic_larger
-            and is_kinetic_unused(law.table)
-        ),
-        "{table_key}.kinetic",
-        "has no effect while the bond length is constant; add rest_growth and slip_growth",
-    ),
-    RemarkRule(
-        lambda law: is_rest_speed_unused(law.table),
-        "{table_key}.rest_speed",
-        "has no effect while the bond length is constant; add rest_growth and slip_growth",
-    ),
-    MissingKeyRule(
-        lambda law: (
-            law.spread
-            and law.has_key("spread")
-            and law.table_key == "friction"
-            and law.draft.tables.normal is not None
-            and not law.draft.has("normal.width")
-        ),
-        "normal.width",
-        "friction.spread needs this key",
-    ),
-    RemarkRule(
-        lambda law: is_temperature_unused(law.table),
-        "{table_key}.temperature",
-        "has no effect without {missing_temperature_keys}",
-    ),
-    MistakeRule(
-        lambda law: law.is_order_wrong,
-        "{table_key}.order",
-        "must be {order_requirement}, not {order}",
-    ),
-    MistakeRule(
-        lambda law: law.has_unknown_springs and law.load_change_description,
-        "{table_key}.stiffness",
-        "{load_change_description} changes the load, and the number of springs in contact changes "
-        "with the load; give bond_length in place of stiffness",
-    ),
-    MistakeRule(
-        lambda law: (
-            law.has_unknown_springs
-            and not law.load_change_description
-            and law.contact.approach
-            and not law.contact.load
-        ),
-        "{table_key}.stiffness",
-        "needs a known load, but [contact.approach] prescribes a distance; give bond_length in place of stiffness, or "
-        "contact.load in place of [contact.approach]",
-    ),
-    MistakeRule(
-        lambda law: law.static == 0 and law.stiffness and law.has_key("stiffness"),
-        "{table_key}.static",
-        "must be > 0 with law '{law}', whose springs need a slip force",
-    ),
-    MistakeRule(
-        lambda law: law.static == 0 and law.compliance,
-        "{table_key}.static",
-        "must be > 0 with {compliance}, because at static = 0 no point carries friction; raise static or leave out "
-        "{compliance}",
-    ),
-)
+from .view import TableView
 
 
 def check_laws(draft: SceneDraft) -> None:
     """Report mistakes inside [friction] and inside the laws of interfaces."""
     if draft.tables.friction is not None:
-        _check_law(draft, "friction", draft.tables.friction, draft.tables.contact)
+        _check_law(TableFacts(draft, "friction", draft.tables.friction), draft.values.contact)
     for index, interface in enumerate(draft.values.structure.interface):
-        law = interface.table
-        _check_law(draft, f"structure.interface.{index}", law, law.contact)
+        law = TableFacts(draft, f"structure.interface.{index}", interface.table)
+        _check_law(law, interface.contact)
 
 
-def _check_law(draft: SceneDraft, table_key: str, law: Friction, contact: Contact | None) -> None:
-    facts = LawFacts(draft, table_key, law, contact)
-    apply_rules(draft, LAW_RULES, facts)
+def _check_law(law: TableFacts, contact: TableView) -> None:
+    """Report mistakes inside one friction law."""
+    unused = find_unused_law_keys(law.table)
+    _check_coefficients(law, unused)
+    _check_bonds(law, unused)
+    _check_stiffness(law, contact)
 
 
-def is_temperature_unused(law: Friction) -> bool:
-    """Return whether a surface temperature has no effect on the growth of bonds."""
-    temperature = law.temperature
-    if temperature is None or not law_has_trait(law.law, "bonds"):
-        return False
-    is_inactive = not temperature.rest_activation and not temperature.slip_activation
-    return is_inactive or (law.rest_growth is None and law.slip_growth is None)
+def _check_coefficients(law: TableFacts, unused: list[str]) -> None:
+    """Report coefficients of friction that exclude each other or the other keys of the law."""
+    # A kinetic coefficient of a law that has none is reported as a key without meaning.
+    if law_takes_key(law.table.law, "kinetic") or not law.has("kinetic"):
+        if law.kinetic > law.static:
+            law.add_mistake(
+                "kinetic",
+                f"{law.kinetic} is larger than static = {law.static}; kinetic <= static is needed",
+            )
+        elif "kinetic" in unused:
+            law.add_remark("kinetic", CONSTANT_LENGTH)
+    if law.static == 0 and law.stiffness and law_takes_key(law.table.law, "stiffness"):
+        law.add_mistake(
+            "static", f"must be > 0 with law '{law.law}', whose springs need a slip force"
+        )
+    if law.static == 0 and law.compliance:
+        law.add_mistake(
+            "static",
+            f"must be > 0 with {law.compliance}, because at static = 0 no point carries friction; raise static or "
+            f"leave out {law.compliance}",
+        )
 
 
-def is_kinetic_unused(law: Friction) -> bool:
-    """Return whether a smaller kinetic coefficient is given for bonds of constant length."""
+CONSTANT_LENGTH = "has no effect while the bond length is constant; add rest_growth and slip_growth"
+
+
+def _check_bonds(law: TableFacts, unused: list[str]) -> None:
+    """Report keys of bonds that are impossible, missing or without effect."""
+    if "rest_speed" in unused:
+        law.add_remark("rest_speed", CONSTANT_LENGTH)
+    if "temperature" in unused:
+        missing = "activation temperatures; add rest_activation, slip_activation or both"
+        if not law.rest_growth:
+            missing = "keys for the growth of the bonds; add rest_growth and slip_growth"
+        law.add_remark("temperature", f"has no effect without {missing}")
+
+    # The bonds of the average pressure have no stretch.
+    is_averaged = law_has_trait(law.table.law, "averaged")
+    needed = "> -1" if is_averaged else "> -1 (reading 'report')"
+    is_wrong = law.order <= -1
+    if law.reading == "stretch" and not is_averaged:
+        needed = ">= 0 (reading 'stretch')"
+        is_wrong = law.order < 0
+    if is_wrong:
+        law.add_mistake("order", f"must be {needed}, not {law.order}")
+
+    is_spread_of_point = law.table_key == "friction" and law.draft.tables.normal is not None
+    if law.spread and law_takes_key(law.table.law, "spread") and is_spread_of_point:
+        if not law.draft.has("normal.width"):
+            law.draft.add_missing("normal.width", "friction.spread needs this key")
+
+
+def _check_stiffness(law: TableFacts, contact: TableView) -> None:
+    """Report a stiffness of a law whose number of springs depends on an unknown or changing load."""
+    if not (law_takes_stiffness_or_length(law.table.law) and law.stiffness):
+        return
+    if change := law.load_change or find_climbed_grooves(law.draft.tables):
+        law.add_mistake(
+            "stiffness",
+            f"{change} changes the load, and the number of springs in contact changes with the load; give bond_length "
+            "in place of stiffness",
+        )
+    elif contact.approach and not contact.load:
+        law.add_mistake(
+            "stiffness",
+            "needs a known load, but [contact.approach] prescribes a distance; give bond_length in place of stiffness, "
+            "or contact.load in place of [contact.approach]",
+        )
+
+
+def find_unused_law_keys(law: Friction) -> list[str]:
+    """Return the keys that have no effect on the bonds of a law, whose length is constant or does not grow at rest."""
+    if not law_has_trait(law.law, "bonds"):
+        return []
     bond = TableView(law)
-    return (
-        law_has_trait(law.law, "bonds")
-        and bond.kinetic < bond.static
-        and not (bond.rest_growth or bond.slip_growth)
-    )
-
-
-def is_rest_speed_unused(law: Friction) -> bool:
-    """Return whether a lower limit of the speed is given for bonds that do not grow at rest."""
-    return (
-        law.rest_speed is not None
-        and law_takes_key(law.law, "rest_speed")
-        and law.rest_growth is None
-    )
+    unused = {
+        "temperature": law.temperature is not None
+        and not (
+            (bond.temperature.rest_activation or bond.temperature.slip_activation)
+            and (law.rest_growth is not None or law.slip_growth is not None)
+        ),
+        "kinetic": bond.kinetic < bond.static and not (bond.rest_growth or bond.slip_growth),
+        "rest_speed": law.rest_speed is not None and law.rest_growth is None,
+    }
+    return [key for key, is_unused in unused.items() if is_unused]

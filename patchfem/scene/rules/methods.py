@@ -63,38 +63,39 @@ class MotionFeatures(NamedTuple):
         """Whether `spring` is a key of grooves."""
         return self.spring.endswith("grooves]")
 
+    def describe_features(self) -> dict[str, str]:
+        """Return the end of a message on each feature that an engine may lack, "" if the motion does not have it."""
+        words = {
+            "no-law": "" if self.joints else "for law 'none'",
+            "load": self.load_change,
+            "yaw": "with strips that yaw" if self.strips_yaw else "",
+            "yaw-levels": "",
+            "parts": f"with {self.compliance}" if self.compliance else "",
+            "grooves": "",
+            "spring": "",
+            "faces": "with several interfaces" if len(self.joints) > 1 else "",
+            "levels": "with waveform 'levels'" if self.waveform.has_levels else "",
+            # the pressure changes with the motion
+            "pressed": "" if "normal.amplitude" in self.load_change else self.load_change,
+        }
+        if words["yaw"] and words["levels"]:
+            words["yaw-levels"] = f"{words['yaw']} and waveform 'levels'"
+        if self.spring:
+            words["grooves" if self.has_grooves else "spring"] = f"with {self.spring}"
+        return words
+
 
 class EngineSupport(NamedTuple):
     """Features that a solver supports.
 
     - law: word of `effects.LAWS[...].supports` that every friction law must carry; "" for any law.
-    - features: names of FEATURE_FINDERS, separated by blanks.
+    - features: names of `MotionFeatures.describe_features`, separated by blanks.
     """
 
     law: str
     features: str
 
 
-# Functions that detect each feature that an engine may lack; they return the end of a message, or
-# "" if a motion does not have the feature.
-FEATURE_FINDERS = {
-    "no-law": lambda motion: "" if motion.joints else "for law 'none'",
-    "load": lambda motion: motion.load_change,
-    "yaw": lambda motion: "with strips that yaw" if motion.strips_yaw else "",
-    "yaw-levels": lambda motion: (
-        "with strips that yaw and waveform 'levels'"
-        if motion.strips_yaw and motion.waveform.has_levels
-        else ""
-    ),
-    "parts": lambda motion: f"with {motion.compliance}" if motion.compliance else "",
-    "grooves": lambda motion: f"with {motion.spring}" if motion.has_grooves else "",
-    "spring": lambda motion: (
-        f"with {motion.spring}" if motion.spring and not motion.has_grooves else ""
-    ),
-    "faces": lambda motion: "with several interfaces" if len(motion.joints) > 1 else "",
-    "levels": lambda motion: "with waveform 'levels'" if motion.waveform.has_levels else "",
-    "pressed": lambda motion: motion.load_change if _is_pressed_by_motion(motion) else "",
-}
 # Laws of the engine `hybrid` under a load that varies in time.
 VARYING_LAWS = ("coulomb", "tanh", "elastic-plastic")
 # Features that each engine of a rig supports; `runs.rig.engines` refers to these names. The rows "exact" and "piecewise"
@@ -103,7 +104,9 @@ ENGINE_SUPPORT = {
     "hybrid": EngineSupport("events", "no-law yaw faces levels parts spring load grooves"),
     "exact": EngineSupport("exact", "no-law yaw faces levels"),
     "piecewise": EngineSupport("pieces", "parts faces levels"),
-    "march": EngineSupport("march", " ".join(FEATURE_FINDERS)),
+    "march": EngineSupport(
+        "march", "no-law load yaw yaw-levels parts grooves spring faces levels pressed"
+    ),
     "harmonic": EngineSupport("", "no-law parts grooves spring faces levels"),
 }
 # Support of the maps of a period by which method "harmonic" finds steady motions exactly.
@@ -129,8 +132,7 @@ def find_unsupported_feature(support: EngineSupport, motion: MotionFeatures) -> 
     if joint is not None:
         compliance = f" with {joint.compliance}" if joint.compliance else ""
         return f"for law '{joint.law.law}'{compliance}"
-    for name, describe in FEATURE_FINDERS.items():
-        words = describe(motion)
+    for name, words in motion.describe_features().items():
         if words and name not in support.features.split():
             return words
     return ""
@@ -145,15 +147,15 @@ def _find_unsupported_joint(support: EngineSupport, motion: MotionFeatures) -> J
     for all laws with a return map.
     """
     for joint in motion.joints:
+        is_rigid = not joint.compliance
+        is_supported = not support.law or law_supports(joint.law, support.law)
         if support.law == "events":
             is_supported = _has_finite_state(joint, motion)
         elif support.law == "march":
             is_supported = has_return_map(joint.law)
-        else:
-            is_supported = not support.law or law_supports(joint.law, support.law)
-        if support.law == "exact":
-            is_supported &= not joint.compliance
-        elif support.law == "pieces" and not joint.compliance:
+        elif support.law == "exact":
+            is_supported &= is_rigid
+        elif support.law == "pieces" and is_rigid:
             is_supported &= not law_has_trait(joint.law.law, "set-valued")
         if not is_supported:
             return joint
@@ -170,14 +172,8 @@ def _has_finite_state(joint: Joint, motion: MotionFeatures) -> bool:
     if motion.load_change:
         return law in VARYING_LAWS
     if law_has_trait(law, "bonds"):
-        moves = bool(motion.lower_shape)
-        return not (needs_bond_list(joint.law) or moves)
+        return not (needs_bond_list(joint.law) or motion.lower_shape)
     return True
-
-
-def _is_pressed_by_motion(motion: MotionFeatures) -> bool:
-    """Return whether the pressure of a patch changes with the motion."""
-    return bool(motion.load_change) and "normal.amplitude" not in motion.load_change
 
 
 def check_method(draft: SceneDraft, kind: str) -> None:
@@ -187,14 +183,8 @@ def check_method(draft: SceneDraft, kind: str) -> None:
         draft.add_remark(
             METHOD_KEY, f"= '{method}' has no meaning in a {kind} scene and is not used"
         )
-    check = {
-        "auto": _find_auto_obstacle,
-        "exact": _find_exact_obstacle,
-        "march": _find_march_obstacle,
-        "harmonic": _find_harmonic_obstacle,
-    }.get(method)
-    if check and kind in ("rig", "linear"):
-        reason = check(find_motion_features(draft.tables, kind))
+    if method and kind in ("rig", "linear"):
+        reason = _find_obstacle(method, find_motion_features(draft.tables, kind))
         if reason:
             draft.add_mistake(METHOD_KEY, reason)
 
@@ -256,21 +246,22 @@ def find_climbed_grooves(tables: Tables) -> str:
 
 def find_yaw_key(tables: Tables) -> str:
     """Return the key of the yaw of the first mode that yaws the patch, or "" if no mode does."""
-    for index, mode in enumerate(TableView(tables).structure.mode):
-        if mode.yaw:
-            return f"structure.mode.{index}.yaw"
-    return ""
+    return _find_mode_key(tables, "yaw")
 
 
 def find_load_change_key(tables: Tables) -> str:
     """Return the key that makes the load of a rig vary, or "" if the load is constant."""
-    scene = TableView(tables)
-    if scene.normal.amplitude:
+    if TableView(tables).normal.amplitude:
         return "normal.amplitude"
-    for index, mode in enumerate(scene.structure.mode):
-        for key in ("normal", "pitch"):
-            if mode[key]:
-                return f"structure.mode.{index}.{key}"
+    return _find_mode_key(tables, "normal", "pitch")
+
+
+def _find_mode_key(tables: Tables, *names: str) -> str:
+    """Return the first of some keys of the modes that is not 0, or "" if all are."""
+    for index, mode in enumerate(TableView(tables).structure.mode):
+        for name in names:
+            if mode[name]:
+                return f"structure.mode.{index}.{name}"
     return ""
 
 
@@ -279,49 +270,40 @@ def describe_load_change(key: str) -> str:
     return key if key == "normal.amplitude" else f"a mode's {key.rpartition('.')[2]}"
 
 
-def _find_exact_obstacle(motion: MotionFeatures) -> str:
-    """Return why a motion cannot be computed from event to event, or "" if it can."""
-    why = find_unsupported_feature(ENGINE_SUPPORT["hybrid"], motion)
-    if not why:
+def _find_obstacle(method: str, motion: MotionFeatures) -> str:
+    """Return why a value of accuracy.method cannot compute a motion, or "" if it can."""
+    if method == "harmonic":
+        return _find_harmonic_obstacle(motion)
+    in_steps = find_unsupported_feature(ENGINE_SUPPORT["march"], motion)
+    by_events = find_unsupported_feature(ENGINE_SUPPORT["hybrid"], motion)
+    without_events = f"the motion cannot be computed from event to event {by_events}"
+    if method == "auto" and in_steps and by_events:
+        return f"{without_events}, nor in time steps {in_steps}; use another law"
+    if method == "exact" and by_events:
+        return f"{without_events}; use 'march' or leave `method` out"
+    if method != "march":
         return ""
-    return f"the motion cannot be computed from event to event {why}; use 'march' or leave `method` out"
-
-
-def _find_march_obstacle(motion: MotionFeatures) -> str:
-    """Return why a motion cannot be computed in time steps, or "" if it can."""
-    if feature := find_unsupported_feature(ENGINE_SUPPORT["march"], motion):
-        return f"'march' {feature} is not supported yet; leave `method` out"
-    laws = [joint.law.law for joint in motion.joints]
-    if not motion.has_grooves or not laws or not law_has_trait(laws[0], "memoryless"):
-        return ""
-    if motion.compliance:
+    if in_steps:
+        return f"'march' {in_steps} is not supported yet; leave `method` out"
+    law = motion.joints[0].law.law if motion.joints else None
+    if motion.compliance or not motion.has_grooves or not law_has_trait(law, "memoryless"):
         return ""
     return (
-        f"the motion over grooves under law '{laws[0]}' is computed from event to event since 2.0; use 'exact' or leave "
+        f"the motion over grooves under law '{law}' is computed from event to event since 2.0; use 'exact' or leave "
         "`method` out"
     )
 
 
-def _find_auto_obstacle(motion: MotionFeatures) -> str:
-    """Return why no engine can compute a motion in time, or "" if one can."""
-    feature = find_unsupported_feature(ENGINE_SUPPORT["march"], motion)
-    why = find_unsupported_feature(ENGINE_SUPPORT["hybrid"], motion)
-    if not (feature and why):
-        return ""
-    return f"the motion cannot be computed from event to event {why}, nor in time steps {feature}; use another law"
-
-
 def _find_harmonic_obstacle(motion: MotionFeatures) -> str:
     """Return why harmonic balance cannot find the steady motion, or "" if it can."""
-    drive = motion.drive
-    is_transient = motion.waveform.name and not motion.waveform.has_steady_motion
-    if drive is not None and (drive.kind == "free" or is_transient):
+    wave = motion.waveform
+    drive = TableView(motion.drive)
+    if drive.kind == "free" or (wave.name and not wave.has_steady_motion):
         return (
             "'harmonic' finds only steady motion: under a sine, over the frequencies of a sweep, or over the "
             "levels of waveform 'levels'; use 'march' or leave `method` out"
         )
-    is_base_sweep = motion.waveform.is_swept and drive is not None and drive.kind == "base"
-    if is_base_sweep and drive.displacement is not None:
+    if wave.is_swept and drive.kind == "base" and drive.table.displacement is not None:
         return (
             "'harmonic' needs a constant acceleration over a sweep; give drive.acceleration in place of "
             "drive.displacement"
@@ -337,25 +319,19 @@ def _find_harmonic_obstacle(motion: MotionFeatures) -> str:
 def _find_harmonic_law_obstacle(motion: MotionFeatures) -> str:
     """Return why harmonic balance cannot use the law of a rig, or "" if it can."""
     law = motion.joints[0].law
+    beside = ""
+    remedy = "march"
     if len(motion.joints) > 1:
-        return describe_unsupported(
-            "'harmonic' with several interfaces and a law without exact solution or a nonlinear spring",
-            "march",
-        )
-    if law_has_trait(law.law, "set-valued"):
-        if motion.compliance:
-            return ""
-        return describe_unsupported(
-            f"'harmonic' with law '{law.law}', whose force jumps, and {motion.spring}",
-            "march or stiff",
-        )
-    if not law_supports(law, "harmonic"):
-        return describe_unsupported(
-            f"'harmonic' with {describe_law(law)}",
-            f"use 'march', or {suggest_laws('harmonic', friction=law)}",
-        )
-    if not law_has_trait(law.law, "bonds"):
-        return ""
-    growth = "friction.rest_growth" if law.rest_growth else ""
-    beside = next(filter(None, (growth, motion.compliance, motion.lower_shape)), "")
-    return beside and describe_unsupported(f"'harmonic' with law '{law.law}' and {beside}", "march")
+        beside = "several interfaces and a law without exact solution or a nonlinear spring"
+    elif law_has_trait(law.law, "set-valued"):
+        if not motion.compliance:
+            beside = f"law '{law.law}', whose force jumps, and {motion.spring}"
+            remedy = "march or stiff"
+    elif not law_supports(law, "harmonic"):
+        beside = describe_law(law)
+        remedy = f"use 'march', or {suggest_laws('harmonic', friction=law)}"
+    elif law_has_trait(law.law, "bonds"):
+        growth = "friction.rest_growth" if law.rest_growth else ""
+        cause = growth or motion.compliance or motion.lower_shape
+        beside = cause and f"law '{law.law}' and {cause}"
+    return beside and describe_unsupported(f"'harmonic' with {beside}", remedy)

@@ -12,6 +12,7 @@ from ..keys.choices import (
     iterate_tables,
     parse_needs,
 )
+from .facts import TableFacts
 from .scene_draft import SceneDraft
 
 HINTS = {  # what else a user should know about a missing key
@@ -25,46 +26,48 @@ HINTS = {  # what else a user should know about a missing key
 
 def check_needed_keys(draft: SceneDraft) -> None:
     """Report the keys that the tables of a scene lack or exclude; add a remark on each key without meaning."""
-    for table_key, table in iterate_tables(draft.tables):
-        written = draft.written_value(table_key) or {}
-        choices = find_choices(table)
+    for table_key, model_table in iterate_tables(draft.tables):
+        table = TableFacts(draft, table_key, model_table)
+        choices = find_choices(model_table)
+
+        # Keys that a selector or another key needs.
         for need, is_required, reason in choices.needs:
             used = [bundle for bundle in need.bundles if bundle[0] not in choices.unused]
-            _check_need(
-                draft, table_key, need._replace(bundles=used), reason, is_required=is_required
-            )
+            _check_need(table, need._replace(bundles=used), reason, is_required=is_required)
         for model, needed_by_key in NEEDS.items():
-            for key, words in needed_by_key.items() if isinstance(table, model) else ():
-                for need in parse_needs(words) if key in written else ():
-                    _check_need(draft, table_key, need, key, is_required=True)
-        for key, other in EQUAL_LENGTHS.get(type(table), {}).items():
-            lengths = [len(getattr(table, name) or ()) for name in (key, other)]
+            for key, word in needed_by_key.items() if isinstance(model_table, model) else ():
+                if table.has(key):
+                    _check_need(table, parse_needs(word)[0], key, is_required=True)
+
+        # Lists with one value for each value of another list.
+        for key, other in EQUAL_LENGTHS.get(type(model_table), {}).items():
+            lengths = [len(tuple(table[name])) for name in (key, other)]
             if key not in choices.unused and all(lengths) and lengths[0] != lengths[1]:
-                sentence = f"{lengths[0]} values for {lengths[1]} values of `{other}`; give one value for each"
-                draft.add_mistake(f"{table_key}.{key}", sentence)
-        for key, reason in choices.unused.items():
-            path = f"{table_key}.{key}"
-            if key in written and key in REFUSED_KEYS:
+                table.add_mistake(
+                    key,
+                    f"{lengths[0]} values for {lengths[1]} values of `{other}`; give one value for each",
+                )
+
+        # Keys without meaning; some of them would be mistaken for an effect, so they are refused.
+        for key in filter(table.has, choices.unused):
+            reason = choices.unused[key]
+            if key in REFUSED_KEYS:
                 laws = name_laws_with_key(key)
-                draft.add_mistake(path, f"{reason} has no key {key}; laws with it are {laws}")
-            elif key in written:
-                draft.add_remark(path, f"has no meaning for {reason} and is not used")
+                table.add_mistake(key, f"{reason} has no key {key}; laws with it are {laws}")
+            else:
+                table.add_remark(key, f"has no meaning for {reason} and is not used")
 
 
-def _check_need(
-    draft: SceneDraft, table_key: str, need: Need, reason: str, *, is_required: bool
-) -> None:
+def _check_need(table: TableFacts, need: Need, reason: str, *, is_required: bool) -> None:
     """Report keys of which none is given, or too many."""
 
     def is_written(key: str) -> bool:
-        path = f"{table_key}.{key}"
-        return draft.has(path) or path in draft.suggested_keys
+        return table.has(key) or f"{table.table_key}.{key}" in table.draft.suggested_keys
 
     used = [bundle for bundle in need.bundles if any(map(is_written, bundle))]
     if len(used) > 1 and need.is_exclusive:
-        second = next(filter(is_written, used[1]))
-        draft.add_mistake(
-            f"{table_key}.{second}",
+        table.add_mistake(
+            next(filter(is_written, used[1])),
             f"`{', '.join(used[0])}` and `{', '.join(used[1])}` exclude each other: keep one",
         )
     elif need.bundles and is_required:
@@ -75,5 +78,4 @@ def _check_need(
             sentence = f"{reason} needs {keys}"
         for key in first:
             if not is_written(key):
-                hint = HINTS.get(key, "")
-                draft.add_missing(f"{table_key}.{key}", "; ".join(filter(None, (sentence, hint))))
+                table.add_missing(key, "; ".join(filter(None, (sentence, HINTS.get(key)))))

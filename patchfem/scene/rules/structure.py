@@ -2,304 +2,211 @@
 
 from __future__ import annotations
 
-from functools import cached_property
-from math import pi, sqrt
+from collections.abc import Iterator
 from typing import Any, NamedTuple
 
 from ..keys.removed import describe_removed
 from ..keys.tables import Tables
 from ..keys.types import advise_on_name
-from .rule_table import MissingKeyRule, MistakeRule, RemarkRule, TableFacts, apply_rules
+from .facts import TableFacts
 from .scene_draft import SceneDraft
 
 ARRAY_EXTENSIONS = (".npz", ".mat")
 UNIVERSAL_EXTENSIONS = (".uff", ".unv")
 # File extensions of matrices from finite-element programs, for [structure.reduced].
-NASTRAN_EXTENSIONS = (".op4", ".pch", ".bdf", ".dat")  # files that are no longer read
 MATRIX_KEYS = ("stiffness", "mass", "damping")  # keys of the files of [structure.reduced]
 MATRIX_EXTENSIONS = (".mtx", ".mat", ".npz")
+NASTRAN_EXTENSIONS = (".op4", ".pch", ".bdf", ".dat")
 # Largest plausible damping ratio, at which a free oscillation decays to a few per cent within one
 # cycle; a larger value probably has a wrong unit, because 1 % is 0.01.
 MAX_USUAL_DAMPING = 0.5
 LOCATION_KEYS = ("slide_at", "output_at", "base_at", "force_at", "normal_at", "pitch_at")
+# What describes a rig of masses in a scene with [contact].
+MODES_ADVICE = (
+    "with [contact], describe these masses and springs by their modes: give structure.moving_mass, and for each mode a "
+    "[[structure.mode]] with its frequency (sqrt(k/m)/(2 pi) for one mass on one spring)"
+)
 # Keys that describe a rig; a scene has one of them.
 DESCRIPTION_KEYS = ("mode", "masses", "file", "reduced")
 
 
-class CoordinateNumbers(NamedTuple):
-    """Coordinates to which the numbers in `between` and `mass` refer.
-
-    - number: number of masses or boundary coordinates; None if there are none, or if their number is not
-      known.
-    - noun: "mass" or "boundary coordinate".
-    - key: key that lists them.
-    """
-
-    number: int | None
-    noun: str
-    key: str
-
-    @classmethod
-    def from_structure(cls, structure: Any) -> CoordinateNumbers:
-        """Return the coordinates to which the numbers in a table [structure] refer."""
-        if structure.reduced is not None:
-            number = len(structure.reduced.boundary or ()) or None
-            return cls(number, "boundary coordinate", "structure.reduced.boundary")
-        number = len(structure.masses) if structure.masses is not None else None
-        return cls(number, "mass", "structure.masses")
-
-
-class StructureFacts(TableFacts):
-    """Properties of the scene that the checks of [structure] use."""
-
-    @cached_property
-    def descriptions(self) -> list[str]:
-        """Keys of DESCRIPTION_KEYS that the scene sets."""
-        return [key for key in DESCRIPTION_KEYS if self.has(key)]
-
-    @property
-    def description(self) -> str:
-        """Description of the structure if there is exactly one, or "" otherwise."""
-        return self.descriptions[0] if len(self.descriptions) == 1 else ""
-
-    @property
-    def modes_advice(self) -> str:
-        """Advice on the modes that replace the masses."""
-        return advise_modes(self.draft)
-
-    @property
-    def is_universal(self) -> bool:
-        """Whether structure.file is a universal file."""
-        return self.extension in UNIVERSAL_EXTENSIONS
-
-    @property
-    def has_masses(self) -> bool:
-        """Whether the structure consists of masses and springs."""
-        return self.table.masses is not None
-
-    @property
-    def repeated_coordinate(self) -> Any:
-        """Boundary coordinate that is named twice, or None if there is none."""
-        boundary = self.table.reduced.boundary or ()
-        return next((name for k, name in enumerate(boundary) if name in boundary[:k]), None)
-
-    @property
-    def extension(self) -> str:
-        """Extension of structure.file in lower case, or "" if there is no file."""
-        return find_file_extension(self.file) if self.file else ""
-
-    @property
-    def extension_advice(self) -> str:
-        """Advice on an extension of structure.file that cannot be read."""
-        return advise_on_name(self.extension, (*ARRAY_EXTENSIONS, ".uff"))
-
-    @property
-    def n_interfaces(self) -> int:
-        """Number of interfaces that could be read."""
-        return len(tuple(self.interface))
-
-    @property
-    def is_stuck(self) -> bool:
-        """Whether the modes were measured with the joint bolted."""
-        return self.measured == "stuck"
-
-    @property
-    def has_joint(self) -> bool:
-        """Whether the scene has a joint."""
-        return bool(self.scene.friction or self.interface)
-
-
-DESCRIPTION_RULES = (
-    MissingKeyRule(
-        lambda s: not s.has("moving_mass") and s.descriptions in ([], ["mode"]),
-        "structure.moving_mass",
-        "",
-    ),
-    *(
-        MistakeRule(
-            lambda s, key=key: s.has(key) and not s.has("masses") and s.draft.has("contact"),
-            f"structure.{key}",
-            "joins masses, which cannot be used with [contact]; {modes_advice}",
-        )
-        for key in ("spring", "damper")
-    ),
-    *(
-        MissingKeyRule(
-            lambda s, key=key: s.has(key) and not s.has("masses") and not s.draft.has("contact"),
-            "structure.masses",
-            f"structure.{key} needs this key",
-        )
-        for key in ("spring", "damper")
-    ),
-    *(
-        MistakeRule(
-            lambda s, key=key: s.has(key) and not s.has("file"),
-            f"structure.{key}",
-            "names a place in a file of modes or responses, but the scene has no such file; give structure.file",
-        )
-        for key in LOCATION_KEYS
-    ),
-    RemarkRule(
-        lambda s: s.descriptions in (["masses"], ["reduced"]) and s.has("moving_mass"),
-        "structure.moving_mass",
-        "has no meaning with structure.{description} and is not used",
-    ),
-)
-FILE_RULES = (
-    MistakeRule(
-        lambda s: s.file and s.extension not in (*ARRAY_EXTENSIONS, *UNIVERSAL_EXTENSIONS),
-        "structure.file",
-        "the name ends in '{extension}'; {extension_advice}: matrices or modes as arrays, or universal files",
-    ),
-    *(
-        MistakeRule(
-            lambda s, key=key: s.file and not s.is_universal and s.has(key),
-            f"structure.{key}",
-            f"names a place in a universal file; a {{extension}} file contains the array {key.removesuffix('_at')}",
-        )
-        for key in LOCATION_KEYS
-    ),
-    MissingKeyRule(
-        lambda s: s.is_universal and not s.has("moving_mass"),
-        "structure.moving_mass",
-        "the modes of a universal file are scaled to this mass",
-    ),
-    MissingKeyRule(
-        lambda s: s.is_universal and not s.has("slide_at"),
-        "structure.slide_at",
-        'the node and direction that slide, such as slide_at = "12:+x"',
-    ),
-    MistakeRule(
-        lambda s: s.is_universal and s.has("interface"),
-        "structure.interface",
-        "a universal file has nodes, not masses; use slide_at with [friction]",
-    ),
-)
-JOINT_RULES = (
-    MistakeRule(
-        lambda s: s.bonded and s.has_masses and s.n_interfaces != 1,
-        "structure.bonded",
-        "applies only to a single contact, but there are {n_interfaces} interfaces; instead write a "
-        "[[structure.spring]] between the masses of the interface",
-    ),
-    MistakeRule(
-        lambda s: s.measured_joint and not s.is_stuck,
-        "structure.measured_joint",
-        'names the joint that is subtracted from the modes, but nothing is subtracted; add measured = "stuck" or leave '
-        "`measured_joint` out",
-    ),
-    MistakeRule(
-        lambda s: s.is_stuck and not s.has_joint,
-        "structure.measured",
-        "'stuck' subtracts the stiffness of the joint from the modes, but this scene has no joint; add [friction] and "
-        "its load, or leave `measured` out",
-    ),
-)
-REDUCED_RULES = (
-    MistakeRule(
-        lambda s: s.repeated_coordinate,
-        "structure.reduced.boundary",
-        "names {repeated_coordinate} twice; name each coordinate once",
-    ),
-    RemarkRule(
-        lambda s: s.reduced.moved and s.scene.drive.kind in ("force", "free"),
-        "structure.reduced.moved",
-        "is not used, because it applies only to a base drive",
-    ),
-    MistakeRule(
-        lambda s: s.has("interface") and s.reduced.slide,
-        "structure.reduced.slide",
-        "applies only to [friction]; a [[structure.interface]] names its two sides with the key `between`: leave "
-        "structure.reduced.slide out",
-    ),
-    MissingKeyRule(
-        lambda s: not s.has("interface") and s.draft.has("friction") and not s.reduced.slide,
-        "structure.reduced.slide",
-        "which two boundary coordinates rub against each other, such as slide = [1, 0] for coordinate 1 against the "
-        "base (0); or write [[structure.interface]] with its own law",
-    ),
-)
-
-
 def check_structure(draft: SceneDraft) -> None:
     """Report mistakes inside [structure]."""
-    structure = draft.tables.structure
-    if structure is None:
+    structure = TableFacts(draft, "structure", draft.tables.structure)
+    if draft.tables.structure is None:
         return
-    facts = StructureFacts(draft, "structure", structure)
-    apply_rules(draft, DESCRIPTION_RULES, facts)
-    _check_modes(draft)
-    _check_masses(draft)
-    apply_rules(draft, FILE_RULES, facts)
-    if structure.reduced is not None:
-        _check_matrix_files(draft)
-        _check_mass_pair(draft, "structure.reduced.slide", structure.reduced.slide)
-        apply_rules(draft, REDUCED_RULES, facts)
-    apply_rules(draft, JOINT_RULES, facts)
-    if structure.start is not None:
-        _check_start(draft)
+    _check_description(structure)
+    _check_modes(structure)
+    _check_numbered_places(structure)
+    if structure.file:
+        _check_file(structure)
+    if structure.reduced:
+        _check_reduced(structure)
+    _check_joint(structure)
+    _check_start(structure)
 
 
-def advise_modes(draft: SceneDraft) -> str:
-    """Return advice on the modes that replace masses and springs in a scene with [contact].
-
-    One mass m on springs k and dampers c to the base is a mode of the frequency sqrt(k/m)/(2 pi) and the damping ratio
-    c/(2 sqrt(k m)). The advice gives these numbers if the scene describes such a mass.
-    """
-    structure = draft.values.structure
-    masses = structure.masses or (structure.moving_mass,)
-    links = (*structure.spring, *structure.damper)
-    stiffness = sum(spring.stiffness or 0.0 for spring in structure.spring)
-    damping = sum(damper.coefficient or 0.0 for damper in structure.damper)
-    is_single = len(masses) == 1 and all(sorted(link.between) == [0, 1] for link in links)
-    if not (is_single and masses[0] and stiffness):
-        return (
-            "with [contact], describe these masses and springs by their modes: give structure.moving_mass, and for "
-            "each mode a [[structure.mode]] with its frequency (sqrt(k/m)/(2 pi) for one mass on one spring)"
+def _check_description(structure: TableFacts) -> None:
+    """Report keys that do not belong to the description of the rig by modes, masses or a file."""
+    drive = structure.scene.drive
+    if drive.mass and drive.kind != "base" and structure.has("mode"):
+        structure.draft.add_mistake(
+            "drive.mass",
+            "applies only to structure.masses, but a structure of [[structure.mode]] is driven at its output point: "
+            "leave drive.mass out",
         )
-    frequency = sqrt(stiffness / masses[0]) / (2 * pi)
-    ratio = damping / (2 * sqrt(stiffness * masses[0]))
-    damping_advice = "its damping ratio"
-    if structure.damper:
-        damping_advice = f"damping = {ratio:.3g} (c/(2 sqrt(k m)))"
-    return (
-        f'with [contact], give structure.moving_mass = "{masses[0]:g} kg" and a [[structure.mode]] with '
-        f'frequency = "{frequency:.6g} Hz" (sqrt(k/m)/(2 pi)), {damping_advice} and `slide` = 1.0'
-    )
+    descriptions = list(filter(structure.has, DESCRIPTION_KEYS))
+    if not structure.has("moving_mass") and descriptions in ([], ["mode"]):
+        structure.add_missing("moving_mass")
+    if structure.has("moving_mass") and descriptions in (["masses"], ["reduced"]):
+        structure.add_remark(
+            "moving_mass", f"has no meaning with structure.{descriptions[0]} and is not used"
+        )
+
+    # Keys of masses without masses, and places in a file without a file.
+    for key in ("spring", "damper"):
+        if not structure.has(key) or structure.has("masses"):
+            continue
+        if structure.draft.has("contact"):
+            structure.add_mistake(
+                key, f"joins masses, which cannot be used with [contact]; {MODES_ADVICE}"
+            )
+        else:
+            structure.add_missing("masses", f"structure.{key} needs this key")
+    for key in LOCATION_KEYS:
+        if structure.has(key) and not structure.has("file"):
+            structure.add_mistake(
+                key,
+                "names a place in a file of modes or responses, but the scene has no such file; give structure.file",
+            )
 
 
-def _check_modes(draft: SceneDraft) -> None:
-    """Report modes of equal name, too much damping, and participation factors that are impossible."""
-    modes = draft.values.structure.mode
+def _check_file(structure: TableFacts) -> None:
+    """Report a file that cannot be read by its extension, and keys that do not fit to its kind."""
+    extension = find_file_extension(structure.file)
+    if extension not in (*ARRAY_EXTENSIONS, *UNIVERSAL_EXTENSIONS):
+        advice = advise_on_name(extension, (*ARRAY_EXTENSIONS, ".uff"))
+        structure.add_mistake(
+            "file",
+            f"the name ends in '{extension}'; {advice}: matrices or modes as arrays, or universal files",
+        )
+    if extension not in UNIVERSAL_EXTENSIONS:
+        for key in filter(structure.has, LOCATION_KEYS):
+            array = key.removesuffix("_at")
+            structure.add_mistake(
+                key,
+                f"names a place in a universal file; a {extension} file contains the array {array}",
+            )
+        return
+    if not structure.has("moving_mass"):
+        structure.add_missing(
+            "moving_mass", "the modes of a universal file are scaled to this mass"
+        )
+    if not structure.has("slide_at"):
+        structure.add_missing(
+            "slide_at", 'the node and direction that slide, such as slide_at = "12:+x"'
+        )
+    if structure.has("interface"):
+        structure.add_mistake(
+            "interface", "a universal file has nodes, not masses; use slide_at with [friction]"
+        )
+
+
+def _check_joint(structure: TableFacts) -> None:
+    """Report a bonded spring without a single contact, and a measured joint that the scene does not have."""
+    n_interfaces = len(tuple(structure.interface))
+    if structure.bonded and structure.table.masses is not None and n_interfaces != 1:
+        structure.add_mistake(
+            "bonded",
+            f"applies only to a single contact, but there are {n_interfaces} interfaces; instead write a "
+            "[[structure.spring]] between the masses of the interface",
+        )
+    if structure.measured_joint and structure.measured != "stuck":
+        structure.add_mistake(
+            "measured_joint",
+            'names the joint that is subtracted from the modes, but nothing is subtracted; add measured = "stuck" or '
+            "leave `measured_joint` out",
+        )
+    if structure.measured == "stuck" and not (structure.scene.friction or structure.interface):
+        structure.add_mistake(
+            "measured",
+            "'stuck' subtracts the stiffness of the joint from the modes, but this scene has no joint; add [friction] "
+            "and its load, or leave `measured` out",
+        )
+
+
+def _check_reduced(structure: TableFacts) -> None:
+    """Report files of [structure.reduced] that cannot be read by their extension, and wrong coordinates."""
+    reduced = structure.reduced
+    for key in MATRIX_KEYS:
+        file = getattr(reduced.table, key)
+        if not isinstance(file, str) or find_file_extension(file) in MATRIX_EXTENSIONS:
+            continue
+        extension = find_file_extension(file)
+        advice = advise_on_name(extension, MATRIX_EXTENSIONS)
+        if extension in NASTRAN_EXTENSIONS:
+            removed = describe_removed("files of Nastran", "reading files of Nastran")
+            advice = f"{removed}; {advice}"
+        structure.add_mistake(f"reduced.{key}", f"the name ends in '{extension}'; {advice}")
+
+    # Coordinates of the boundary, of the base and of the joint.
+    boundary = tuple(reduced.boundary)
+    for k, name in enumerate(boundary):
+        if name in boundary[:k]:
+            structure.add_mistake(
+                "reduced.boundary", f"names {name} twice; name each coordinate once"
+            )
+            break
+    if reduced.moved and structure.scene.drive.kind in ("force", "free"):
+        structure.add_remark(
+            "reduced.moved", "is not used, because it applies only to a base drive"
+        )
+    if structure.has("interface"):
+        if reduced.slide:
+            structure.add_mistake(
+                "reduced.slide",
+                "applies only to [friction]; a [[structure.interface]] names its two sides with the key `between`: "
+                "leave structure.reduced.slide out",
+            )
+    elif structure.draft.has("friction") and not reduced.slide:
+        structure.add_missing(
+            "reduced.slide",
+            "which two boundary coordinates rub against each other, such as slide = [1, 0] for coordinate 1 against "
+            "the base (0); or write [[structure.interface]] with its own law",
+        )
+
+
+def find_file_extension(name: str) -> str:
+    """Return the extension of a file name in lower case, with its dot."""
+    return "." + name.rpartition(".")[2].lower()
+
+
+def _check_modes(structure: TableFacts) -> None:
+    """Report modes of equal name, too much damping, and participations in the base motion above 1."""
     names: set[str] = set()
-    for index, mode in enumerate(modes):
+    squares = []
+    for index, mode in enumerate(structure.mode):
+        path = f"mode.{index}"
         if mode.name in names:
-            draft.add_mistake(
-                f"structure.mode.{index}.name",
-                f"two modes are named '{mode.name}'; give each its own name",
+            structure.add_mistake(
+                f"{path}.name", f"two modes are named '{mode.name}'; give each its own name"
             )
         if mode.name:
             names.add(mode.name)
         if mode.damping >= MAX_USUAL_DAMPING:
-            draft.add_remark(
-                f"structure.mode.{index}.damping",
+            structure.add_remark(
+                f"{path}.damping",
                 f"= {mode.damping:g} is a damping ratio: 1 means critical damping, and 1 % is written 0.01",
             )
-    _check_base(draft, modes)
-
-
-def _check_base(draft: SceneDraft, modes: tuple) -> None:
-    """Report participations in the base motion whose squares add up to more than 1."""
-    squares = []
-    for index, mode in enumerate(modes):
         default = 0.0 if index else mode.slide
-        base = mode.base if draft.has(f"structure.mode.{index}.base") else default
+        base = mode.base if structure.has(f"{path}.base") else default
         squares.append((base or 0.0) ** 2)
+
     if sum(squares) > 1 + 1e-9:  # round-off of the mode shapes can cause this excess
-        table_key = f"structure.mode.{squares.index(max(squares))}"
-        key = "base" if draft.has(f"{table_key}.base") else "slide"
-        draft.add_mistake(
-            f"{table_key}.{key}",
+        path = f"mode.{squares.index(max(squares))}"
+        key = "base" if structure.has(f"{path}.base") else "slide"
+        structure.add_mistake(
+            f"{path}.{key}",
             f"the sum of `base`^2 over the modes is {sum(squares):.6g}, but at most 1 is possible (`base` is the "
             "participation of a mode in the base motion; for the first mode, `base` = `slide` unless given)",
         )
@@ -307,8 +214,7 @@ def _check_base(draft: SceneDraft, modes: tuple) -> None:
 
 def check_energy_gain(draft: SceneDraft, kind: str) -> None:
     """Report modes that gain energy in a scene without friction."""
-    modes = draft.values.structure.mode if kind == "linear" else ()
-    for index, mode in enumerate(modes):
+    for index, mode in enumerate(draft.values.structure.mode if kind == "linear" else ()):
         if mode.damping < 0:
             draft.add_mistake(
                 f"structure.mode.{index}.damping",
@@ -327,21 +233,22 @@ def describe_default_outputs(tables: Tables) -> list[str]:
 
     These are the first mode under a force, which acts at the output point, and other modes that slide.
     """
-    structure = tables.structure
+    modes = tables.structure.mode if tables.structure is not None else ()
     drive = tables.drive
+    kind = drive.kind if drive is not None else ""
     sentences = []
-    first = structure.mode[0] if structure is not None and structure.mode else None
-    if first is not None and first.output is None and drive is not None and drive.kind == "force":
-        sentences.append(
-            f"the force acts at the output point, which moves by 1 per unit of the coordinate of mode '{first.name}' "
-            f"(default of `output`); the patch moves by {first.slide:g} (`slide`)"
-        )
-    for mode in structure.mode[1:] if structure is not None else ():
+    for mode in modes[:1]:
+        if mode.output is None and kind == "force":
+            sentences.append(
+                f"the force acts at the output point, which moves by 1 per unit of the coordinate of mode '{mode.name}' "
+                f"(default of `output`); the patch moves by {mode.slide:g} (`slide`)"
+            )
+    for mode in modes[1:]:
         if mode.slide and (mode.output, mode.accelerometer, mode.gauge) == (None, None, None):
             sentence = (
                 f"mode '{mode.name}' does not move the output point (`output` is 0 by default)"
             )
-            if drive is not None and drive.kind == "base" and mode.base is None:
+            if kind == "base" and mode.base is None:
                 sentence += (
                     ", and the base motion does not drive this mode (`base` is 0 by default)"
                 )
@@ -359,99 +266,71 @@ def find_instrument_key(draft: SceneDraft) -> str:
     return ""
 
 
-def _check_masses(draft: SceneDraft) -> None:
-    """Report springs, dampers, interfaces and outputs that name masses that do not exist."""
-    structure = draft.tables.structure
-    if structure.masses is not None and not structure.masses:
-        draft.add_mistake(
-            "structure.masses", 'at least one mass is needed, such as masses = ["1 kg"]'
-        )
-        return
+class CoordinateNumbers(NamedTuple):
+    """Coordinates to which the numbers in `between` and `mass` refer.
+
+    - values: masses or boundary coordinates; () if there are none, or if they are not known.
+    - noun: "mass" or "boundary coordinate".
+    - key: key that lists them.
+    """
+
+    values: tuple[Any, ...]
+    noun: str
+    key: str
+
+
+def _find_coordinates(structure: TableFacts) -> CoordinateNumbers:
+    """Return the coordinates to which the numbers in a table [structure] refer."""
+    if structure.reduced:
+        boundary = tuple(structure.reduced.boundary)
+        return CoordinateNumbers(boundary, "boundary coordinate", "structure.reduced.boundary")
+    return CoordinateNumbers(tuple(structure.masses), "mass", "structure.masses")
+
+
+def _iterate_numbered_places(structure: TableFacts) -> Iterator[tuple[str, tuple[int, ...]]]:
+    """Yield each key that names masses or boundary coordinates by number, with the numbers."""
     for name in ("spring", "damper", "interface"):
-        for index, item in enumerate(getattr(structure, name) or ()):
-            _check_mass_pair(draft, f"structure.{name}.{index}.between", item.between)
-    _check_mass_number(draft, "structure.output_mass", structure.output_mass)
+        for index, item in enumerate(structure[name]):
+            yield f"structure.{name}.{index}.between", tuple(item.between)
+    yield "structure.reduced.slide", tuple(structure.reduced.slide)
+    yield "structure.output_mass", (structure.output_mass or 0,)
+    drive = structure.scene.drive
+    if drive.kind != "base" and not structure.has("mode"):
+        yield "drive.mass", (drive.mass or 0,)
 
 
-def _check_mass_pair(draft: SceneDraft, key: str, pair: tuple | None) -> None:
-    """Report a pair that joins a mass to itself or names a mass that does not exist."""
-    if pair is None:
-        return
-    if pair[0] == pair[1]:
-        noun = CoordinateNumbers.from_structure(draft.tables.structure).noun
-        place = f"{noun} {pair[0]}" if pair[0] else "the base"
-        draft.add_mistake(
-            key,
-            f"joins {place} to itself; two different ends are needed, where 0 stands for the base",
-        )
-    for number in dict.fromkeys(pair):
-        _check_mass_number(draft, key, number)
-
-
-def _check_mass_number(draft: SceneDraft, key: str, number: int | None) -> None:
-    """Report the number of a mass that does not exist."""
-    coordinates = CoordinateNumbers.from_structure(draft.tables.structure)
-    if coordinates.number is None or number is None or number <= coordinates.number:
-        return
-    base = ""
-    if key.endswith(("between", "slide")):
-        base = "; 0 stands for the base"
-    draft.add_mistake(
-        key,
-        f"there is no {coordinates.noun} {number}: {coordinates.key} has {coordinates.number}, numbered from 1{base}",
-    )
-
-
-def check_driven_mass(draft: SceneDraft) -> None:
-    """Report a drive.mass that does not exist, or that is given for a rig of modes."""
-    drive = draft.tables.drive
-    if drive.mass is None or draft.tables.structure is None or drive.kind == "base":
-        return
-    if draft.has("structure.mode"):
-        draft.add_mistake(
-            "drive.mass",
-            "applies only to structure.masses, but a structure of [[structure.mode]] is driven at its output point: "
-            "leave drive.mass out",
-        )
-    else:
-        _check_mass_number(draft, "drive.mass", drive.mass)
-
-
-def _check_matrix_files(draft: SceneDraft) -> None:
-    """Report files of [structure.reduced] that cannot be read by their extension."""
-    reduced = draft.tables.structure.reduced
-    for key in MATRIX_KEYS:
-        file = getattr(reduced, key)
-        if isinstance(file, str) and find_file_extension(file) not in MATRIX_EXTENSIONS:
-            extension = find_file_extension(file)
-            advice = advise_on_name(extension, MATRIX_EXTENSIONS)
-            if extension in NASTRAN_EXTENSIONS:
-                removed = describe_removed("files of Nastran", "reading files of Nastran")
-                advice = f"{removed}; {advice}"
-            draft.add_mistake(
-                f"structure.reduced.{key}", f"the name ends in '{extension}'; {advice}"
+def _check_numbered_places(structure: TableFacts) -> None:
+    """Report masses or boundary coordinates that do not exist, and pairs that join one of them to itself."""
+    values, noun, list_key = _find_coordinates(structure)
+    for key, numbers in _iterate_numbered_places(structure):
+        base = "; 0 stands for the base" if len(numbers) == 2 else ""
+        if len(numbers) == 2 and numbers[0] == numbers[1]:
+            place = f"{noun} {numbers[0]}" if numbers[0] else "the base"
+            structure.draft.add_mistake(
+                key, f"joins {place} to itself; two different ends are needed{base}"
             )
+        for number in dict.fromkeys(numbers):
+            if values and number > len(values):
+                structure.draft.add_mistake(
+                    key,
+                    f"there is no {noun} {number}: {list_key} has {len(values)}, numbered from 1{base}",
+                )
 
 
-def find_file_extension(name: str) -> str:
-    """Return the extension of a file name in lower case, with its dot."""
-    return "." + name.rpartition(".")[2].lower()
-
-
-def _check_start(draft: SceneDraft) -> None:
-    """Report missing initial values, and lists without one value for each mode or mass."""
-    structure = draft.tables.structure
-    count = CoordinateNumbers.from_structure(structure).number or len(structure.mode or ())
-    noun = "mode" if count == 1 else "modes"
-    if structure.reduced is not None:
-        noun = "boundary coordinates"
-    elif structure.masses:
-        noun = "mass" if count == 1 else "masses"
+def _check_start(structure: TableFacts) -> None:
+    """Report initial values that are not one for each mode, mass or boundary coordinate."""
+    coordinates = _find_coordinates(structure)
+    if coordinates.values:
+        count = len(coordinates.values)
+        noun = coordinates.noun
+    else:
+        count = len(tuple(structure.mode))
+        noun = "mode"
     for key in ("displacement", "velocity"):
-        values = getattr(structure.start, key)
-        if values is not None and count and len(values) != count:
-            plural = "s" if len(values) > 1 else ""
-            draft.add_mistake(
-                f"structure.start.{key}",
-                f"{len(values)} value{plural} for {count} {noun}; give one value for each, in the same order",
+        n_values = len(tuple(structure.start[key]))
+        if n_values and count and n_values != count:
+            structure.add_mistake(
+                f"start.{key}",
+                f"the number of values is {n_values}, but one value for each {noun} is needed, in the same order: "
+                f"{count}",
             )

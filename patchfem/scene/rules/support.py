@@ -1,13 +1,15 @@
 """Combinations of effects that a scene may contain but no run can compute: the table SUPPORT.
 
-Each row names two or three of FEATURES and says what to do instead. To support a combination, delete its row. What
-single engines of a rig can compute stands in `methods`.
+Each row names two or three features and says what to do instead; LIMITS.md lists the rows. A feature is a key
+(`structure.stiffening`), a key with a value (`drive.kind=free`) or a row of FEATURES; keys of the patch of a joint begin
+with `patch`. To support a combination, delete its row. What single engines of a rig can compute stands in `methods`.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import cached_property
+from functools import cache, cached_property, reduce
+from itertools import chain, repeat
 from typing import Any, NamedTuple
 
 from ...effects import (
@@ -23,6 +25,7 @@ from ...effects import (
 )
 from ..keys.contact import Contact
 from ..keys.tables import Friction
+from .facts import TableFacts
 from .methods import (
     check_method,
     describe_load_change,
@@ -30,12 +33,12 @@ from .methods import (
     find_yaw_key,
     list_lower_shapes,
 )
-from .rule_table import MistakeRule, TableFacts, apply_rules
 from .scene_draft import SceneDraft
 from .structure import find_instrument_key
 from .view import wrap_value
 
-SCENE_FEATURES = ("wear", "stuck", "instruments")  # features that do not depend on a joint
+# Features of the whole scene: their rows are tried once, also where no law could be read.
+SCENE_FEATURES = ("wear", "structure.measured=stuck", "sensor apart from the output")
 SINGLE_SUMS = "use 'auto', 'direct' or 'truncated'"
 SUMS = ("direct", "truncated", "merged")  # methods of accuracy.quadrature that sum single bonds
 
@@ -73,6 +76,11 @@ class Joint(TableFacts):
         self.yaw = find_yaw_key(draft.tables)
         self.instrument_key = find_instrument_key(draft)
         self.wave = find_waveform(draft.tables.drive)
+
+    def find_key_value(self, key: str) -> Any:
+        """Return the value of a key of the scene, or of the patch of the joint if it begins with "patch"."""
+        table, *names = key.split(".")
+        return reduce(getattr, names, self.contact if table == "patch" else self.scene[table])
 
     def has_trait(self, trait: str) -> bool:
         """Return whether the law has a trait of `effects.LAWS[...].traits`."""
@@ -153,253 +161,219 @@ class Feature(NamedTuple):
     words: str = ""
 
 
+# Features that only the friction law has, with a function of the joint that tells whether it has them.
+LAW_FEATURES = {
+    "law for a constant load": lambda j: not j.has_trait("bonds") and j.lacks("varying-load"),
+    "law with memory for a constant pressure": lambda j: (
+        not j.has_trait("memoryless") and not j.has_trait("bonds") and j.lacks("varying-load")
+    ),
+    "law for rigid pieces": lambda j: (
+        not j.is_interface and not j.has_trait("bonds") and j.lacks("shear")
+    ),
+    "law without elements": lambda j: j.is_interface and j.lacks("pieces", "shear"),
+    "law for one interface": lambda j: j.lacks("joints"),
+    "law for flat faces": lambda j: not j.needs_list and j.lacks("grooves"),
+    "law without bonds": lambda j: not j.has_trait("bonds"),
+    "law of an averaged pressure": lambda j: j.has_trait("averaged"),
+    "law that sticks rigidly": lambda j: j.has_trait("set-valued") and j.supports("shear"),
+}
 FEATURES = {
-    # kinds of scenes, drives and methods
+    name: Feature(is_there, "{table_key}.law", "{law_description}")
+    for name, is_there in LAW_FEATURES.items()
+} | {
+    # kinds of scenes and drives
     "bench": Feature(lambda j: j.kind == "bench"),
     "rig": Feature(lambda j: j.kind == "rig"),
-    "release": Feature(lambda j: j.scene.drive.kind == "free", "drive.kind", "drive.kind = 'free'"),
-    "transient": Feature(
+    "load on a point": Feature(lambda j: j.scene.normal),
+    "drive other than a sine": Feature(
         lambda j: j.wave.name and not j.wave.is_sine,
         "drive.waveform",
         "drive.waveform = '{scene.drive.waveform}'",
     ),
-    "harmonic": Feature(
-        lambda j: j.scene.accuracy.method == "harmonic",
-        "accuracy.method",
-        "accuracy.method 'harmonic'",
-    ),
-    "harmonics": Feature(lambda j: j.scene.accuracy.harmonics, "accuracy.harmonics"),
-    "wear": Feature(lambda j: j.scene.wear and not j.is_interface, "wear"),
-    "worn start": Feature(lambda j: j.scene.wear.start, "wear.start"),
-    "stuck": Feature(
-        lambda j: j.scene.structure.measured == "stuck" and not j.is_interface,
-        "structure.measured",
-        "'stuck'",
-    ),
-    "instruments": Feature(lambda j: not j.is_interface and j.instrument_key, "{instrument_key}"),
-    "travel": Feature(lambda j: j.scene.structure.travel, "structure.travel"),
-    "levels or sweep": Feature(
+    "levels or sweep in time": Feature(
         lambda j: j.scene.accuracy.method != "harmonic" and (j.wave.is_swept or j.wave.has_levels),
         "drive.waveform",
         "drive.waveform = '{scene.drive.waveform}'",
     ),
+    "sensor apart from the output": Feature(lambda j: j.instrument_key, "{instrument_key}"),
     # the load
-    "oscillating load": Feature(lambda j: j.scene.normal.amplitude, "normal.amplitude"),
-    "moving load": Feature(lambda j: j.load_change[:9] == "structure", "{load_change}"),
+    "mode with heave or pitch": Feature(
+        lambda j: j.load_change.startswith("structure"), "{load_change}"
+    ),
     "changing load": Feature(
         lambda j: j.kind == "rig" and j.load_change, "{load_change}", "{load_change_description}"
     ),
-    # the law
-    "constant load": Feature(
-        lambda j: not j.has_trait("bonds") and j.lacks("varying-load"),
-        "{table_key}.law",
-        "law '{law}'",
-    ),
-    "constant pressure": Feature(
-        lambda j: (
-            not j.has_trait("memoryless") and not j.has_trait("bonds") and j.lacks("varying-load")
-        ),
-        "{table_key}.law",
-        "law '{law}'",
-    ),
-    "rigid pieces": Feature(
-        lambda j: not j.is_interface and not j.has_trait("bonds") and j.lacks("shear"),
-        "{table_key}.law",
-        "'{law}'",
-    ),
-    "no elements": Feature(
-        lambda j: j.is_interface and j.lacks("pieces", "shear"),
-        "{table_key}.law",
-        "{law_description}",
-    ),
-    "one interface": Feature(lambda j: j.lacks("joints"), "{table_key}.law", "{law_description}"),
-    "flat faces": Feature(
-        lambda j: not j.needs_list and j.lacks("grooves"), "{table_key}.law", "law '{law}'"
-    ),
-    "no bonds": Feature(lambda j: not j.has_trait("bonds"), "{table_key}.law", "law '{law}'"),
-    "averaged": Feature(lambda j: j.has_trait("averaged"), "{table_key}.law", "law '{law}'"),
-    "rigid stick": Feature(
-        lambda j: j.has_trait("set-valued") and j.supports("shear"), "{table_key}.law", "'{law}'"
-    ),
-    "lower kinetic": Feature(
+    # the law; LAW_FEATURES has more
+    "kinetic below static": Feature(
         lambda j: j.has_trait("set-valued") and j.supports("shear") and -1 < j.kinetic < j.static,
         "{table_key}.kinetic",
         "{kinetic:g} below static = {static:g}",
     ),
-    "spread": Feature(lambda j: j.spread and law_takes_key(j.law, "spread"), "{table_key}.spread"),
+    "spread of the bonds": Feature(
+        lambda j: j.spread and law_takes_key(j.law, "spread"), "{table_key}.spread"
+    ),
     # the sum over bonds
-    "list": Feature(lambda j: j.needs_list, "{table_key}.{key_preventing_recursion}"),
-    "stretched list": Feature(
+    "sum over all bonds": Feature(lambda j: j.needs_list, "{table_key}.{key_preventing_recursion}"),
+    "sum over all stretched bonds": Feature(
         lambda j: j.needs_list and j.reading != "report", "{table_key}.{key_preventing_recursion}"
     ),
-    "recursion": Feature(lambda j: not j.needs_list),
-    "named sum": Feature(
+    "sum by recursion": Feature(lambda j: not j.needs_list),
+    "named method of the sum": Feature(
         lambda j: j.has_trait("bonds") and j.scene.accuracy.quadrature in SUMS,
         "accuracy.quadrature",
         "'{scene.accuracy.quadrature}'",
     ),
-    "merged": Feature(
-        lambda j: j.scene.accuracy.quadrature == "merged", "accuracy.quadrature", "'merged'"
-    ),
     # the patch
-    "rigid patch": Feature(lambda j: not j.compliance),
-    "compliance": Feature(lambda j: j.compliance, "{compliance}"),
-    "lower shape": Feature(lambda j: j.lower_shape, "{lower_shape}", "a shape on the lower piece"),
-    "strips": Feature(lambda j: j.contact.strips, "{patch_key}.strips"),
-    "joined strips": Feature(lambda j: not j.can_slip_in_strips),
-    "yaw": Feature(lambda j: j.yaw, "{yaw}"),
-    "nonlinear layer": Feature(
-        lambda j: j.contact.asperities.law in ("exponential", "hertz"),
-        "contact.asperities.law",
-        "'{contact.asperities.law}'",
+    "patch that slips as a whole": Feature(lambda j: not j.compliance),
+    "partial slip": Feature(lambda j: j.compliance, "{compliance}"),
+    "shape on the lower piece": Feature(
+        lambda j: j.lower_shape, "{lower_shape}", "a shape on the lower piece"
     ),
-    "holder": Feature(
-        lambda j: j.contact.holder.tangential_stiffness, "contact.holder.tangential_stiffness"
-    ),
+    "strips that slip together": Feature(lambda j: not j.can_slip_in_strips),
+    "mode with yaw": Feature(lambda j: j.yaw, "{yaw}"),
     "grooves": Feature(lambda j: not j.is_interface and j.grooves, "contact.grooves", "{grooves}"),
-    "point": Feature(lambda j: j.scene.normal),
-    # the structure
-    "stiffening": Feature(lambda j: j.scene.structure.stiffening, "structure.stiffening"),
-    "interlock": Feature(
-        lambda j: j.scene.structure.bonded.wavelength, "structure.bonded.wavelength"
-    ),
-    "masses": Feature(lambda j: j.scene.structure.masses, "structure.masses"),
-    "reduced": Feature(lambda j: j.scene.structure.reduced, "[structure.reduced]"),
-    "patches": Feature(
-        lambda j: any(face.contact for face in j.scene.structure.interface),
-        "[structure.interface.contact]",
-    ),
-    "interfaces": Feature(
-        lambda j: j.scene.structure.interface, "structure.interface", "[[structure.interface]]"
-    ),
+    # interfaces
     "interface": Feature(lambda j: j.is_interface, "{table_key}", "[[structure.interface]]"),
-    "others": Feature(
+    "several interfaces": Feature(
         lambda j: j.is_interface and len(j.scene.structure.interface) > 1,
         "structure.interface",
         "other interfaces",
     ),
-    "patch": Feature(
+    "patch of an interface": Feature(
         lambda j: j.is_interface and j.contact, "{patch_key}", "[structure.interface.contact]"
     ),
-    "approach": Feature(lambda j: j.contact.approach, "{patch_key}.approach"),
-    "own grooves": Feature(lambda j: j.contact.grooves, "{patch_key}.grooves"),
-    "grooved faces": Feature(
-        lambda j: j.contact.grooves or j.scene.normal.grooves, "contact.grooves", "grooves"
+    "patches of interfaces": Feature(
+        lambda j: any(face.contact for face in j.scene.structure.interface),
+        "[structure.interface.contact]",
     ),
 }
+
+
+@cache
+def find_feature(name: str) -> Feature:
+    """Return a feature of a row of SUPPORT: a row of FEATURES, a key, or a key with a value."""
+    if name in FEATURES:
+        return FEATURES[name]
+    key, _, value = name.partition("=")
+    shown_key = key.replace("patch", "{patch_key}", 1) if key.startswith("patch.") else key
+    if value:
+        return Feature(lambda j: j.find_key_value(key) == value, shown_key, f"'{value}'")
+    return Feature(lambda j: j.find_key_value(key), shown_key)
+
+
 AT_OUTPUT = "give `accelerometer` and `gauge` the value of `output`"
 ONLY_MODES = "only modes can be measured with the joint: leave `measured` out"
 WITHOUT_JOINT = (
     "the joint has no single stiffness to subtract from the modes: give the modes without the joint"
 )
 STEADY_ADVICE = "wear is computed from the last cycle of a steady motion: use"
-# Features that no run supports together, and what to do instead: a key of `effects.REMEDIES`, or the advice itself. A
-# mistake is reported at the key of the first feature.
-SUPPORT = (
-    ("constant load, changing load", suggest_laws("varying-load")),
-    ("stretched list, changing load", "recursion"),
-    ("rigid stick, compliance, changing load", "stiff"),
-    ("stiffening, changing load", "either"),
-    ("interlock, changing load", "either"),
-    ("strips, changing load", "either"),
-    ("nonlinear layer, changing load", "linear"),
-    ("lower shape, changing load", "shapes"),
-    ("oscillating load, bench, constant pressure", suggest_laws("varying-load")),
-    ("named sum, rig, recursion, lower shape", "use 'recursion' or 'auto'"),
-    ("merged, bench, rigid patch, lower shape", SINGLE_SUMS),
-    ("merged, bench, rigid patch, oscillating load", SINGLE_SUMS),
-    ("yaw, strips, rig, one interface", "{joints_advice}"),
-    ("strips, averaged", "out"),
-    ("strips, joined strips, compliance", "either"),
-    ("rigid pieces, compliance", f"leave out {{compliance}}, or {suggest_laws('shear')}"),
-    ("lower kinetic, compliance", "kinetic"),
-    ("lower shape, no bonds, rig", "shapes"),
-    ("lower shape, no bonds, compliance", "shapes"),
-    ("lower shape, bench, constant pressure", "shapes"),
-    ("lower shape, interface", "shapes"),
-    ("list, grooves", "recursion"),
-    ("flat faces, grooves", "{grooves_advice}"),
-    ("named sum, grooves", "use 'recursion' or 'auto'"),
-    (
-        "harmonics, harmonic, grooves",
-        "leave `harmonics` out: the motion is integrated until it repeats",
+# Features that no run supports together, by what to do instead: a key of `effects.REMEDIES`, or the advice itself. A
+# mistake is reported at the key of the first feature, and only the first row of a key counts.
+COMBINATIONS = {
+    suggest_laws("varying-load"): (
+        "law for a constant load, changing load",
+        "normal.amplitude, bench, law with memory for a constant pressure",
     ),
-    (
-        "harmonics, harmonic, others",
-        "leave `harmonics` out: the steady motion of all interfaces is found without it",
+    "recursion": (
+        "sum over all stretched bonds, changing load",
+        "sum over all bonds, grooves",
     ),
-    ("holder, grooves", "out"),
-    ("grooves, strips, yaw", "either"),
-    ("grooves, strips, compliance", "either"),
-    ("oscillating load, grooves", "either"),
-    ("moving load, grooves", "either"),
-    ("lower shape, grooves", "shapes"),
-    ("stiffening, grooves", "either"),
-    ("interlock, grooves", "either"),
-    ("spread, interface", "out"),
-    ("one interface, others", "{joints_advice}"),
-    ("one interface, patch", "{joints_advice}"),
-    ("no elements, compliance", f"leave out {{compliance}}, or {suggest_laws('pieces', 'shear')}"),
-    ("approach, interface", "give contact.load instead"),
-    ("own grooves, interface", "out"),
-    (
-        "wear, grooves, point",
-        "a [normal] contact has no area, so its wear has no depth: use [contact]",
+    "stiff": ("law that sticks rigidly, partial slip, changing load",),
+    "either": (
+        "structure.stiffening, changing load",
+        "structure.bonded.wavelength, changing load",
+        "patch.strips, changing load",
+        "patch.strips, strips that slip together, partial slip",
+        "grooves, patch.strips, mode with yaw",
+        "grooves, patch.strips, partial slip",
+        "normal.amplitude, grooves",
+        "mode with heave or pitch, grooves",
+        "structure.stiffening, grooves",
+        "structure.bonded.wavelength, grooves",
     ),
-    ("wear, strips, compliance", "leave out [wear] or {compliance}"),
-    ("wear, strips, lower shape", "put all shapes on the upper piece"),
-    ("wear, strips, worn start", "leave out [wear] or leave out wear.start"),
-    ("wear, rig, oscillating load", "leave out [wear] or the amplitude"),
-    (
-        "wear, interfaces",
-        "leave out [wear] or describe a single interface by [friction] and [normal]",
+    "linear": (
+        "patch.asperities.law=exponential, changing load",
+        "patch.asperities.law=hertz, changing load",
     ),
-    ("wear, moving load", "leave out [wear] or this key"),
-    ("wear, rig, release", f"{STEADY_ADVICE} kind 'base' or 'force'"),
-    ("wear, rig, transient", f"{STEADY_ADVICE} waveform 'sine'"),
-    ("wear, rig, harmonic", "use 'auto', 'exact' or 'march'"),
-    ("stuck, masses", ONLY_MODES),
-    ("stuck, reduced", ONLY_MODES),
-    ("stuck, interlock", WITHOUT_JOINT),
-    ("stuck, grooved faces", WITHOUT_JOINT),
-    ("stuck, oscillating load", WITHOUT_JOINT),
-    ("stuck, moving load", WITHOUT_JOINT),
-    ("stuck, yaw", WITHOUT_JOINT),
-    ("stuck, patches", WITHOUT_JOINT),
-    ("instruments, travel", AT_OUTPUT),
-    ("instruments, stiffening", AT_OUTPUT),
-    ("instruments, release", AT_OUTPUT),
-    ("instruments, levels or sweep", AT_OUTPUT),
-    ("wear, averaged", "leave out [wear] or use law 'coulomb'"),
-)
-JOINT_RULES = (
-    MistakeRule(
-        lambda j: j.kind == "rig" and j.yaw and not j.contact.strips,
-        "{yaw}",
-        "`yaw` rotates the patch about its normal; add [contact.strips], whose strips slide independently",
+    "shapes": (
+        "shape on the lower piece, changing load",
+        "shape on the lower piece, law without bonds, rig",
+        "shape on the lower piece, law without bonds, partial slip",
+        "shape on the lower piece, bench, law with memory for a constant pressure",
+        "shape on the lower piece, interface",
+        "shape on the lower piece, grooves",
     ),
-    MistakeRule(
-        lambda j: (
-            j.kind == "rig"
-            and not j.is_interface
-            and not j.contact
-            and j.load_change[:9] == "structure"
-        ),
-        "{load_change}",
-        "a single contact point cannot heave or pitch: use [contact] in place of [normal]",
+    "use 'recursion' or 'auto'": (
+        "named method of the sum, rig, sum by recursion, shape on the lower piece",
+        "named method of the sum, grooves",
     ),
-    MistakeRule(
-        lambda j: (
-            j.compliance
-            and j.has_trait("bonds")
-            and j.reading == "report"
-            and -1 < j.order < 0
-            and j.initial_bonds
-        ),
-        "{table_key}.initial_bonds",
-        "{initial_bonds:g} with order = {order:g} and {compliance} gives points that no force can move: in the law as "
-        "printed in the report, (R/eps)^order is unbounded for bonds at rest; set initial_bonds = 0 or use order >= 0",
+    SINGLE_SUMS: (
+        "accuracy.quadrature=merged, bench, patch that slips as a whole, shape on the lower piece",
+        "accuracy.quadrature=merged, bench, patch that slips as a whole, normal.amplitude",
     ),
+    "{joints_advice}": (
+        "mode with yaw, patch.strips, rig, law for one interface",
+        "law for one interface, several interfaces",
+        "law for one interface, patch of an interface",
+    ),
+    "out": (
+        "patch.strips, law of an averaged pressure",
+        "patch.holder.tangential_stiffness, grooves",
+        "spread of the bonds, interface",
+        "patch.grooves, interface",
+    ),
+    f"leave out {{compliance}}, or {suggest_laws('shear')}": (
+        "law for rigid pieces, partial slip",
+    ),
+    "kinetic": ("kinetic below static, partial slip",),
+    "{grooves_advice}": ("law for flat faces, grooves",),
+    "leave `harmonics` out: the motion is integrated until it repeats": (
+        "accuracy.harmonics, accuracy.method=harmonic, grooves",
+    ),
+    "leave `harmonics` out: the steady motion of all interfaces is found without it": (
+        "accuracy.harmonics, accuracy.method=harmonic, several interfaces",
+    ),
+    f"leave out {{compliance}}, or {suggest_laws('pieces', 'shear')}": (
+        "law without elements, partial slip",
+    ),
+    "give contact.load instead": ("patch.approach, interface",),
+    "a [normal] contact has no area, so its wear has no depth: use [contact]": (
+        "wear, grooves, load on a point",
+    ),
+    "leave out [wear] or {compliance}": ("wear, patch.strips, partial slip",),
+    "put all shapes on the upper piece": ("wear, patch.strips, shape on the lower piece",),
+    "leave out [wear] or leave out wear.start": ("wear, patch.strips, wear.start",),
+    "leave out [wear] or the amplitude": ("wear, rig, normal.amplitude",),
+    "leave out [wear] or describe a single interface by [friction] and [normal]": (
+        "wear, structure.interface",
+    ),
+    "leave out [wear] or this key": ("wear, mode with heave or pitch",),
+    f"{STEADY_ADVICE} kind 'base' or 'force'": ("wear, rig, drive.kind=free",),
+    f"{STEADY_ADVICE} waveform 'sine'": ("wear, rig, drive other than a sine",),
+    "use 'auto', 'exact' or 'march'": ("wear, rig, accuracy.method=harmonic",),
+    ONLY_MODES: (
+        "structure.measured=stuck, structure.masses",
+        "structure.measured=stuck, structure.reduced",
+    ),
+    WITHOUT_JOINT: (
+        "structure.measured=stuck, structure.bonded.wavelength",
+        "structure.measured=stuck, contact.grooves",
+        "structure.measured=stuck, normal.grooves",
+        "structure.measured=stuck, normal.amplitude",
+        "structure.measured=stuck, mode with heave or pitch",
+        "structure.measured=stuck, mode with yaw",
+        "structure.measured=stuck, patches of interfaces",
+    ),
+    AT_OUTPUT: (
+        "sensor apart from the output, structure.travel",
+        "sensor apart from the output, structure.stiffening",
+        "sensor apart from the output, drive.kind=free",
+        "sensor apart from the output, levels or sweep in time",
+    ),
+    "leave out [wear] or use law 'coulomb'": ("wear, law of an averaged pressure",),
+}
+SUPPORT = tuple(
+    chain.from_iterable(zip(rows, repeat(instead)) for instead, rows in COMBINATIONS.items())
 )
 
 
@@ -411,38 +385,72 @@ def check_combinations(draft: SceneDraft, kind: str) -> None:
         table = interface.table
         joints.append(Joint(draft, f"structure.interface.{index}", table, table.contact, kind))
     for joint in joints:
-        _check_shape_sides(joint)
-        apply_rules(draft, JOINT_RULES if joint.is_read else (), joint)
+        if joint.is_read:
+            _check_shape_sides(joint)
+            _check_modes(joint)
+            _check_initial_bonds(joint)
+        # Many rows name the same feature, which is looked for only once.
+        is_there = cache(lambda name, joint=joint: find_feature(name).is_there(joint))
         reported: set[str] = set()  # one mistake for each key is enough
-        there = {name for name, feature in FEATURES.items() if feature.is_there(joint)}
         for names, instead in SUPPORT:
             first, *others = names.split(", ")
-            key = FEATURES[first].key
-            if not there.issuperset((first, *others)) or not (
-                joint.is_read or first in SCENE_FEATURES
-            ):
+            feature = find_feature(first)
+            is_tried = not joint.is_interface if first in SCENE_FEATURES else joint.is_read
+            if not is_tried or feature.key in reported:
                 continue
-            if key not in reported:
-                beside = " and ".join(filter(None, map(_name_feature, others)))
-                words = f"{FEATURES[first].words} with {beside}".strip()
+            if all(map(is_there, (first, *others))):
+                beside = " and ".join(filter(None, map(name_feature, others)))
+                words = f"{feature.words} with {beside}".strip()
                 message = describe_unsupported(words, instead).format_map(joint)
-                draft.add_mistake(key.format_map(joint), message)
-                reported.add(key)
+                draft.add_mistake(feature.key.format_map(joint), message)
+                reported.add(feature.key)
 
 
-def _name_feature(name: str) -> str:
-    """Return a feature as text, with names of properties in braces."""
-    return FEATURES[name].words or FEATURES[name].key
+def name_feature(name: str) -> str:
+    """Return a feature as text, with names of properties in braces; "" for a mere condition."""
+    feature = find_feature(name)
+    if "=" in name:
+        return f"{feature.key} = {feature.words}"
+    return feature.words or feature.key
 
 
 def _check_shape_sides(joint: Joint) -> None:
     """Report shapes on different pieces."""
     shapes = joint.contact.table.shapes if joint.contact else {}
     sides = {f"{joint.patch_key}.{name}.on": shape.on for name, shape in shapes.items() if shape.on}
-    if len(set(sides.values())) > 1 and joint.is_read:
+    if len(set(sides.values())) > 1:
         key = next((key for key in reversed(sides) if joint.draft.has(key)), next(iter(sides)))
         names = " and ".join(f"contact.{key.split('.')[-2]}" for key in sides)
         message = describe_unsupported(
             f"{names} on different pieces", "put all shapes on one piece"
         )
         joint.draft.add_mistake(key, message)
+
+
+def _check_modes(joint: Joint) -> None:
+    """Report modes that rotate or lift a patch that cannot follow."""
+    if joint.kind != "rig":
+        return
+    if joint.yaw and not joint.contact.strips:
+        joint.draft.add_mistake(
+            joint.yaw,
+            "`yaw` rotates the patch about its normal; add [contact.strips], whose strips slide independently",
+        )
+    is_point = not joint.is_interface and not joint.contact
+    if is_point and joint.load_change.startswith("structure"):
+        joint.draft.add_mistake(
+            joint.load_change,
+            "a single contact point cannot heave or pitch: use [contact] in place of [normal]",
+        )
+
+
+def _check_initial_bonds(joint: Joint) -> None:
+    """Report bonds at rest that no force can move."""
+    is_unbounded = joint.has_trait("bonds") and joint.reading == "report" and -1 < joint.order < 0
+    if is_unbounded and joint.compliance and joint.initial_bonds:
+        joint.add_mistake(
+            "initial_bonds",
+            f"{joint.initial_bonds:g} with order = {joint.order:g} and {joint.compliance} gives points that no force can "
+            "move: in the law as printed in the report, (R/eps)^order is unbounded for bonds at rest; set "
+            "initial_bonds = 0 or use order >= 0",
+        )

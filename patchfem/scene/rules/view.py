@@ -20,6 +20,9 @@ class _Unknown(float):
     def __getattr__(self, name: str) -> _Unknown:
         return self
 
+    def __getitem__(self, name: object) -> _Unknown:
+        return self
+
 
 # As with every NaN, no comparison with this value holds except `!=`.
 UNKNOWN_VALUE = _Unknown("nan")

@@ -5,18 +5,11 @@ from pathlib import Path
 from typing import Literal, get_args, get_origin
 
 from patchfem.effects import EFFECTS
-from patchfem.scene import UNIT_FACTORS, Coating, Material, Tables, find_meaning
+from patchfem.scene import UNIT_FACTORS, Coating, Material, Tables
 from patchfem.scene.keys.choices import NEEDS, SELECTORS, find_selectors, format_keys, parse_needs
-from patchfem.scene.keys.lookup import is_table_or_value
 from patchfem.scene.keys.quantities import EXAMPLE_QUANTITIES
 from patchfem.scene.keys.tables import Interface
-from patchfem.scene.keys.types import (
-    attributes_by_key,
-    find_inner_table,
-    find_key_record,
-    find_quantity_kind,
-    iterate_annotation_parts,
-)
+from patchfem.scene.keys.types import Key, list_keys
 
 FOLDER = Path(__file__).parents[3] / "patchfem" / "scene"
 FILE = FOLDER / "README.md"
@@ -68,19 +61,11 @@ def iterate_tables(model: type = Tables, header: str = "") -> Iterator[tuple]:
     model: the pydantic class to begin with; header: its header.
     """
     yield (header, model)
-    for key, name in attributes_by_key(model).items():
+    for name, key in list_keys(model).items():
         # An interface has the same tables as [contact].
-        if _is_table(model, name) and (model, name) != (Interface, "contact"):
-            path = f"{header.strip('[]')}.{key}".strip(".")
-            is_array = get_origin(model.model_fields[name].annotation) is tuple
-            yield from iterate_tables(
-                find_inner_table(model, name), f"[[{path}]]" if is_array else f"[{path}]"
-            )
-
-
-def _is_table(model: type, name: str) -> bool:
-    """Return whether a field of a model is a table."""
-    return find_inner_table(model, name) is not None and not is_table_or_value(model, name)
+        if not key.accepts_value and (model, name) != (Interface, "contact"):
+            path = f"{header.strip('[]')}.{name}".strip(".")
+            yield from iterate_tables(key.inner, f"[[{path}]]" if key.is_array else f"[{path}]")
 
 
 def _format_sections() -> list:
@@ -93,8 +78,8 @@ def _format_sections() -> list:
         parent = model.__mro__[1]
         own = [
             key
-            for key, name in attributes_by_key(model).items()
-            if name in model.__annotations__ and not _is_table(model, name)
+            for key in list_keys(model).values()
+            if key.attribute in model.__annotations__ and key.accepts_value
         ]
         about = " ".join((model.__doc__ or "").split())
         if parent in heads:
@@ -112,32 +97,28 @@ def _format_sections() -> list:
             out.append(
                 format_table(
                     ("key", "kind", "default", "required", "meaning"),
-                    [_format_row(model, key) for key in own],
+                    [format_row(key) for key in own],
                 )
             )
     return out
 
 
-def _format_row(model: type, key: str) -> tuple:
+def format_row(key: Key) -> tuple:
     """Return the row of a key: name, kind, default, condition and meaning."""
-    name = attributes_by_key(model)[key]
-    field = model.model_fields[name]
+    field = key.field
     default = "" if field.is_required() or field.default in (None, "") else field.default
     if isinstance(default, int | float):
-        default = " ".join(
-            [f"{default:g}", *list(UNIT_FACTORS.get(find_quantity_kind(model, name), ()))[:1]]
-        )
+        default = " ".join([f"{default:g}", *list(UNIT_FACTORS.get(key.kind, ()))[:1]])
     elif default:
         default = f"`{default}`"
-    required = "yes" if field.is_required() else _format_condition(model, key)
-    return f"`{key}`", _format_kind(model, name), default, required, find_meaning(model, key)
+    required = "yes" if field.is_required() else _format_condition(key.table, key.name)
+    return f"`{key.name}`", _format_kind(key), default, required, key.record.meaning
 
 
 def _format_condition(model: type, key: str) -> str:
     """Return the condition that makes a key necessary: "with law `tanh`", "unless `to` is given", or a sentence."""
-    record = find_key_record(model, key)
-    if record and record.required:
-        return record.required
+    if required := list_keys(model)[key].record.required:
+        return required
     conditions = []
     for selector in find_selectors(model):
         values = {}  # other keys in place of this one -> values of the selector
@@ -159,15 +140,14 @@ def _format_condition(model: type, key: str) -> str:
     return "; ".join(dict.fromkeys(conditions))
 
 
-def _format_kind(model: type, name: str) -> str:
+def _format_kind(key: Key) -> str:
     """Return the kind of value of a key, with its bounds."""
-    annotation = model.model_fields[name].annotation
-    types = (annotation, *iterate_annotation_parts(annotation))
+    types = key.types
     words = [
         f"`{value}`" for part in types if get_origin(part) is Literal for value in get_args(part)
     ]
-    if kind := find_quantity_kind(model, name):
-        words.append(kind)
+    if key.kind:
+        words.append(key.kind)
     elif Material in types:
         words = ["material"]
     elif Coating in types:
@@ -177,7 +157,7 @@ def _format_kind(model: type, name: str) -> str:
     arrays = [get_args(part) for part in types if get_origin(part) is tuple]
     prefix = "" if not arrays else "list of " if ... in arrays[0] else "pair of "
     words = dict.fromkeys(map(_plural, words) if prefix else words)
-    return ", ".join([prefix + ", ".join(words), *_format_bounds(model, name)])
+    return ", ".join([prefix + ", ".join(words), *_format_bounds(key)])
 
 
 def _plural(word: str) -> str:
@@ -191,16 +171,11 @@ def _plural(word: str) -> str:
     )
 
 
-def _format_bounds(model: type, name: str) -> list:
+def _format_bounds(key: Key) -> list:
     """Return the bounds of a key, such as ">= 1"."""
-    annotation = model.model_fields[name].annotation
     marks = [
         inner
-        for mark in (
-            *model.model_fields[name].metadata,
-            annotation,
-            *iterate_annotation_parts(annotation),
-        )
+        for mark in (*key.field.metadata, *key.types)
         for inner in (mark, *getattr(mark, "metadata", ()))
     ]
     return list(
@@ -216,13 +191,13 @@ def _format_bounds(model: type, name: str) -> list:
 def iterate_bounds() -> Iterator[tuple]:
     """Yield (dotted key, kind with its bounds) of every key that is a whole number or has an upper bound."""
     for header, model in iterate_tables():
-        for key, name in attributes_by_key(model).items():
-            if _is_table(model, name):
+        for name, key in list_keys(model).items():
+            if not key.accepts_value:
                 continue
-            kind = _format_kind(model, name)
-            bound = _format_bounds(model, name)
+            kind = _format_kind(key)
+            bound = _format_bounds(key)
             if bound and ("whole number" in kind or any(text.startswith("<") for text in bound)):
-                yield f"{header.strip('[]')}.{key}".strip("."), kind
+                yield f"{header.strip('[]')}.{name}".strip("."), kind
 
 
 class Equations:
@@ -255,7 +230,7 @@ def format_effects() -> str:
 
 def find_example(model: type, name: str) -> str:
     """Return an example of the value of a key of a table, as it is written in a scene."""
-    kind = find_quantity_kind(model, name)
+    kind = list_keys(model)[name].kind
     return f'"{EXAMPLE_QUANTITIES[kind]}"' if kind else "1.0"
 
 

@@ -2,8 +2,10 @@
 
 from importlib import import_module
 
+from patchfem.effects import REMEDIES
 from patchfem.runs.patch.result import MAX_SMALL_STRAIN, MIN_COUPLING_RATIO
 from patchfem.scene.keys.types import DIVISOR_KINDS, MAX_MAGNITUDE
+from patchfem.scene.rules import support
 
 from .keys import FOLDER, format_table, iterate_bounds
 from .tried import (
@@ -115,6 +117,11 @@ infinite; any computed value of this peak would depend on the mesh.
 """
 
 
+ADVICE = {  # Property of a joint in the advice of a row -> its meaning.
+    "{compliance}": "what lets the patch slip part by part",
+    "{joints_advice}": "use a law that supports several interfaces",
+    "{grooves_advice}": "use a law that supports grooves",
+}
 METHOD_COLUMNS = tuple(
     SceneColumn(f"`{method}`", POINT + RIG, (f"accuracy.method={method}",)) for method in METHODS
 )
@@ -131,6 +138,10 @@ def text() -> str:
         "In this table each scene is a rig with a single contact point under a sine drive. The "
         "heading of a column is the value of `accuracy.method`; `auto` chooses a method that supports the law.",
         _format_compatibility(METHOD_COLUMNS),
+        "## Combinations",
+        "`patchfem check` refuses a scene in which all features of a row stand together. A feature in code style is a key, "
+        "a table or a value of a key; `patch` stands for `contact` or `structure.interface.contact`.",
+        _format_combinations(),
         "## Numbers",
         f"The magnitude of a quantity must be at most {MAX_MAGNITUDE:g} in SI units. If the quantity is of a kind by "
         "which the program divides ("
@@ -184,6 +195,21 @@ def _format_compatibility(columns: tuple) -> str:
             for name in list_laws()
         ],
     )
+
+
+def _format_combinations() -> str:
+    """Return the table of the features that no run supports together."""
+    rows = []
+    for names, instead in support.SUPPORT:
+        features = [
+            name if name in support.FEATURES else f"`{name.replace('=', ' = ')}`"
+            for name in names.split(", ")
+        ]
+        advice = REMEDIES.get(instead, instead)
+        for word, meaning in ADVICE.items():
+            advice = advice.replace(word, meaning)
+        rows.append((features[0], "; ".join(features[1:]), advice))
+    return format_table(("feature", "together with", "instead"), rows)
 
 
 def _format_bounds() -> str:

@@ -3,7 +3,7 @@
 from functools import cache
 
 from patchfem.scene import Tables
-from patchfem.scene.keys.types import attributes_by_key, find_inner_table, find_quantity_kind
+from patchfem.scene.keys.types import list_keys
 
 
 def to_toml(tables: dict) -> str:
@@ -98,10 +98,8 @@ def list_schema_keys() -> tuple:
 
 def _iterate_keys(model, prefix: tuple):
     """Yield the keys of a model and of the tables in it."""
-    for key, name in attributes_by_key(model).items():
-        inner = find_inner_table(model, name)
-        is_array = inner is not None and "tuple" in str(model.model_fields[name].annotation)
-        path = (*prefix, key, 0) if is_array else (*prefix, key)
-        yield path, find_quantity_kind(model, name), inner
-        if inner is not None and len(prefix) < 6:
-            yield from _iterate_keys(inner, path)
+    for name, key in list_keys(model).items():
+        path = (*prefix, name, 0) if key.inner is not None and key.is_array else (*prefix, name)
+        yield path, key.kind, key.inner
+        if key.inner is not None and len(prefix) < 6:
+            yield from _iterate_keys(key.inner, path)

@@ -1,0 +1,134 @@
+"""Each row of the table of unsupported combinations refuses a scene that has its features."""
+
+from __future__ import annotations
+
+import pytest
+from scene_texts import BENCH, FORCED, LINEAR, PAIR, PATCH, RIG
+
+from patchfem.effects import describe_unsupported
+from patchfem.scene import loads
+from patchfem.scene.rules.support import SUPPORT
+from patchfem.scene.scene import SceneError
+
+POINT_RIG = BENCH[: BENCH.index("[slide]")] + LINEAR
+PATCH_BENCH = PATCH + BENCH[BENCH.index("[friction]") :]
+IWAN = "{law}.law=iwan {law}.stiffness=1e7_N/m {law}.chi=-0.5 {law}.beta=0.5"
+TANH = "{law}.law=tanh {law}.reference_speed=1_mm/s"
+BONDS = "{law}.law=nonlocal {law}.bond_length=1_um"
+GROOVES = "{load}.grooves.wavelength=80_um {load}.grooves.amplitude=1_um"
+OWN_PATCH = "{patch}.length=10_mm {patch}.width=10_mm {patch}.height=5_mm {patch}.load=60_N {patch}.substrate=steel"
+WEAR = "wear.coefficient=1e-14_m^2/N wear.cycles=1000"
+# Assignments that give a scene a feature, separated by blanks; _ stands for the blank in a quantity.
+SETS = {
+    "accuracy.harmonics": "accuracy.harmonics=9",
+    "accuracy.method=harmonic": "accuracy.method=harmonic",
+    "accuracy.quadrature=merged": f"{BONDS} {{law}}.reading=report accuracy.quadrature=merged",
+    "changing load": "{change}",
+    "contact.grooves": GROOVES,
+    "drive other than a sine": "drive.waveform=step",
+    "drive.kind=free": "drive.kind=free drive.displacement=1_mm",
+    "grooves": GROOVES,
+    "interface": "",
+    "kinetic below static": "{law}.law=coulomb {law}.kinetic=0.2",
+    "law for a constant load": IWAN,
+    "law for flat faces": IWAN,
+    "law for one interface": "{law}.law=convolution {law}.bond_length=1_um",
+    "law for rigid pieces": IWAN,
+    "law of an averaged pressure": "{law}.law=convolution {law}.bond_length=1_um",
+    "law that sticks rigidly": "{law}.law=coulomb",
+    "law with memory for a constant pressure": IWAN,
+    "law without bonds": "{law}.law=coulomb",
+    "law without elements": TANH,
+    "levels or sweep in time": "drive.waveform=levels drive.levels=['1_g','2_g']",
+    "load on a point": "",
+    "mode with heave or pitch": "structure.mode.second.pitch=1_rad/m",
+    "mode with yaw": "structure.mode.second.yaw=1_rad/m",
+    "named method of the sum": f"{BONDS} accuracy.quadrature=direct",
+    "normal.amplitude": "normal.amplitude=5_N normal.frequency=50_Hz",
+    "normal.grooves": GROOVES,
+    "partial slip": "{patch}.shear={{}}",
+    "patch of an interface": OWN_PATCH,
+    "patch.approach": "{patch}.approach.distance=1_um",
+    "patch.asperities.law=exponential": (
+        "{patch}.asperities.law=exponential {patch}.asperities.decay_length=1_um"
+    ),
+    "patch.asperities.law=hertz": (
+        "{patch}.asperities.law=hertz {patch}.asperities.radius=1_um {patch}.asperities.density=1e10_1/m^2 "
+        "{patch}.asperities.height_deviation=1_um"
+    ),
+    "patch.grooves": "{patch}.grooves.wavelength=80_um {patch}.grooves.amplitude=1_um",
+    "patch.holder.tangential_stiffness": "{patch}.holder.tangential_stiffness=1e7_N/m",
+    "patch.strips": "{patch}.strips.count=4",
+    "patches of interfaces": OWN_PATCH,
+    "sensor apart from the output": "structure.mode.second.gauge=0.3",
+    "shape on the lower piece": (
+        "{patch}.tilt.angle=0.1_mrad {patch}.tilt.on=lower"
+    ),
+    "spread of the bonds": f"{BONDS} {{law}}.spread=1_um",
+    "structure.bonded.wavelength": (
+        "structure.bonded.stiffness=1e5_N/m structure.bonded.wavelength=80_um"
+    ),
+    "structure.measured=stuck": "structure.measured=stuck",
+    "structure.stiffening": "structure.stiffening.cubic=1e10_N/m^3",
+    "structure.travel": "structure.travel=1_mm",
+    "sum by recursion": "",
+    "sum over all bonds": f"{BONDS} {{law}}.order=2",
+    "sum over all stretched bonds": f"{BONDS} {{law}}.order=2",
+    "wear": WEAR,
+    "wear.start": "wear.start=result.nc",
+}  # fmt: skip
+REDUCED = POINT_RIG[: POINT_RIG.index("[structure]")] + (
+    '[structure.reduced]\nstiffness = "k.mtx"\nmass = "m.mtx"\nboundary = [1, 2]\nslide = [1, 0]\n'
+    + LINEAR[LINEAR.index("[drive]") :]
+)
+POINT_FEATURES = {"load on a point", "normal.amplitude", "normal.grooves"}
+MASS_FEATURES = {"interface", "several interfaces", "structure.interface", "patches of interfaces"}
+
+
+FILE = """\
+[structure]
+file = "a.npz"
+[[structure.interface]]
+between = [1, 0]
+law = "coulomb"
+static = 0.3
+"""
+
+
+def write_blanks(assignment: str) -> str:
+    """Return an assignment with blanks in its value."""
+    key, _, value = assignment.partition("=")
+    return f"{key}={value.replace('_', ' ')}"
+
+
+def choose_base(features: set[str]) -> tuple[str, dict[str, str]]:
+    """Return a scene for some features, and the keys of its law, its load, its patch and a changing load."""
+    words = {"law": "friction", "load": "contact", "patch": "contact"}
+    words["change"] = SETS["mode with heave or pitch"]
+    if "patches of interfaces" in features:
+        return FILE + FORCED, words | {"patch": "structure.interface.0.contact"}
+    if features & (MASS_FEATURES | {"patch of an interface", "law without elements"}):
+        law = "structure.interface.0"
+        return PAIR + FORCED, words | {"law": law, "patch": f"{law}.contact"}
+    if "structure.masses" in features:
+        return PAIR.split("[[structure.interface]]")[0] + FORCED, words
+    if "structure.reduced" in features:
+        return REDUCED, words
+    if features & POINT_FEATURES:
+        words |= {"load": "normal", "change": SETS["normal.amplitude"]}
+        return (BENCH if "bench" in features else POINT_RIG), words
+    return (PATCH_BENCH if "bench" in features else RIG), words
+
+
+@pytest.mark.parametrize("names, instead", SUPPORT, ids=[names for names, _ in SUPPORT])
+def test_refuses_each_row_of_support(names, instead):
+    """A scene with the features of a row is refused, with the advice of the row."""
+    features = names.split(", ")
+    text, words = choose_base(set(features))
+
+    sets = " ".join(SETS.get(name, "") for name in features).format_map(words).split()
+    with pytest.raises(SceneError) as refused:
+        loads(text, "a.toml", [write_blanks(assignment) for assignment in sets])
+    found = [message for message in refused.value.mistakes if "not supported yet" in message]
+    advice = describe_unsupported("", instead).partition("; ")[2]
+    assert found and ("{" in advice or any(message.endswith(advice) for message in found)), found
