@@ -101,7 +101,16 @@ class FreeBalance:
         )
 
     def start(self, omega: float, shape, amplitude: float) -> np.ndarray:
-        """Return the unknowns of a linear mode (n,) of a frequency [rad/s] and an amplitude at the output [m]."""
+        """Return the unknowns of a linear mode.
+
+        Parameters
+        ----------
+        omega : float
+            Frequency of the mode [rad/s].
+        shape : (n,) array
+        amplitude : float
+            At the output [m].
+        """
         y = np.zeros((self.balance.rank, self.h + 1), complex)
         reach = 1.0 if self.output is None else abs(float(self.output @ shape))
         y[:, 1] = self.balance.faces @ shape * amplitude / reach
@@ -221,7 +230,14 @@ class FreeBalance:
         return x, self.evaluate(x, amplitude).motion
 
     def follow(self, x, start: float, target: float) -> tuple[np.ndarray, FreeMotion]:
-        """Follow a free motion with unknowns x (N,) from one amplitude to another [m].
+        """Follow a free motion from one amplitude to another.
+
+        Parameters
+        ----------
+        x : (N,) array
+            Unknowns at the first amplitude.
+        start, target : float
+            First and last amplitude [m].
 
         Raises
         ------

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ...core import NotConverged, PatchfemError, SineDrive
-from .continuation import NEWTON_TOL, PathSettings, correct_point, follow_curve
+from .continuation import NEWTON_TOL, PathEquations, PathSettings, correct_point, follow_curve
 from .equations import HarmonicBalance
 from .motion import SteadyMotion
 from .series import pad_harmonics
@@ -23,7 +23,7 @@ PATH = PathSettings(first_step=0.0125, max_step=0.05)
 # Ratio of the harmonics of the first motion, which meet the tolerance alone, to those of the first curve.
 FIRST_REDUCTION = 4
 TRUNCATION_RATIO = 0.25  # part of the tolerance that the harmonics above H may have
-MAX_SAMPLE_CHANGES = 3  # times that the samples are increased for the amplitude that was found
+MAX_SAMPLE_CHANGES = 3  # largest number of curves with more samples each
 SAME_MOTION = 10.0  # distance of two motions that are the same, in tolerances
 
 
@@ -104,11 +104,11 @@ def _trace_with_harmonics(modes, drive: SineDrive, omegas, first: SteadyMotion, 
 
 
 def _differentiate(balance: HarmonicBalance, drive: SineDrive):
-    """Return a function of unknowns and frequency [rad/s] that gives residual, Jacobian and derivative by frequency."""
+    """Return a function of unknowns and frequency [rad/s] that gives the equations of a curve."""
 
     def evaluate(x, omega):
         equations = balance.evaluate(x, omega, drive.acceleration)
-        return equations.residual, equations.jacobian, equations.by_omega
+        return PathEquations(equations.residual, equations.jacobian, equations.by_omega)
 
     return evaluate
 
@@ -126,7 +126,11 @@ def _pack_points(first: SteadyMotion, second: SteadyMotion, width: float) -> tup
 def measure_distance(first: SteadyMotion, second: SteadyMotion, width: float) -> float:
     """Return the distance between two points on a branch in scaled unknowns and frequency.
 
-    width: frequency step [rad/s] that counts as 1.
+    Parameters
+    ----------
+    first, second : SteadyMotion
+    width : float
+        Frequency step [rad/s] that counts as 1.
     """
     _, begin, end, unit = _pack_points(first, second, width)
     return float(np.linalg.norm((end - begin) / unit))

@@ -14,7 +14,7 @@ from ...core import NotConverged
 from .equations import factor
 
 NEWTON_TOL = 1e-9  # change of the unknowns, relative to their size, at which Newton's method ends
-MAX_NEWTON_STEPS = 12  # a point that needs more is given up, and the step along the curve is halved
+MAX_NEWTON_STEPS = 12  # largest number of Newton steps to a point of the curve
 MIN_STEP = 1e-7  # smallest step of the arc length
 MIN_STEP_COSINE = 0.7  # smallest cosine between a step and the tangent; a larger angle is a jump
 MIN_TANGENT_COSINE = 0.1  # smallest cosine between two tangents in the cubic through a fold
@@ -33,6 +33,14 @@ class CurvePath:
     p: np.ndarray
     folds: tuple
     ended: str
+
+
+class PathEquations(NamedTuple):
+    """Residual (N,) of a curve, its derivatives (N, N) by the unknowns, and (N,) by the parameter."""
+
+    residual: np.ndarray
+    jacobian: np.ndarray
+    by_parameter: np.ndarray
 
 
 class PathSettings(NamedTuple):
@@ -67,7 +75,7 @@ def follow_curve(
     Parameters
     ----------
     evaluate : callable
-        evaluate(x, p) -> residual (N,), d/dx (N, N), d/dp (N,).
+        evaluate(x, p) -> PathEquations.
     x : array_like
     p : float
         Initial guess of the first point, which is corrected first.

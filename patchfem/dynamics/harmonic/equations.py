@@ -118,9 +118,17 @@ class HarmonicBalance:
     def make_stiffness(
         self, omega: float, harmonics: int, damping=None, *, has_springs: bool = True
     ) -> tuple:
-        """Return P_k, or S_k without springs, and dS_k/d omega, (H + 1, n, n) each, at a frequency [rad/s].
+        """Return P_k, or S_k without springs, and dS_k/d omega, (H + 1, n, n) each.
 
-        damping: damping matrices (H + 1, n, n) [1/s]; default: that of the modes.
+        Parameters
+        ----------
+        omega : float
+            [rad/s].
+        harmonics : int
+        damping : (H + 1, n, n) array, optional
+            Damping matrices [1/s]; default: that of the modes.
+        has_springs : bool
+            Whether the springs on the rows are added.
         """
         modes = self.modes
         k = np.arange(harmonics + 1)[:, None, None]
@@ -173,7 +181,15 @@ class HarmonicBalance:
         return Motion(modal, contact, transfer, by_unknowns, by_omega)
 
     def evaluate(self, x, omega: float, level: float) -> Equations:
-        """Evaluate the balance for unknowns x (N,) under a drive of a frequency [rad/s] and a level [m s-2]."""
+        """Evaluate the balance.
+
+        Parameters
+        ----------
+        x : (N,) array
+            Unknowns.
+        omega, level : float
+            Frequency [rad/s] and amplitude [m s-2] of the drive.
+        """
         h = (x.size // self.rank - 1) // 2
         stiffness, by_omega = self.make_stiffness(omega, h)
         linear = LinearPart(invert_matrices(stiffness), by_omega)
@@ -223,7 +239,14 @@ class HarmonicBalance:
         return solution
 
     def solve_stuck(self, omega: float, level: float, harmonics: int) -> np.ndarray:
-        """Return the unknowns of the motion in which all contacts stick."""
+        """Return the unknowns of the motion in which all contacts stick.
+
+        Parameters
+        ----------
+        omega, level : float
+            Frequency [rad/s] and amplitude [m s-2] of the drive.
+        harmonics : int
+        """
         equations = self.evaluate(np.zeros(self.rank * (2 * harmonics + 1)), omega, level)
         return -factor(equations.jacobian)(equations.residual)
 

@@ -112,7 +112,17 @@ class LawGroup:
         return [[law.evaluate(slides, i) for law in laws] for i, laws in enumerate(self.laws)]
 
     def compute_forces(self, q, omega: float, samples: int) -> np.ndarray:
-        """Return the forces (i, N) [N] at equal samples of a cycle, for harmonics q (i, H + 1) [m] of the slides."""
+        """Return the forces (i, N) [N] at equal samples of a cycle.
+
+        Parameters
+        ----------
+        q : (i, H + 1) array
+            Harmonics of the slides [m].
+        omega : float
+            [rad/s].
+        samples : int
+            Samples per cycle.
+        """
         slides = make_slides(q, omega, samples)
         forces = [sum(law.force for law in row) for row in self.evaluate(slides)]
         return np.array(forces)[:, slides.is_sample]
@@ -135,8 +145,8 @@ class LawGroup:
         ]
         return ForceHarmonics(*map(np.array, zip(*rows)))
 
-    def _differentiate_row(self, slides: Slides, i: int, forces: list[LawForce]) -> tuple:
-        """Return the harmonics (H + 1,) of the force of a row, and the derivatives of `ForceHarmonics`.
+    def _differentiate_row(self, slides: Slides, i: int, forces: list[LawForce]) -> ForceHarmonics:
+        """Return the harmonics (H + 1,) of the force of a row, and their derivatives.
 
         A local stiffness K(theta) enters by its harmonics up to 2 H, a reversal by the harmonics of its stiffness and the
         waves at its angle.
@@ -173,7 +183,7 @@ class LawGroup:
                 by_slide, by_frequency = law.differentiate(slides, i, law_force.states)
                 jacobian += by_slide
                 by_omega = by_omega + by_frequency
-        return x[0, : h + 1], jacobian, by_omega
+        return ForceHarmonics(x[0, : h + 1], jacobian, by_omega)
 
 
 def find_local_jacobian(stiffness) -> np.ndarray:

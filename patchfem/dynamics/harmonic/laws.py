@@ -139,11 +139,12 @@ class Jenkins(Law):
         """Return the number of samples that resolve the phases of stick at an amplitude [m]."""
         return _count_stick_samples(self.limit / self.total / max(amplitude, 1e-300))
 
-    def load_first(self, x) -> tuple:
-        """Return force, stretch times limit, and stiffness on first loading to slides x >= 0 [m]."""
+    def load_first(self, x) -> np.ndarray:
+        """Return force, stretch times limit, and stiffness (3, ...) on first loading to slides x >= 0 [m]."""
         corners, forces, stretches, sticking = self.curve
         number = np.searchsorted(corners[1:], x, side="right")
-        return np.interp(x, corners, forces), np.interp(x, corners, stretches), sticking[number]
+        loaded = (np.interp(x, corners, forces), np.interp(x, corners, stretches), sticking[number])
+        return np.array(loaded)
 
     def evaluate(self, slides: Slides, row: int) -> LawForce:
         """Return the steady force for the slide of an interface that starts from an unstretched contact."""

@@ -41,7 +41,17 @@ class Slides(NamedTuple):
 
 
 def make_slides(x, omega: float, samples: int) -> Slides:
-    """Evaluate slides with the harmonics (i, H + 1) [m] at a number of samples and at their reversals."""
+    """Evaluate slides at equal samples and at their reversals.
+
+    Parameters
+    ----------
+    x : (i, H + 1) array_like
+        Harmonics of the slides [m].
+    omega : float
+        [rad/s].
+    samples : int
+        Samples per cycle.
+    """
     x = np.asarray(x, complex)
     k = np.arange(x.shape[1])
     q = evaluate_series(x, samples)

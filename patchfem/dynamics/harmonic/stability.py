@@ -32,7 +32,12 @@ MIN_FADING = 1e-9  # smallest decay in a cell that is told from none
 def add_stability(motion: SteadyMotion, modes, cells: int = 0) -> SteadyMotion:
     """Return a steady motion with its Floquet multipliers, in decreasing magnitude, and its stability.
 
-    cells: number of cells of the cycle; 0 for MIN_CELLS, or for the samples of the motion if they are more.
+    Parameters
+    ----------
+    motion : SteadyMotion
+    modes : ModalBasis
+    cells : int
+        Number of cells of the cycle; 0 for MIN_CELLS, or for the samples of the motion if they are more.
     """
     values = find_multipliers(find_monodromy(motion, modes, cells))
     is_stable = bool(np.abs(values).max(initial=0.0) <= MAX_STABLE_MULTIPLIER)
@@ -73,7 +78,7 @@ def find_monodromy(motion: SteadyMotion, modes, cells: int = 0) -> np.ndarray:
     for i, forces in enumerate(group.evaluate(slides)):
         for force in forces:
             if force.states is not None:
-                memories.append((i, *_find_fading(force, force.states, widths)))
+                memories.append((i, *_find_fading(force.states, widths)))
                 damping[i] += _average(force.states.slopes[1])
                 continue
             weight = _weigh_ends(slides.q[i], force)
@@ -144,12 +149,12 @@ def _weigh_ends(q, force: LawForce):
     return np.round(np.clip(weight, 0.0, 1.0), ROUND_OFF_DIGITS)
 
 
-def _find_fading(force: LawForce, states: FlowStates, widths) -> tuple:
-    """Return the coefficients of a stretch u' = gain q' - loss u and the stiffness [N/m] of each cell, (M,) each."""
+def _find_fading(states: FlowStates, widths) -> np.ndarray:
+    """Return gain and loss of a stretch u' = gain q' - loss u, and the stiffness [N/m] of each cell, (3, M)."""
     decay, by_slide, _ = states.steps
     left = -np.log(np.maximum(decay, 1e-300))
     gain = by_slide * np.divide(left, 1 - decay, out=np.ones_like(left), where=left > MIN_FADING)
-    return gain, left / np.maximum(widths, 1e-300), _average(states.slopes[0])
+    return np.array([gain, left / np.maximum(widths, 1e-300), _average(states.slopes[0])])
 
 
 def _multiply(steps) -> np.ndarray:

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.optimize import brentq, minimize_scalar
 
 from ...core import NotConverged
-from .continuation import PathSettings, follow_curve
+from .continuation import PathEquations, PathSettings, follow_curve
 from .equations import HarmonicBalance, has_undamped_resonance
 from .forces import LawGroup
 from .motion import SteadyMotion
@@ -108,8 +108,16 @@ def find_amplitudes(slides) -> np.ndarray:
 def make_motion(balance: HarmonicBalance, x, drive, coarser=None, n_steps: int = 0) -> SteadyMotion:
     """Return the motion of unknowns (N,) that solve the balance.
 
-    Its error is the relative change from the slides (i, K + 1) of a coarser solution. Without one it is the size of as
-    many further harmonics, which follow from the force.
+    Parameters
+    ----------
+    balance : HarmonicBalance
+    x : (N,) array
+    drive : core.SineDrive
+    coarser : (i, K + 1) array, optional
+        Slides [m] of a coarser solution; the change from them is the error. Without them it is the size of as many further
+        harmonics, which follow from the force.
+    n_steps : int
+        Number of Newton steps.
     """
     equations = balance.evaluate(x, drive.omega, drive.acceleration)
     slides = balance.unpack_slides(x)
@@ -134,8 +142,18 @@ def make_motion(balance: HarmonicBalance, x, drive, coarser=None, n_steps: int =
 def refine_steady_motion(motion: SteadyMotion, modes, drive) -> SteadyMotion:
     """Solve for a steady motion again with twice the harmonics and samples.
 
-    One harmonic becomes three, because a symmetric law has no even harmonics. NotConverged is raised if no solution is
-    found.
+    One harmonic becomes three, because a symmetric law has no even harmonics.
+
+    Parameters
+    ----------
+    motion : SteadyMotion
+    modes : ModalBasis
+    drive : core.SineDrive
+
+    Raises
+    ------
+    NotConverged
+        If no solution is found.
     """
     balance = HarmonicBalance(modes, motion.group, 2 * motion.samples)
     start = balance.pack_slides(pad_harmonics(motion.slides, max(2 * motion.harmonics, 3)))
@@ -178,7 +196,7 @@ def _follow_levels(balance: HarmonicBalance, omega: float, level: float, h: int)
 
     def evaluate(x, level):
         equations = balance.evaluate(x, omega, level)
-        return equations.residual, equations.jacobian, equations.by_level
+        return PathEquations(equations.residual, equations.jacobian, equations.by_level)
 
     start = balance.solve_stuck(omega, level, h) * WEAK_DRIVE
     path = follow_curve(evaluate, start, WEAK_DRIVE * level, (0.0, level), settings=LEVEL_PATH)
@@ -203,6 +221,12 @@ def find_one_harmonic_roots(balance: HarmonicBalance, omega: float, level: float
 
     The balance is evaluated at amplitudes of the linear motion. For one row the result is exact, because a phase turns
     slide and force alike; for several it is an initial guess.
+
+    Parameters
+    ----------
+    balance : HarmonicBalance
+    omega, level : float
+        Frequency [rad/s] and amplitude [m s-2] of the drive.
     """
     balance = HarmonicBalance(balance.modes, balance.group, N_ROOT_SAMPLES)
     unmoved = balance.evaluate(np.zeros(3 * balance.rank), omega, level)
