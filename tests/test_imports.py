@@ -93,7 +93,7 @@ MODULES_OF_SCENES = {  # run from Python -> text of the scene, modules that are 
         COULOMB_RIG,
         "hybrid.runs structure.modes",
         "structure.matrices structure.masses structure.arrays structure.universal structure.modal_fit structure.drives "
-        "dynamics.harmonic.harmonic dynamics.harmonic.continuation dynamics.harmonic.balance "
+        "dynamics.harmonic.equations dynamics.harmonic.continuation dynamics.harmonic.steady "
         "points.time_march runs.rig.steady " + " ".join(RIG_KEYS),
     ),
     **{

@@ -6,9 +6,8 @@ entry of this list and the entries before it:
 1. `integrated`       accelerations and phases of slip of a run
 2. `curve_points`     adaptive points of a curve, denser where its curvature is larger
 3. `event_list`       log of the events of a run
-4. `periodic`         linear systems and Floquet multipliers of periodic motions
-5. `harmonic`         steady motions by harmonic balance, branches and stability
-6. `limit_cycles`     limit cycles of modes with negative damping and friction
+4. `harmonic`         steady motions by harmonic balance, branches and stability
+5. `limit_cycles`     limit cycles of modes with negative damping and friction
 
 Motion in time is computed by `hybrid` and `points`.
 """
@@ -23,11 +22,9 @@ PUBLIC = {
         "STOP",
         "EventLog",
     ),
-    "harmonic.backbone": ("FreeBalance",),
-    "harmonic.balance": (
-        "find_cycle_energies",
-        "find_regime",
-        "make_cycle_response",
+    "harmonic.backbone": (
+        "find_free_motions",
+        "make_free_balance",
     ),
     "harmonic.branch": (
         "find_branches",
@@ -35,21 +32,16 @@ PUBLIC = {
         "measure_distance",
         "trace_over_frequency",
     ),
+    "harmonic.equations": ("has_undamped_resonance",),
     "harmonic.forces": ("LawGroup",),
-    "harmonic.harmonic": (
-        "make_linear_part",
-        "pack_harmonics",
-    ),
     "harmonic.laws": (
         "Interlock",
         "Spring",
-        "evaluate_series",
     ),
-    "harmonic.point": (
-        "find_peak",
-        "find_steady_motion",
-        "make_balance",
-        "refine_steady_motion",
+    "harmonic.motion": (
+        "find_cycle_energies",
+        "find_regime",
+        "make_cycle_response",
     ),
     "harmonic.quasi_static": (
         "StaticLoops",
@@ -57,6 +49,10 @@ PUBLIC = {
         "find_static_motions_from_loops",
     ),
     "harmonic.stability": ("add_stability",),
+    "harmonic.steady": (
+        "find_steady_motion",
+        "refine_steady_motion",
+    ),
     "integrated": (
         "EngineResult",
         "mean_slip_phase",

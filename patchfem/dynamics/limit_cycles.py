@@ -12,6 +12,7 @@ a smaller limit cycle that is stable.
 """
 
 from dataclasses import replace
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -19,10 +20,10 @@ from scipy.linalg import expm
 from scipy.optimize import brentq
 
 from ..core import ModalBasis, NotConverged
-from .harmonic.backbone import FreeBalance, FreeMotion, trace_free_motions
+from .harmonic.backbone import FreeBalance, find_free_motions
+from .harmonic.equations import HarmonicBalance
 from .harmonic.forces import LawGroup
-from .harmonic.harmonic import pack_harmonics
-from .harmonic.point import make_balance
+from .harmonic.series import half_range
 
 # Number of samples of a cycle for its amplitude; with parabolas between
 # samples the error is negligible.
@@ -371,91 +372,58 @@ def find_balance_cycles(modes: ModalBasis, group: LawGroup, row, limit: float) -
 
 def _find_mode_cycles(modes: ModalBasis, group: LawGroup, mode: int, size: float) -> tuple:
     """Return the limit cycles of one mode and the smallest amplitude [m] that was examined."""
-    shape = np.eye(modes.omega.size)[mode]
+    stuck_mode = modes.compute_stuck_mode(group.rows, group.stiffness(), mode)
+    free_mode = (modes.omega[mode], np.eye(modes.omega.size)[mode])
     paths = (
+        (np.geomspace(MIN_AMPLITUDE_RATIO, MAX_AMPLITUDE_RATIO, N_AMPLITUDES), stuck_mode, 0.0),
         (
-            size * np.geomspace(MIN_AMPLITUDE_RATIO, MAX_AMPLITUDE_RATIO, N_AMPLITUDES),
-            modes.compute_stuck_mode(group.rows, group.stiffness(), mode),
-            0.0,
-        ),
-        (
-            size * np.geomspace(MIN_SLIDING_RATIO, MAX_AMPLITUDE_RATIO, N_SLIDING_AMPLITUDES),
-            (modes.omega[mode], shape),
+            np.geomspace(MIN_SLIDING_RATIO, MAX_AMPLITUDE_RATIO, N_SLIDING_AMPLITUDES),
+            free_mode,
             MIN_SLIDING_RATIO * size,
         ),
     )
-    for amplitudes, start, min_amplitude in paths:
-        try:
-            path = amplitudes, start
-            coarse_cycles = _find_undamped_motions(modes, group, mode, path, N_HARMONICS)
-            fine_cycles = _find_undamped_motions(modes, group, mode, path, 2 * N_HARMONICS + 1)
-        except NotConverged:
+    for ratios, start, min_amplitude in paths:
+        found = [
+            _find_undamped_motions(modes, group, mode, (size * ratios, start), harmonics)
+            for harmonics in (N_HARMONICS, 2 * N_HARMONICS + 1)
+        ]
+        if None in found:
             continue
-        if len(coarse_cycles) != len(fine_cycles):
+        coarse, fine = found
+        if len(coarse) != len(fine):
             raise NotConverged(
-                f"{len(coarse_cycles)} limit cycles were found with {N_HARMONICS} harmonics but {len(fine_cycles)} limit "
+                f"{len(coarse)} limit cycles were found with {N_HARMONICS} harmonics but {len(fine)} limit "
                 f"cycles with {2 * N_HARMONICS + 1} harmonics"
             )
         cycles = []
-        for coarse, fine in zip(coarse_cycles, fine_cycles):
-            change = abs(coarse.amplitude - fine.amplitude)
-            cycles.append(fine._replace(error=2 * change + AMPLITUDE_TOL * fine.amplitude))
+        for other, cycle in zip(coarse, fine):
+            change = abs(other.amplitude - cycle.amplitude)
+            cycles.append(cycle._replace(error=2 * change + AMPLITUDE_TOL * cycle.amplitude))
         return cycles, min_amplitude
     raise NotConverged(NOT_FOLLOWED_MESSAGE)
 
 
 def _find_undamped_motions(
     modes: ModalBasis, group: LawGroup, mode: int, path: tuple, harmonics: int
-) -> list:
-    """Find the limit cycles of a mode: free motions at amplitudes where the damping changes sign.
+) -> list | None:
+    """Find the limit cycles of a mode: free motions without damping; None if free motions are not found.
 
     path: amplitudes (k,) [m], and frequency [rad/s] and shape (n,) of the first motion.
     """
-    amplitudes, (omega, shape) = path
-    slides = np.abs(group.rows @ shape) * amplitudes[-1]
-    balance = make_balance(modes, group, group.samples_for(harmonics, slides))
-    equations = FreeBalance(balance, mode, harmonics, omega)
-    path = trace_free_motions(equations, amplitudes, omega, shape)
-    zeta = np.array([free_motion.zeta for free_motion in path])
+    amplitudes, start = path
+    samples = group.samples_for(harmonics, np.abs(group.rows @ start[1]) * amplitudes[-1])
+    equations = FreeBalance(HarmonicBalance(modes, group, samples), mode, harmonics, start[0])
+    found = find_free_motions(equations, amplitudes, mode=start)
+    if None in found:
+        return None
+
+    # Where the damping changes its sign, a motion without damping lies between two others.
     cycles = []
-    for k in np.flatnonzero(np.sign(zeta[:-1]) * np.sign(zeta[1:]) < 0):
-        undamped_motion = _solve_undamped_between(equations, path[k], path[k + 1])
-        wave = np.exp(
-            1j
-            * np.outer(
-                np.linspace(0, 2 * np.pi, N_SAMPLES + 1), np.arange(len(undamped_motion.modal))
-            )
-        )
-        motion = (wave @ (undamped_motion.modal @ modes.output)).real
-        amplitude = (_find_maximum(motion) + _find_maximum(-motion)) / 2
-        cycles.append(LimitCycle(amplitude, 0.0, undamped_motion.omega, bool(zeta[k + 1] > 0)))
+    for low, high in pairwise(found):
+        if np.sign(low.motion.zeta) * np.sign(high.motion.zeta) < 0:
+            share = low.motion.zeta / (low.motion.zeta - high.motion.zeta)
+            guess = low.unknowns + share * (high.unknowns - low.unknowns)
+            motion = equations.solve(guess, None)[1]
+            amplitude = half_range(motion.modal @ modes.output)
+            cycles.append(LimitCycle(amplitude, 0.0, motion.omega, high.motion.zeta > 0))
     return cycles
-
-
-def _pack_unknowns(equations: FreeBalance, motion: FreeMotion) -> np.ndarray:
-    """Pack a free motion into the vector of unknowns for `FreeBalance.solve`."""
-    y = equations.balance.lift.T @ motion.slides[:, : equations.h + 1]
-    return np.append(
-        pack_harmonics(y) / motion.amplitude, [motion.omega / equations.scale, motion.zeta]
-    )
-
-
-def _solve_undamped_between(
-    equations: FreeBalance, low: FreeMotion, high: FreeMotion
-) -> FreeMotion:
-    """Find the undamped free motion between two with opposite signs of damping (Illinois method)."""
-    ends = [(np.log(motion.amplitude), motion.zeta, motion) for motion in (low, high)]
-    last = 0
-    for _ in range(60):
-        (a, below, start), (b, above, _) = ends
-        at = (a * above - b * below) / (above - below)
-        _, middle = equations.solve(_pack_unknowns(equations, start), float(np.exp(at)))
-        if abs(middle.zeta) < 1e-13 or abs(b - a) < 1e-13:
-            return middle
-        side = int(np.sign(middle.zeta) == np.sign(above))
-        ends[side] = (at, middle.zeta, middle)
-        if side == last:  # the Illinois rule halves the value at the retained end
-            k = 1 - side
-            ends[k] = (ends[k][0], ends[k][1] / 2, ends[k][2])
-        last = side
-    return middle

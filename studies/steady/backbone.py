@@ -23,7 +23,7 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
 import steady_pictures
 from rig_texts import ONE_MODE, TEXTS
 
-from patchfem.dynamics.harmonic.branch import find_backbone
+from patchfem.dynamics import LawGroup, find_free_motions, make_free_balance
 from patchfem.model import build
 from patchfem.runs import choose_numerics, solve_with_coarser
 from patchfem.runs import run as runner
@@ -96,15 +96,19 @@ def case(name: str, shares=SHARES, steps: int = 4000) -> Row:
     )
     element = make_single_law(model, choose_numerics(model), patch).element
     amplitude = size * np.asarray(shares)
-    free = [find_backbone(modes, element, amplitude, harmonics=h) for h in (1, 9)]
+    group = LawGroup(modes, element)
+    free = []
+    for harmonics in (1, 9):
+        equations = make_free_balance(modes, group, 0, amplitude[-1], harmonics)
+        motions = [found.motion for found in find_free_motions(equations, amplitude)]
+        frequency = np.array([motion.omega for motion in motions]) / (2 * np.pi)
+        free.append((frequency, np.array([motion.zeta for motion in motions])))
     w = modes.omega[0]
     zeta = modes.zeta[0]
     stiffness, area = np.array([loop(text, float(a), steps) for a in amplitude]).T
     omega = np.sqrt(w**2 + stiffness / modes.mass)
     damping = zeta * w / omega + area / (2 * np.pi * modes.mass * omega**2 * amplitude**2)
-    return Row(
-        name, amplitude, (omega / (2 * np.pi), damping), *((b.frequency, b.damping) for b in free)
-    )
+    return Row(name, amplitude, (omega / (2 * np.pi), damping), *free)
 
 
 def main(names=tuple(CASES), path: Path | None = FOLDER / "backbone.svg", **how) -> list:

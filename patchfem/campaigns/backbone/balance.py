@@ -6,30 +6,18 @@ periodic motion: Krack, Comput. Struct. 154, 59, 2015). A force at the output in
 the force of a test in phase resonance.
 """
 
-from typing import NamedTuple
-
 import numpy as np
 
 from ...core import NotConverged, PatchfemError
 from ...dynamics import limit_cycles
-from ...dynamics.harmonic.backbone import FreeBalance, FreeMotion
+from ...dynamics.harmonic.backbone import find_free_motions, make_free_balance
 from ...dynamics.harmonic.forces import LawGroup
-from ...dynamics.harmonic.harmonic import pack_harmonics
-from ...dynamics.harmonic.laws import evaluate_series
-from ...dynamics.harmonic.point import find_peak, make_balance
 from ...response.errors import convergence_error
 from .joint import MIN_AMPLITUDE_FACTOR, JointMode
-from .records import AMPLITUDE_TOL, ROUND_OFF_ERROR, Curve, make_curve
+from .records import ROUND_OFF_ERROR, Curve, make_curve
 
 # Numbers of harmonics that are tried in turn, each with four times the samples of the previous one.
 HARMONIC_COUNTS = (9, 19, 39)
-# Largest number of samples per cycle: more take too long, and 39 harmonics need fewer.
-MAX_SAMPLES = 65536
-N_SAMPLES = 4096  # Number of samples per cycle from which the largest displacement is determined.
-MAX_STEPS = 8  # Largest number of secant steps to the motion of the requested output amplitude.
-# Smallest slope of log(output) with respect to log(modal amplitude) at which a secant step is
-# taken.
-MIN_SLOPE = 0.1
 # Number of fixed-point steps to the damping that sustains the motion of a linear rig; they converge fast.
 N_LINEAR_STEPS = 8
 NO_MOTION = "no free motion of these amplitudes was found"
@@ -100,17 +88,36 @@ def tabulate_free_motions(
     -------
     values : (3, k) array
         Frequency [Hz], damping ratio and loss [J]; NaN if no motion is found.
-    motions : list of Solution or None
+    motions : list of FreeSolution or None
     """
-    motions = FreeMotionSolver(group, joint, amplitudes[-1], harmonics).solve(amplitudes)
+    motions = _find_motions(group, joint, amplitudes, harmonics)
     values = np.full((3, len(amplitudes)), np.nan)
-    for column, motion in enumerate(motions):
-        if motion is not None:
-            free = motion.free
-            work = (np.conj(free.slides) * free.forces).imag
-            loss = np.pi * float(np.sum(np.arange(harmonics + 1) * work))
-            values[:, column] = free.omega / (2 * np.pi), free.zeta, loss
+    for column, found in enumerate(motions):
+        if found is not None:
+            motion = found.motion
+            values[:, column] = motion.omega / (2 * np.pi), motion.zeta, motion.loss
     return values, motions
+
+
+def _find_motions(
+    group: LawGroup, joint: JointMode, amplitudes, harmonics: int, excitation=None, starts=None
+) -> list:
+    """Find the free motions at amplitudes (k,) [m] of the output, from similar ones if they are given.
+
+    excitation: matrix E of `FreeBalance`.
+    """
+    equations = make_free_balance(
+        joint.modes,
+        group,
+        joint.mode,
+        amplitudes[-1],
+        harmonics,
+        excitation,
+        joint.modes.output,
+        (harmonics // HARMONIC_COUNTS[0]) ** 2,
+    )
+    small = MIN_AMPLITUDE_FACTOR * float(joint.slip_amplitude)
+    return find_free_motions(equations, amplitudes, small, starts)
 
 
 def find_forces(
@@ -126,180 +133,17 @@ def find_forces(
     modes = joint.modes
     reach = abs(float(modes.output @ joint.shape))
     excitation = np.outer(modes.output, modes.output) / reach**2
-    solver = FreeMotionSolver(group, joint, amplitudes[-1], harmonics, excitation)
-    motions = solver.solve(amplitudes, motions)
     out = np.full((2, len(amplitudes)), np.nan)
-    for column, motion in enumerate(motions):
-        if motion is not None:
+    for column, found in enumerate(
+        _find_motions(group, joint, amplitudes, harmonics, excitation, motions)
+    ):
+        if found is not None:
             # the excitation 2 zeta omega m E z' with E = output output^T/reach^2, as a force at the output
-            free = motion.free
+            free = found.motion
             output = abs(free.modal[1] @ modes.output)
             force = 2 * free.zeta * free.omega**2 * modes.mass * output / reach**2
             out[:, column] = force, free.omega / (2 * np.pi)
     return out
-
-
-class Solution(NamedTuple):
-    """Motion at an amplitude with its unknowns (N,), and amplitude at the output / that of the coordinate."""
-
-    free: FreeMotion
-    unknowns: np.ndarray
-    reach: float
-
-
-class FreeMotionSolver:
-    """Solver for the periodic motions of a mode by harmonic balance.
-
-    Parameters
-    ----------
-    group : LawGroup
-        Steady loops of the laws.
-    joint : JointMode
-    max_amplitude : float
-        Largest amplitude at the output [m].
-    harmonics : int
-    excitation : (n, n) array, optional
-        Excitation in place of the negative damping of all coordinates, as in `FreeBalance`.
-    """
-
-    def __init__(
-        self,
-        group: LawGroup,
-        joint: JointMode,
-        max_amplitude: float,
-        harmonics: int,
-        excitation: np.ndarray | None = None,
-    ):
-        modes = joint.modes
-        omega, shape = modes.compute_stuck_mode(group.rows, group.stiffness(), joint.mode)
-        self.output = modes.output
-        self.reach = abs(float(modes.output @ shape))
-        widest = np.abs(group.rows @ shape) * max_amplitude / self.reach
-        samples = group.samples or group.samples_for(harmonics, widest)
-        samples = min(samples * (harmonics // HARMONIC_COUNTS[0]) ** 2, MAX_SAMPLES)
-        balance = make_balance(modes, group, samples)
-        self.equations = FreeBalance(balance, joint.mode, harmonics, omega, excitation)
-
-        # the stuck mode as initial guess, and an amplitude at which it is nearly exact
-        balance = self.equations.balance
-        faces = np.zeros((balance.lift.shape[1], harmonics + 1), complex)
-        faces[:, 1] = balance.faces @ shape
-        self.stuck = np.append(pack_harmonics(faces), [1.0, 0.0])
-        self.small = MIN_AMPLITUDE_FACTOR * float(joint.slip_amplitude) / self.reach
-
-    def solve(self, amplitudes, starts: list | None = None) -> list[Solution | None]:
-        """Solve for the motions at increasing amplitudes (k,) [m] of the output; None where none is found.
-
-        A search starts from the similar motion in `starts`, else from the motion at the amplitude before. If there is
-        none, for example after a fold of the curve, it starts from the sticking mode, for the first motion also via a
-        small amplitude. Motions that are still missing are then searched for from the motion at the next larger
-        amplitude.
-        """
-        out: list[Solution | None] = [None] * len(amplitudes)
-        for k, amplitude in enumerate(amplitudes):
-            neighbours = [starts[k]] if starts else []
-            neighbours.append(out[k - 1] if k else None)
-            for neighbour in neighbours:
-                out[k] = out[k] or self._solve_from_neighbour(neighbour, amplitude)
-            out[k] = out[k] or self._solve_from_stuck_mode(amplitude, is_first=not any(out))
-        for k in range(len(amplitudes) - 2, -1, -1):
-            out[k] = out[k] or self._solve_from_neighbour(out[k + 1], amplitudes[k])
-        return out
-
-    def _solve_from_neighbour(
-        self, neighbour: Solution | None, amplitude: float
-    ) -> Solution | None:
-        """Solve at an amplitude [m] with a similar motion as initial guess; None if this fails."""
-        if neighbour is None:
-            return None
-        here = amplitude / neighbour.reach
-        try:
-            return self._solve_at_output_amplitude(neighbour.unknowns, here, amplitude)
-        except NotConverged:
-            # The amplitudes are too far apart for a single step.
-            pass
-        try:
-            start = neighbour.free.amplitude
-            x = self.equations.follow_to_amplitude(neighbour.unknowns, start, here)
-            return self._solve_at_output_amplitude(x, here, amplitude)
-        except NotConverged:
-            return None
-
-    def _solve_from_stuck_mode(self, amplitude: float, *, is_first: bool) -> Solution | None:
-        """Solve at an amplitude [m] with the stuck mode as initial guess; None if this fails.
-
-        is_first: whether a search via a small amplitude is tried as well.
-        """
-        here = amplitude / self.reach
-        solve = self.equations.solve
-        try:
-            try:
-                x = solve(self.stuck, here)[0]
-            except NotConverged:
-                if not (is_first and self.small < here):
-                    raise
-                x = solve(self.stuck, self.small)[0]
-                x = self.equations.follow_to_amplitude(x, self.small, here)
-            return self._solve_at_output_amplitude(x, here, amplitude)
-        except NotConverged:
-            return None
-
-    def _solve_at_output_amplitude(self, x, here: float, amplitude: float) -> Solution:
-        """Solve for the motion at an amplitude of the output by secant steps.
-
-        The steps end at the round-off error. If they lead no further, a difference up to AMPLITUDE_TOL is accepted.
-
-        Parameters
-        ----------
-        x : (N,) array
-            Unknowns near the amplitude of the coordinate.
-        here : float
-            Amplitude of the coordinate [m].
-        amplitude : float
-            Requested amplitude at the output [m].
-
-        Raises
-        ------
-        NotConverged
-            If no motion with this amplitude is found.
-        """
-        slope = 1.0
-        before = None
-        best = None
-        best_distance = np.inf
-        for _ in range(MAX_STEPS):
-            try:
-                x, free = self.equations.solve(x, here)
-            except NotConverged:
-                if best is None:
-                    raise
-                break
-            largest = half_peak_to_peak(free.modal @ self.output)
-            distance = float(np.log(largest / amplitude))
-            if best is not None and abs(distance) >= best_distance:
-                break
-            if abs(distance) < AMPLITUDE_TOL:
-                best_distance = abs(distance)
-                best = Solution(free, x, amplitude / here)
-            if abs(distance) < ROUND_OFF_ERROR:
-                break
-
-            # secant step in logarithms; near a turning point of the amplitude the slope is useless
-            if before is not None:
-                last_here, last_distance = before
-                slope = (distance - last_distance) / np.log(here / last_here)
-            slope = slope if slope > MIN_SLOPE else 1.0
-            before = (here, distance)
-            here *= np.exp(-distance / slope)
-        if best is None:
-            raise NotConverged(NO_MOTION)
-        return best
-
-
-def half_peak_to_peak(harmonics) -> float:
-    """Return half the peak-to-peak value of a motion given by its harmonics (H + 1,)."""
-    motion = evaluate_series(harmonics, N_SAMPLES)
-    return (find_peak(motion) + find_peak(-motion)) / 2
 
 
 def _compute_rigid_curve(joint: JointMode, amplitudes) -> Curve:

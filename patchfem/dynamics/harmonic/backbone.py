@@ -1,13 +1,13 @@
-"""Backbone curve of a mode with friction: frequency and damping ratio as functions of amplitude.
+"""Free motions of a mode with friction that a negative damping sustains: frequency and damping over amplitude.
 
-A negative damping that balances friction sustains the motion.
+z'' + (D - 2 zeta omega E) z' + Omega^2 z + rows^T F/m = 0 has, for every amplitude of the mode's coordinate, one periodic
+motion with its own omega and zeta. With E = 1, zeta is the loss of a cycle over 8 pi times the mean kinetic energy, as
+in a slow free decay (extended periodic motion concept: Krack, Comput. Struct. 154, 59, 2015). With one harmonic and one
+mode of slide s this is omega^2 = omega_0^2 + s^2 K_eq/m and zeta = zeta_0 omega_0/omega + loss/(2 pi m omega^2 A^2), where
+K_eq and the loss are those of the friction loop of the contact alone.
 
-z'' + (D - 2 zeta omega) z' + Omega^2 z + faces^T F/m = 0 has, for every amplitude of the mode's
-coordinate, one periodic motion with its own omega and zeta: zeta is the loss of a cycle over 8 pi
-times the mean kinetic energy, as in a slow free decay (extended periodic motion concept: Krack
-2015). With one harmonic and one mode of slide s this is omega^2 = omega_0^2 + s^2 K_eq/m and zeta =
-zeta_0 omega_0/omega + loss/(2 pi m omega^2 A^2), where K_eq and the loss are those of the friction loop
-of the contact alone.
+The unknowns are the slides, omega, zeta and the amplitude a of the coordinate z_j in the first harmonic. A spring and
+damper of any size holds z_j at a, and its force must vanish: z_j = a. A further condition selects the motion.
 """
 
 from typing import NamedTuple
@@ -16,26 +16,25 @@ import numpy as np
 
 from ...core import NotConverged
 from ...formatting import format_length
-from .harmonic import (
-    BalanceEquations,
-    HarmonicBalance,
-    LinearPart,
-    pack_harmonics,
-    solve_damped,
-    unpack_harmonics,
-)
+from .equations import HarmonicBalance, LinearPart, invert_matrices, solve_damped, split_equations
+from .laws import MAX_SAMPLES
+from .motion import find_loss
+from .series import N_SAMPLES, evaluate_series, find_peak, pack_harmonics
 
 # Largest number of times that the step between two amplitudes is halved if no solution is found.
 MAX_HALVINGS = 6
-# Largest number of Newton iterations at each amplitude of a continuation. If they do not converge, an amplitude between
-# the last solution and this one is solved first, which takes fewer evaluations than more iterations.
-MAX_CONTINUATION_ITERATIONS = 10
+# Largest number of Newton steps at each amplitude of a continuation. If they do not converge, an amplitude between the
+# last solution and this one is solved first, which takes fewer evaluations than more steps.
+MAX_CONTINUATION_STEPS = 10
+MAX_RESIDUAL = (
+    1e-7  # residual after the last Newton step, relative to the amplitude, that is round-off
+)
 
 
 class FreeMotion(NamedTuple):
-    """Periodic free motion of one mode at a given amplitude, sustained by negative damping.
+    """Periodic free motion of one mode, sustained by negative damping.
 
-    - amplitude: amplitude of the coordinate of the mode [m]
+    - amplitude: that of the coordinate of the mode in the first harmonic [m]
     - omega, zeta: frequency [rad/s] and damping ratio
     - slides, forces: (i, H + 1) harmonics of the slides [m] and friction forces [N]
     - modal: (H + 1, n) harmonics of the modal coordinates [m]
@@ -48,20 +47,37 @@ class FreeMotion(NamedTuple):
     forces: np.ndarray
     modal: np.ndarray
 
+    @property
+    def loss(self) -> float:
+        """Friction loss per cycle [J]."""
+        return find_loss(self.slides, self.forces)
+
+
+class FreeEquations(NamedTuple):
+    """Residual (N,) of a free motion [m], its derivatives (N, N), and the motion."""
+
+    residual: np.ndarray
+    jacobian: np.ndarray
+    motion: FreeMotion
+
 
 class FreeBalance:
-    """Harmonic balance for the free motion of one mode that is sustained by negative damping.
+    """Harmonic balance for free motions of a coordinate.
 
-    - balance: HarmonicBalance of the interface rows
-    - mode: index of the modal coordinate whose amplitude is prescribed
-    - h: number of harmonics
-
-    - scale: scale of the frequency [rad/s]
-    - excitation: (n, n) matrix E of a force 2 zeta omega m E z' in the first harmonic alone, such as that of a shaker;
-      None for the negative damping 2 zeta omega m z' of all coordinates in all harmonics
-
-    The unknowns are the packed slides of `HarmonicBalance` divided by the amplitude, omega/scale and zeta. The
-    prescribed coordinate has no receptance; its two equations determine omega and zeta.
+    Parameters
+    ----------
+    balance : HarmonicBalance
+    mode : int
+        Index of the coordinate.
+    harmonics : int
+    omega : float
+        Scale of the frequency [rad/s].
+    excitation : (n, n) array, optional
+        Matrix E of a force 2 zeta omega m E z' in the first harmonic alone, such as that of a shaker; default: the
+        negative damping of all coordinates in all harmonics.
+    output : (n,) array, optional
+        Row of the displacement to which amplitudes belong, as half its range; default: the coordinate in the first
+        harmonic.
     """
 
     def __init__(
@@ -69,125 +85,157 @@ class FreeBalance:
         balance: HarmonicBalance,
         mode: int,
         harmonics: int,
-        scale: float,
-        excitation: np.ndarray | None = None,
+        omega: float,
+        excitation=None,
+        output=None,
     ):
         self.balance = balance
         self.mode = mode
         self.h = harmonics
-        self.scale = scale
+        self.omega = omega
+        self.output = output
         n = balance.modes.omega.size
-        # matrix of the exciting force for each harmonic
-        self.excitation = np.broadcast_to(np.eye(n), (harmonics + 1, n, n))
-        if excitation is not None:
-            is_first = np.arange(harmonics + 1) == 1
-            self.excitation = is_first[:, None, None] * excitation
+        is_excited = np.ones(harmonics + 1) if excitation is None else np.arange(harmonics + 1) == 1
+        self.excitation = is_excited[:, None, None] * (
+            np.eye(n) if excitation is None else excitation
+        )
 
-    def make_linear_part(self, omega: float, zeta: float) -> LinearPart:
-        """Return the receptances of the modes, to which the damping -2 zeta omega E is added.
+    def start(self, omega: float, shape, amplitude: float) -> np.ndarray:
+        """Return the unknowns of a linear mode.
 
-        The coordinate of prescribed amplitude has no receptance. omega: frequency [rad/s].
+        Parameters
+        ----------
+        omega : float
+            Frequency of the mode [rad/s].
+        shape : (n,) array
+        amplitude : float
+            At the output [m].
         """
-        modes = self.balance.modes
-        k = np.arange(self.h + 1)[:, None, None]
-        eye = np.eye(modes.omega.size)
-        is_other = np.arange(modes.omega.size) != self.mode
-        dynamic_stiffness = (
-            np.diag(modes.omega**2)
-            - (k * omega) ** 2 * eye
-            + 1j * k * omega * (modes.damping_matrix - 2 * zeta * omega * self.excitation)
-        )
-        inverse = np.zeros_like(dynamic_stiffness)
-        right_vector = eye[self.mode] + 0j
-        left_vector = eye[self.mode] + 0j
-        inverse[np.arange(self.h + 1) != 1] = _invert_matrices(
-            dynamic_stiffness[np.arange(self.h + 1) != 1]
-        )
-        inverse[np.ix_([1], is_other, is_other)] = np.linalg.inv(
-            dynamic_stiffness[1][np.ix_(is_other, is_other)]
-        )
-        right_vector -= inverse[1] @ dynamic_stiffness[1][:, self.mode]
-        left_vector -= dynamic_stiffness[1][self.mode] @ inverse[1]
-        damping_slope = modes.damping_matrix - 4 * zeta * omega * self.excitation
-        slope = -2 * k**2 * omega * eye + 1j * k * damping_slope
-        return LinearPart(
-            inverse,
-            slope,
-            ((1, right_vector, left_vector, left_vector @ dynamic_stiffness[1][:, self.mode]),),
-        )
+        y = np.zeros((self.balance.rank, self.h + 1), complex)
+        reach = 1.0 if self.output is None else abs(float(self.output @ shape))
+        y[:, 1] = self.balance.faces @ shape * amplitude / reach
+        return np.append(pack_harmonics(y), [omega / self.omega, 0.0, amplitude / reach])
 
-    def evaluate(self, x, amplitude: float) -> BalanceEquations:
-        """Evaluate the balance equations for a free motion at given unknowns and amplitude.
+    def evaluate(self, x, amplitude: float | None) -> FreeEquations:
+        """Evaluate the equations of a free motion.
 
-        x: unknowns (N,); amplitude [m], by which all lengths of the equations are divided.
-
+        Parameters
+        ----------
+        x : (N,) array
+            Packed slides [m], omega over its scale, zeta, and amplitude of the coordinate [m].
+        amplitude : float or None
+            Amplitude of the output [m]; None for a motion without damping, zeta = 0.
         """
-        omega = x[-2] * self.scale
-        zeta = x[-1]
         balance = self.balance
+        modes = balance.modes
+        omega = x[-3] * self.omega
+        zeta, a = x[-2:]
         if not omega > 0:
-            return BalanceEquations(np.full(x.size, np.inf), np.eye(x.size), None, None, None)
-        linear_part = self.make_linear_part(omega, zeta)
-        equations = balance.evaluate(
-            np.append(x[:-2] * amplitude, [amplitude, 0.0]), omega, 0.0, self.h, linear_part
+            return FreeEquations(np.full(x.size, np.inf), np.eye(x.size), None)
+
+        # The spring of the coordinate is as stiff as the mode.
+        damping = modes.damping_matrix - 2 * zeta * omega * self.excitation
+        stiffness, by_omega = balance.make_stiffness(omega, self.h, damping)
+        k = np.arange(self.h + 1)[:, None, None]
+        by_omega = by_omega - 2j * k * omega * zeta * self.excitation
+        spring = self.omega**2 * (1 + 1j)
+        stiffness[1, self.mode, self.mode] += spring
+        exciting = np.zeros((self.h + 1, modes.omega.size), complex)
+        exciting[1, self.mode] = spring * a
+        rows = [balance.faces, np.eye(modes.omega.size)[[self.mode]]]
+        rows += [] if self.output is None else [self.output[None]]
+        measured = np.vstack(rows)
+        linear = LinearPart(invert_matrices(stiffness), by_omega)
+        motion = balance.find_motion(x[:-3], omega, linear, exciting, measured)
+
+        # Measured displacements, and their derivatives by all unknowns.
+        values = motion.modal @ measured.T
+        by_zeta = 2j * k[..., 0] * omega**2 * np.einsum("kab,kb->ka", self.excitation, motion.modal)
+        by_zeta = np.einsum("kpa,ka->kp", motion.transfer, by_zeta)
+        by_a = np.zeros_like(by_zeta)
+        by_a[1] = motion.transfer[1, :, self.mode] * spring
+        slopes = np.concatenate(
+            [motion.by_unknowns, np.stack([motion.by_omega * self.omega, by_zeta, by_a], axis=2)],
+            axis=2,
         )
-        # This is the derivative of the dynamic stiffness with respect to zeta, times the motion.
-        excited = np.einsum("kab,kb->ka", self.excitation, equations.modal)
-        by_zeta = -2j * np.arange(self.h + 1)[:, None] * omega**2 * excited
-        slides_by_zeta = balance.faces @ np.einsum("kab,kb->ak", linear_part.inverse, by_zeta)
-        residual_by_zeta = linear_part.free[0][2] @ by_zeta[1] / omega**2
-        jacobian = equations.jacobian.copy()
-        jacobian[:, -2] = equations.by_omega * self.scale / amplitude
-        jacobian[:, -1] = (
-            np.append(
-                pack_harmonics(slides_by_zeta), [residual_by_zeta.real, residual_by_zeta.imag]
-            )
-            / amplitude
+        r = balance.rank
+        residual = np.empty(x.size)
+        jacobian = np.zeros((x.size, x.size))
+        residual[:-3] = x[:-3] - split_equations(values[:, :r])
+        jacobian[:-3] = np.eye(x.size)[:-3] - split_equations(slopes[:, :r])
+        residual[-3:-1] = values[1, r].real - a, values[1, r].imag
+        jacobian[-3:-1] = slopes[1, r].real, slopes[1, r].imag
+        jacobian[-3, -1] -= 1.0
+        residual[-1], jacobian[-1] = self._find_condition(
+            x, amplitude, values[:, -1], slopes[:, -1]
         )
-        return equations._replace(residual=equations.residual / amplitude, jacobian=jacobian)
+        slides = balance.unpack_slides(x[:-3])
+        free = FreeMotion(a, omega, zeta, slides, motion.contact.force, motion.modal)
+        return FreeEquations(residual, jacobian, free)
 
-    def solve(self, x, amplitude: float, max_steps: int = 40) -> tuple:
-        """Solve for the free motion at an amplitude by Newton's method.
+    def _find_condition(self, x, amplitude: float | None, output, slopes) -> tuple:
+        """Return residual [m] and derivatives (N,) of the condition that selects the motion.
 
-        x: unknowns (N,) of the initial guess; amplitude [m]; max_steps: number of Newton iterations.
+        output, slopes: harmonics (H + 1,) of the output [m] and their derivatives (H + 1, N).
+        """
+        gradient = np.zeros(x.size)
+        if amplitude is None:
+            gradient[-2:] = x[-1], x[-2]
+            return x[-2] * x[-1], gradient
+        if self.output is None:
+            gradient[-1] = 1.0
+            return x[-1] - amplitude, gradient
+        motion = evaluate_series(output, N_SAMPLES)
+        ends = 2 * np.pi / N_SAMPLES * np.array([np.argmax(motion), np.argmin(motion)])
+        high, low = np.exp(1j * np.outer(ends, np.arange(output.size)))
+        residual = (find_peak(motion) + find_peak(-motion)) / 2 - amplitude
+        return residual, ((high - low) @ slopes).real / 2
 
-        Returns
-        -------
-        unknowns : ndarray
-        motion : FreeMotion
+    def solve(
+        self, x, amplitude: float | None, max_steps: int = 40
+    ) -> tuple[np.ndarray, FreeMotion]:
+        """Solve for the unknowns and the motion at an amplitude of the output [m], or without damping for None.
+
+        Parameters
+        ----------
+        x : (N,) array
+            Unknowns of a similar motion.
+        amplitude : float or None
+        max_steps : int
+            Number of Newton steps.
 
         Raises
         ------
         NotConverged
             If there is no motion near x.
         """
-        solution = solve_damped(
-            lambda v: self.evaluate(v, amplitude),
-            x,
-            lambda _, left, size: np.linalg.norm(left) < 1e-7,
-            max_steps=max_steps,
-        )
+        size = abs(x[-1])
+        unit = np.full(x.size, size)
+        unit[-3:-1] = 1.0
+
+        def evaluate(scaled) -> FreeEquations:
+            residual, jacobian, motion = self.evaluate(scaled * unit, amplitude)
+            return FreeEquations(residual / size, jacobian * unit / size, motion)
+
+        def is_solved(equations, residual, size) -> bool:
+            return float(np.linalg.norm(residual)) < MAX_RESIDUAL
+
+        solution = solve_damped(evaluate, x / unit, is_solved, max_steps)
         if solution is None:
             raise NotConverged(
-                f"backbone: no free motion with the amplitude {format_length(amplitude, 3)} was found by "
+                f"backbone: no free motion with the amplitude {format_length(amplitude or x[-1], 3)} was found by "
                 "following the motion from smaller amplitudes"
             )
-        x = solution[0]
-        equations = self.evaluate(solution[0], amplitude)
-        slides = self.balance.lift @ unpack_harmonics(
-            x[:-2] * amplitude, self.balance.lift.shape[1]
-        )
-        return x, FreeMotion(
-            amplitude, x[-2] * self.scale, x[-1], slides, equations.fold.force, equations.modal
-        )
+        x = solution[0] * unit
+        return x, self.evaluate(x, amplitude).motion
 
-    def follow_to_amplitude(self, x, start: float, target: float) -> np.ndarray:
-        """Follow a free motion from one amplitude to another by natural continuation.
+    def follow(self, x, start: float, target: float) -> tuple[np.ndarray, FreeMotion]:
+        """Follow a free motion from one amplitude to another.
 
         Parameters
         ----------
-        x : (N,) ndarray
-            Unknowns at the amplitude `start`.
+        x : (N,) array
+            Unknowns at the first amplitude.
         start, target : float
             First and last amplitude [m].
 
@@ -198,57 +246,112 @@ class FreeBalance:
         """
         targets = [float(target)]
         while targets:
+            scaled = x * np.append(
+                np.full(x.size - 3, targets[-1] / start), [1.0, 1.0, targets[-1] / start]
+            )
             try:
-                x = self.solve(x, targets[-1], MAX_CONTINUATION_ITERATIONS)[0]
+                x, motion = self.solve(scaled, targets[-1], MAX_CONTINUATION_STEPS)
                 start = targets.pop()
             except NotConverged:
                 if len(targets) > MAX_HALVINGS:
                     raise
                 targets.append(float(np.sqrt(start * targets[-1])))
-        return x
+        return x, motion
 
 
-def _invert_matrices(matrices) -> np.ndarray:
-    """Return the inverses of matrices (k, n, n), or their pseudoinverses if one of them is singular.
+class FreeSolution(NamedTuple):
+    """Free motion at an amplitude of the output [m], and its unknowns (N,)."""
 
-    A matrix is singular if nothing determines the mean of a coordinate.
+    amplitude: float
+    unknowns: np.ndarray
+    motion: FreeMotion
 
+
+def make_free_balance(
+    modes,
+    group,
+    mode: int,
+    max_amplitude: float,
+    harmonics: int,
+    excitation=None,
+    output=None,
+    factor: int = 1,
+) -> FreeBalance:
+    """Return the balance of the free motions of a mode up to an amplitude of the output [m].
+
+    Parameters
+    ----------
+    modes : ModalBasis
+    group : LawGroup
+    mode, harmonics, excitation, output
+        See `FreeBalance`.
+    max_amplitude : float
+    factor : int, optional
+        Samples per cycle, relative to those that the laws need.
     """
-    try:
-        inverses = np.linalg.inv(matrices)
-        if np.isfinite(inverses).all():
-            return inverses
-    except np.linalg.LinAlgError:
-        pass
-    return np.linalg.pinv(matrices, rcond=1e-13)
+    omega, shape = modes.compute_stuck_mode(group.rows, group.stiffness(), mode)
+    reach = 1.0 if output is None else abs(float(output @ shape))
+    widest = np.abs(group.rows @ shape) * max_amplitude / reach
+    samples = min(factor * group.samples_for(harmonics, widest), MAX_SAMPLES)
+    return FreeBalance(
+        HarmonicBalance(modes, group, samples), mode, harmonics, omega, excitation, output
+    )
 
 
-def trace_free_motions(equations: FreeBalance, amplitudes, omega: float, shape) -> list:
-    """Compute the free motions of a mode at increasing amplitudes, starting from its linear mode shape.
+def find_free_motions(
+    equations: FreeBalance,
+    amplitudes,
+    small: float = 0.0,
+    starts: list | None = None,
+    mode: tuple | None = None,
+) -> list[FreeSolution | None]:
+    """Find the free motions at increasing amplitudes (k,) [m] of the output; None where none is found.
+
+    A search starts from the similar motion in `starts`, else from the motion at the amplitude before. If there is none,
+    for example after a fold of the curve, it starts from the linear mode, for the first motion also via a small
+    amplitude. Motions that are still missing are then searched for from the motion at the next larger amplitude.
 
     Parameters
     ----------
     equations : FreeBalance
-    amplitudes : array_like
-    omega : float
-        Natural frequency of the linear mode [rad/s].
-    shape : ndarray
-        (n,) shape of the linear mode.
-
-    Returns
-    -------
-    list of FreeMotion
+    amplitudes : (k,) array
+    small : float, optional
+        Amplitude [m] at which the linear mode is nearly exact.
+    starts : list, optional
+        Similar motions.
+    mode : tuple, optional
+        Frequency [rad/s] and shape (n,) of the linear mode; by default that of the sticking contact.
     """
-    balance = equations.balance
-    h = equations.h
-    y = np.zeros((balance.lift.shape[1], h + 1), complex)
-    y[:, 1] = balance.faces @ shape
-    x = np.append(pack_harmonics(y), [omega / equations.scale, 0.0])
-    last_amplitude = None
-    motions = []
-    for target in amplitudes:
-        x = equations.follow_to_amplitude(x, last_amplitude, target) if motions else x
-        x, motion = equations.solve(x, float(target))
-        last_amplitude = float(target)
-        motions.append(motion)
-    return motions
+    modes = equations.balance.modes
+    group = equations.balance.group
+    linear_mode = mode or modes.compute_stuck_mode(group.rows, group.stiffness(), equations.mode)
+
+    def solve_near(neighbour: FreeSolution | None, amplitude: float) -> FreeSolution | None:
+        """Solve at an amplitude with a similar motion as initial guess; None if this fails."""
+        if neighbour is None:
+            return None
+        try:
+            found = equations.follow(neighbour.unknowns, neighbour.amplitude, amplitude)
+        except NotConverged:
+            return None
+        return FreeSolution(amplitude, *found)
+
+    def solve_linear_mode(amplitude: float) -> FreeSolution | None:
+        """Solve at an amplitude with the linear mode as initial guess; None if this fails."""
+        try:
+            return FreeSolution(
+                amplitude, *equations.solve(equations.start(*linear_mode, amplitude), amplitude)
+            )
+        except NotConverged:
+            return None
+
+    out: list[FreeSolution | None] = [None] * len(amplitudes)
+    for k, amplitude in enumerate(map(float, amplitudes)):
+        out[k] = solve_near(starts[k] if starts else None, amplitude)
+        out[k] = out[k] or solve_near(out[k - 1] if k else None, amplitude)
+        out[k] = out[k] or solve_linear_mode(amplitude)
+        if out[k] is None and 0 < small < amplitude and not any(out):
+            out[k] = solve_near(solve_linear_mode(small), amplitude)
+    for k in range(len(amplitudes) - 2, -1, -1):
+        out[k] = out[k] or solve_near(out[k + 1], float(amplitudes[k]))
+    return out

@@ -1,7 +1,6 @@
-"""Periodic state of a friction law with one memory variable along a cycle (compiled).
+"""Periodic stretch of a friction law with one state along a cycle, and its derivatives (compiled).
 
-The samples and the reversals between them are the nodes of the cycle. From one node to the
-next the slide changes linearly; forces are evaluated at the nodes, with the velocity there.
+From one node of the cycle to the next the slide changes linearly; the force is evaluated at the nodes.
 """
 
 from math import inf
@@ -10,83 +9,77 @@ from ...compiled.jit import njit
 from ...friction.flags_kernels import NJIT_NO_REFCOUNT
 from ...friction.laws import stretch_kernels as law
 
-# Largest number of cycles in the iteration to a periodic memory.
-MAX_CYCLES = 60
+MAX_CYCLES = 60  # largest number of cycles until the stretch is periodic
+CLOSED_RATIO = 1e-14  # change over a cycle, relative to the stretch, that is round-off
+MIN_FADING = 1e-9  # smallest part of a stretch that fades in a cycle for Newton's method
+MIN_FADED = 1e-12  # the same for derivatives of a periodic stretch
 
 
 @njit(error_model="numpy", cache=True, **NJIT_NO_REFCOUNT)
-def solve_cycle(num, q, speed, dt, z, steps, force, slopes):
-    """Solve for the periodic state of a friction law with one memory variable over a cycle.
+def solve_cycle(numbers, q, velocity, dt, stretch, steps, force, slopes):
+    """Find the periodic stretch that a cycle from an unstretched contact reaches.
 
-    The first cycle starts from a virgin contact; Newton steps on the memory at the first node
-    follow if the memory fades within a cycle.
+    From the second cycle on, Newton's method corrects the stretch at the first node, if it fades within a cycle.
 
     Parameters
     ----------
-    num : ndarray
-        (1, k) numbers of the law.
-    q, speed, dt : ndarray
-        (M,) slides [m], velocities [m/s] and times [s] to the next node.
-    z : ndarray
-        (M,) becomes the memory.
-    steps : ndarray
-        (3, M) becomes the derivatives of the next z with respect to z, slide and time.
-    force : ndarray
-        (M,) becomes the force [N].
-    slopes : ndarray
-        (2, M) becomes the derivatives of the force with respect to z and velocity.
+    numbers : (k,) array
+        Numbers of the law.
+    q, velocity, dt : (M,) array
+        Slides [m], velocities [m/s] and times to the next node [s].
+    stretch : (M,) array
+        It is written [m].
+    steps : (3, M) array
+        Derivatives of the next stretch by stretch, slide and time, which are written.
+    force, slopes : (M,), (2, M) array
+        Force [N] and its derivatives by stretch and velocity, which are written.
     """
     n = q.size
-    duration = 0.0
-    for i in range(n):
-        duration += dt[i]
-    start = law.relax_stretch(num[0], 0.0, q[0], duration).stretch
+    start = law.relax_stretch(numbers, 0.0, q[0], dt.sum()).stretch
     last = inf
     for cycle in range(MAX_CYCLES):
         now = start
         kept = 1.0
         largest = abs(start)
         for i in range(n):
-            z[i] = now
+            stretch[i] = now
             now, steps[0, i], steps[1, i], steps[2, i] = law.relax_stretch(
-                num[0], now, q[(i + 1) % n] - q[i], dt[i]
+                numbers, now, q[(i + 1) % n] - q[i], dt[i]
             )
             kept *= steps[0, i]
             largest = max(largest, abs(now))
-        mismatch = abs(now - start)
-        # The iteration ends when the periodicity error has reached
-        # round-off or no longer decreases.
-        if mismatch <= 1e-14 * largest * min(1 - kept, 1.0) or (
-            cycle > 2 and mismatch > 0.5 * last
-        ):
+        gap = abs(now - start)
+        is_closed = gap <= CLOSED_RATIO * largest * min(1 - kept, 1.0)
+        if is_closed or (cycle > 2 and gap > 0.5 * last):
             break
-        last = mismatch
-        start += (now - start) / (1 - kept) if cycle and kept < 1 - 1e-9 else now - start
+        last = gap
+        fades = cycle > 0 and kept < 1 - MIN_FADING
+        start += (now - start) / (1 - kept) if fades else now - start
     for i in range(n):
-        direction = 1.0 if speed[i] > 0 else -1.0
-        rates = law.rate_equation(num[0], z[i], speed[i], direction)
+        rates = law.rate_equation(
+            numbers, stretch[i], velocity[i], 1.0 if velocity[i] > 0 else -1.0
+        )
         force[i] = rates.force
         slopes[0, i] = rates.force_by_stretch
         slopes[1, i] = rates.force_by_velocity
 
 
 @njit(error_model="numpy", cache=True, **NJIT_NO_REFCOUNT)
-def solve_tangents(steps, out):
-    """Solve for the derivatives (M, p) of the periodic memory with respect to p parameters.
+def solve_recursion(decay, source):
+    """Solve z[i + 1] = decay[i] z[i] + source[i] for the periodic z, which replaces the source; 0 if z does not fade.
 
-    out: on entry the derivative of the slide increment of every step, in the last
-    column that of the time increment; on return the derivatives of the memory.
+    Parameters
+    ----------
+    decay : (M,) array
+    source : (M,) complex array
     """
-    n, p = out.shape
-    for k in range(p):
-        by = 2 if k == p - 1 else 1
-        kept = 1.0
-        now = 0.0
-        for i in range(n):
-            now = steps[0, i] * now + steps[by, i] * out[i, k]
-            kept *= steps[0, i]
-        now = now / (1 - kept) if kept < 1 - 1e-12 else 0.0
-        for i in range(n):
-            taken = out[i, k]
-            out[i, k] = now
-            now = steps[0, i] * now + steps[by, i] * taken
+    kept = 1.0
+    now = 0.0 + 0.0j
+    for i in range(source.size):
+        now = decay[i] * now + source[i]
+        kept *= decay[i]
+    now = now / (1 - kept) if kept < 1 - MIN_FADED else 0.0 + 0.0j
+    for i in range(source.size):
+        change = source[i]
+        source[i] = now
+        now = decay[i] * now + change

@@ -1,14 +1,11 @@
-"""Friction laws and springs sampled over one cycle of a periodic relative displacement.
+"""Friction laws and springs along one cycle of a periodic relative displacement.
 
-Forces are taken at instants, not as means over steps: the mean of a trigonometric polynomial over
-equal samples is exact up to their number, so only the corners of the force alias, by (slope
-jump)(2 pi/N)^2/12, while a mean over a step damps every harmonic by (k pi/N)^2/6. Reversals
-are located from the harmonics, not at samples.
+Forces are taken at instants, not as means over steps: the mean of a trigonometric polynomial over equal samples is
+exact up to their number, so only the corners of the force alias, by (slope jump)(2 pi/N)^2/12.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cache, cached_property
+from functools import cache
 from typing import NamedTuple
 
 import numpy as np
@@ -16,160 +13,53 @@ import numpy as np
 from ...compiled import instantiate, load
 from ...core import PatchfemError, frozen_array
 from ...friction.protocol import Element
+from .series import find_harmonics
+from .slides import Slides
 
 # Number of samples while an element passes from one friction limit to the other.
 SAMPLES_PER_STICK = 48
+MAX_SAMPLES = 65536  # largest number of samples per cycle
+MAX_WAVES = 1000.0  # largest number of passed wavelengths for which the samples are increased
 
 
 @cache
-def load_cycle_kernels():
-    """Load the compiled kernels that find reversals and sample elastic-plastic elements over a cycle."""
-    return load("dynamics.harmonic.cycle_kernels")
+def load_kernels(name: str, law: str):
+    """Load the compiled functions of a module of this folder for the law of another module."""
+    return instantiate(f"dynamics.harmonic.{name}", {"law": load(law)})
 
 
-@cache
-def load_speed_kernels(law: str):
-    """Load the compiled kernel that samples a velocity-dependent law without memory."""
-    return instantiate("dynamics.harmonic.speed_kernels", {"law": load(law)})
+class FlowStates(NamedTuple):
+    """Periodic state of a law with one state at the M nodes of a cycle.
+
+    - steps: (3, M) derivatives of the next stretch by stretch, slide and time
+    - slopes: (2, M) derivatives of the force by stretch [N/m] and velocity [N s/m]
+    """
+
+    steps: np.ndarray
+    slopes: np.ndarray
 
 
-@cache
-def load_flow_kernels(law: str):
-    """Load the compiled kernel that finds the periodic state of a law with one memory variable."""
-    return instantiate("dynamics.harmonic.flow_kernels", {"law": load(law)})
+class LawForce(NamedTuple):
+    """Force of a law at the M nodes of a cycle, and its derivatives.
 
-
-class SampledForce(NamedTuple):
-    """Force of a friction law at N samples of a cycle, and its derivatives.
-
-    - force, slope, by_rate: force [N], derivative with respect to slide [N/m] and velocity [N s/m]
-    - hold: (R, N) derivatives with respect to the slides at R reversals [N/m]
-    - limit, stretch: friction limit [N], and elastic stretch times it (N,) [N m]
-    - tangent: for a law whose memory is not that of reversals, a function that returns the
-      derivatives of the force with respect to the harmonics of the slide (N, 2 H + 1), real parts
-      first, and to the frequency (N,)
+    - force: (M,) [N]
+    - slope, by_velocity: (M,) derivatives by slide [N/m] and velocity [N s/m], or 0
+    - holds: (r, M) derivatives by the slides at the reversals of the interface [N/m], or 0
+    - limit, stretch: friction limit [N], and the elastic stretch times it (M,) [N m]
+    - states: states of a law whose memory is no slide at a reversal; its derivatives follow from them alone
     """
 
     force: np.ndarray
-    slope: np.ndarray | None = None
-    by_rate: np.ndarray | None = None
-    hold: np.ndarray | None = None
+    slope: np.ndarray | float = 0.0
+    by_velocity: np.ndarray | float = 0.0
+    holds: np.ndarray | float = 0.0
     limit: float = 0.0
-    stretch: np.ndarray | None = None
-    tangent: Callable | None = None
-
-
-class TurningPoints(NamedTuple):
-    """Reversals of a periodic relative displacement within a cycle.
-
-    - angles, slides: (R,) angle [rad] and slide [m] at each reversal
-    - cells: (R,) index of the sample before each reversal
-    - start: direction of the slide at the first sample
-    """
-
-    angles: np.ndarray
-    slides: np.ndarray
-    cells: np.ndarray
-    start: float
-
-
-class JenkinsSums(NamedTuple):
-    """Cumulative sums (t + 1,) over Jenkins elements, sorted by yield displacement.
-
-    They are sums of the stiffness k [N/m], k limit [N] and k limit^2 [N m].
-
-    """
-
-    stiffness: np.ndarray
-    limit: np.ndarray
-    square: np.ndarray
-
-
-class JenkinsGroups(NamedTuple):
-    """Groups of Jenkins elements whose last slip ended at the same reversal (workspace).
-
-    The innermost group is the last one.
-
-    - end: number of elements up to the end of a group
-    - mark: index of the reversal, -1 before the first one
-    - sign, base: direction of the slip, and slide [m] at the reversal
-    """
-
-    end: np.ndarray
-    mark: np.ndarray
-    sign: np.ndarray
-    base: np.ndarray
-
-
-class JenkinsSamples(NamedTuple):
-    """Forces and stiffnesses of parallel Jenkins elements at N samples of a cycle.
-
-    - force: (N,) total force [N]
-    - slope: (N,) stiffness of the sticking elements [N/m]
-    - hold: (R, N) derivatives of the force with respect to the slides at R reversals [N/m]
-    - stretch: (N,) sum of k limit stretch [N m]
-    """
-
-    force: np.ndarray
-    slope: np.ndarray
-    hold: np.ndarray
-    stretch: np.ndarray
-
-
-class SampledSlide:
-    """Periodic relative displacement, sampled at equidistant instants of the cycle.
-
-    - x: (H + 1,) harmonics [m]; omega [rad/s]; samples: N
-    - q, rate: (N,) slide and dq/d(omega t) [m]
-    """
-
-    def __init__(self, x, omega: float, samples: int, q=None, rate=None):
-        self.x = x
-        self.omega = omega
-        self.samples = samples
-        self.q = evaluate_series(x, samples) if q is None else q
-        self.rate = evaluate_series(1j * np.arange(x.size) * x, samples) if rate is None else rate
-
-    @cached_property
-    def turning_points(self) -> "TurningPoints":
-        """Reversals of the relative displacement within the cycle."""
-        n = self.samples
-        angle = np.empty(n)
-        slide = np.empty(n)
-        cell = np.empty(n, np.int64)
-        re = np.ascontiguousarray(self.x.real)
-        im = np.ascontiguousarray(self.x.imag)
-        count, start = load_cycle_kernels().find_turning_points(
-            re, im, self.rate, angle, slide, cell
-        )
-        return TurningPoints(angle[:count], slide[:count], cell[:count], start)
-
-
-def evaluate_series(x, samples: int) -> np.ndarray:
-    """Evaluate the Fourier series Re sum X_k exp(i k theta) at N samples of a cycle."""
-    if 2 * x.shape[-1] > samples:
-        stride = -(-2 * x.shape[-1] // samples)
-        return evaluate_series(x, samples * stride)[..., ::stride]
-    spectrum = np.zeros((*x.shape[:-1], samples // 2 + 1), complex)
-    spectrum[..., : x.shape[-1]] = x * (samples / 2)
-    spectrum[..., 0] *= 2
-    return np.fft.irfft(spectrum, samples, axis=-1)
-
-
-def find_harmonics(values, harmonics: int) -> np.ndarray:
-    """Compute the complex harmonics (..., H + 1) from samples (..., N) of a cycle.
-
-    H must not exceed N/2.
-
-    """
-    n = values.shape[-1]
-    out = np.fft.rfft(values, axis=-1)[..., : harmonics + 1] * (2 / n)
-    out[..., 0] /= 2
-    return out
+    stretch: np.ndarray | float = 0.0
+    states: FlowStates | None = None
 
 
 class Law:
-    """Force law of an interface row for harmonic balance.
+    """Force law of an interface for harmonic balance.
 
     total: tangent stiffness at rest [N/m], 0 for a law that creeps under any force.
     """
@@ -178,92 +68,138 @@ class Law:
     total = 0.0
 
     def count_samples(self, amplitude: float) -> int:
-        """Return the number of samples per cycle needed to resolve the kinks of the force.
-
-        amplitude: amplitude of the slide [m]. The number is 0 for a smooth force.
-
-        """
+        """Return the number of samples that resolve the corners of the force at an amplitude [m]; 0 without corners."""
         return 0
 
-    def sample(self, track: "SampledSlide") -> "SampledForce":
-        """Sample the steady periodic force for a periodic displacement, from an initially unstretched contact."""
+    def evaluate(self, slides: Slides, row: int) -> LawForce:
+        """Return the steady force for the slide of an interface that starts from an unstretched contact."""
         raise NotImplementedError
+
+
+class _Reversal(NamedTuple):
+    """Reversal in the memory of parallel elements.
+
+    Contains its number in the cycle, the slide [m], the force [N], the stretch times the limit [N m] and the derivatives
+    (r,) of the force by the slides at all reversals.
+    """
+
+    number: int
+    slide: float
+    force: float
+    stretch: float
+    holds: np.ndarray
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Jenkins(Law):
-    """Parallel elastic-plastic (Jenkins) elements on an interface row.
+    """Parallel elastic-plastic (Jenkins) elements, by Masing's rules.
 
-    stiffness: (t,) stiffnesses [N/m] > 0; limit_slide: (t,) yield slides [m] >= 0.
+    On first loading to the slide x the force is B(x) = sum k min(x, w). From a reversal at (q_r, F_r) in the direction
+    d it is F_r + 2 d B(d (q - q_r)/2), until the branch before the last one is met.
+
+    stiffness: (t,) [N/m] > 0; limit_slide: (t,) slides w [m] >= 0 at which the elements yield.
     """
 
     stiffness: np.ndarray
     limit_slide: np.ndarray
-    sums: tuple = ()
+    curve: tuple = ()
 
     def __post_init__(self):
         k, w = (np.atleast_1d(np.asarray(v, float)) for v in (self.stiffness, self.limit_slide))
-        if (
-            k.shape != w.shape
-            or not (np.isfinite(k).all() and np.isfinite(w).all())
-            or k.min() <= 0
-            or w.min() < 0
-        ):
+        is_finite = np.isfinite(k).all() and np.isfinite(w).all()
+        if k.shape != w.shape or not is_finite or k.min() <= 0 or w.min() < 0:
             raise PatchfemError(
                 "each Jenkins element needs a finite stiffness > 0 and a finite limit slide >= 0"
             )
-        order = np.argsort(w, kind="stable")
-        k = k[order]
-        w = w[order]
         object.__setattr__(self, "stiffness", frozen_array(k))
         object.__setattr__(self, "limit_slide", frozen_array(w))
-        object.__setattr__(
-            self,
-            "sums",
-            JenkinsSums(
-                *(frozen_array(np.append(0.0, np.cumsum(v))) for v in (k, k * w, k * w * w))
-            ),
-        )
+
+        # Corners of the curve of first loading; before each of them the elements beyond it stick.
+        ends, which = np.unique(w, return_inverse=True)
+        parts = np.bincount(which, k)
+        sticking = np.cumsum(parts[::-1])[::-1]
+        rises = np.diff(ends, prepend=0.0)
+        forces = np.append(0.0, np.cumsum(sticking * rises))
+        limits = np.cumsum((parts * ends)[::-1])[::-1]
+        stretches = np.append(0.0, np.cumsum(limits * rises))
+        corners = np.append(0.0, ends)
+        object.__setattr__(self, "curve", (corners, forces, stretches, np.append(sticking, 0.0)))
 
     @property
     def total(self) -> float:
         """Tangent stiffness at rest [N/m]."""
-        return float(self.sums.stiffness[-1])
+        return float(self.stiffness.sum())
+
+    @property
+    def limit(self) -> float:
+        """Sum of the slip forces [N]."""
+        return float(self.stiffness @ self.limit_slide)
 
     def count_samples(self, amplitude: float) -> int:
-        """Return the number of samples per cycle needed to resolve the stick phases.
+        """Return the number of samples that resolve the phases of stick at an amplitude [m]."""
+        return _count_stick_samples(self.limit / self.total / max(amplitude, 1e-300))
 
-        amplitude: amplitude of the slide [m].
+    def load_first(self, x) -> np.ndarray:
+        """Return force, stretch times limit, and stiffness (3, ...) on first loading to slides x >= 0 [m]."""
+        corners, forces, stretches, sticking = self.curve
+        number = np.searchsorted(corners[1:], x, side="right")
+        loaded = (np.interp(x, corners, forces), np.interp(x, corners, stretches), sticking[number])
+        return np.array(loaded)
 
+    def evaluate(self, slides: Slides, row: int) -> LawForce:
+        """Return the steady force for the slide of an interface that starts from an unstretched contact."""
+        q = slides.q[row]
+        turns = slides.reversals[row]
+        if not turns.size:
+            force, stretch, slope = self.load_first(np.abs(q))
+            return LawForce(np.sign(q) * force, slope, 0.0, 0.0, self.limit, np.sign(q) * stretch)
+
+        # The largest slide erases the memory of all others; the cycle begins there.
+        first = int(np.argmax(np.abs(q[turns])))
+        sign = np.sign(q[turns[first]])
+        force, stretch, slope = self.load_first(abs(q[turns[first]]))
+        holds = slope * (np.arange(turns.size) == first)
+        memory = [_Reversal(first, q[turns[first]], sign * force, sign * stretch, holds)]
+        out = np.empty((3 + turns.size, q.size))
+        for begin in (first + np.arange(turns.size)) % turns.size:
+            end = (begin + 1) % turns.size
+            count = (turns[end] - turns[begin] - 1) % q.size + 1
+            nodes = (turns[begin] + 1 + np.arange(count)) % q.size
+            self._follow_branches(q[nodes], nodes, memory, out)
+            force, slope, stretch = out[:3, turns[end]]
+            holds = out[3:, turns[end]] + slope * (np.arange(turns.size) == end)
+            memory.append(_Reversal(end, q[turns[end]], force, stretch, holds))
+        return LawForce(out[0], out[1], 0.0, out[3:], self.limit, out[2])
+
+    def _follow_branches(self, q, nodes, memory: list, out) -> None:
+        """Write the force between two reversals, and remove the reversals that are passed from the memory.
+
+        Parameters
+        ----------
+        q, nodes : (k,) array
+            Slides [m] after the last reversal in the memory up to the next one, and their columns in `out`.
+        memory : list of _Reversal
+        out : (3 + r, M) array
+            Force, stiffness, stretch times limit, and derivatives by the slides at reversals.
         """
-        stick_fraction = float(self.sums.limit[-1]) / self.total / max(amplitude, 1e-300)
-        return _count_samples(stick_fraction)
-
-    def sample(self, track: SampledSlide) -> SampledForce:
-        """Sample the steady periodic force for a periodic displacement, from an initially unstretched contact."""
-        n = track.samples
-        n_turning_points = track.turning_points.slides.size
-        max_groups = 2 * n_turning_points + 3
-        groups = JenkinsGroups(
-            np.empty(max_groups, np.int64),
-            np.empty(max_groups, np.int64),
-            np.empty(max_groups),
-            np.empty(max_groups),
-        )
-        samples = JenkinsSamples(
-            np.empty(n), np.empty(n), np.zeros((n_turning_points, n)), np.empty(n)
-        )
-        load_cycle_kernels().sample_jenkins(
-            track.q, track.turning_points, self.limit_slide, self.sums, groups, samples
-        )
-        return SampledForce(
-            samples.force,
-            samples.slope,
-            None,
-            samples.hold,
-            float(self.sums.limit[-1]),
-            samples.stretch,
-        )
+        direction = np.sign(q[-1] - memory[-1].slide)
+        done = 0
+        while done < q.size:
+            last = memory[-1]
+            end = q.size
+            if len(memory) > 2:
+                end = int(np.sum(direction * (q - memory[-2].slide) <= 0))
+            part = nodes[done:end]
+            x = np.maximum(direction * (q[done:end] - last.slide) / 2, 0.0)
+            force, stretch, slope = self.load_first(x)
+            out[0, part] = last.force + 2 * direction * force
+            out[1, part] = slope
+            out[2, part] = last.stretch + 2 * direction * stretch
+            out[3:, part] = last.holds[:, None]
+            out[3 + last.number, part] -= slope
+            done = end
+            if done < q.size:
+                del memory[-2:]
 
 
 @dataclass(frozen=True, slots=True)
@@ -278,21 +214,16 @@ class Spring(Law):
         """Tangent stiffness at rest [N/m]."""
         return self.stiffness
 
-    def sample(self, track: SampledSlide) -> SampledForce:
-        """Sample the force and its derivative for a periodic relative displacement."""
-        q = track.q
-        return SampledForce(
-            q * (self.stiffness + self.cubic * q * q), self.stiffness + 3 * self.cubic * q * q
-        )
+    def evaluate(self, slides: Slides, row: int) -> LawForce:
+        """Return the force of the spring."""
+        q = slides.q[row]
+        force = q * (self.stiffness + self.cubic * q * q)
+        return LawForce(force, self.stiffness + 3 * self.cubic * q * q)
 
 
 @dataclass(frozen=True, slots=True)
 class Interlock(Law):
-    """Sinusoidal restoring force of interlocking surface peaks.
-
-    The force is stiffness wavelength/(2 pi) sin(2 pi q/wavelength), in [N/m] and [m].
-
-    """
+    """Force k L/(2 pi) sin(2 pi q/L) of interlocking surface peaks, of stiffness k [N/m] and wavelength L [m]."""
 
     stiffness: float
     wavelength: float
@@ -303,37 +234,34 @@ class Interlock(Law):
         return self.stiffness
 
     def count_samples(self, amplitude: float) -> int:
-        """Return the number of samples per cycle needed to resolve the wavelengths passed."""
-        return int(16 * min(2 * np.pi * amplitude / self.wavelength, 1000.0))
+        """Return the number of samples that resolve the wavelengths passed at an amplitude [m]."""
+        return int(16 * min(2 * np.pi * amplitude / self.wavelength, MAX_WAVES))
 
-    def sample(self, track: SampledSlide) -> SampledForce:
-        """Sample the force and its derivative for a periodic relative displacement."""
-        angle = 2 * np.pi / self.wavelength * track.q
-        return SampledForce(
-            self.stiffness * self.wavelength / (2 * np.pi) * np.sin(angle),
-            self.stiffness * np.cos(angle),
-        )
+    def evaluate(self, slides: Slides, row: int) -> LawForce:
+        """Return the force of the interlocking peaks."""
+        wave = 2 * np.pi / self.wavelength
+        angle = wave * slides.q[row]
+        return LawForce(self.stiffness / wave * np.sin(angle), self.stiffness * np.cos(angle))
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class SpeedLaw(Law):
-    """Velocity-dependent friction law without memory, made from an Element of form "speed"."""
+    """Friction law that is a function of the velocity, from an Element of form "speed"."""
 
     element: Element
 
-    def sample(self, track: SampledSlide) -> SampledForce:
-        """Sample the force and its derivative for a periodic relative displacement."""
-        force = np.empty(track.samples)
-        slope = np.empty(track.samples)
-        load_speed_kernels(self.element.kernels).sample_forces(
-            self.element.numbers[None], track.omega * track.rate, force, slope
-        )
-        return SampledForce(force, None, slope, None, self.element.limit, np.zeros(track.samples))
+    def evaluate(self, slides: Slides, row: int) -> LawForce:
+        """Return the force at the velocities of the cycle."""
+        velocity = slides.omega * slides.rate[row]
+        force, slope = np.empty((2, velocity.size))
+        kernels = load_kernels("speed_kernels", self.element.kernels)
+        kernels.sample_forces(self.element.numbers, velocity, force, slope)
+        return LawForce(force, 0.0, slope, 0.0, self.element.limit)
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class FlowLaw(Law):
-    """Friction law whose only memory is its elastic stretch, such as an Element of form "flow"."""
+    """Friction law whose only memory is its elastic stretch, from an Element of form "flow" or "points"."""
 
     element: Element
 
@@ -348,148 +276,69 @@ class FlowLaw(Law):
         return self.element.limit / self.element.length
 
     def count_samples(self, amplitude: float) -> int:
-        """Return the number of samples per cycle needed to resolve the force after a reversal.
+        """Return the number of samples that resolve the force after a reversal at an amplitude [m]."""
+        return _count_stick_samples(self.length / max(amplitude, 1e-300))
 
-        amplitude: amplitude of the slide [m].
-
-        """
-        return _count_samples(self.length / max(amplitude, 1e-300))
-
-    def find_periodic_state(self, track: SampledSlide) -> "FlowNodes":
-        """Find the periodic state of the law at the samples and reversals of a cycle."""
-        angles, slides, cells, _ = track.turning_points
-        n = track.samples
-        is_sample = np.ones(track.samples + len(cells), bool)
-        is_sample[cells + 1 + np.arange(len(cells))] = False
-        angle, q, speed = np.zeros((3, is_sample.size))  # the velocity is 0 at a turning point
-        angle[is_sample] = np.arange(n) * (2 * np.pi / n)
-        q[is_sample] = track.q
-        speed[is_sample] = track.omega * track.rate
-        angle[~is_sample] = angles
-        q[~is_sample] = slides
-        dt = np.maximum(np.diff(angle, append=2 * np.pi) / track.omega, 1e-300)
-        z = np.empty(q.size)
-        steps = np.empty((3, q.size))
-        force = np.empty(q.size)
-        slopes = np.empty((2, q.size))
-        load_flow_kernels(self.element.kernels).solve_cycle(
-            self.element.numbers[None], q, speed, dt, z, steps, force, slopes
-        )
-        return FlowNodes(angle, is_sample, dt, z, steps, force, slopes)
-
-    def sample(self, track: SampledSlide) -> SampledForce:
-        """Sample the steady periodic force for a periodic relative displacement.
-
-        For a rate-independent law the derivatives are those with respect to the slide and its
-        reversals, otherwise those with respect to the harmonics.
-        """
-        nodes = self.find_periodic_state(track)
-        is_sample = nodes.own
-        force = nodes.force[nodes.own]
-        stretch = self.element.limit * nodes.z[nodes.own]
-        if nodes.steps[2].any() or nodes.slopes[1].any():
-            return SampledForce(
-                force,
-                limit=self.element.limit,
-                stretch=stretch,
-                tangent=lambda: self._compute_tangent(track, nodes),
-            )
-        # At the end of a step, dz/dq is the derivative of z with respect to the slide. At its
-        # start, this derivative is also divided by the fraction of z that remains after the step.
-        before = np.roll(nodes.steps[1], 1)
-        after = nodes.steps[1] / np.maximum(nodes.steps[0], 1e-300)
-        hold = (
-            nodes.find_remainders(np.flatnonzero(~is_sample)) * (before - after)[~is_sample, None]
-        )
-        return SampledForce(
-            force,
-            (nodes.slopes[0] * before)[is_sample],
-            None,
-            (nodes.slopes[0] * hold)[:, is_sample],
-            self.element.limit,
+    def evaluate(self, slides: Slides, row: int) -> LawForce:
+        """Return the periodic force that a cycle from an unstretched contact reaches."""
+        q = slides.q[row]
+        dt = np.maximum(slides.widths / slides.omega, 1e-300)
+        force, stretch = np.empty((2, q.size))
+        states = FlowStates(np.empty((3, q.size)), np.empty((2, q.size)))
+        load_kernels("flow_kernels", self.element.kernels).solve_cycle(
+            self.element.numbers,
+            q,
+            slides.omega * slides.rate[row],
+            dt,
             stretch,
+            states.steps,
+            force,
+            states.slopes,
         )
+        limit = self.element.limit
+        return LawForce(force, limit=limit, stretch=limit * stretch, states=states)
 
-    def _compute_tangent(self, track: SampledSlide, nodes: "FlowNodes") -> tuple:
-        """Compute the derivatives of the force by the displacement harmonics and by the frequency.
+    def differentiate(self, slides: Slides, row: int, states: FlowStates) -> tuple:
+        """Return the derivatives of the harmonics of the force by those of the slide and by the frequency.
 
-        See `SampledForce.tangent`.
-
+        Returns
+        -------
+        by_slide : (H + 1, 2 H + 1) array
+            By the real parts of k = 0 to H, then the imaginary parts of k = 1 to H [N/m].
+        by_omega : (H + 1,) array
+            [N s].
         """
-        k = np.arange(track.x.size)
-        is_sample = nodes.own
-        exponentials = np.exp(1j * np.outer(nodes.angle, k))
-        wave, rate = (
-            np.concatenate([x.real, -x.imag[:, 1:]], axis=1)
-            for x in (exponentials, 1j * k * exponentials)
-        )
-        out = np.empty((nodes.angle.size, wave.shape[1] + 1))
-        out[:, :-1] = np.roll(wave, -1, axis=0) - wave
-        out[:, -1] = -nodes.dt / track.omega
-        load_flow_kernels(self.element.kernels).solve_tangents(nodes.steps, out)
-        out = out[is_sample] * nodes.slopes[0, is_sample, None]
-        out[:, :-1] += nodes.slopes[1, is_sample, None] * track.omega * rate[is_sample]
-        out[:, -1] += nodes.slopes[1, is_sample] * track.rate
-        return out[:, :-1], out[:, -1]
+        h = slides.harmonics.shape[1] - 1
+        solve = load_kernels("flow_kernels", self.element.kernels).solve_recursion
+        decay, by_increment, by_time = states.steps
+        by_stretch, by_velocity = states.slopes
+
+        def find_force_harmonics(source, velocity) -> np.ndarray:
+            """Return the harmonics of the force (2, H + 1) for real and negative imaginary part of the changes."""
+            solve(decay, source)
+            force = (by_stretch * source + by_velocity * velocity)[slides.is_sample]
+            return find_harmonics(np.array([force.real, -force.imag]), h)
+
+        by_slide = np.empty((h + 1, 2 * h + 1), complex)
+        for k in range(h + 1):
+            wave = np.exp(1j * k * slides.angle)
+            source = by_increment * (np.roll(wave, -1) - wave)
+            real, imaginary = find_force_harmonics(source, 1j * k * slides.omega * wave)
+            by_slide[:, k] = real
+            if k:
+                by_slide[:, h + k] = imaginary
+        source = -by_time * slides.widths / slides.omega**2 + 0j
+        return by_slide, find_force_harmonics(source, slides.rate[row])[0]
 
 
-class FlowNodes(NamedTuple):
-    """Periodic state of a FlowLaw at the M samples and reversals of a cycle.
-
-    - angle: (M,) [rad]; own: (M,) true for samples; dt: (M,) time to the next node [s]
-    - z: (M,) stretch [m]
-    - steps: (3, M) derivatives of the next stretch with respect to stretch, slide and time
-    - force, slopes: (M,) force [N], (2, M) its derivatives with respect to stretch and velocity
-    """
-
-    angle: np.ndarray
-    own: np.ndarray
-    dt: np.ndarray
-    z: np.ndarray
-    steps: np.ndarray
-    force: np.ndarray
-    slopes: np.ndarray
-
-    def find_remainders(self, nodes) -> np.ndarray:
-        """Return the fractions (r, M) of stretch perturbations at r nodes that remain at all M nodes.
-
-        It is 0 for a law whose memory does not fade.
-        """
-        log_decay = np.append(0.0, np.cumsum(np.log(np.maximum(self.steps[0], 1e-300))))
-        log_remainder = (
-            log_decay[:-1]
-            - log_decay[nodes, None]
-            + np.where(np.arange(self.z.size) < nodes[:, None], log_decay[-1], 0.0)
-        )
-        cycle_loss = -np.expm1(log_decay[-1])
-        if not cycle_loss > 1e-12:
-            return np.zeros_like(log_remainder)
-        return np.exp(log_remainder) / cycle_loss
-
-    def find_cell_factors(self) -> tuple:
-        """Return the factor (N,) by which the stretch decays in each cell, and its derivative by displacement."""
-        decay, by_slide, _ = self.steps
-        first = np.flatnonzero(self.own)
-        is_reversal = ~self.own
-        weight = np.ones(self.z.size)
-        weight[is_reversal] = self.dt[is_reversal]
-        weight[np.roll(is_reversal, -1)] = self.dt[np.roll(is_reversal, -1)]
-        weight[is_reversal | np.roll(is_reversal, -1)] /= self.dt[self.own][0]
-        later = np.where(np.roll(is_reversal, -1), np.roll(decay, -1), 1.0)
-        return np.multiply.reduceat(decay, first), np.add.reduceat(by_slide * weight * later, first)
+def _count_stick_samples(stick_ratio: float) -> int:
+    """Return the number of samples that resolve a phase of stick over the angle acos(1 - 2 stick_ratio)."""
+    angle = np.arccos(max(1 - 2 * stick_ratio, -1.0))
+    return int(min(SAMPLES_PER_STICK * 2 * np.pi / max(angle, 1e-9), MAX_SAMPLES))
 
 
-def _count_samples(stick_fraction: float) -> int:
-    """Return the number of samples per cycle needed to resolve a stick phase.
-
-    stick_fraction: yield slide relative to the amplitude. The stick phase spans the angle acos(1 - 2 stick_fraction).
-    """
-    angle = np.arccos(max(1 - 2 * stick_fraction, -1.0))
-    return int(min(SAMPLES_PER_STICK * 2 * np.pi / max(angle, 1e-9), 65536))
-
-
-def make_law(element: Element | None):
-    """Return the harmonic-balance law of an Element; None means bonds that are no single element.
+def make_law(element: Element | None) -> Law:
+    """Return the law of harmonic balance for an Element; None stands for bonds that are no single element.
 
     Raises
     ------

@@ -1,33 +1,32 @@
 """Quasi-static backbone of a mode, from a static force along the mode shape and friction loops.
 
-The inertia force m omega^2 z of a deflection z holds it in equilibrium: m omega_i^2 z_i + (rows^T F)_i =
-m omega^2 z_i. The slides reverse together, so each law runs through its own loop, whose tip is F, and
-omega is the natural frequency with the secant stiffness of the loops: that of the stuck mode at small
-amplitudes, and that of the mode without the contact at large ones. The damping is what the loops lose
-of 2 pi m omega^2 z z. Where a law follows Masing's rule the loop is its curve of first loading, twice
-as large: one static curve gives both (Festjens, Chevallier and Dion 2013, with the distribution of the
-force updated by the deflection; Lacayo and Allen 2019). A force with the fixed shape of the stuck mode
-would not tend to the free mode if several modes move the contact.
+The inertia force m omega^2 z of a deflection z holds it in equilibrium: m omega_i^2 z_i + (rows^T F)_i = m omega^2 z_i. The
+slides reverse together, so each law runs through its own loop, whose tip is F, and omega and z are the natural mode
+with the secant stiffness of the loops: the stuck mode at small amplitudes, and the mode without the contact at large
+ones. The damping is what the loops lose of 2 pi m omega^2 z z. Where a law follows Masing's rule the loop is its curve of
+first loading, twice as large: one static curve gives both (Festjens, Chevallier and Dion 2013, with the distribution of
+the force updated by the deflection; Lacayo and Allen 2019). A force with the fixed shape of the stuck mode would not
+tend to the free mode if several modes move the contact.
 """
 
-from itertools import chain
 from typing import NamedTuple
 
 import numpy as np
 from scipy.optimize import root
 
-from ...core import ModalBasis, NotConverged, PatchfemError
-from ...formatting import format_length
+from ...core import ModalBasis, PatchfemError
 from ...friction.laws.elastic_plastic import masing_loop
 from .forces import LawGroup
-from .laws import Jenkins, SampledSlide
+from .laws import Jenkins
+from .slides import make_slides
 
-# Relative increment of the slide for the finite difference of the tip force of a loop.
-RELATIVE_SLIDE_STEP = 1e-6
-# Ratio of the two drive frequencies at which a law is compared to detect a dependence on speed.
-TEST_RATE_RATIO = 2.0
-# Largest relative change of a force that is attributed to round-off.
-FORCE_TOL = 1e-9
+TEST_RATE_RATIO = 2.0  # ratio of two drive frequencies at which the forces of a law are compared
+TEST_SAMPLES = 512  # samples per cycle of this comparison
+FORCE_TOL = 1e-9  # relative change of a force that is round-off
+ROOT_TOL = (
+    1e-13  # change of the slides, relative to those of the stuck mode, at which their search ends
+)
+SLIDE_TOL = 1e-9  # relative error of the slides of an equilibrium
 SPEED_MESSAGE = "a friction force that depends on the sliding speed has no static loop"
 
 
@@ -41,13 +40,11 @@ class StaticLoops(NamedTuple):
 class StaticMotion(NamedTuple):
     """Quasi-static motion of a mode, with its frequency and damping ratio.
 
-    - amplitude: amplitude of the motion along the shape of the given mode [m]
     - omega, zeta: frequency [rad/s] and damping ratio
     - z: (n,) modal coordinates at the reversal [m]
     - loss: friction loss per cycle [J]
     """
 
-    amplitude: float
     omega: float
     zeta: float
     z: np.ndarray
@@ -55,7 +52,7 @@ class StaticMotion(NamedTuple):
 
 
 def find_loops(laws, u: float, samples: int) -> StaticLoops:
-    """Compute the tip force and the area of the friction loop on an interface row.
+    """Return the tip force and the area of the friction loop of an interface row.
 
     Parameters
     ----------
@@ -65,74 +62,48 @@ def find_loops(laws, u: float, samples: int) -> StaticLoops:
         Amplitude of the slide, >= 0 [m].
     samples : int
         Samples of a cycle, for laws that have no closed form.
-
-    Returns
-    -------
-    StaticLoops
     """
-    loops = []
+    tip = area = 0.0
+    slides = make_slides([[0.0, u]], 1.0, samples)
     for law in laws:
         if isinstance(law, Jenkins):
-            tip, area = masing_loop(law.stiffness, law.limit_slide, u)
-            loops.append(StaticLoops(float(tip), float(area)))
+            law_tip, law_area = masing_loop(law.stiffness, law.limit_slide, u)
         else:
-            loops.append(_sample_loops(law, u, samples))
-    return StaticLoops(sum(loop.tip for loop in loops), sum(loop.area for loop in loops))
-
-
-def _sample_loops(law, u: float, samples: int) -> StaticLoops:
-    """Compute the tip force and area of a rate-independent law's loop by sampling a cycle."""
-    if u == 0:
-        return StaticLoops(0.0, 0.0)
-    track = SampledSlide(np.array([0.0, u], complex), 1.0, samples)
-    force = law.sample(track).force
-    return StaticLoops(
-        float(force[0] - force[samples // 2]) / 2, float(force @ track.rate) * 2 * np.pi / samples
-    )
+            force = law.evaluate(slides, 0).force[slides.is_sample]
+            law_tip = (force[0] - force[samples // 2]) / 2
+            law_area = force @ slides.rate[0, slides.is_sample] * 2 * np.pi / samples
+        tip += float(law_tip)
+        area += float(law_area)
+    return StaticLoops(tip, area)
 
 
 def depends_on_speed(group: LawGroup, u: float) -> bool:
-    """Return whether any friction force in the group depends on the sliding speed.
-
-    u: amplitude of the slide [m] at which the laws are sampled.
-
-    """
-    for law in chain.from_iterable(group.laws):
-        if isinstance(law, Jenkins):
-            continue
-        slide = np.array([0.0, u], complex)
-        slow = law.sample(SampledSlide(slide, 1.0, 512)).force
-        fast = law.sample(SampledSlide(slide, TEST_RATE_RATIO, 512)).force
-        if np.abs(fast - slow).max() > FORCE_TOL * np.abs(slow).max(initial=1e-300):
-            return True
-    return False
+    """Return whether a friction force of the group depends on the sliding speed at an amplitude u [m] of the slides."""
+    slides = np.tile([0.0, u], (len(group.rows), 1))
+    slow, fast = (
+        group.compute_forces(slides, omega, TEST_SAMPLES) for omega in (1.0, TEST_RATE_RATIO)
+    )
+    return bool((np.abs(fast - slow).max(axis=1) > FORCE_TOL * np.abs(slow).max(axis=1)).any())
 
 
 def find_static_motions(
-    modes: ModalBasis, group: LawGroup, amplitudes, stuck_mode: tuple, samples: int = 4096, row=None
-) -> list:
-    """Compute the quasi-static motions of a mode at given amplitudes.
+    modes: ModalBasis, group: LawGroup, mode: int, amplitudes, row, samples: int = 4096
+) -> list[StaticMotion]:
+    """Find the quasi-static motions of a mode at given amplitudes, with NaN where no equilibrium is found.
 
     Parameters
     ----------
     modes : ModalBasis
-        Modes of the structure, excluding the contact.
+        Modes of the structure, without the contact.
     group : LawGroup
-        Laws on the rows.
+    mode : int
+        Index of the coordinate of the mode.
     amplitudes : array_like
-        (k,) amplitudes of the motion along the shape, or along `row` [m].
-    stuck_mode : tuple
-        Frequency [rad/s] and shape (n,) of the stuck mode.
+        (k,) amplitudes [m] of the displacement row z, such as that of the output.
+    row : ndarray
+        (n,)
     samples : int, optional
         Samples per cycle, for laws that have no closed form.
-    row : ndarray, optional
-        (n,) displacement per coordinate to which the amplitudes belong, such as that of the output;
-        the component along the shape by default.
-
-    Returns
-    -------
-    list of StaticMotion
-        One motion per amplitude, with NaN if no equilibrium is found.
 
     Raises
     ------
@@ -141,33 +112,36 @@ def find_static_motions(
     """
     if depends_on_speed(group, float(np.abs(group.rows).max()) * float(np.max(amplitudes))):
         raise PatchfemError(SPEED_MESSAGE)
-    omega, shape = stuck_mode
+    stiffness = group.stiffness()
+
+    def find_mode(slides, amplitude: float) -> tuple:
+        """Return frequency, coordinates at an amplitude, and loops of the mode with the secants at slides (i,) [m]."""
+        loops = [find_loops(laws, u, samples) for u, laws in zip(slides, group.laws)]
+        secants = [loop.tip / u if u > 0 else k for u, loop, k in zip(slides, loops, stiffness)]
+        omega, shape = modes.compute_stuck_mode(group.rows, np.array(secants), mode)
+        return omega, shape * (amplitude / abs(float(row @ shape))), loops
+
+    # The slides of the mode must be those of its secants.
     motions = []
-    guess = np.append(shape, 1.0)
-    row = shape / (shape @ shape) if row is None else row
     for amplitude in amplitudes:
-        try:
-            guess = _solve_equilibrium(
-                modes, group, (*stuck_mode, row), float(amplitude), guess, samples
-            )
-        except NotConverged:
-            motions.append(
-                StaticMotion(
-                    float(amplitude), np.nan, np.nan, np.full(modes.omega.size, np.nan), np.nan
-                )
-            )
-            continue
-        z = guess[:-1] * amplitude
-        square = float(guess[-1]) * omega**2
-        slides = np.abs(group.rows @ z)
-        areas = [find_loops(laws, u, samples).area for u, laws in zip(slides, group.laws)]
-        loss = sum(areas)
-        motions.append(_make_static_motion(modes, shape, (z, square, loss)))
+        stuck = np.abs(group.rows @ find_mode(np.zeros(stiffness.size), amplitude)[1])
+        unit = np.maximum(stuck, 1e-300)
+
+        def find_residual(x, amplitude=amplitude, unit=unit) -> np.ndarray:
+            return np.abs(group.rows @ find_mode(np.abs(x) * unit, amplitude)[1]) / unit - x
+
+        solution = root(find_residual, stuck / unit, tol=ROOT_TOL)
+        omega, z, loops = find_mode(np.abs(solution.x) * unit, amplitude)
+        if not (omega and (np.abs(solution.fun) <= SLIDE_TOL).all()):
+            omega = np.nan
+        motions.append(_make_motion(modes, omega, z, sum(loop.area for loop in loops)))
     return motions
 
 
-def find_static_motions_from_loops(modes: ModalBasis, row, mode: int, slides, loops) -> list:
-    """Compute the quasi-static motions of a mode with one interface whose friction loops are known.
+def find_static_motions_from_loops(
+    modes: ModalBasis, row, mode: int, slides, loops
+) -> list[StaticMotion]:
+    """Find the quasi-static motions of a mode with one interface whose friction loops are known.
 
     Parameters
     ----------
@@ -180,76 +154,16 @@ def find_static_motions_from_loops(modes: ModalBasis, row, mode: int, slides, lo
         (k,) amplitudes of the slide [m], > 0.
     loops : sequence of StaticLoops
         (k,) loop at each amplitude.
-
-    Returns
-    -------
-    list of StaticMotion
     """
-    row = np.asarray(row)
     motions = []
     for slide, loop in zip(slides, loops):
-        secant_stiffness = np.array([loop.tip / slide])
-        omega, shape = modes.compute_stuck_mode(row[None], secant_stiffness, mode)
-        z = shape * slide / (row @ shape)
-        motions.append(_make_static_motion(modes, shape, (z, omega**2, loop.area)))
+        omega, shape = modes.compute_stuck_mode(row[None], np.array([loop.tip / slide]), mode)
+        motions.append(_make_motion(modes, omega, shape * slide / (row @ shape), loop.area))
     return motions
 
 
-def _solve_equilibrium(
-    modes, group, mode: tuple, amplitude: float, guess, samples: int
-) -> np.ndarray:
-    """Solve for the static equilibrium of a mode at a given amplitude [m].
-
-    Returns z/amplitude, and the squared frequency relative to that of the stuck mode. mode: frequency [rad/s] and
-    shape of the stuck mode, and the row of the amplitude.
-    """
-    omega, shape, row = mode
-    m = modes.mass
-    n = modes.omega.size
-    modal_stiffness = np.diag(modes.omega**2) / omega**2
-
-    def find_residual(x):
-        slides = group.rows @ x[:n] * amplitude
-        tips = [find_loops(laws, abs(u), samples).tip for u, laws in zip(slides, group.laws)]
-        force = np.sign(slides) * np.array(tips)
-        return np.append(
-            modal_stiffness @ x[:n]
-            + group.rows.T @ force / (m * omega**2 * amplitude)
-            - x[n] * x[:n],
-            row @ x[:n] - 1,
-        )
-
-    def find_slopes(x):
-        u = np.abs(group.rows @ x[:n] * amplitude)
-        tip_slopes = [_find_tip_slope(laws, slide, samples) for slide, laws in zip(u, group.laws)]
-        stiffness = modal_stiffness + group.rows.T * tip_slopes @ group.rows / (m * omega**2)
-        stiffness -= x[n] * np.eye(n)
-        return np.block([[stiffness, -x[:n, None]], [row[None], np.zeros((1, 1))]])
-
-    for start in (guess, np.append(shape, 1.0)):
-        solution = root(find_residual, start, jac=find_slopes, tol=1e-13)
-        if np.abs(solution.fun).max() < 1e-9:
-            return solution.x
-    raise NotConverged(
-        f"backbone: no equilibrium was found at the amplitude {format_length(amplitude, 3)} of the static curve"
-    )
-
-
-def _find_tip_slope(laws, u: float, samples: int) -> float:
-    """Return the derivative [N/m] of the force at the loop tip by the displacement amplitude."""
-    step = max(RELATIVE_SLIDE_STEP * u, 1e-30)
-    return (find_loops(laws, u + step, samples).tip - find_loops(laws, u, samples).tip) / step
-
-
-def _make_static_motion(modes, shape, motion: tuple) -> StaticMotion:
-    """Return the quasi-static motion, with frequency and damping ratio, for an equilibrium.
-
-    motion: z (n,) [m], squared frequency [rad2 s-2] and loss [J].
-
-    """
-    z, square, loss = motion
-    component = float(shape @ z / (shape @ shape))
-    omega = float(np.sqrt(square)) if square > 0 else np.nan
+def _make_motion(modes, omega: float, z, loss: float) -> StaticMotion:
+    """Return the motion of an equilibrium z (n,) [m] with a frequency [rad/s] and a loss per cycle [J]."""
     viscous = np.pi * omega * modes.mass * float(z @ modes.damping_matrix @ z)
-    work = 2 * np.pi * square * modes.mass * float(z @ z)
-    return StaticMotion(component, omega, (loss + viscous) / work, z, float(loss))
+    work = 2 * np.pi * omega**2 * modes.mass * float(z @ z)
+    return StaticMotion(omega, (loss + viscous) / work, z, float(loss))

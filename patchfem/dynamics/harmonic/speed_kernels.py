@@ -6,17 +6,17 @@ from ...friction.laws import tanh_kernels as law
 
 
 @njit(error_model="numpy", cache=True, **NJIT_NO_REFCOUNT)
-def sample_forces(num, speed, force, slope):
-    """Write force and derivative of a velocity-dependent law at given velocities.
+def sample_forces(numbers, velocity, force, slope):
+    """Write force and derivative of a law at given velocities.
 
     Parameters
     ----------
-    num : ndarray
-        (1, k) numbers of the law.
-    speed : ndarray
-        (N,) velocities [m/s].
-    force, slope : ndarray
-        (N,) force [N] and slope [N s/m], which are written.
+    numbers : (k,) array
+        Numbers of the law.
+    velocity : (M,) array
+        [m/s].
+    force, slope : (M,) array
+        Force [N] and slope [N s/m], which are written.
     """
-    for i in range(speed.size):
-        force[i], slope[i] = law.find_force(num[0], speed[i])
+    for i in range(velocity.size):
+        force[i], slope[i] = law.find_force(numbers, velocity[i])

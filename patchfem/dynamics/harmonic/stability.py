@@ -1,148 +1,166 @@
-"""Stability of a steady motion: Floquet multipliers from the derivatives of the friction laws."""
+"""Floquet multipliers of a steady motion: the factors by which a cycle multiplies small perturbations.
+
+The state is the motion of the modes and the memory of the contacts. A law without memory has a slope by the slide and by
+its rate. Elastic-plastic elements remember the slides at the reversals: the perturbation of each is a state, on which
+the stiffness that sticks since then acts. The force is continuous, so nothing jumps; a reversal may shift in time, but
+the slide is at rest there, so the shift has no effect to first order. Elements that slip lose their memory; an element
+that never slips is a spring, whose offset (multiplier 1) is left out. A law with one state has one state per row.
+
+In each cell between two nodes of the cycle the coefficients are constant and the motion is a matrix exponential: order 2
+in the width of the cells. Successive cells of equal coefficients become one.
+"""
 
 from dataclasses import replace
 
 import numpy as np
+from scipy.linalg import expm
 
-from ..periodic import find_multipliers, is_stable
-from .floquet import FadingMemory, TurningPoint, find_monodromy
-from .laws import FlowLaw, FlowNodes
+from .laws import FlowStates, LawForce
+from .motion import SteadyMotion
+
+MIN_CELLS = 1024  # smallest number of cells of a cycle
+MAX_STABLE_MULTIPLIER = (
+    1 + 1e-5
+)  # largest magnitude of a multiplier of a stable motion, with round-off
+# Smallest change of the slide in a cell, relative to its range, and of the stiffness, relative to the largest, from which
+# the mean stiffness is a secant.
+MIN_CHANGE = 1e-9
+ROUND_OFF_DIGITS = 6  # digits of the weight in the mean stiffness of a cell
+MIN_FADING = 1e-9  # smallest decay in a cell that is told from none
 
 
-def add_stability(periodic, modes, cells: int = 0):
-    """Add Floquet multipliers and stability to a steady motion.
+def add_stability(motion: SteadyMotion, modes, cells: int = 0) -> SteadyMotion:
+    """Return a steady motion with its Floquet multipliers, in decreasing magnitude, and its stability.
 
     Parameters
     ----------
-    periodic : SteadyMotion
+    motion : SteadyMotion
     modes : ModalBasis
-    cells : int, optional
-        Number of cells of the cycle; 0 for 1024, or for the samples of the motion if they are more.
-
-    Returns
-    -------
-    SteadyMotion
+    cells : int
+        Number of cells of the cycle; 0 for MIN_CELLS, or for the samples of the motion if they are more.
     """
-    multipliers = find_multipliers(find_motion_monodromy(periodic, modes, cells))
-    return replace(periodic, multipliers=multipliers, stable=is_stable(multipliers))
+    values = find_multipliers(find_monodromy(motion, modes, cells))
+    is_stable = bool(np.abs(values).max(initial=0.0) <= MAX_STABLE_MULTIPLIER)
+    return replace(motion, multipliers=values, stable=is_stable)
 
 
-def find_motion_monodromy(periodic, modes, cells: int = 0) -> np.ndarray:
-    """Compute the monodromy matrix of a steady motion over one period of the drive signal.
+def find_multipliers(monodromy) -> np.ndarray:
+    """Return the eigenvalues (s,) of a monodromy matrix in order of decreasing magnitude."""
+    values = np.linalg.eigvals(monodromy)
+    return values[np.argsort(-np.abs(values))]
+
+
+def find_monodromy(motion: SteadyMotion, modes, cells: int = 0) -> np.ndarray:
+    """Return the derivative of the state (z, dz/dtheta, memories) after a cycle by that before, theta = omega t from 0.
 
     Parameters
     ----------
-    periodic, modes, cells
-        See `add_stability`; the slopes of the laws are constant in a cell.
+    motion : SteadyMotion
+    modes : ModalBasis
+    cells : int
+        See `add_stability`.
 
     Returns
     -------
-    ndarray
-        (2n, 2n), or larger by the memories of the laws.
+    (s, s) array
+        s = 2 n + number of memories.
     """
-    group = periodic.group
-    n = cells or max(1024, 2 ** (periodic.samples - 1).bit_length())
-    slope, by_rate = np.zeros((2, len(group.rows), n))
-    reversals = []
-    fading = []
-    for i, (track, laws) in enumerate(
-        zip(group.sample_slides(periodic.coefficients, periodic.omega, n), group.laws)
-    ):
-        for law in laws:
-            if isinstance(law, FlowLaw):
-                nodes = law.find_periodic_state(track)
-                fading.append(_make_fading_memory(i, nodes))
-                by_rate[i] += _average_cells(nodes.slopes[1, nodes.own], 0.5)
+    n = modes.omega.size
+    group = motion.group
+    omega = motion.omega
+    slides = motion.sample(cells or max(MIN_CELLS, 2 ** (motion.samples - 1).bit_length()))
+    widths = slides.widths
+
+    # Coefficients of each cell: of the accelerations by the slides, their rates and memories.
+    slope, damping = np.zeros((2, len(group.rows), widths.size))
+    turns = []
+    memories = []
+    for i, forces in enumerate(group.evaluate(slides)):
+        for force in forces:
+            if force.states is not None:
+                memories.append((i, *_find_fading(force.states, widths)))
+                damping[i] += _average(force.states.slopes[1])
                 continue
-            sampled = law.sample(track)
-            weights = _weigh_samples(track, sampled)
-            slope[i] += _average_cells(sampled.slope, weights) if sampled.slope is not None else 0.0
-            by_rate[i] += (
-                _average_cells(sampled.by_rate, 0.5) if sampled.by_rate is not None else 0.0
-            )
-            if sampled.hold is not None:
-                reversals += _make_turning_points(i, track, sampled.hold, weights, slope[i])
-    return find_monodromy(modes, group.rows, periodic.omega, slope, by_rate, reversals, fading)
+            weight = _weigh_ends(slides.q[i], force)
+            slope[i] += _average(force.slope, weight)
+            damping[i] += _average(force.by_velocity)
+            if np.ndim(force.holds):
+                held = _average(force.holds - force.holds.max(axis=1, keepdims=True), weight)
+                moves = held.any(axis=1)
+                turns += [(i, *turn) for turn in zip(slides.reversals[i][moves], held[moves])]
+
+    # Successive cells of equal coefficients are one, but for those that begin with a reversal.
+    coefficients = [
+        slope,
+        damping,
+        *(turn[2] for turn in turns),
+        *(part for memory in memories for part in memory[1:]),
+    ]
+    table = np.vstack(coefficients)
+    is_first = np.append(True, (table[:, 1:] != table[:, :-1]).any(axis=0))
+    is_first[[node for _, node, _ in turns]] = True
+    first = np.flatnonzero(is_first)
+
+    # Matrices of the rates of the state by theta.
+    size = 2 * n + len(turns) + len(memories)
+    to_rate = group.rows.T / (modes.mass * omega**2)
+    rates = np.zeros((first.size, size, size))
+    rates[:, :n, n : 2 * n] = np.eye(n)
+    rates[:, n : 2 * n, :n] = -np.diag(modes.omega**2) / omega**2
+    rates[:, n : 2 * n, :n] -= (to_rate * slope.T[first, None]) @ group.rows
+    rates[:, n : 2 * n, n : 2 * n] = -modes.damping_matrix / omega
+    rates[:, n : 2 * n, n : 2 * n] -= omega * (to_rate * damping.T[first, None]) @ group.rows
+    for k, (i, _, held) in enumerate(turns, 2 * n):
+        rates[:, n : 2 * n, k] = -np.outer(held[first], to_rate[:, i])
+    for k, (i, gain, loss, stiffness) in enumerate(memories, 2 * n + len(turns)):
+        rates[:, n : 2 * n, k] = -np.outer(stiffness[first], to_rate[:, i])
+        rates[:, k, n : 2 * n] = np.outer(gain[first], group.rows[i])
+        rates[:, k, k] = -loss[first]
+
+    steps = expm(rates * np.add.reduceat(widths, first)[:, None, None])
+    for k, (i, node, _) in enumerate(turns, 2 * n):
+        last = np.searchsorted(first, node) - 1
+        steps[last, k] = group.rows[i] @ steps[last, :n]
+    return _multiply(steps)
 
 
-def _average_cells(values, weights) -> np.ndarray:
-    """Return the weighted means (..., N) of sampled values in all cells.
+def _average(values, weight=0.5):
+    """Return the means (..., M) of values at the nodes in the cells after them; weight: that of the end of the cell."""
+    if not np.ndim(values):
+        return values
+    return (1 - weight) * values + weight * np.roll(values, -1, axis=-1)
 
-    weights: weight of the value at the end of a cell.
 
+def _weigh_ends(q, force: LawForce):
+    """Return the weights (M,) of the ends of the cells at which the mean stiffness of a law is the secant of its force.
+
+    They are 0.5 where the stiffness changes little, or depends on the velocity.
     """
-    return (1 - weights) * values + weights * np.roll(values, -1, axis=-1)
-
-
-def _weigh_samples(track, sampled):
-    """Return the weights (N,) that the later sample of each cell has in the cell's mean stiffness.
-
-    The mean is the secant of the force over the cell, or follows the position of a reversal in
-    it; the weight is 0.5 if the force does not depend on the slide alone.
-    """
-    if sampled.slope is None:
+    if not np.ndim(force.slope):
         return 0.5
-    if sampled.by_rate is not None:
-        if sampled.hold is None:
-            return 0.5
-        return _set_reversal_weights(track, np.full(track.samples, 0.5))
-    after = np.roll(sampled.slope, -1)
-    slide_increment = np.roll(track.q, -1) - track.q
-    jump = after - sampled.slope
-    is_resolved = (np.abs(slide_increment) > 1e-9 * np.ptp(track.q)) & (
-        np.abs(jump) > 1e-9 * np.abs(sampled.slope).max()
+    jump = np.roll(force.slope, -1) - force.slope
+    change = np.roll(q, -1) - q
+    is_clear = np.abs(change) > MIN_CHANGE * np.ptp(q)
+    is_clear &= np.abs(jump) > MIN_CHANGE * np.abs(force.slope).max()
+    secant = np.divide(
+        np.roll(force.force, -1) - force.force, change, where=is_clear, out=np.zeros(q.size)
     )
-    secant = (np.roll(sampled.force, -1) - sampled.force) / np.where(
-        is_resolved, slide_increment, 1.0
-    )
-    return _set_reversal_weights(
-        track,
-        np.where(
-            is_resolved,
-            np.clip((secant - sampled.slope) / np.where(is_resolved, jump, 1.0), 0.0, 1.0),
-            0.5,
-        ),
-    )
+    weight = np.divide(secant - force.slope, jump, where=is_clear, out=np.full(q.size, 0.5))
+    return np.round(np.clip(weight, 0.0, 1.0), ROUND_OFF_DIGITS)
 
 
-def _set_reversal_weights(track, weights):
-    """Set the weights in cells with a reversal, from the position of the reversal in the cell."""
-    cells = track.turning_points.cells
-    weights[cells] = 1 - _find_cell_positions(track)
-    return weights
+def _find_fading(states: FlowStates, widths) -> np.ndarray:
+    """Return gain and loss of a stretch u' = gain q' - loss u, and the stiffness [N/m] of each cell, (3, M)."""
+    decay, by_slide, _ = states.steps
+    left = -np.log(np.maximum(decay, 1e-300))
+    gain = by_slide * np.divide(left, 1 - decay, out=np.ones_like(left), where=left > MIN_FADING)
+    return np.array([gain, left / np.maximum(widths, 1e-300), _average(states.slopes[0])])
 
 
-def _find_cell_positions(track) -> np.ndarray:
-    """Return the relative position [0, 1] of each reversal within its cell."""
-    return track.turning_points.angles * (track.samples / (2 * np.pi)) - track.turning_points.cells
-
-
-def _make_turning_points(row: int, track, hold, weights, slope) -> list:
-    """Return the reversals of the displacement that affect the sticking elements.
-
-    The list has no reversal whose elements never slip. In the cell of a reversal its stiffness does not act yet:
-    the displacement there departs from the reversal only by a term of second order in the cell length.
-    """
-    reversals = []
-    for cell, position, stiffness in zip(
-        track.turning_points.cells, _find_cell_positions(track), hold
-    ):
-        if stiffness.min() < stiffness.max():
-            stiffness = stiffness - stiffness.max()
-            mean = _average_cells(stiffness, weights)
-            mean[cell] = position * stiffness[cell]
-            slope[cell] += (1 - position) * stiffness[(cell + 1) % stiffness.size]
-            reversals.append(TurningPoint(row, int(cell), float(position), mean))
-    return reversals
-
-
-def _make_fading_memory(row: int, nodes: FlowNodes) -> FadingMemory:
-    decay, by_slide = nodes.find_cell_factors()
-    loss = -np.log(np.maximum(decay, 1e-300))
-    gain = by_slide * np.divide(loss, 1 - decay, out=np.ones_like(loss), where=loss > 1e-9)
-    return FadingMemory(
-        row,
-        gain,
-        loss * (decay.size / (2 * np.pi)),
-        _average_cells(nodes.slopes[0, nodes.own], 0.5),
-    )
+def _multiply(steps) -> np.ndarray:
+    """Return the product of matrices (k, s, s), the first one rightmost, by pairs."""
+    while len(steps) > 1:
+        unpaired = steps[-1:] if len(steps) % 2 else steps[:0]
+        pairs = steps[: len(steps) - len(unpaired)]
+        steps = np.concatenate([pairs[1::2] @ pairs[::2], unpaired])
+    return steps[0]

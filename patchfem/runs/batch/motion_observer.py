@@ -14,8 +14,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ...core import NotConverged, Outcome, Response
-from ...dynamics.harmonic import balance as point_balance
-from ...dynamics.harmonic import harmonic, point
+from ...dynamics.harmonic.equations import has_undamped_resonance
+from ...dynamics.harmonic.motion import make_cycle_response
+from ...dynamics.harmonic.steady import find_steady_motion
 from ...response import measures
 from ...response.measures import measure_half_range
 from ..rig import march, solve
@@ -140,10 +141,10 @@ class MotionObserver:
         """Compute the motion of a linear structure without friction in closed form."""
         modes = self.model.rig.modes
         omega = drive.omega
-        linear_part = harmonic.make_linear_part(modes, omega, 1)
-        if any(k == 1 for k, *_ in linear_part.free):
+        stiffness = np.diag(modes.omega**2 - omega**2) + 1j * omega * modes.damping_matrix
+        if has_undamped_resonance(modes, omega):
             return None
-        z = linear_part.inverse[1] @ (1j * drive.acceleration * modes.base)
+        z = np.linalg.solve(stiffness, 1j * drive.acceleration * modes.base)
         time = np.linspace(0.0, drive.period, SAMPLES_PER_CYCLE + 1)
         phase_factor = np.exp(1j * omega * time)
         modal, rate = (np.outer(phase_factor, z * factor).real for factor in (1.0, 1j * omega))
@@ -189,7 +190,7 @@ class MotionObserver:
                 self.model, self.numerics, self.patch, 0, self.report
             ),
         )
-        solution = point.find_steady_motion(
+        solution = find_steady_motion(
             solver.modes,
             drive,
             solver.group,
@@ -197,9 +198,7 @@ class MotionObserver:
             solver.tolerance,
             start=initial_guess,
         )
-        window = point_balance.make_cycle_response(
-            solution, solver.modes, drive, rig_balance.SAMPLES_PER_CYCLE
-        )
+        window = make_cycle_response(solution, solver.modes, drive, rig_balance.SAMPLES_PER_CYCLE)
         return ObservedMotion(
             window,
             measures.compute_peak(window.acceleration),

@@ -12,7 +12,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from ...compiled import load
 from ...core import NotConverged, PatchfemError
 from ...dynamics.harmonic import forces, quasi_static
 from ...response.decay_curve import (
@@ -115,7 +114,6 @@ def make_laws_on_mesh(model, patch, meshed: tuple = ()):
             replace(numerics.choose_numerics(with_automatic_method(model)), meshed=meshed),
             patch,
         ).group
-    load("dynamics.harmonic.cycle_kernels", None)
     return forces.LawGroup(
         rig.modes,
         list(enumerate(interface.make_interface_elements(model, meshed))),
@@ -167,19 +165,10 @@ def compute_static_curve(modes, laws, mode_index: int, amplitudes, samples: int)
         Amplitude [m], frequency [Hz], damping ratio [1], energy that friction dissipates per cycle [J], and the force at
         the output that replaces the energy of a cycle [N].
     """
-    stuck_mode = modes.compute_stuck_mode(laws.rows, laws.stiffness(), mode_index)
-    output_motion = float(modes.output @ stuck_mode[1])
-    return tabulate_static_motions(
-        modes,
-        quasi_static.find_static_motions(
-            modes,
-            laws,
-            amplitudes / abs(output_motion),
-            stuck_mode,
-            samples,
-            modes.output / output_motion,
-        ),
+    motions = quasi_static.find_static_motions(
+        modes, laws, mode_index, amplitudes, modes.output, samples
     )
+    return tabulate_static_motions(modes, motions)
 
 
 def tabulate_static_motions(modes, motions: list) -> np.ndarray:

@@ -18,22 +18,19 @@ from scipy.special import ellipk
 from patchfem import plan, run
 from patchfem.core import G_N, NotConverged, PatchfemError, SineDrive
 from patchfem.dynamics import (
-    FreeBalance,
     LawGroup,
     Spring,
-    evaluate_series,
     find_branches,
+    find_free_motions,
     find_steady_motion,
     make_cycle_response,
+    make_free_balance,
     trace_over_frequency,
 )
-from patchfem.dynamics.harmonic.backbone import trace_free_motions
-from patchfem.dynamics.harmonic.branch import find_backbone, trace_over_level
 from patchfem.dynamics.harmonic.continuation import PathSettings, follow_curve
-from patchfem.dynamics.harmonic.harmonic import HarmonicBalance
 from patchfem.dynamics.harmonic.laws import Jenkins
-from patchfem.dynamics.harmonic.stability import find_motion_monodromy
-from patchfem.dynamics.periodic import find_multipliers
+from patchfem.dynamics.harmonic.series import evaluate_series, half_range
+from patchfem.dynamics.harmonic.stability import find_monodromy, find_multipliers
 
 W = 2 * np.pi * 143
 MASS = 0.884
@@ -60,21 +57,9 @@ def test_exact_continuation_follows_circle_through_fold():
         and path.x[-1, 0] == pytest.approx(-np.sqrt(0.75), abs=1e-9)
     )
     assert path.x[:, 0] ** 2 + path.p**2 == pytest.approx(np.ones(path.p.size), abs=1e-8)
-    assert path.folds == (pytest.approx(1.0, abs=1e-8),) and not path.crossings
+    assert path.folds == (pytest.approx(1.0, abs=1e-8),)
     back = follow_curve(circle, [0.6], 0.8, (-0.5, 2.0), False, PathSettings(0.05, 0.05))
     assert back.ended == "end" and (np.diff(back.p) < 0).all() and (back.x > 0).all()
-
-
-def test_exact_pitchfork_is_reported_as_crossing():
-    """On x (p - 1/3 - x^2) = 0 along x = 0 the branch point at p = 1/3 is reported within 0.02."""
-
-    def pitchfork(x, p):
-        return x * (p - 1 / 3) - x**3, np.array([[p - 1 / 3 - 3 * x[0] ** 2]]), x
-
-    path = follow_curve(pitchfork, [0.0], 0.0, (0.0, 1.0), True, PathSettings(0.02, 0.02, size=1.0))
-    assert (
-        path.ended == "end" and len(path.crossings) == 1 and abs(path.crossings[0] - 1 / 3) < 0.02
-    )
 
 
 def test_refuses_start_without_nearby_branch():
@@ -124,7 +109,7 @@ def test_exact_branch_stability_agrees_with_time_integration():
         ).max() < 3e-4 * p.amplitude([1.0])
         assert not np.isnan(solution.y).any()
     middle = points[1]
-    eigen = np.linalg.eig(find_motion_monodromy(middle, RIG))
+    eigen = np.linalg.eig(find_monodromy(middle, RIG))
     k = int(np.argmax(np.abs(eigen[0])))
     # the monodromy matrix acts on (z, z'/omega)
     perturbation = eigen[1][:, k].real * np.array([1.0, drive.omega])
@@ -146,32 +131,33 @@ def test_exact_branch_stability_agrees_with_time_integration():
     assert growth == pytest.approx(eigen[0][k].real ** 3, rel=1e-3) and growth > 1.2
 
 
-def test_exact_folds_over_level_agree_with_closed_form():
-    """The folds of the branch over the drive level at 150 Hz are the extremes of the one-harmonic
-    relation level(amplitude), within 1e-3."""
-    drive = SineDrive(LEVEL, 2 * np.pi * 150)
-    branch = trace_over_level(RIG, drive, STIFF, (0.2 * G_N, 12 * G_N), harmonics=1)
+def test_exact_folds_agree_with_closed_form():
+    """The folds of the branch with one harmonic are the extremes of the frequency over the amplitude on the relation
+    level = a |W^2 - w^2 + 3 c a^2/(4 m) + 2 i xi W w|, within 1e-4 of the width of the sweep."""
+    branch = trace_over_frequency(RIG, SineDrive(LEVEL, W), STIFF, (130.0, 220.0), harmonics=1)
 
-    def level(a):
-        return a * np.hypot(
-            W**2 - drive.omega**2 + 0.75 * CUBIC / MASS * a * a, 0.006 * W * drive.omega
-        )
-
-    a = np.linspace(1e-5, 4e-3, 40_001)
-    extremes = np.flatnonzero(np.diff(np.sign(np.diff(level(a)))))
-    assert sorted(branch.folds) == pytest.approx(sorted(level(a)[extremes + 1]), rel=1e-3)
-    assert [level(np.abs(p.coefficients[0, 1])) for p in branch.points] == pytest.approx(
-        [p.level for p in branch.points], rel=1e-6
+    # with s = W^2 + 3 c a^2/(4 m): w^2 = s - d +- sqrt(d^2 - 2 s d + (level/a)^2), d = (0.006 W)^2/2
+    a = np.geomspace(1e-4, 2e-2, 1_000_001)
+    stiffness = W**2 + 0.75 * CUBIC / MASS * a * a
+    half_damping = 0.5 * (0.006 * W) ** 2
+    root = half_damping**2 - 2 * stiffness * half_damping + (LEVEL / a) ** 2
+    a = a[root >= 0]
+    frequency = np.sqrt((stiffness - half_damping + np.sqrt(np.maximum(root, 0)))[root >= 0]) / (
+        2 * np.pi
     )
+    expected = (frequency.min(), frequency[-1])
+    assert sorted(branch.folds) == pytest.approx(sorted(expected), abs=1e-3)
+    for p in branch.points:
+        size = abs(p.slides[0, 1])
+        stiff = W**2 - p.omega**2 + 0.75 * CUBIC / MASS * size**2
+        assert size * np.hypot(stiff, 0.006 * W * p.omega) == pytest.approx(LEVEL, rel=1e-6)
 
 
 def test_refuses_invalid_sweep_values():
-    """Sweeps with a single value, a negative value or NaN are refused."""
-    for values in ([100.0], [100.0, -5.0], [100.0, np.nan, 120.0]):
+    """Sweeps to a negative frequency or to NaN are refused."""
+    for ends in ([100.0, -5.0], [100.0, np.nan]):
         with pytest.raises(PatchfemError, match="positive"):
-            trace_over_frequency(RIG, SineDrive(1.0, W), STIFF, values)
-        with pytest.raises(PatchfemError, match="positive"):
-            trace_over_level(RIG, SineDrive(1.0, W), STIFF, values)
+            trace_over_frequency(RIG, SineDrive(1.0, W), STIFF, ends)
 
 
 # ---- Floquet multipliers
@@ -196,7 +182,7 @@ def test_exact_monodromy_agrees_with_perturbed_march(omega):
             for s in (1, -1)
         ]
         columns.append((ends[0] - ends[1]) / 2e-4)
-    monodromy = find_motion_monodromy(p, modes, 4096)
+    monodromy = find_monodromy(p, modes, 4096)
     scale = np.repeat([1.0, omega], 5)
     block = (monodromy[:10, :10] * scale[:, None] / scale)[:, [0, 1, 4, 5, 6]]
     assert np.abs(block - np.array(columns).T).max() < 1.5e-3 * np.abs(block).max()
@@ -234,46 +220,56 @@ def test_exact_monodromy_of_bonds_agrees_with_dop853():
     scale = np.array(
         [1.0, 1.2, 1 / length]
     )  # the matrix uses rates per radian and the stretch u length
-    monodromy = find_motion_monodromy(p, modes, 4096) * scale[:, None] / scale
+    monodromy = find_monodromy(p, modes, 4096) * scale[:, None] / scale
     assert monodromy == pytest.approx(columns, abs=2e-5)
 
 
 # ---- backbones
 
 
-def test_exact_free_motion_satisfies_modal_equations():
-    """With coupled damping every harmonic of the free motion satisfies the modal equations,
-    including the balancing negative damping."""
-    modes = make_five_modes(np.diag(0.04 * np.arange(1, 6)) + 0.02)
-    group = LawGroup(modes, Jenkins(*make_elements(20)), 512)
-    omega, shape = modes.compute_stuck_mode(group.rows, group.stiffness(), 1)
-    for motion in trace_free_motions(
-        FreeBalance(HarmonicBalance(modes, group.rows, group), 1, 5, omega),
-        [0.05, 0.3],
-        omega,
-        shape,
-    ):
+def find_backbone(modes, law, amplitudes, harmonics):
+    """Return the free motions of the first mode at amplitudes [m]."""
+    group = LawGroup(modes, law)
+    equations = make_free_balance(modes, group, 0, amplitudes[-1], harmonics)
+    return [found.motion for found in find_free_motions(equations, amplitudes)]
+
+
+@pytest.mark.parametrize("is_forced", [False, True])
+def test_exact_free_motion_satisfies_modal_equations(is_forced):
+    """With coupled damping every harmonic of the free motion satisfies the modal equations, including the negative
+    damping, or the force at a point in the first harmonic, and the output has the requested half range."""
+    modes = make_five_modes(np.diag(0.004 * np.arange(1, 6)) + 0.002)
+    group = LawGroup(modes, Jenkins(*make_elements(20, total=0.6, limit=0.12)))
+    excitation = np.outer(modes.output, modes.output) / 0.36 if is_forced else None
+    equations = make_free_balance(modes, group, 1, 0.3, 5, output=modes.output)
+    motions = find_free_motions(equations, [0.05, 0.3])
+    assert motions[1].motion.loss > 1e-3
+    if is_forced:
+        forced = make_free_balance(modes, group, 1, 0.3, 5, excitation, modes.output)
+        motions = find_free_motions(forced, [0.05, 0.3], starts=motions)
+    for found in motions:
+        motion = found.motion
         for k in range(6):
+            force = excitation * (k == 1) if is_forced else np.eye(5)
             a = np.diag(modes.omega**2 - (k * motion.omega) ** 2) + 1j * k * motion.omega * (
-                modes.damping_matrix - 2 * motion.zeta * motion.omega * np.eye(5)
+                modes.damping_matrix - 2 * motion.zeta * motion.omega * force
             )
             residual = a @ motion.modal[k] + modes.slide * motion.forces[0, k] / modes.mass
             assert np.abs(residual).max() < 1e-9 * motion.amplitude
-        assert motion.modal[1, 1] == motion.amplitude and motion.slides[0] == pytest.approx(
-            motion.modal @ modes.slide
-        )
+        assert motion.modal[1, 1] == pytest.approx(motion.amplitude, abs=1e-12)
+        assert motion.slides[0] == pytest.approx(motion.modal @ modes.slide)
+        output = evaluate_series(motion.modal @ modes.output, 2**16)
+        assert np.ptp(output) / 2 == pytest.approx(found.amplitude, rel=1e-7)
 
 
 def test_exact_backbone_of_duffing_oscillator_agrees_with_closed_form():
     """The backbone of the undamped Duffing oscillator has the period 4 K(m)/sqrt(1 + c a^2) with m
     = c a^2/(2 (1 + c a^2)), within 1e-4."""
-    backbone = find_backbone(
-        make_sdof(0.0), Spring(0.0, 0.5), np.array([0.3, 1.0, 2.0]), harmonics=15
-    )
-    for a, f, z in zip(backbone.slide, backbone.frequency, backbone.damping):
-        c = 0.5 * a * a
-        assert f == pytest.approx(np.sqrt(1 + c) / (4 * ellipk(c / (2 * (1 + c)))), rel=1e-4)
-        assert abs(z) < 1e-9
+    for motion in find_backbone(make_sdof(0.0), Spring(0.0, 0.5), [0.3, 1.0, 2.0], 15):
+        c = 0.5 * half_range(motion.slides[0]) ** 2
+        frequency = np.sqrt(1 + c) / (4 * ellipk(c / (2 * (1 + c))))
+        assert motion.omega / (2 * np.pi) == pytest.approx(frequency, rel=1e-4)
+        assert abs(motion.zeta) < 1e-9
 
 
 BENCH = """\
@@ -307,22 +303,13 @@ def test_exact_backbone_agrees_with_bench_loops(text, law):
     the area of the loop of a bench, within 3e-4."""
     omega = W
     amplitudes = np.array([4.0])
-    backbone = find_backbone(RIG, law, amplitudes * 1e-6, harmonics=1)
-    for k, amplitude in enumerate(amplitudes):
+    motions = find_backbone(RIG, law, amplitudes * 1e-6, 1)
+    for motion, amplitude in zip(motions, amplitudes):
         result = run(plan(BENCH.format(law=text, amplitude=amplitude)))
         stiffness = result.measures["equivalent_stiffness"].value
         area = result.measures["loop_area"].value
         w = np.sqrt(omega**2 + stiffness / MASS)
-        assert 2 * np.pi * backbone.frequency[k] == pytest.approx(w, rel=2e-4)
+        assert motion.omega == pytest.approx(w, rel=2e-4)
         loss = area / (2 * np.pi * MASS * w * w * (amplitude * 1e-6) ** 2)
-        assert backbone.damping[k] == pytest.approx(0.003 * omega / w + loss, rel=3e-4)
-        assert backbone.loss[k] == pytest.approx(area, rel=3e-4)
-
-
-def test_refuses_falling_amplitudes_and_missing_mode():
-    """Amplitudes in falling order and a mode that does not exist are refused."""
-    with pytest.raises(PatchfemError, match="in rising order"):
-        find_backbone(RIG, Spring(1.0), np.array([2.0, 1.0]))
-    with pytest.raises(PatchfemError, match="mode 3"):
-        find_backbone(RIG, Spring(1.0), np.array([2.0]), mode=3)
-    assert evaluate_series(np.array([1.0, 1.0 + 0j]), 4) == pytest.approx([2, 1, 0, 1])
+        assert motion.zeta == pytest.approx(0.003 * omega / w + loss, rel=3e-4)
+        assert motion.loss == pytest.approx(area, rel=3e-4)

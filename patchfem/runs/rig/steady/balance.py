@@ -10,16 +10,15 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ....compiled import load
 from ....core import IntegratedMeasures, NotConverged, Outcome, SineDrive
 from ....dynamics.harmonic import branch as branches
-from ....dynamics.harmonic.balance import find_cycle_energies, make_cycle_response
-from ....dynamics.harmonic.balance import find_regime as balanced_regime
 from ....dynamics.harmonic.forces import LawGroup
 from ....dynamics.harmonic.laws import Interlock, Spring
-from ....dynamics.harmonic.point import find_steady_motion as periodic_point
-from ....dynamics.harmonic.point import refine_steady_motion
+from ....dynamics.harmonic.motion import find_cycle_energies, make_cycle_response
+from ....dynamics.harmonic.motion import find_regime as balanced_regime
 from ....dynamics.harmonic.stability import add_stability
+from ....dynamics.harmonic.steady import find_steady_motion as periodic_point
+from ....dynamics.harmonic.steady import refine_steady_motion
 from ....dynamics.integrated import EngineResult
 from ....formatting import format_length
 from ....response.errors import finer_errors
@@ -37,7 +36,7 @@ SAMPLES_PER_CYCLE = 4096
 class BalanceEvaluator(RunEvaluator):
     """Evaluation of one cycle of a motion from harmonic balance.
 
-    `turns` are the reversals of the cycle, see `SteadyMotion.turns`.
+    `turns` are the reversals of the cycle, see `SteadyMotion.find_reversals`.
     """
 
     turns: tuple = ()
@@ -115,7 +114,6 @@ class BalanceFinder:
     peak_tolerances = (1e-2, 0.1)
 
     def __init__(self, model, numerics, patch, frames: int = 0, say=None):
-        load("dynamics.harmonic.cycle_kernels", say)
         rig = model.rig
         parts = []
         if model.friction is not None:
@@ -160,12 +158,11 @@ class BalanceFinder:
                 min(errors["slip_start_phase"], np.pi / 2), 2 * np.pi / SAMPLES_PER_CYCLE
             )
             errors["stick_fraction"] = max(errors.get("stick_fraction", 0.0), 4 / SAMPLES_PER_CYCLE)
-        name, _ = balanced_regime(motion)
+        name = balanced_regime(motion)
         is_stuck = name == "stuck"
         extra = {
             "regime": name if stability.stable else f"{name}, unstable",
             "multipliers": stability.multipliers,
-            "residual": motion.residual,
             "harmonics": motion.harmonics,
         }
         amplitude = np.array([values["relative_displacement_amplitude"]])
@@ -209,11 +206,7 @@ class BalanceFinder:
             finer = refine_steady_motion(motion, self.modes, drive)
         except NotConverged:
             return errors
-        residual = max(motion.remaining_change, finer.remaining_change)
-        finer_values = compute_measures(finer, drive) if np.isfinite(finer.error) else {}
-        for name, error in finer_errors(values, finer_values).items():
-            errors[name] = error + abs(values[name]) * residual
-        return errors
+        return errors | finer_errors(values, compute_measures(finer, drive))
 
     def _find_stable_motion(self, drive, motion) -> StableMotion:
         """Return a steady motion if it is stable, otherwise the smallest stable one.
@@ -252,7 +245,7 @@ class BalanceFinder:
 
     def _make_curve_point(self, motion) -> CurvePoint:
         """Convert a steady motion with known stability to a point of a response curve."""
-        kind = balanced_regime(motion)[0]
+        kind = balanced_regime(motion)
         stable = bool(motion.stable)
         drive = SineDrive(motion.level, motion.omega, self.model.rig.drive.signal.moving)
         return CurvePoint(
@@ -305,9 +298,8 @@ class BalanceFinder:
             first,
             self.group,
             (drive.low, drive.high),
-            True,
-            harmonics=self.harmonics,
-            tolerance=self.tolerance,
+            self.harmonics,
+            self.tolerance,
         )
         return [self._convert_branch_point(point, first) for point in branch.points], branch.folds
 

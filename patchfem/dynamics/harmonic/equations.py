@@ -1,0 +1,338 @@
+"""Harmonic balance of modes with contact forces on interface rows; the linear part of the structure is exact.
+
+With theta = omega t every coordinate is Re sum_k Z_k exp(i k theta), k = 0 to H. The modal equations
+
+    S_k Z_k + rows^T F_k/m = i a base (k = 1),    S_k = Omega^2 - k^2 omega^2 + i k omega D,
+
+are condensed to the slides Q_k = rows Z_k. A spring and damper sigma (1 + i) of any size acts on the rows, and
+its force is taken off the friction: with P_k = S_k + rows^T sigma (1 + i) rows/m the residual is
+
+    Q_k - rows P_k^-1 (drive - rows^T (F_k - sigma (1 + i) Q_k)/m).
+
+P_k is regular also for a rigid mode (k = 0) and for an undamped mode at its natural frequency.
+
+Method: Krack and Gross, Harmonic Balance for Nonlinear Vibration Problems, 2019; damped Newton: Deuflhard 2004.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from scipy.linalg.lapack import dgetrf, dgetrs
+
+from ...core import ModalBasis, NotConverged, PatchfemError
+from .forces import ForceHarmonics, LawGroup
+from .series import find_harmonics, pack_harmonics, unpack_harmonics
+
+RANK_TOL = 1e-12  # singular values of dependent rows are below it, relative to the largest
+RESONANCE_TOL = 1e-10  # dynamic stiffness of an undamped resonance, relative to the largest
+SINGULAR_RATIO = 1e-13  # smallest pivot of a regular matrix, relative to the largest
+NEWTON_TOL = 1e-10  # change of the unknowns, relative to their size, at which Newton's method ends
+MIN_FRACTION = 0.02  # smallest fraction of a Newton step
+MAX_RESIDUAL = (
+    1e-7  # residual after the last step, relative to the unknowns and the drive, that is round-off
+)
+MAX_STEPS = 40
+
+
+class LinearPart(NamedTuple):
+    """Linear part of the modal equations at a frequency: P_k^-1 and dS_k/d omega, (H + 1, n, n) each."""
+
+    inverse: np.ndarray
+    by_omega: np.ndarray
+
+
+class Motion(NamedTuple):
+    """Motion that follows from given slides, and its derivatives.
+
+    - modal: (H + 1, n) harmonics of the modal coordinates [m]
+    - contact: forces of the contact
+    - transfer: (H + 1, p, n) displacement of p measured rows per acceleration of the coordinates
+    - by_unknowns: (H + 1, p, r (2 H + 1)) derivative of the measured rows by the packed unknowns
+    - by_omega: (H + 1, p) derivative of the measured rows by the frequency
+    """
+
+    modal: np.ndarray
+    contact: ForceHarmonics
+    transfer: np.ndarray
+    by_unknowns: np.ndarray
+    by_omega: np.ndarray
+
+
+class Equations(NamedTuple):
+    """Residual (N,), its derivatives (N, N) by the unknowns and (N,) by frequency and drive level, and the motion."""
+
+    residual: np.ndarray
+    jacobian: np.ndarray
+    by_omega: np.ndarray
+    by_level: np.ndarray
+    motion: Motion
+
+
+def split_equations(equations) -> np.ndarray:
+    """Return complex equations (H + 1, r, ...) as real ones (r (2 H + 1), ...) in the order of `pack_harmonics`."""
+    real = np.concatenate([equations.real, equations.imag[1:]])
+    return np.moveaxis(real, 0, 1).reshape(-1, *equations.shape[2:])
+
+
+class HarmonicBalance:
+    """Harmonic balance of a modal basis with the laws of a group, at a number of samples per cycle.
+
+    The unknowns are the packed harmonics of `rank` independent combinations y of the slides, q = lift y = lift faces z.
+    PatchfemError is raised if no mode moves the rows.
+    """
+
+    def __init__(self, modes: ModalBasis, group: LawGroup, samples: int):
+        u, s, vt = np.linalg.svd(group.rows, full_matrices=False)
+        rank = int(np.sum(s > RANK_TOL * s[0])) if s[0] > 0 else 0
+        if rank == 0:
+            raise PatchfemError(
+                "structure.mode.slide: no mode moves the interface, so no friction acts and harmonic "
+                "balance is not needed; give a mode the key `slide`"
+            )
+        self.modes = modes
+        self.group = group
+        self.samples = samples
+        self.lift = u[:, :rank]
+        self.faces = s[:rank, None] * vt[:rank]
+        # The springs have the size of the smallest modal stiffness.
+        omega = float(modes.omega[modes.omega > 0].min(initial=np.inf))
+        self.spring = modes.mass * (omega**2 if np.isfinite(omega) else 1.0) / s[0] ** 2
+
+    @property
+    def rank(self) -> int:
+        """Number of independent combinations of the slides."""
+        return self.lift.shape[1]
+
+    def unpack_slides(self, x) -> np.ndarray:
+        """Return the harmonics (i, H + 1) [m] of the slides for the unknowns (N,)."""
+        return self.lift @ unpack_harmonics(x, self.rank)
+
+    def pack_slides(self, q) -> np.ndarray:
+        """Return the unknowns (N,) for the harmonics (i, H + 1) [m] of the slides."""
+        return pack_harmonics(self.lift.T @ q)
+
+    def make_springs(self, harmonics: int) -> np.ndarray:
+        """Return the complex stiffness (H + 1,) [N/m] of the springs on the rows."""
+        return self.spring * (1 + 1j * (np.arange(harmonics + 1) > 0))
+
+    def make_stiffness(
+        self, omega: float, harmonics: int, damping=None, *, has_springs: bool = True
+    ) -> tuple:
+        """Return P_k, or S_k without springs, and dS_k/d omega, (H + 1, n, n) each.
+
+        Parameters
+        ----------
+        omega : float
+            [rad/s].
+        harmonics : int
+        damping : (H + 1, n, n) array, optional
+            Damping matrices [1/s]; default: that of the modes.
+        has_springs : bool
+            Whether the springs on the rows are added.
+        """
+        modes = self.modes
+        k = np.arange(harmonics + 1)[:, None, None]
+        eye = np.eye(modes.omega.size)
+        damping = modes.damping_matrix if damping is None else damping
+        stiffness = np.diag(modes.omega**2) - (k * omega) ** 2 * eye + 1j * k * omega * damping
+        if has_springs:
+            springs = self.make_springs(harmonics)[:, None, None] / modes.mass
+            stiffness = stiffness + springs * (self.faces.T @ self.faces)
+        return stiffness, 1j * k * damping - 2 * k**2 * omega * eye
+
+    def find_motion(self, x, omega: float, linear: LinearPart, exciting, measured) -> Motion:
+        """Return the motion that follows from slides, and its derivatives.
+
+        Parameters
+        ----------
+        x : (r (2 H + 1),) array
+            Packed harmonics y of the combinations of slides [m].
+        omega : float
+            [rad/s].
+        linear : LinearPart
+        exciting : (H + 1, n) array
+            Accelerations of the coordinates by the drive [m s-2].
+        measured : (p, n) array
+            Rows of the displacements whose derivatives are computed.
+        """
+        y = unpack_harmonics(x, self.rank)
+        h = y.shape[1] - 1
+        springs = self.make_springs(h)
+        contact = self.group.compute_harmonics(self.lift @ y, omega, self.samples)
+        friction = self.lift.T @ contact.force - springs * y
+        modal_force = exciting - friction.T @ self.faces / self.modes.mass
+        modal = np.einsum("kab,kb->ka", linear.inverse, modal_force)
+
+        # Derivatives of friction by the unknowns, (H + 1, r, r, 2 H + 1), less those of the springs.
+        r = self.rank
+        count = len(self.lift)
+        pairs = (self.lift[:, :, None] * self.lift[:, None, :]).reshape(count, r * r)
+        slope = (pairs.T @ contact.slope.reshape(count, -1)).reshape(r, r, h + 1, 2 * h + 1)
+        slope = np.moveaxis(slope, 2, 0)
+        k = np.arange(h + 1)
+        for row in range(r):
+            slope[k, row, row, k] -= springs
+            slope[k[1:], row, row, h + k[1:]] -= 1j * springs[1:]
+        transfer = measured @ linear.inverse
+        by_force = -transfer @ self.faces.T / self.modes.mass
+        by_unknowns = by_force @ slope.reshape(h + 1, r, -1)
+        by_omega = -np.einsum("kpa,kab,kb->kp", transfer, linear.by_omega, modal)
+        by_omega += np.einsum("kpr,rk->kp", by_force, self.lift.T @ contact.by_omega)
+        return Motion(modal, contact, transfer, by_unknowns, by_omega)
+
+    def evaluate(self, x, omega: float, level: float) -> Equations:
+        """Evaluate the balance.
+
+        Parameters
+        ----------
+        x : (N,) array
+            Unknowns.
+        omega, level : float
+            Frequency [rad/s] and amplitude [m s-2] of the drive.
+        """
+        h = (x.size // self.rank - 1) // 2
+        stiffness, by_omega = self.make_stiffness(omega, h)
+        linear = LinearPart(invert_matrices(stiffness), by_omega)
+        exciting = np.zeros((h + 1, self.modes.omega.size), complex)
+        if h:
+            exciting[1] = 1j * level * self.modes.base
+        motion = self.find_motion(x, omega, linear, exciting, self.faces)
+        by_level = np.zeros((h + 1, self.rank), complex)
+        if h:
+            by_level[1] = -1j * motion.transfer[1] @ self.modes.base
+        return Equations(
+            x - split_equations(motion.modal @ self.faces.T),
+            np.eye(x.size) - split_equations(motion.by_unknowns),
+            -split_equations(motion.by_omega),
+            split_equations(by_level),
+            motion,
+        )
+
+    def solve(self, x, omega: float, level: float, max_steps: int = MAX_STEPS) -> tuple:
+        """Solve the balance from unknowns x (N,).
+
+        Returns
+        -------
+        x : (N,) array
+        equations : Equations
+            Those before the last step.
+        n_steps : int
+
+        Raises
+        ------
+        NotConverged
+            If Newton's method ends at no solution.
+        """
+
+        def is_solved(equations, residual, size) -> bool:
+            drive = abs(level) * float(np.linalg.norm(equations.by_level))
+            return float(np.linalg.norm(residual)) <= MAX_RESIDUAL * (size + drive)
+
+        solution = solve_damped(lambda v: self.evaluate(v, omega, level), x, is_solved, max_steps)
+        if solution is None:
+            count = (x.size // self.rank - 1) // 2
+            conditions = f"{count} harmonics at {omega / (2 * np.pi):.6g} Hz"
+            raise NotConverged(
+                f"accuracy.harmonics: harmonic balance with {conditions} did not converge in {max_steps} iterations; "
+                "give a motion to start from, or begin at a lower drive level"
+            )
+        return solution
+
+    def solve_stuck(self, omega: float, level: float, harmonics: int) -> np.ndarray:
+        """Return the unknowns of the motion in which all contacts stick.
+
+        Parameters
+        ----------
+        omega, level : float
+            Frequency [rad/s] and amplitude [m s-2] of the drive.
+        harmonics : int
+        """
+        equations = self.evaluate(np.zeros(self.rank * (2 * harmonics + 1)), omega, level)
+        return -factor(equations.jacobian)(equations.residual)
+
+    def find_higher_harmonics(self, q, omega: float) -> np.ndarray:
+        """Return harmonics H + 1 to 2 H (i, H) of the slides that follow from the forces of slides q (i, H + 1) [m]."""
+        h = q.shape[1] - 1
+        force = find_harmonics(self.group.compute_forces(q, omega, self.samples), 2 * h)
+        stiffness = self.make_stiffness(omega, 2 * h, has_springs=False)[0][h + 1 :]
+        modal_force = -force[:, h + 1 :].T @ self.group.rows / self.modes.mass
+        return np.einsum("ia,kab,kb->ik", self.group.rows, invert_matrices(stiffness), modal_force)
+
+
+def has_undamped_resonance(modes: ModalBasis, omega: float) -> bool:
+    """Return whether an undamped mode is driven at its natural frequency omega [rad/s]."""
+    stiffness = np.diag(modes.omega**2 - omega**2) + 1j * omega * modes.damping_matrix
+    largest = float(modes.omega.max()) ** 2 + omega**2
+    return bool(np.linalg.svd(stiffness, compute_uv=False)[-1] < RESONANCE_TOL * largest)
+
+
+def invert_matrices(matrices) -> np.ndarray:
+    """Return the inverses of matrices (k, n, n), or pseudoinverses if nothing determines the mean of a coordinate."""
+    try:
+        return np.linalg.inv(matrices)
+    except np.linalg.LinAlgError:
+        return np.linalg.pinv(matrices, rcond=SINGULAR_RATIO)
+
+
+def factor(matrix):
+    """Return a function that solves the linear system of a matrix (n, n) for a right-hand side.
+
+    It is the least-squares solution for a singular matrix, if nothing determines a mean displacement or a rest position.
+    """
+    factors, pivots, _ = dgetrf(matrix)
+    sizes = np.abs(factors.diagonal())
+    if np.isfinite(sizes).all() and sizes.min(initial=np.inf) > SINGULAR_RATIO * sizes.max(
+        initial=0.0
+    ):
+        return lambda b: dgetrs(factors, pivots, b)[0]
+    if not np.isfinite(matrix).all():
+        return lambda b: np.full(b.shape, np.nan)
+    return lambda b: np.linalg.lstsq(matrix, b, rcond=RANK_TOL)[0]
+
+
+def solve_damped(evaluate, x, is_solved, max_steps: int = MAX_STEPS) -> tuple | None:
+    """Solve equations by Newton's method with the natural monotonicity test.
+
+    Parameters
+    ----------
+    evaluate : callable
+        evaluate(x) -> record with `residual` and `jacobian`.
+    x : (N,) array
+        Initial guess.
+    is_solved : callable
+        is_solved(record, linearised residual after the last step, norm of x) -> whether x is a solution. The step also
+        vanishes at a least-squares minimum that is none.
+    max_steps : int
+
+    Returns
+    -------
+    tuple or None
+        Unknowns, record before the last step, and number of steps; None without convergence.
+    """
+    equations = evaluate(x)
+    for count in range(1, max_steps + 1):
+        solve = factor(equations.jacobian)
+        step = -solve(equations.residual)
+        length = float(np.linalg.norm(step))
+        size = float(np.linalg.norm(x))
+        if not np.isfinite(length):
+            return None
+        if length <= max(NEWTON_TOL * size, 1e-300):
+            residual = equations.residual + equations.jacobian @ step
+            return (x + step, equations, count) if is_solved(equations, residual, size) else None
+
+        # The simplified step after this one must be shorter; a tiny step is always taken.
+        fraction = 1.0
+        best = None
+        while True:
+            trial = x + fraction * step
+            trial_equations = evaluate(trial)
+            next_length = float(np.linalg.norm(solve(trial_equations.residual)))
+            if best is None or next_length < best[0] or not np.isfinite(best[0]):
+                best = (next_length, trial, trial_equations)
+            is_shorter = next_length <= (1 - fraction / 4) * length
+            if is_shorter or fraction < MIN_FRACTION or length <= 1e-8 * size:
+                break
+            fraction /= 2
+        _, x, equations = best
+    return None
