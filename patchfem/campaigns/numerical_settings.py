@@ -93,7 +93,7 @@ def list_tolerances(model: Model) -> list:
 
     The values include the tolerance of the scene.
     """
-    models = {value: with_accuracy_key(model, "tolerance", value) for value in SCENE_TOLERANCES}
+    models = {value: _with_accuracy_key(model, "tolerance", value) for value in SCENE_TOLERANCES}
     models[model.accuracy.tolerance] = model
     settings = []
     for value in sorted(models, reverse=True):
@@ -101,20 +101,8 @@ def list_tolerances(model: Model) -> list:
     return settings
 
 
-def with_accuracy_key(model: Model, key: str, value: float) -> Model:
-    """Return a model with another value of a key of the table [accuracy].
-
-    Parameters
-    ----------
-    model : Model
-    key : str
-        Key of the table, such as "tolerance".
-    value : float
-
-    Returns
-    -------
-    Model
-    """
+def _with_accuracy_key(model: Model, key: str, value: float) -> Model:
+    """Return a model with another value of a key of the table [accuracy], such as "tolerance"."""
     return replace(model, accuracy=model.accuracy.model_copy(update={key: value}))
 
 
@@ -153,48 +141,32 @@ def _list_uniform_meshes(model: Model) -> list:
     return settings
 
 
-def _list_integer_values(model: Model, setting_name: str) -> list:
+def _list_integer_values(model: Model, setting_name: str) -> list[Setting]:
     """Return settings for integer values around the value of the scene.
 
     There are fewer coarse values if the value of the scene is small, because values less than 1 are
     excluded.
     """
-    is_set_in_scene = _find_scene_value(model, setting_name)
+    of_scene = getattr(model.wear if setting_name == "jumps" else model.accuracy, setting_name)
     is_step_count = setting_name == "steps_per_cycle"
-    middle = _find_middle_value(model, setting_name)
+    middle = of_scene or DEFAULT_SETTING_VALUES.get(setting_name)
+    if is_step_count and model.kind == "bench":
+        middle = engine.steps_per_cycle(model)
+    elif is_step_count:
+        middle = numerics.choose_numerics(model).steps
     unit = setting_name.replace("_", " ")
     models = {}
     for power in range(-2, N_VALUES - 2):
         value = max(1, round(middle * 2.0**power))
-        is_scene_value = not power and (is_set_in_scene or is_step_count)
-        if is_scene_value:
+        if not power and (of_scene or is_step_count):
             models[value] = model
+        elif setting_name == "jumps":
+            models[value] = replace(model, wear=replace(model.wear, jumps=value))
         elif not is_step_count or 4 <= value <= MAX_STEPS:
-            models[value] = _with_integer_setting(model, setting_name, value)
+            models[value] = _with_accuracy_key(model, setting_name, value)
     settings = []
     for value, changed in models.items():
         settings.append(Setting(str(value), float(value), f"{value} {unit}", changed))
-    if not is_set_in_scene and not is_step_count:
+    if not of_scene and not is_step_count:
         settings.append(Setting("by tolerance", None, f"{unit} set by the tolerance", model))
     return settings
-
-
-def _find_scene_value(model: Model, setting_name: str) -> int | None:
-    """Return the value of a numerical setting in the scene; None if the scene does not set it."""
-    return model.wear.jumps if setting_name == "jumps" else getattr(model.accuracy, setting_name)
-
-
-def _find_middle_value(model: Model, setting_name: str) -> int:
-    """Return the middle one of the values of a numerical setting."""
-    if setting_name != "steps_per_cycle":
-        return _find_scene_value(model, setting_name) or DEFAULT_SETTING_VALUES[setting_name]
-    if model.kind == "bench":
-        return engine.steps_per_cycle(model)
-    return numerics.choose_numerics(model).steps
-
-
-def _with_integer_setting(model: Model, setting_name: str, value: int) -> Model:
-    """Return a model with another value of an integer setting."""
-    if setting_name == "jumps":
-        return replace(model, wear=replace(model.wear, jumps=value))
-    return with_accuracy_key(model, setting_name, value)

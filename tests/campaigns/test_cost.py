@@ -2,13 +2,11 @@
 
 import csv
 import json
-import re
 
 import pytest
 from command_line import run_cli
-from scene_texts import BENCH, PIECE
+from scene_texts import PIECE
 
-import patchfem as pf
 from patchfem import build
 from patchfem.campaigns import (
     Cost,
@@ -166,31 +164,6 @@ def test_exact_smallest_of_equally_fast_settings_is_proposed():
         "fastest in these timings: a knob at 2, 1 CPU s per run"
     )
     assert describe_fastest_setting(slow, 5e-3).endswith("within the tolerance 0.005")
-
-
-def test_exact_proposed_steps_meet_the_tolerance_in_a_run(
-    tmp_path,
-):
-    """A run with the proposed number of steps meets the tolerance of the row."""
-    text = BENCH.replace('law = "coulomb"', 'law = "nonlocal"\nbond_length = "1 um"')
-    text += "[accuracy]\nsteps_per_cycle = 100\n" if "[accuracy]" not in text else ""
-    scene = tmp_path / "bench.toml"
-    scene.write_text(text, "utf-8")
-    process = run_cli("cost", scene, "-o", tmp_path / "out", "-q", "--json")
-    assert process.code == 0, process.err
-    runs = json.loads(process.out)["tolerance"]["runs"]
-    assert list(dict.fromkeys(run["tolerance"] for run in runs)) == [0.1, 0.01, 0.001, 0.0001]
-    labels = [run["label"] for run in runs if run["meets_tolerance"]]
-    proposed_steps = [re.search(r", (\d+) steps per cycle", label) for label in labels]
-    proposed_steps = [match[1] for match in proposed_steps if match]
-    assert proposed_steps
-    result = pf.run(
-        text, **{"accuracy.tolerance": 1e-4, "accuracy.steps_per_cycle": int(proposed_steps[-1])}
-    )
-    assert not any("the tolerance is" in one for one in result.warnings)
-    with open(tmp_path / "out" / "cost.csv", encoding="utf-8") as file:
-        settings = [(row["knob"], row["setting"]) for row in csv.DictReader(file)]
-    assert ("tolerance", f"0.0001, {proposed_steps[-1]} steps per cycle") in settings
 
 
 @pytest.mark.parametrize(
