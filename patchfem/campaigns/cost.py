@@ -20,7 +20,6 @@ from ..core import NotConverged, PatchfemError, compute_allowed_error
 from ..formatting import format_number
 from ..model.model import Model
 from ..model.source import locate_errors
-from ..runs.patch.mesh_levels import solve_on_split_mesh
 from ..runs.plan import plan
 from ..runs.run import run as run_plan
 from .numerical_settings import (
@@ -53,7 +52,7 @@ class Cost:
     Attributes
     ----------
     label : str
-        Label of the setting, or of all settings with identical results.
+        Label of the setting.
     value : float or None
         Value of the setting in SI; None if it follows from the tolerance of the scene.
     words : str
@@ -137,7 +136,7 @@ def compute_setting_costs(
     Returns
     -------
     list of Cost
-        Consecutive identical runs of a setting are merged. The automatic setting follows after the fixed values.
+        The automatic setting follows after the fixed values.
 
     Raises
     ------
@@ -165,7 +164,6 @@ def compute_setting_costs(
             f"cost --over {setting_name}: runs with fewer than three values of this setting succeeded",
             "",
         )
-    runs = _merge_identical_runs(runs)
 
     # the reference is the finest or the automatic setting, whose least accurate measure is more accurate
     best = runs[-1]
@@ -182,30 +180,6 @@ def compute_setting_costs(
     return compared
 
 
-def _merge_identical_runs(runs: list[Cost]) -> list[Cost]:
-    """Merge consecutive runs of fixed values with identical results into one run with both labels.
-
-    The description in a sentence is the shorter one, which is that of the automatic setting.
-    """
-    merged = runs[:1]
-    for run in runs[1:]:
-        last = merged[-1]
-        is_fixed = None not in (run.value, last.value)
-        if not (is_fixed and (run.values, run.errors) == (last.values, last.errors)):
-            merged.append(run)
-            continue
-        faster = min(last, run, key=lambda run: run.seconds)
-        merged[-1] = replace(
-            last,
-            label=f"{last.label}, {run.label.removeprefix('tolerance ')}",
-            words=min(last.words, run.words, key=len),
-            seconds=faster.seconds,
-            wall_seconds=faster.wall_seconds,
-            timings=last.timings + run.timings,
-        )
-    return merged
-
-
 def _time_settings(settings: list[Setting], say: Callable | None) -> list[Cost]:
     """Run and time a model with each of some settings; settings that fail are left out."""
     # The first run includes imports and compilation, which the timings must not contain.
@@ -218,7 +192,7 @@ def _time_settings(settings: list[Setting], say: Callable | None) -> list[Cost]:
         while is_short and len(timings) < N_TIMINGS:
             compile_seconds = compiled.COMPILE_SECONDS[0]
             begin = (_measure_cpu_time(), perf_counter())
-            finished = _run_setting(setting, setting.label, say, can_split=setting != settings[-1])
+            finished = _run_setting(setting, setting.label, say)
             if finished is None:
                 break
             timings.append((_measure_cpu_time() - begin[0], perf_counter() - begin[1]))
@@ -282,9 +256,7 @@ def _measure_cpu_time() -> float:
     return process_time() + children.children_user + children.children_system
 
 
-def _run_setting(
-    setting: Setting, label: str, say: Callable | None, *, can_split: bool = True
-) -> _FinishedRun | None:
+def _run_setting(setting: Setting, label: str, say: Callable | None) -> _FinishedRun | None:
     """Run a model with a numerical setting; return None if the run fails.
 
     A run fails if it does not converge or runs out of memory. The pieces are condensed again instead
@@ -297,13 +269,8 @@ def _run_setting(
         Name of the run in a message.
     say : callable or None
         Called with a line of text.
-    can_split : bool
-        Whether the mesh of a file may be refined once more for its error estimate.
     """
     try:
-        if setting.level:
-            fine, *_ = solve_on_split_mesh(setting.model.patch, setting.level, can_split)
-            return _FinishedRun(fine.measures, ())
         result = run_plan(plan(setting.model), fresh=True)
         steps = result.extra.get("steps_per_cycle") or result.extra.get("steps")
         nodes = None if result.patch is None else int(result.patch.x.size)

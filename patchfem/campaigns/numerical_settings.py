@@ -34,15 +34,12 @@ class Setting(NamedTuple):
     words : str
         Description of the setting for use in a sentence.
     model : Model
-    level : int
-        Number of refinements of a mesh file, each of which halves the edges.
     """
 
     label: str
     value: float | None
     words: str
     model: Model
-    level: int = 0
 
 
 def find_applicable_settings(model: Model) -> list:
@@ -50,7 +47,8 @@ def find_applicable_settings(model: Model) -> list:
 
     Possible settings are element size, time steps, shear modes and jumps over wear cycles.
     """
-    settings = ["element_size"] if model.patch is not None else []
+    has_own_mesh = model.patch is not None and model.patch.mesh.file is None
+    settings = ["element_size"] if has_own_mesh else []
     # All engines of a bench, including the sum over bonds, take the same time steps.
     engine_name = "bench" if model.kind == "bench" else plan(model).engine
     if has_effect("steps_per_cycle", model.kind, engine_name):
@@ -70,22 +68,9 @@ def make_setting_values(model: Model, setting_name: str) -> list:
     """
     if setting_name != "element_size":
         return _list_integer_values(model, setting_name)
-    if model.patch.mesh.file is not None:
-        return _list_split_meshes(model)
     if model.patch.mesh.is_automatic:
         return _list_tolerance_meshes(model)
     return _list_uniform_meshes(model)
-
-
-def _list_split_meshes(model: Model) -> list:
-    """Return settings for the mesh of a file and for its refinements with halved edges."""
-    settings = []
-    for level in range(3):
-        words = "contact.mesh as it is"
-        if level:
-            words = f"contact.mesh with every element edge halved {level} times"
-        settings.append(Setting(f"file, edges / {2**level}", float(2**-level), words, model, level))
-    return settings
 
 
 def list_tolerances(model: Model) -> list:

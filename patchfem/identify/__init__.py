@@ -24,6 +24,5 @@ PUBLIC = {
         "list_shape_modes",
     ),
     "space": ("make_space_filling_points",),
-    "two_models": ("TwoModels",),
     "fit_sentences": ("describe_fit",),
 }

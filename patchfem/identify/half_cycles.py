@@ -12,6 +12,7 @@ import numpy as np
 
 from ..core import PatchfemError
 from ..response.decay_curve import HalfCycles, smooth_slopes
+from .sinusoids import MAX_EVALUATIONS, START_TOL, SinusoidProblem
 
 MIN_SAMPLES = 5  # smallest number of samples in a half cycle
 # Smallest relative standard deviation of the midpoint (relative to the half period) and the size of a half cycle,
@@ -24,8 +25,9 @@ N_PASSES = 3
 MAX_ITERATIONS = 4  # largest number of iterations for the midpoint of a half cycle
 MAX_MIDDLE_SHIFT = 0.35  # largest distance of a midpoint from its prediction, in half periods
 N_NEIGHBOURS = 8  # half cycles on each side from which the noise of a half cycle is estimated
-# Trial frequencies of the first cycle, relative to that of the highest spectral line.
-FREQUENCY_RATIOS = np.linspace(0.75, 1.3, 56)
+# Lower and upper bounds of the frequency of the first cycle, relative to that of the highest spectral line, and of its
+# decay rate [1/s].
+FIRST_CYCLE_BOUNDS = ((0.75, -np.inf), (1.3, np.inf))
 MAX_STEP_RATIO = 10.0  # smallest length of a gap, relative to the 10 % quantile of the time steps
 PADDING_FACTOR = 8  # length of the zero-padded record relative to the record, for a finer spectrum
 
@@ -155,27 +157,25 @@ def _find_first_half_cycle(time, value) -> tuple[float, float]:
     if not frequency > 0 or not np.ptp(value) > 0:
         raise PatchfemError("the record contains no oscillation")
 
-    # sines of the length of the first cycle
-    fits = []
-    for f in frequency * FREQUENCY_RATIOS:
-        is_first_cycle = time - time[0] <= 1 / f
-        n_samples = np.count_nonzero(is_first_cycle)
-        if n_samples < 2 * MIN_SAMPLES:
-            raise PatchfemError(
-                f"the record has {n_samples} samples per cycle of {f:.4g} Hz; at least "
-                f"{2 * MIN_SAMPLES} are needed"
-            )
-        angle = 2 * np.pi * f * (time[is_first_cycle] - time[0])
-        columns = np.stack([np.ones(angle.size), np.cos(angle), np.sin(angle)], axis=1)
-        coefficients = np.linalg.lstsq(columns, value[is_first_cycle], rcond=None)[0]
-        mean_square = float(np.mean((columns @ coefficients - value[is_first_cycle]) ** 2))
-        fits.append((mean_square, f, np.arctan2(-coefficients[1], coefficients[2])))
-    _, f, phase = min(fits)
+    # a sinusoid that is fitted to the first cycle
+    is_first = time - time[0] <= 1.2 / frequency
+    n_samples = round(np.count_nonzero(is_first) / 1.2)
+    if n_samples < 2 * MIN_SAMPLES:
+        raise PatchfemError(
+            f"the record has {n_samples} samples per cycle of {frequency:.4g} Hz; at least "
+            f"{2 * MIN_SAMPLES} are needed"
+        )
+    omega = 2 * np.pi * frequency
+    bounds = tuple(np.array([ratio * omega, rate]) for ratio, rate in FIRST_CYCLE_BOUNDS)
+    record = (time[is_first] - time[0], value[is_first])
+    problem = SinusoidProblem(*record, [np.ones(record[0].size)], bounds=bounds)
+    cycle = problem.refine([[omega, 0.0]], MAX_EVALUATIONS, START_TOL)
+    cosine, sine = cycle.coefficients[0]
 
     # the first half cycle must lie completely in the record
-    half_period = 0.5 / f
-    start = phase / (2 * np.pi * f) % half_period
-    if start < 0.24 / f:
+    half_period = np.pi / cycle.poles[0, 0]
+    start = -np.arctan2(cosine, sine) / np.pi % 1.0 * half_period
+    if start < 0.48 * half_period:
         start += half_period
     return time[0] + start, half_period
 

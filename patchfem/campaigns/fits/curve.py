@@ -1,10 +1,8 @@
 """Fit of a rig to measured frequency and damping as functions of amplitude.
 
-The reference curve of the model comes from periodic motions at the measured amplitudes, by harmonic
-balance. The search uses a quasi-static curve instead, which is a hundred times faster and is
-corrected to have the value and the derivatives of the reference (`identify.two_models`). If this
-search does not converge, the reference is used directly. If one of the two methods has no result,
-the other is used.
+The curve of the model comes from periodic motions at the measured amplitudes, by harmonic balance. The
+quasi-static curve, which is a hundred times faster, gives the start of this search. If one of the two
+methods has no result, the other is used.
 """
 
 from collections.abc import Callable, Iterable, Sequence
@@ -16,11 +14,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...core import NotConverged, PatchfemError, frozen_array
+from ...core import PatchfemError, frozen_array
 from ...formatting import format_length
 from ...identify.least_squares import Fit, Problem
 from ...identify.space import make_space_filling_points
-from ...identify.two_models import MappedMinimum, TwoModels
 from ...inputs.cells import TableFormat
 from ...inputs.columns import read_columns
 from ...inputs.units import RATIO_UNITS
@@ -211,36 +208,21 @@ class CurveModel:
         self.n_computed += 1
         return compute_points(self.build_model(values), self.amplitude, method)
 
-    def compute_reference(self, values) -> np.ndarray:
-        """Compute frequency and damping by the first of the methods; NaN where the mode does not oscillate."""
-        return self._compute_once(tuple(map(float, values)), self.methods[0])
-
-    def compute_fast(self, values) -> np.ndarray:
-        """Compute frequency and damping (2, k) by the last, i.e. fastest, of the methods.
+    def compute(self, values, method: str) -> np.ndarray:
+        """Compute frequency and damping (2, k) by one of the methods.
 
         Raises PatchfemError if the mode does not oscillate at one of the amplitudes.
         """
-        curve = self._compute_once(tuple(map(float, values)), self.methods[-1])
+        curve = self._compute_once(tuple(map(float, values)), method)
         missing = self.amplitude[np.isnan(curve[0])]
         if missing.size:
+            listed = [format_length(size, 3) for size in missing[:MAX_LISTED_AMPLITUDES]]
+            etc = ", ..." if missing.size > len(listed) else ""
             raise PatchfemError(
-                "the mode of the model does not oscillate at the amplitudes "
-                f"{_format_amplitudes(missing)}; leave out these rows, or narrow the ranges of --free"
+                f"the mode of the model does not oscillate at the amplitudes {', '.join(listed)}{etc}; leave out these "
+                "rows, or narrow the ranges of --free"
             )
         return curve
-
-    def compute_reference_without_gaps(self, values) -> np.ndarray:
-        """Compute frequency and damping by harmonic balance, with gaps filled by the fast method.
-
-        In a gap, the value of the fast method is multiplied by the ratio of both methods at the
-        nearest amplitude at which the reference method has a value.
-        """
-        curve = self.compute_reference(values)
-        fast = self.compute_fast(values)
-        known = np.flatnonzero(~np.isnan(curve[0]))
-        distance = np.abs(np.log(self.amplitude[:, None] / self.amplitude[known]))
-        nearest = known[distance.argmin(axis=1)]
-        return np.where(np.isnan(curve), fast * (curve / fast)[:, nearest], curve)
 
     def choose_methods(self, trials: Iterable) -> None:
         """Select the backbone methods that succeed for trial values of the free parameters.
@@ -329,59 +311,40 @@ def fit_curve(
         )
     curves = CurveModel(scene, ranges, measured.amplitude, say)
     keys = FreeKeys(scene, ranges)
-    model = curves.compute_fast
-    problem = keys.make_problem(lambda values: measured.normalized_residual(model(values)))
+
+    def make_problem(method: str, start) -> Problem:
+        """Return the fit of the curve by a method."""
+        problem = keys.make_problem(
+            lambda values: measured.normalized_residual(curves.compute(values, method))
+        )
+        return problem if start is None else replace(problem, start=start)
+
+    problem = make_problem(METHODS[0], None)
     points = make_space_filling_points(MAX_TRIALS, len(ranges))
     curves.choose_methods([problem.start, *map(problem.search_space.to_values, points)])
     if say:
         say(f"{n_amplitudes} amplitudes computed by {' and '.join(curves.methods)}")
-
-    # the fast model is corrected until its minimum is that of harmonic balance
+    reference = curves.methods[0]
+    start = None
     if len(curves.methods) > 1:
-        minimum = _search_two_models(curves, measured, problem, starts)
-        model = minimum.model or curves.compute_reference_without_gaps
-        problem = replace(problem, start=minimum.values)
+        start = make_problem(curves.methods[-1], None).solve(starts, "").values
         starts = 1
+    problem = make_problem(reference, start)
     fit = problem.solve(starts, "series")
-    missing = measured.amplitude[np.isnan(curves.compute_reference(fit.values)[0])]
-    if missing.size:
-        keys = replace(keys, notes=[_warn_of_substituted_values(missing)])
-    fitted = model(fit.values)
-    widened, mode_notes = _widen_by_missing_modes(problem, fit, curves, measured, model)
+    fitted = curves.compute(fit.values, reference)
+    widened, mode_notes = _widen_by_missing_modes(problem, fit, curves, measured)
     beyond, advice = extrapolate_curve(curves, measured, widened)
-    notes = [measured.assumed, _note_different_methods(curves.methods[0], measured)]
+    notes = [measured.assumed, _note_different_methods(reference, measured)]
     return FittedCurve(
         keys=keys.make_fitted_keys(widened, begin),
         path=Path(curve_file),
         measured=measured,
         model=fitted,
-        method=curves.methods[0],
+        method=reference,
         notes=tuple(filter(None, [*notes, mode_notes, advice])),
         n_computed=curves.n_computed,
         beyond=beyond,
     )
-
-
-def _search_two_models(
-    curves: CurveModel, measured: MeasuredCurve, problem: Problem, starts: int
-) -> MappedMinimum:
-    """Find the minimum of the residual of harmonic balance with the corrected fast model."""
-    models = TwoModels(
-        curves.compute_fast,
-        curves.compute_reference_without_gaps,
-        measured.normalized_residual,
-        problem,
-    )
-    try:
-        return models.search(starts)
-    except NotConverged:
-        raise
-    except PatchfemError as reason:
-        raise PatchfemError(
-            "with the fitted values harmonic balance finds no oscillation at the amplitudes "
-            f"{_format_amplitudes(measured.amplitude)}: {reason}; leave out the rows with the largest "
-            "damping, or narrow the ranges of --free"
-        ) from None
 
 
 def extrapolate_curve(
@@ -446,15 +409,6 @@ def extrapolate_curve(
     return beyond[:, known], advice
 
 
-def _warn_of_substituted_values(amplitudes) -> str:
-    """Return the warning about amplitudes (k,) [m] at which harmonic balance has no result."""
-    return (
-        f"harmonic balance found no oscillation at the amplitudes {_format_amplitudes(amplitudes)}; there, "
-        "the values of the static curve are used, multiplied by the ratio of the two methods at "
-        "the nearest amplitude at which both have a value"
-    )
-
-
 def _note_different_methods(method: str, measured: MeasuredCurve) -> str:
     """Return a note if the measured and the computed curve come from different methods, else ""."""
     if measured.method == method:
@@ -472,7 +426,7 @@ def _note_different_methods(method: str, measured: MeasuredCurve) -> str:
 
 
 def _widen_by_missing_modes(
-    problem: Problem, fit: Fit, curves: CurveModel, measured: MeasuredCurve, model: Callable
+    problem: Problem, fit: Fit, curves: CurveModel, measured: MeasuredCurve
 ) -> tuple[Fit, str]:
     """Widen the intervals of a fit by the effect of modes that a reduced structure neglects.
 
@@ -483,8 +437,6 @@ def _widen_by_missing_modes(
         Solution of the problem.
     curves : CurveModel
     measured : MeasuredCurve
-    model : callable
-        Function from the free parameters to the fitted curve (2, k).
 
     Returns
     -------
@@ -492,24 +444,25 @@ def _widen_by_missing_modes(
     note : str
         "" if no mode is neglected.
     """
+    method = curves.methods[0]
     rig_model = curves.build_model(fit.values)
     richer = rig_model.rig.structure.richer_rig
     if richer is None:
         return fit, ""
     try:
-        richer_curve = compute_points(
-            replace(rig_model, rig=richer), curves.amplitude, curves.methods[0]
-        )
+        richer_curve = compute_points(replace(rig_model, rig=richer), curves.amplitude, method)
     except PatchfemError as reason:
         return fit, f"{NO_MODE_ERROR}: {reason}"
 
     # the fit to the curve with the estimated error of the modes
-    reference = curves.compute_reference(fit.values)
+    reference = curves.compute(fit.values, method)
     change = np.nan_to_num(richer_curve - reference)
     error = convergence_error(change, ratio=0.5, order=2.0)
     shifted = replace(
         problem,
-        residual=lambda values: measured.normalized_residual(model(values) + error),
+        residual=lambda values: measured.normalized_residual(
+            curves.compute(values, method) + error
+        ),
         start=fit.values,
     )
     shifts = np.abs(shifted.solve(1, "").values - fit.values)
@@ -527,9 +480,3 @@ def _widen_by_missing_modes(
         f"to {damping:.2g} %, and moves {', '.join(texts)}"
     )
     return replace(fit, intervals=replace(fit.intervals, ends=ends)), note
-
-
-def _format_amplitudes(amplitudes) -> str:
-    """Format the first amplitudes as a list with units."""
-    listed = [format_length(amplitude, 3) for amplitude in amplitudes[:MAX_LISTED_AMPLITUDES]]
-    return ", ".join(listed) + (", ..." if len(amplitudes) > MAX_LISTED_AMPLITUDES else "")

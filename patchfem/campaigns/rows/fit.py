@@ -5,8 +5,6 @@ and the left-out readings. A search does not use the readings that are held out 
 predicted after the fit.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from time import perf_counter
@@ -17,15 +15,38 @@ from ...core import PatchfemError
 from ...identify.least_squares import Descents, Fit, Search
 from ..fits.problem import FittedKeys, FreeKeys
 from .cells import MAX_LOG_RATIO, Readings, compute_rms_scores, read_response_table
+from .checkpoint import SearchCheckpoint
 from .condition_models import ConditionModels, FitRequest
 from .model_readings import ModelReadings
-from .search import SearchSettings, make_residual
 
+# Treatments of a reading flagged U (unstable), and their meanings.
 UNSTABLE_MEANINGS = {
     "bound": "count in the fit as lower bounds",
     "out": "are left out of the fit",
     "read": "count in the fit like all other readings",
 }
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class SearchSettings:
+    """Settings of a search from random starting points.
+
+    Attributes
+    ----------
+    starts : int
+        Number of random starting points.
+    seed : int
+        Seed of the random numbers.
+    unstable : str
+        Treatment of readings flagged U, a key of UNSTABLE_MEANINGS.
+    checkpoint : SearchCheckpoint or None
+        Finished descents, which are not repeated.
+    """
+
+    starts: int = 8
+    seed: int = 0
+    unstable: str = "bound"
+    checkpoint: SearchCheckpoint | None = None
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -246,3 +267,33 @@ def _warn_of_doubtful_fit(
             "a better fit may exist; raise --starts"
         )
     return warnings
+
+
+def make_residual(
+    readings: Readings, model_readings: ModelReadings, training, unstable: str
+) -> Callable:
+    """Return the function that computes the log ratios of selected readings from free parameters.
+
+    Parameters
+    ----------
+    readings : Readings
+    model_readings : ModelReadings
+    training : (n,) bool
+        Mask of the readings in the residual.
+    unstable : str
+        Treatment of readings flagged U. "bound": such a reading is a lower bound, because the
+        motion was still growing, so that only a smaller computed value gives a residual; "out":
+        the reading is excluded; "read": it is treated like any other reading.
+    """
+    is_used = training & ~readings.unstable if unstable == "out" else training
+    conditions = sorted(set(readings.condition[is_used].tolist()))
+    is_lower_bound = (
+        readings.unstable[is_used] if unstable == "bound" else np.zeros(int(is_used.sum()), bool)
+    )
+
+    def residual(values):
+        """Return the log ratios (r,) of computed to measured readings for parameters (n,)."""
+        logs = readings.compute_log_ratios(*model_readings(values, conditions))[is_used]
+        return np.where(is_lower_bound, np.minimum(logs, 0.0), logs)
+
+    return residual

@@ -4,8 +4,6 @@ The peak is that of a spline of 1/y^2 over f^2, which is exact for a single mode
 the errors of the largest cases with the differences from splines of other degrees.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -3,8 +3,6 @@
 The cluster is started on this machine, or belongs to a scheduler at a given address.
 """
 
-from __future__ import annotations
-
 import os
 import sys
 from concurrent.futures import Future

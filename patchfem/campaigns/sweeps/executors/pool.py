@@ -1,7 +1,5 @@
 """Executors that compute chunks in other processes, as futures of `concurrent.futures`."""
 
-from __future__ import annotations
-
 import multiprocessing
 import os
 import signal
