@@ -98,12 +98,18 @@ class Cost:
 
     def meets_tolerance(self) -> bool:
         """Return whether every error estimate is within the tolerance of the run."""
-        return all(
-            self.is_allowed(name, error, self.tolerance) for name, error in self.errors.items()
-        )
+        return all(self.is_allowed(name, self.errors[name], self.tolerance) for name in self.errors)
 
     def is_allowed(self, name: str, error: float, tolerance: float) -> bool:
-        """Return whether an error of a measure is at most tolerance x |value| + floor."""
+        """Return whether an error of a measure is at most tolerance x |value| + floor.
+
+        Parameters
+        ----------
+        name : str
+        error : float
+            In the unit of the measure.
+        tolerance : float
+        """
         return error <= compute_allowed_error(tolerance, self.values[name], self.floors[name])
 
     def known_error(self, name: str) -> float | None:
@@ -231,6 +237,7 @@ def _make_cost(
 ) -> Cost:
     """Return the cost of a setting from its pairs of CPU time and elapsed time [s]."""
     known = {name: one for name, one in finished.measures.items() if one.value is not None}
+    remedies = map(_REMEDY_TEXT.search, finished.warnings)
     seconds, wall_seconds = min(timings)
     return Cost(
         label=setting.label,
@@ -244,7 +251,7 @@ def _make_cost(
         floors={name: measure.floor for name, measure in known.items()},
         distances={},
         tolerance=setting.model.accuracy.tolerance,
-        remedies=tuple(text for one in finished.warnings for text in _REMEDY_TEXT.findall(one)),
+        remedies=tuple(remedy[1] for remedy in remedies if remedy),
         steps=finished.steps,
         nodes=finished.nodes,
     )
@@ -332,11 +339,10 @@ def describe_fastest_setting(runs: list[Cost], tolerance: float) -> str:
     fastest = find_fastest_run(runs, tolerance)
     if fastest is not None:
         cost = f"{format_number(fastest.seconds, 2)} CPU s per run"
-        has_effect = any(
-            not run.is_allowed(name, distance, tolerance)
-            for run in runs
-            for name, distance in run.distances.items()
-        )
+        has_effect = False
+        for run in runs:
+            for name, distance in run.distances.items():
+                has_effect = has_effect or not run.is_allowed(name, distance, tolerance)
         if len(runs) > 1 and not has_effect:
             return (
                 f"this setting changes no result by more than the tolerance {tolerance:g}; fastest in these timings: "
@@ -348,12 +354,9 @@ def describe_fastest_setting(runs: list[Cost], tolerance: float) -> str:
     best = min(known, key=lambda run: find_worst_error(run, names, tolerance))
     worst = find_worst_error(best, names, tolerance)
     size = format_number(worst.fraction, 2)
-    sizes = [
-        find_worst_error(run, [worst.name], tolerance).fraction
-        for run in known
-        if worst.name in run.values
-    ]
-    if worst.fraction >= NO_EFFECT_RATIO * max(sizes):
+    affected = [run for run in known if worst.name in run.values]
+    largest = max(find_worst_error(run, [worst.name], tolerance).fraction for run in affected)
+    if worst.fraction >= NO_EFFECT_RATIO * largest:
         return (
             f"no setting meets the tolerance {tolerance:g}: with every setting the error of {worst.name} is "
             f"{size}"

@@ -51,11 +51,10 @@ class _FittedSines(NamedTuple):
     def compute_noise(self) -> np.ndarray:
         """Return the standard deviation (n,) of the noise in the neighbourhood of each half cycle."""
         window = np.ones(2 * N_NEIGHBOURS + 1)
-        sums = [
-            np.convolve(numbers, window)[N_NEIGHBOURS:-N_NEIGHBOURS]
-            for numbers in (self.square, self.n_free)
-        ]
-        return np.sqrt(np.maximum(sums[0], 0.0) / sums[1])
+        inner = slice(N_NEIGHBOURS, -N_NEIGHBOURS)
+        square = np.convolve(self.square, window)[inner]
+        n_free = np.convolve(self.n_free, window)[inner]
+        return np.sqrt(np.maximum(square, 0.0) / n_free)
 
 
 def find_half_cycles(time, value) -> HalfCycles:

@@ -32,7 +32,6 @@ SAME_RESULT_TOL = 1e-6  # relative difference between the sums of squares of equ
 NEAR_BOUND_FRACTION = 1e-3
 # Number of trial points per parameter for the choice of the starting points.
 N_TRIALS_PER_VALUE = 8
-PENALTY_FACTOR = 1e3  # residual of a failed evaluation, relative to the largest residual
 
 
 class IntervalKind(StrEnum):
@@ -302,41 +301,31 @@ def descend(model: UnitCubeResidual, u, free) -> Descent:
     if not (free and start.is_converged):
         return start
 
-    def place(part) -> np.ndarray:
-        """Return the point (n,) of the unit cube with the free coordinates (f,)."""
-        point = u.copy()
-        point[free] = part
-        return point
+    # the point with the free coordinates v is fixed + select v
+    select = np.eye(u.size)[:, free]
+    fixed = u - select @ u[free]
 
     # the trust-region method needs a start inside the bounds
     for margin in (1e-3, 1e-9):
         inner = np.clip(u[free], margin, 1 - margin)
-        residual = model(place(inner))
+        residual = model(fixed + select @ inner)
         if residual is not None:
             break
     else:
         return start._replace(is_converged=False)
     scale = max(float(np.abs(residual).max()), 1e-300)
-
-    def compute_scaled_residual(part) -> np.ndarray:
-        """Return the scaled residual (r,), or one larger than all before if the evaluation fails."""
-        residual = model(place(part))
-        if residual is None:
-            residual = np.full(model.rows, PENALTY_FACTOR * max(model.largest, 1e-300))
-        return residual / scale
-
     ftol = QUICK_COST_TOL if model.is_expensive else COST_TOL
     result = least_squares(
-        compute_scaled_residual,
+        lambda part: model.with_penalty(fixed + select @ part) / scale,
         inner,
-        jac=lambda part: model.jacobian(place(part), free) / scale,
+        jac=lambda part: model.jacobian(fixed + select @ part, free) / scale,
         bounds=(0, 1),
         ftol=ftol,
         xtol=10 * ftol,
         gtol=1e-15,
         max_nfev=MAX_EVALUATIONS,
     )
-    end = place(result.x)
+    end = fixed + select @ result.x
     cost = model.sum_of_squares(end)
     best = start if cost > start.cost else Descent(end, cost, True, model.rows)
     return best._replace(is_converged=result.status > 0)

@@ -134,7 +134,15 @@ class SinusoidProblem:
         return fit, slopes - basis @ (basis.T @ slopes)
 
     def refine(self, poles, max_evaluations: int, tolerance: float) -> SinusoidFit:
-        """Minimize the residual over the poles (n, 2) from an initial guess, to a relative tolerance."""
+        """Minimize the residual over the poles from an initial guess.
+
+        Parameters
+        ----------
+        poles : (n, 2) array_like
+        max_evaluations : int
+        tolerance : float
+            Relative change of poles and residual at convergence.
+        """
         low, high = (np.tile(bound, len(poles)) for bound in self.bounds)
         result = least_squares(
             lambda p: self.solve(p.reshape(-1, 2))[0].residual / self.scale,
@@ -165,10 +173,10 @@ class SinusoidProblem:
         """
         best, _ = self.solve(np.empty((0, 2)))
         while len(best.poles) < limits.count and best.mean_square > (MIN_MISFIT * self.scale) ** 2:
-            attempts = [
-                self.refine([*best.poles, start], MAX_START_EVALUATIONS, START_TOL)
-                for start in find_starts(best)
-            ]
+            attempts = []
+            for start in find_starts(best):
+                poles = [*best.poles, start]
+                attempts.append(self.refine(poles, MAX_START_EVALUATIONS, START_TOL))
             start = min(attempts, key=lambda fit: fit.mean_square)
             further = self.refine(start.poles, MAX_EVALUATIONS, FIT_TOL)
 

@@ -10,6 +10,7 @@ from ..core import Missing, PatchfemError
 
 DIFFERENCE_STEP = 1e-5  # step of finite differences, relative to the range of a parameter
 MIN_BOUND_RATIO_FOR_LOG = 10  # largest ratio of upper to lower bound of a linear scale
+PENALTY_FACTOR = 1e3  # residual of a failed evaluation, relative to the largest residual
 N_KNOWN_RESIDUALS = (
     32  # number of the last residuals that are kept: a search returns to its neighbours
 )
@@ -117,6 +118,13 @@ class UnitCubeResidual:
         """Return the sum of squares of the residual at u (n,); infinite if the evaluation fails."""
         residual = self(u)
         return np.inf if residual is None else float(residual @ residual)
+
+    def with_penalty(self, u) -> np.ndarray:
+        """Return the residual (r,) at u (n,), or one larger than all before if the evaluation fails."""
+        residual = self(u)
+        if residual is None:
+            return np.full(self.rows, PENALTY_FACTOR * max(self.largest, 1e-300))
+        return residual
 
     def _evaluate(self, u: tuple[float, ...]) -> np.ndarray | None:
         """Evaluate the residual at u (n,), and count evaluations and failures."""

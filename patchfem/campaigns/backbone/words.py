@@ -185,13 +185,14 @@ def _describe_band_width(backbone: Backbone) -> str:
     """Describe where the band of the damping ratio is widest, and the largest deviation of the frequency."""
     band = backbone.band
     curve = backbone.best
-
-    def find_deviations(value, low, high) -> np.ndarray:
-        """Return the largest relative deviation (k,) of a value from the limits of its band."""
-        return np.maximum(high - value, value - low) / np.maximum(np.abs(value), 1e-300)
-
-    frequency = find_deviations(curve.frequency, band.frequency_low, band.frequency_high)
-    k = int(np.argmax(find_deviations(curve.damping, band.damping_low, band.damping_high)))
+    deviations = []
+    for name in ("frequency", "damping"):
+        value = getattr(curve, name)
+        above = getattr(band, f"{name}_high") - value
+        below = value - getattr(band, f"{name}_low")
+        deviations.append(np.maximum(above, below) / np.maximum(np.abs(value), 1e-300))
+    frequency, damping = deviations
+    k = int(np.argmax(damping))
     content = "the numerical error"
     if len(backbone.curves) > 1:
         content += " and the difference of the two methods"

@@ -251,9 +251,25 @@ class CurveModel:
 
 
 def compute_points(model: Model, amplitudes: np.ndarray, method: str) -> np.ndarray:
-    """Compute frequency [Hz] and damping ratio (2, k) of a rig at amplitudes (k,) [m].
+    """Compute frequency [Hz] and damping ratio of a rig at some amplitudes.
 
-    Both are NaN where the mode does not oscillate. Raises PatchfemError if it never oscillates.
+    Parameters
+    ----------
+    model : Model
+    amplitudes : (k,) array
+        [m]
+    method : str
+        Of the backbone.
+
+    Returns
+    -------
+    (2, k) array
+        NaN where the mode does not oscillate.
+
+    Raises
+    ------
+    PatchfemError
+        If the mode never oscillates.
     """
     with locate_errors(model.source):
         backbone = compute_backbone(model, "", amplitudes, (method,), errors=False)

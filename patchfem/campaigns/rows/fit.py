@@ -184,16 +184,20 @@ def fit_rows(
         if progress is not None:
             progress(n_finished / (settings.starts * len(trainings)))
 
-    def predict(values, conditions) -> np.ndarray:
-        """Predict the readings (2, c) with motions that start from rest."""
-        computed.reset_motions()
-        return np.array(computed(values, conditions))
-
     def fit(name: str, training, interval_kind: str) -> Fit:
-        """Fit the parameters to the readings in the mask `training` (n,).
+        """Fit the parameters to some of the readings.
 
         The first motions of each descent start from rest, so that its result depends only on its starting point and on
         the training readings.
+
+        Parameters
+        ----------
+        name : str
+            Under which the finished descents are stored.
+        training : (n,) bool
+            Mask of the readings.
+        interval_kind : str
+            As in `Problem.solve`.
         """
         search = Search(settings.starts, settings.seed, computed.reset_motions, report)
         if settings.checkpoint is not None:
@@ -202,13 +206,13 @@ def fit_rows(
         return keys.make_problem(residual).search(search, interval_kind)
 
     best = fit("all", ~held_out, "rows")
-    prediction = predict(best.values, range(len(cells.conditions)))
+    prediction = computed.predict(best.values, range(len(cells.conditions)))
     logs = cells.compute_log_ratios(*prediction)
     left_out_logs = np.full(held_out.size, np.nan)
     for name, group in groups.items():
         fold = fit(f"without {name}", ~held_out & ~group, "")
         conditions = sorted(set(cells.condition[group].tolist()))
-        fold_logs = cells.compute_log_ratios(*predict(fold.values, conditions))
+        fold_logs = cells.compute_log_ratios(*computed.predict(fold.values, conditions))
         left_out_logs[group] = fold_logs[group]
     warnings = _warn_of_doubtful_fit(cells, best.descents, logs, settings)
     return FittedRows(

@@ -76,9 +76,8 @@ def rank_keys(table: SweepTable, requested: str = "") -> dict[str, list[SobolInd
     columns = {name: table.measures[name].values for name in names}
     if table.is_grid:
         names = [name for name in names if np.isfinite(columns[name]).all()]
-        found = [
-            compute_grid_indices(columns[name].reshape(table.shape))[:, varied] for name in names
-        ]
+        grids = [columns[name].reshape(table.shape) for name in names]
+        found = [compute_grid_indices(grid)[:, varied] for grid in grids]
     else:
         known = np.isfinite(list(columns.values())).all(axis=0) if columns else np.zeros(1, bool)
         if known.sum() < MIN_CASES_PER_KEY * len(varied):
@@ -164,10 +163,8 @@ def estimate_random_indices(coordinates: np.ndarray, values: np.ndarray) -> list
     ]
     smoothing = SMOOTHING_PARAMETERS[int(np.argmin(medians))]
     surfaces = [fit(fitted, smoothing) for fitted, _ in halves]
-    unexplained = np.mean(
-        [find_unexplained(surface, others) for surface, (_, others) in zip(surfaces, halves)],
-        axis=0,
-    )
+    left = [find_unexplained(surface, half[1]) for surface, half in zip(surfaces, halves)]
+    unexplained = np.mean(left, axis=0)
     first, total = _compute_surface_indices(fit(every, smoothing))
     totals = [total, *(_compute_surface_indices(surface)[1] for surface in surfaces)]
     margin = unexplained[:, None] + INDEX_ERROR

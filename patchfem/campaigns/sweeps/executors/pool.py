@@ -103,7 +103,7 @@ class Pool(FutureExecutor):
 
     def begin(self, work: WorkerData, *, is_silent: bool) -> None:
         """Keep the data that each new process receives."""
-        self.initial_data = (work, is_silent)
+        self.initial_data = (work, None if is_silent else _print_to_stderr)
         self.other_processes = multiprocessing.active_children()
 
     def submit(self, chunk: list) -> Future:
@@ -155,13 +155,13 @@ def _worker_environment() -> Iterator[None]:
 _PROCESS_DATA: list = []
 
 
-def _begin_process(work: WorkerData, is_silent: bool) -> None:
+def _begin_process(work: WorkerData, say: Callable | None) -> None:
     """Keep the data of the sweep in a new process, which ends with the process that started it."""
     # The process that started the sweep handles interrupts.
     for name in ("SIGINT", "SIGHUP"):
         if hasattr(signal, name):
             signal.signal(getattr(signal, name), signal.SIG_IGN)
-    _PROCESS_DATA[:] = work, None if is_silent else _print_to_stderr
+    _PROCESS_DATA[:] = work, say
     Thread(target=_end_with_parent, daemon=True).start()
 
 
