@@ -10,7 +10,7 @@ affected by other programs.
 import os
 import re
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from math import inf
 from time import perf_counter, process_time
 from typing import NamedTuple
@@ -41,8 +41,6 @@ _REMEDY_TEXT = re.compile(r"; the tolerance is [^;]*; (.*)", re.DOTALL)
 MIN_ELAPSED_TO_CPU_RATIO = 1.5
 EQUAL_COST_RATIO = 1.1  # Largest ratio of the CPU times of equally expensive runs.
 TIMING_SCATTER = 2e-3  # Scatter of the CPU time of repeated short runs [s].
-# A setting is ineffective if the ratio of its smallest to its largest error exceeds this value.
-NO_EFFECT_RATIO = 0.9
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -69,8 +67,6 @@ class Cost:
         Error estimate of each measure, in the unit of its value.
     floors : dict
         Absolute floor of the allowed error of each measure.
-    distances : dict
-        Absolute difference of each measure to the best run; empty for the best run.
     tolerance : float
         Tolerance of the run.
     remedies : tuple of str
@@ -90,7 +86,6 @@ class Cost:
     values: dict[str, float]
     errors: dict[str, float]
     floors: dict[str, float]
-    distances: dict[str, float]
     tolerance: float = 0.0
     remedies: tuple[str, ...] = ()
     steps: int | None = None
@@ -111,19 +106,6 @@ class Cost:
         tolerance : float
         """
         return error <= compute_allowed_error(tolerance, self.values[name], self.floors[name])
-
-    def known_error(self, name: str) -> float | None:
-        """Return the larger one of error estimate and difference to the best run; None if neither is known."""
-        known = [errors[name] for errors in (self.errors, self.distances) if name in errors]
-        return max(known, default=None)
-
-    def is_within_tolerance(self, names: Sequence[str], tolerance: float) -> bool:
-        """Return whether the known errors of the named measures that the run has are within a tolerance."""
-        for name in set(names) & self.values.keys():
-            error = self.known_error(name)
-            if error is None or not self.is_allowed(name, error, tolerance):
-                return False
-        return True
 
 
 def compute_setting_costs(
@@ -170,20 +152,7 @@ def compute_setting_costs(
             f"cost --over {setting_name}: runs with fewer than three values of this setting succeeded",
             "",
         )
-
-    # the reference is the finest or the automatic setting, whose least accurate measure is more accurate
-    best = runs[-1]
-    if best.value is None:
-        names = best.errors.keys() & runs[-2].errors.keys()
-        best = min(
-            (best, runs[-2]), key=lambda run: find_worst_error(run, names, run.tolerance).fraction
-        )
-    compared = []
-    for run in runs:
-        names = () if run is best else run.values.keys() & best.values.keys()
-        distances = {name: abs(run.values[name] - best.values[name]) for name in names}
-        compared.append(replace(run, distances=distances))
-    return compared
+    return runs
 
 
 def _time_settings(settings: list[Setting], say: Callable | None) -> list[Cost]:
@@ -249,7 +218,6 @@ def _make_cost(
         values={name: measure.value for name, measure in known.items()},
         errors={name: one.error for name, one in known.items() if one.error is not None},
         floors={name: measure.floor for name, measure in known.items()},
-        distances={},
         tolerance=setting.model.accuracy.tolerance,
         remedies=tuple(remedy[1] for remedy in remedies if remedy),
         steps=finished.steps,
@@ -289,45 +257,40 @@ def _run_setting(setting: Setting, label: str, say: Callable | None) -> _Finishe
 
 
 def find_fastest_settings(runs: list[Cost], tolerance: float) -> dict[str, str | None]:
-    """Return, for each measure, the label of the fastest run whose error is within the tolerance, or None.
-
-    A coarse run that is accurate by chance is excluded: all finer runs must meet the tolerance as well.
-    """
+    """Return, for each measure, the label of the fastest run whose error is within the tolerance, or None."""
     labels = {}
-    for name in runs[0].values:
-        confirmed = _select_confirmed_runs(runs, [name], tolerance)
-        labels[name] = min(confirmed, key=lambda run: run.seconds).label if confirmed else None
+    for name in find_measures_with_error(runs):
+        fastest = find_fastest_run(runs, tolerance, [name])
+        labels[name] = None if fastest is None else fastest.label
     return labels
 
 
-def _select_confirmed_runs(runs: list[Cost], names: Sequence[str], tolerance: float) -> list[Cost]:
-    """Select the runs whose named measures meet a tolerance, provided that those of all finer runs meet it as well.
+def find_fastest_run(runs: list[Cost], tolerance: float, names: Sequence[str] = ()) -> Cost | None:
+    """Return the run with the shortest CPU time whose errors are within a tolerance; None if there is none.
 
-    The run with the automatic setting is judged independently of the others.
+    A coarse run that is accurate by chance is excluded: those of all finer values must be within the tolerance as well.
+    The automatic setting is judged independently of the others. Among equally expensive runs, the one with the coarsest
+    setting is returned.
+
+    Parameters
+    ----------
+    runs : list of Cost
+    tolerance : float
+    names : sequence of str
+        Measures that count; all by default.
     """
     confirmed = []
-    for run in reversed([run for run in runs if run.value is not None]):
-        # Without error estimates, the best run only serves as the reference of the others.
-        if not run.errors and not run.distances:
-            continue
-        if not run.is_within_tolerance(names, tolerance):
-            break
-        confirmed.append(run)
-    automatic = [run for run in runs if run.value is None]
-    return confirmed + [run for run in automatic if run.is_within_tolerance(names, tolerance)]
-
-
-def find_fastest_run(runs: list[Cost], tolerance: float) -> Cost | None:
-    """Return the run with the shortest CPU time that meets a tolerance; None if no run meets it.
-
-    Among equally expensive runs, the one with the coarsest setting is returned.
-    """
-    confirmed = _select_confirmed_runs(runs, find_measures_with_error(runs), tolerance)
+    is_confirmed = True
+    for run in reversed(runs):
+        counted = [name for name in run.errors if name in names or not names]
+        is_accurate = all(run.is_allowed(name, run.errors[name], tolerance) for name in counted)
+        if run.value is not None:
+            is_confirmed = is_confirmed and is_accurate
+        if is_accurate and (is_confirmed or run.value is None):
+            confirmed.append(run)
     shortest = min((run.seconds for run in confirmed), default=inf)
-    for run in runs:
-        if run in confirmed and run.seconds <= EQUAL_COST_RATIO * shortest + TIMING_SCATTER:
-            return run
-    return None
+    limit = EQUAL_COST_RATIO * shortest + TIMING_SCATTER
+    return next((run for run in reversed(confirmed) if run.seconds <= limit), None)
 
 
 def describe_fastest_setting(runs: list[Cost], tolerance: float) -> str:
@@ -335,35 +298,19 @@ def describe_fastest_setting(runs: list[Cost], tolerance: float) -> str:
 
     If no setting meets the tolerance, the description contains the worst measure of the best run.
     """
-    names = find_measures_with_error(runs)
     fastest = find_fastest_run(runs, tolerance)
     if fastest is not None:
-        cost = f"{format_number(fastest.seconds, 2)} CPU s per run"
-        has_effect = False
-        for run in runs:
-            for name, distance in run.distances.items():
-                has_effect = has_effect or not run.is_allowed(name, distance, tolerance)
-        if len(runs) > 1 and not has_effect:
-            return (
-                f"this setting changes no result by more than the tolerance {tolerance:g}; fastest in these timings: "
-                f"{fastest.words}, {cost}"
-            )
-        return f"{fastest.words}: {cost}, with every measure within the tolerance {tolerance:g}"
-
-    known = [run for run in runs if run.errors or run.distances]
-    best = min(known, key=lambda run: find_worst_error(run, names, tolerance))
-    worst = find_worst_error(best, names, tolerance)
-    size = format_number(worst.fraction, 2)
-    affected = [run for run in known if worst.name in run.values]
-    largest = max(find_worst_error(run, [worst.name], tolerance).fraction for run in affected)
-    if worst.fraction >= NO_EFFECT_RATIO * largest:
+        seconds = format_number(fastest.seconds, 2)
         return (
-            f"no setting meets the tolerance {tolerance:g}: with every setting the error of {worst.name} is "
-            f"{size}"
+            f"{fastest.words}: {seconds} CPU s per run, with every measure within the tolerance "
+            f"{tolerance:g}"
         )
+    names = find_measures_with_error(runs)
+    best = min(runs, key=lambda run: find_worst_error(run, names, tolerance))
+    worst = find_worst_error(best, names, tolerance)
     return (
         f"no setting meets the tolerance {tolerance:g}: the best run, with {best.words}, has an error of "
-        f"{size} in {worst.name} and takes {format_number(best.seconds, 2)} CPU s"
+        f"{format_number(worst.fraction, 2)} in {worst.name} and takes {format_number(best.seconds, 2)} CPU s"
     )
 
 
@@ -394,7 +341,7 @@ def find_worst_error(run: Cost, names: Sequence, tolerance: float) -> WorstError
     """
     worst = WorstError(0.0, "")
     for name in names:
-        error = run.known_error(name)
+        error = run.errors.get(name)
         if error:
             size = abs(run.values[name]) + run.floors[name] / tolerance
             worst = max(worst, WorstError(error / size if size else inf, name))
