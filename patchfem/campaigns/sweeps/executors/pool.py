@@ -139,7 +139,7 @@ class Pool(FutureExecutor):
 @contextmanager
 def _worker_environment() -> Iterator[None]:
     """Set the environment of processes that start, and hide the script of the caller, which they would run again."""
-    environment = dict(os.environ)
+    before = {name: os.environ.get(name) for name in WORKER_ENVIRONMENT}
     script = sys.modules["__main__"]
     os.environ.update(WORKER_ENVIRONMENT)
     sys.modules["__main__"] = ModuleType("__main__")
@@ -147,8 +147,11 @@ def _worker_environment() -> Iterator[None]:
         yield
     finally:
         sys.modules["__main__"] = script
-        os.environ.clear()
-        os.environ.update(environment)
+        for name, value in before.items():
+            if value is None:
+                del os.environ[name]
+            else:
+                os.environ[name] = value
 
 
 # Data of the sweep in a worker process, and the function that prints a line of text.
