@@ -13,7 +13,6 @@ PUBLIC = {
         "Fit",
         "Problem",
         "Search",
-        "SearchCounts",
     ),
     "measured_modes": (
         "SHAPE_QUANTITIES",
