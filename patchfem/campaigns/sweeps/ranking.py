@@ -141,7 +141,9 @@ def estimate_random_indices(coordinates: np.ndarray, values: np.ndarray) -> list
     from scipy.interpolate import RBFInterpolator
 
     rng = np.random.default_rng(0)
-    every = rng.permutation(len(coordinates))[:MAX_SURFACE_CASES]
+    every = np.arange(len(coordinates))
+    if every.size > MAX_SURFACE_CASES:
+        every = rng.choice(every, MAX_SURFACE_CASES, replace=False)
     scaled = (values - values.mean(axis=0)) / values.std(axis=0)
     halves = [np.array_split(rng.permutation(every), 2) for _ in range(N_HALVES)]
 
