@@ -23,8 +23,6 @@ from campaigns import Row
 from scene_texts import DRIVE, KILOGRAM, POINT
 
 import patchfem as pf
-from patchfem.campaigns.fits.curve import fit_curve
-from patchfem.campaigns.fits.loop import fit_hysteresis_loop
 from patchfem.identify.decay import fit_decay
 
 NOISE = 0.03
@@ -41,23 +39,21 @@ def compare_fit(seed: int, folder: Path, earlier: dict | None = None) -> dict:
     return {"rows": rows, "seconds": process_time() - begin}
 
 
-def make_rows(kind: str, fit, truth: dict) -> list[Row]:
-    """Return a row for each fitted value, with the distance to the end of its interval on the side of the truth."""
-    rows = []
-    for (key, true_value), value, ends in zip(truth.items(), fit.values, fit.intervals.ends):
-        error = ends[1] - value if true_value > value else value - ends[0]
-        rows.append(Row(f"{kind} {key}", float(value), float(error), 0.0, true_value, 0.0))
-    return rows
+def fit_keys(kind: str, scene: str, path: Path, truth: dict) -> list[Row]:
+    """Fit keys, and return a row for each, with the distance to the end of its interval on the side of the truth.
 
-
-def make_free(truth: dict) -> list[str]:
-    """Return the ranges of the fitted keys, from a fifth to five times each value."""
-    texts = []
+    The ranges are from a fifth to five times each value.
+    """
+    free = {}
     for key, value in truth.items():
         ends = (-0.95, -0.02) if key == "friction.chi" else (value / 5, 5 * value)
-        unit = UNITS.get(key, "")
-        texts.append(f"{key}={ends[0]!r}{unit}..{ends[1]!r}{unit}")
-    return texts
+        free[key] = tuple(f"{end!r}{UNITS.get(key, '')}" for end in ends)
+    rows = []
+    for key, found in pf.fit(scene, to=path, free=free)["values"].items():
+        value = found["value"]
+        error = found["high"] - value if truth[key] > value else value - found["low"]
+        rows.append(Row(f"{kind} {key}", value, error, 0.0, truth[key], 0.0))
+    return rows
 
 
 def draw_log(rng, low: float, high: float) -> float:
@@ -87,8 +83,7 @@ def fit_loop(seed: int, rng, folder: Path) -> list[Row]:
     law = "nonlocal" if seed % 2 else "elastic-plastic"
     text = POINT + f'[friction]\nlaw = "{law}"\nstatic = 0.3\nbond_length = "2 um"\n' + SLIDE
     truth = {"friction.static": static, "friction.bond_length": bond}
-    found = fit_hysteresis_loop(pf.load(text), path, make_free(truth))
-    return make_rows("loop", found.keys.fit, truth)
+    return fit_keys("loop", text, path, truth)
 
 
 def fit_backbone(seed: int, rng, folder: Path) -> list[Row]:
@@ -119,7 +114,7 @@ def fit_backbone(seed: int, rng, folder: Path) -> list[Row]:
     head = "amplitude [m],frequency [Hz],frequency_error [Hz],damping,damping_error"
     np.savetxt(path, table, fmt="%.17g", delimiter=",", header=head, comments="")
     truth = {"friction.stiffness": stiffness, "friction.chi": chi}
-    return make_rows("curve", fit_curve(pf.load(scene), path, make_free(truth)).keys.fit, truth)
+    return fit_keys("curve", scene, path, truth)
 
 
 def fit_modes(seed: int, rng, folder: Path) -> list[Row]:
