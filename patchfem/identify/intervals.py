@@ -106,6 +106,7 @@ class _Minimum(NamedTuple):
         Parameters
         ----------
         k : int
+            Number of the parameter.
         sign : float
             Side, -1 or 1.
         step : float
@@ -150,6 +151,7 @@ def compute_intervals(
     Parameters
     ----------
     model : UnitCubeResidual
+        Residual as a function on the unit cube.
     u : (n,) ndarray
         Minimum in the unit cube.
     cost : float
@@ -201,6 +203,8 @@ def compute_intervals(
                 steps[side] = minimum.find_profile_end(k, sign, step, others)
             open_ends[k] = ~np.isfinite(steps)
             steps = np.minimum(steps, bounds)
+
+        # data that exclude neither bound do not determine the parameter
         if open_ends[k].all():
             methods[k] = "none"
             continue

@@ -285,6 +285,7 @@ def descend(model: UnitCubeResidual, u, free) -> Descent:
     Parameters
     ----------
     model : UnitCubeResidual
+        Residual as a function on the unit cube.
     u : (n,) array_like
         Starting point.
     free : sequence of int
@@ -314,6 +315,8 @@ def descend(model: UnitCubeResidual, u, free) -> Descent:
     else:
         return start._replace(is_converged=False)
     scale = max(float(np.abs(residual).max()), 1e-300)
+
+    # the residual is scaled because the method stops at an absolute gradient
     ftol = QUICK_COST_TOL if model.is_expensive else COST_TOL
     result = least_squares(
         lambda part: model.with_penalty(fixed + select @ part) / scale,

@@ -139,7 +139,9 @@ class SinusoidProblem:
         Parameters
         ----------
         poles : (n, 2) array_like
+            Damped frequency [rad/s] and decay rate [1/s] of each sinusoid.
         max_evaluations : int
+            Largest number of evaluations.
         tolerance : float
             Relative change of poles and residual at convergence.
         """
@@ -165,6 +167,7 @@ class SinusoidProblem:
         find_starts : callable
             Function of a SinusoidFit that returns initial poles (2,) of a further sinusoid.
         limits : Limits
+            When no further sinusoid is added.
 
         Returns
         -------

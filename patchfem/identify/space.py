@@ -62,6 +62,7 @@ def make_search_space(low, high) -> SearchSpace:
     Parameters
     ----------
     low, high : (n,) array_like
+        Bounds.
 
     Returns
     -------
@@ -152,6 +153,7 @@ class UnitCubeResidual:
         Parameters
         ----------
         u : (n,) array_like
+            Point of the unit cube.
         free : sequence of int
             Indices of the f coordinates that vary.
         """

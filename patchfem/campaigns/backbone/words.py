@@ -216,6 +216,8 @@ def _describe_static_curve(curves: dict[str, Curve]) -> list[str]:
         error = getattr(balance, f"{name}_error") + getattr(static, f"{name}_error")
         limit = AGREEMENT * np.abs(value) + error + ROUND_OFF_ERROR
         agrees &= np.abs(getattr(static, name) - value) <= limit
+
+    # the range ends at the first amplitude at which they differ
     tolerance = f"{100 * AGREEMENT:g} %"
     if agrees.all():
         return [f"The quasi-static curve holds within {tolerance} at all its amplitudes."]

@@ -143,6 +143,8 @@ def read_damping_curve(path) -> MeasuredCurve:
             f"{path}: the file contains the curves of several methods; keep the rows of one method "
             "only"
         )
+
+    # errors of a table without columns of errors are assumed
     value = np.array([columns["frequency"], columns["damping"]])
     error = np.zeros_like(value)
     assumed = []
@@ -157,6 +159,7 @@ def read_damping_curve(path) -> MeasuredCurve:
             f"{path}: errors must be 0 or more; of a value with a confidence interval, give half "
             "the width of this interval as the error, or leave out the column of errors"
         )
+
     amplitude = columns["amplitude"]
     if not (amplitude > 0).all() or not (value[0] > 0).all():
         raise PatchfemError(f"{path}: amplitudes and frequencies must be above 0")
@@ -340,6 +343,8 @@ def fit_curve(
     curves.choose_methods([problem.start, *map(problem.search_space.to_values, points)])
     if say:
         say(f"{n_amplitudes} amplitudes computed by {' and '.join(curves.methods)}")
+
+    # the fast method gives the start of the search by the reference method
     reference = curves.methods[0]
     start = None
     if len(curves.methods) > 1:
@@ -485,6 +490,8 @@ def _widen_by_missing_modes(
     ends = fit.intervals.ends + shifts[:, None] * [-1, 1]
     space = problem.search_space
     ends = frozen_array(np.clip(ends, space.low[:, None], space.high[:, None]))
+
+    # what the note tells
     texts = []
     for bound, shift, value in zip(curves.ranges, shifts, fit.values):
         size = f"{100 * shift / abs(value):.2g} %" if value else f"{shift:.2g}"

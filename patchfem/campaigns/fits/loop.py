@@ -129,6 +129,8 @@ def fit_hysteresis_loop(
             f"{loop_file}: only {n_used} rows are used for the fit (rows that are held out do not count), "
             f"too few to determine {n_values} values and their intervals"
         )
+
+    # least squares of the deviations, as fractions of the largest force
     bench = BenchModel(scene, loop, ranges, offsets, warm_up=options.warm, say=say)
     scale = float(np.abs(loop.reading[~held_out]).max())
     offset_ranges = [offset.range for offset in offsets]

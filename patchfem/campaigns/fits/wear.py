@@ -192,6 +192,7 @@ def fit_wear(
         """Compute the wear depth over the cycles for a wear coefficient [m2/N]."""
         return _compute_wear_curve(model, patch, coefficient, target.name, progress)
 
+    # one run with the largest coefficient gives the depth for all smaller ones
     curve = compute(bounds.high)
     max_depth = float(curve.depth[-1])
     if not max_depth >= target.value:
@@ -205,6 +206,8 @@ def fit_wear(
             f"--free {COEFFICIENT_KEY}: with the high bound {bounds.high:.4g} m^2/N the scene reaches only "
             f"{target.name} = {max_depth:.4g}, but {target.value:.4g} was measured; {advice}"
         )
+
+    # the interpolated coefficient is corrected until a run with it has the measured depth
     inverse = curve.make_inverse()
     value = float(bounds.high * inverse(target.value))
     n_runs = 1

@@ -170,6 +170,8 @@ def read_response_table(path: Path) -> Readings:
                 f"{path}: row {k + 1}: the acceleration is 0, but the fit takes its logarithm; leave "
                 "the cell empty"
             )
+
+        # a row has an acceleration, a displacement or both
         for value, is_felt in ((row.acceleration, True), (row.displacement, False)):
             if value is not None:
                 row_numbers.append(k)

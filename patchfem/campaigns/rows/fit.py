@@ -172,6 +172,8 @@ def fit_rows(
     trainings |= {f"without {name}": ~held_out & ~group for name, group in groups.items()}
     for training in trainings.values():
         _require_enough_readings(cells, training, len(request.ranges), settings)
+
+    # readings of the model, and the counter of finished descents
     models = request.make_condition_models(cells.conditions)
     computed = ModelReadings(models, say)
     keys = FreeKeys(models.scene, models.ranges, sets=models.sets, notes=models.notes)
