@@ -1,4 +1,4 @@
-"""Executors that compute chunks in other processes, as futures of `concurrent.futures`."""
+"""Executors that compute chunks in other processes, as futures of the standard library."""
 
 import multiprocessing
 import os
