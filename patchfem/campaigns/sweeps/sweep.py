@@ -5,7 +5,7 @@ If a worker dies, the cases of its chunk are repeated one by one.
 In: `WorkerData`, case numbers and an executor of `executors/`. Out: results by chunk from `iterate_chunks`.
 """
 
-from collections import deque
+from collections import Counter, deque
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from time import perf_counter
@@ -22,6 +22,8 @@ from ...runs.batch.meshes import SharedMeshes
 from .case_models import SweepScene
 from .cases import Cases
 
+# Number of deaths of a worker after which a case is abandoned: another case may have caused the first one.
+MAX_DEATHS = 3
 # Target time of a chunk [s], which is long compared with its transfer to a worker and short compared
 # with a sweep.
 CHUNK_SECONDS = 1.0
@@ -187,7 +189,7 @@ class ChunkQueue:
         self.min_size = min_size
         self.remaining = deque(numbers)
         self.suspects: deque[int] = deque()
-        self.repeated: set[int] = set()
+        self.deaths: Counter[int] = Counter()
         self.workers = max(workers, 1)
         # Elapsed time per case of the last chunk, with a guess before the first chunk.
         self.seconds_per_case = CHUNK_SECONDS
@@ -216,10 +218,9 @@ class ChunkQueue:
 
     def record_death(self, numbers: Sequence[int]) -> list[int]:
         """Record the failure of a chunk: return the cases to abandon, and queue the others to be repeated alone."""
-        abandoned = [number for number in numbers if number in self.repeated]
-        self.suspects += [number for number in numbers if number not in self.repeated]
-        self.repeated.update(numbers)
-        return abandoned
+        self.deaths.update(numbers)
+        self.suspects += [number for number in numbers if self.deaths[number] < MAX_DEATHS]
+        return [number for number in numbers if self.deaths[number] >= MAX_DEATHS]
 
 
 def iterate_chunks(

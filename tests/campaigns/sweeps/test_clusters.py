@@ -170,7 +170,7 @@ def test_always_lost_scheduler_keeps_finished_cases(tmp_path):
             text=True,
             env=os.environ | {"PYTHONUNBUFFERED": "1"},
         )
-        while running.poll() is None and not any((tmp_path / "out" / "chunks").glob("*.h5")):
+        while running.poll() is None and not any((tmp_path / "out" / "chunks").glob("*.nc")):
             pass
     finally:
         server.kill()
