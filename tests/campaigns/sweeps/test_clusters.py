@@ -176,8 +176,8 @@ def test_always_lost_scheduler_keeps_finished_cases(tmp_path):
         server.kill()
     _, message = running.communicate(timeout=60)
     assert running.returncode == 4, message
-    assert "the connection to the scheduler is lost; " in message
-    assert "of 3000 cases are kept; continue with: patchfem sweep" in message
+    assert "the connection to the scheduler is lost" in message
+    assert list((tmp_path / "out/chunks").glob("*.nc"))
     assert "Traceback" not in message and "CommClosed" not in message
 
 
