@@ -427,10 +427,8 @@ def cost(
         The output of `patchfem cost --json`: an entry "tolerance", or one with the name of the setting, with the list
         `runs`. Each run has its `label`, `tolerance`, CPU `seconds`, `wall_seconds`, the `worst` measure with its error
         (relative to the allowed error at a tolerance of 1), `meets_tolerance`, the advice from its warnings as `remedies`,
-        and for each measure its value in `values` and its error estimate in `errors`, in SI units. If a run misses its
-        tolerance, further runs with the same `tolerance` and a proposed setting may follow. For a setting, each run also
-        has `distances` from the best run, the entry has `cheapest` and `sentence`, and settings with bit-identical
-        results are listed once.
+        and for each measure its value in `values` and its error estimate in `errors`, in SI units. For a setting,
+        the entry has `cheapest` and `sentence`.
 
     Raises
     ------

@@ -43,10 +43,7 @@ PUBLIC = {
         "NUMERICAL_SETTINGS",
         "find_applicable_settings",
     ),
-    "rows.fit": (
-        "FittedRows",
-        "SAME_SCORE",
-    ),
+    "rows.fit": ("FittedRows",),
     "surface_pairs": (
         "average_pairs",
         "find_group",

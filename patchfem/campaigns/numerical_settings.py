@@ -34,15 +34,12 @@ class Setting(NamedTuple):
     words : str
         Description of the setting for use in a sentence.
     model : Model
-    level : int
-        Number of refinements of a mesh file, each of which halves the edges.
     """
 
     label: str
     value: float | None
     words: str
     model: Model
-    level: int = 0
 
 
 def find_applicable_settings(model: Model) -> list:
@@ -50,7 +47,8 @@ def find_applicable_settings(model: Model) -> list:
 
     Possible settings are element size, time steps, shear modes and jumps over wear cycles.
     """
-    settings = ["element_size"] if model.patch is not None else []
+    has_own_mesh = model.patch is not None and model.patch.mesh.file is None
+    settings = ["element_size"] if has_own_mesh else []
     # All engines of a bench, including the sum over bonds, take the same time steps.
     engine_name = "bench" if model.kind == "bench" else plan(model).engine
     if has_effect("steps_per_cycle", model.kind, engine_name):
@@ -70,22 +68,9 @@ def make_setting_values(model: Model, setting_name: str) -> list:
     """
     if setting_name != "element_size":
         return _list_integer_values(model, setting_name)
-    if model.patch.mesh.file is not None:
-        return _list_split_meshes(model)
     if model.patch.mesh.is_automatic:
         return _list_tolerance_meshes(model)
     return _list_uniform_meshes(model)
-
-
-def _list_split_meshes(model: Model) -> list:
-    """Return settings for the mesh of a file and for its refinements with halved edges."""
-    settings = []
-    for level in range(3):
-        words = "contact.mesh as it is"
-        if level:
-            words = f"contact.mesh with every element edge halved {level} times"
-        settings.append(Setting(f"file, edges / {2**level}", float(2**-level), words, model, level))
-    return settings
 
 
 def list_tolerances(model: Model) -> list:
@@ -93,7 +78,7 @@ def list_tolerances(model: Model) -> list:
 
     The values include the tolerance of the scene.
     """
-    models = {value: with_accuracy_key(model, "tolerance", value) for value in SCENE_TOLERANCES}
+    models = {value: _with_accuracy_key(model, "tolerance", value) for value in SCENE_TOLERANCES}
     models[model.accuracy.tolerance] = model
     settings = []
     for value in sorted(models, reverse=True):
@@ -101,20 +86,8 @@ def list_tolerances(model: Model) -> list:
     return settings
 
 
-def with_accuracy_key(model: Model, key: str, value: float) -> Model:
-    """Return a model with another value of a key of the table [accuracy].
-
-    Parameters
-    ----------
-    model : Model
-    key : str
-        Key of the table, such as "tolerance".
-    value : float
-
-    Returns
-    -------
-    Model
-    """
+def _with_accuracy_key(model: Model, key: str, value: float) -> Model:
+    """Return a model with another value of a key of the table [accuracy], such as "tolerance"."""
     return replace(model, accuracy=model.accuracy.model_copy(update={key: value}))
 
 
@@ -153,48 +126,32 @@ def _list_uniform_meshes(model: Model) -> list:
     return settings
 
 
-def _list_integer_values(model: Model, setting_name: str) -> list:
+def _list_integer_values(model: Model, setting_name: str) -> list[Setting]:
     """Return settings for integer values around the value of the scene.
 
     There are fewer coarse values if the value of the scene is small, because values less than 1 are
     excluded.
     """
-    is_set_in_scene = _find_scene_value(model, setting_name)
+    of_scene = getattr(model.wear if setting_name == "jumps" else model.accuracy, setting_name)
     is_step_count = setting_name == "steps_per_cycle"
-    middle = _find_middle_value(model, setting_name)
+    middle = of_scene or DEFAULT_SETTING_VALUES.get(setting_name)
+    if is_step_count and model.kind == "bench":
+        middle = engine.steps_per_cycle(model)
+    elif is_step_count:
+        middle = numerics.choose_numerics(model).steps
     unit = setting_name.replace("_", " ")
     models = {}
     for power in range(-2, N_VALUES - 2):
         value = max(1, round(middle * 2.0**power))
-        is_scene_value = not power and (is_set_in_scene or is_step_count)
-        if is_scene_value:
+        if not power and (of_scene or is_step_count):
             models[value] = model
+        elif setting_name == "jumps":
+            models[value] = replace(model, wear=replace(model.wear, jumps=value))
         elif not is_step_count or 4 <= value <= MAX_STEPS:
-            models[value] = _with_integer_setting(model, setting_name, value)
+            models[value] = _with_accuracy_key(model, setting_name, value)
     settings = []
     for value, changed in models.items():
         settings.append(Setting(str(value), float(value), f"{value} {unit}", changed))
-    if not is_set_in_scene and not is_step_count:
+    if not of_scene and not is_step_count:
         settings.append(Setting("by tolerance", None, f"{unit} set by the tolerance", model))
     return settings
-
-
-def _find_scene_value(model: Model, setting_name: str) -> int | None:
-    """Return the value of a numerical setting in the scene; None if the scene does not set it."""
-    return model.wear.jumps if setting_name == "jumps" else getattr(model.accuracy, setting_name)
-
-
-def _find_middle_value(model: Model, setting_name: str) -> int:
-    """Return the middle one of the values of a numerical setting."""
-    if setting_name != "steps_per_cycle":
-        return _find_scene_value(model, setting_name) or DEFAULT_SETTING_VALUES[setting_name]
-    if model.kind == "bench":
-        return engine.steps_per_cycle(model)
-    return numerics.choose_numerics(model).steps
-
-
-def _with_integer_setting(model: Model, setting_name: str, value: int) -> Model:
-    """Return a model with another value of an integer setting."""
-    if setting_name == "jumps":
-        return replace(model, wear=replace(model.wear, jumps=value))
-    return with_accuracy_key(model, setting_name, value)

@@ -176,7 +176,7 @@ def _make_data(rows: list[Row], main: str, tolerance: float) -> dict[str, Variab
     for attribute, (name, unit) in RUN_COLUMNS.items():
         columns[name] = ([getattr(run, attribute) for run in runs], unit)
     for name in dict.fromkeys(name for run in runs for name in run.values):
-        for prefix, part in (("", "values"), ("error_", "errors"), ("distance_", "distances")):
+        for prefix, part in (("", "values"), ("error_", "errors")):
             values = [getattr(run, part).get(name) for run in runs]
             columns[prefix + name] = (values, _find_unit(name))
 

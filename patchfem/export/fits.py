@@ -15,7 +15,7 @@ from ..campaigns.fits.curve import EXTENT, FittedCurve
 from ..campaigns.fits.loop import FittedLoop
 from ..campaigns.fits.request import FitOptions, Listener, fit_measurement
 from ..campaigns.fits.wear import COEFFICIENT_KEY, FittedCoefficient
-from ..campaigns.rows.fit import SAME_SCORE, FittedRows
+from ..campaigns.rows.fit import FittedRows
 from ..disk.atomic_write import write_text
 from ..formatting import format_number
 from ..identify.least_squares import Fit
@@ -342,7 +342,6 @@ def describe_rows_fit(fit: FittedRows) -> Parts:
     scores = fit.compute_scores()
     totals = {name: score["all"] for name, score in scores.items() if score is not None}
     texts = [f"{name.replace('_', ' ')} {value:.3f}" for name, value in totals.items() if value]
-    n_best = int((search.rms <= np.nanmin(search.rms) * SAME_SCORE).sum())
     names = [bound.key for bound in fit.keys.ranges]
     starts = []
     for first, last, rms in zip(
@@ -359,8 +358,8 @@ def describe_rows_fit(fit: FittedRows) -> Parts:
             instrument[key] = value
     rows, data = _collect_rows(fit)
     return Parts(
-        residual=f"The rms of ln(computed/measured) is {', '.join(texts)}; {n_best} of {search.rms.size} starts led to "
-        "within 1 % of the best.",
+        residual=f"The rms of ln(computed/measured) is {', '.join(texts)}; {search.n_best} of {search.rms.size} starts led "
+        "to within 1 % of the best.",
         details={
             "measured": fit.cells.path.name,
             "quantity": "rows",

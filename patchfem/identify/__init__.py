@@ -13,7 +13,6 @@ PUBLIC = {
         "Fit",
         "Problem",
         "Search",
-        "SearchCounts",
     ),
     "measured_modes": (
         "SHAPE_QUANTITIES",
@@ -24,6 +23,5 @@ PUBLIC = {
         "list_shape_modes",
     ),
     "space": ("make_space_filling_points",),
-    "two_models": ("TwoModels",),
     "fit_sentences": ("describe_fit",),
 }

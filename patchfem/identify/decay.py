@@ -5,13 +5,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..core import PatchfemError
-from .sinusoids import SinusoidFit, SinusoidProblem
+from .sinusoids import Limits, SinusoidFit, SinusoidProblem
 
 MIN_SAMPLES = 32  # smallest number of samples of a record
 MAX_SINUSOIDS = 8  # largest number of sinusoids in one fit
-# Largest ratio of the residuals with and without a further sinusoid; beyond it, the sinusoid fits noise.
-MAX_RESIDUAL_RATIO = 0.8
-MIN_MISFIT = 1e-9  # smallest residual above round-off, relative to the record
+MIN_DECREASE = (
+    0.36  # smallest reduction of the sum of squares by a further sinusoid that does not fit noise
+)
 # Smallest distance of two sinusoids in spectral lines (1/T for a record of length T).
 MIN_SPECTRAL_LINE_SPACING = 3
 MIN_AMPLITUDE_RATIO = 0.01  # smallest amplitude of a sinusoid, relative to the largest one
@@ -66,20 +66,15 @@ def fit_decay(time, value) -> Decay:
         )
     time = time - time[0]
     problem = SinusoidProblem(time, value, [np.ones(time.size)])
-
-    def is_better(before: SinusoidFit, after: SinusoidFit) -> bool:
-        """Return whether a further sinusoid is distinct and fits more than noise."""
-        return _are_distinct(time, after.poles) and after.rms <= MAX_RESIDUAL_RATIO * before.rms
-
-    fit = problem.fit(lambda one: _find_starts(time, one), is_better, MAX_SINUSOIDS, MIN_MISFIT)
+    spacing = 2 * np.pi * MIN_SPECTRAL_LINE_SPACING / time[-1]
+    limits = Limits(MAX_SINUSOIDS, MIN_DECREASE, spacing=spacing)
+    fit = problem.fit(lambda fit: _find_starts(time, fit), limits)
     if not fit.poles.size:
         raise PatchfemError("the record contains no decaying oscillation")
 
     # sinusoids that decay, and whose energy counts
-    design, _ = problem.tabulate(fit.poles)
-    linear = problem.project(design)
-    motions = design * linear.coefficients
-    energy = np.sum((motions[:, 1::2] + motions[:, 2::2]) ** 2, axis=0)
+    motions = np.einsum("nkc,nc->nk", problem.tabulate(fit.poles)[:, 0], fit.coefficients)
+    energy = np.sum(motions**2, axis=1)
     is_kept = (fit.damping > 0) & (energy > MIN_AMPLITUDE_RATIO**2 * energy.max())
     if not is_kept.any():
         raise PatchfemError(
@@ -88,20 +83,12 @@ def fit_decay(time, value) -> Decay:
         )
     order = np.flatnonzero(is_kept)[np.argsort(fit.omega[is_kept])]
     return Decay(
-        frequency=(fit.omega / (2 * np.pi))[order],
+        frequency=fit.omega[order] / (2 * np.pi),
         damping=fit.damping[order],
-        amplitude=np.hypot(*problem.split_coefficients(linear).T)[order],
-        damping_error=(problem.estimate_rate_errors(fit) / fit.omega)[order],
-        misfit=fit.rms / problem.scale,
+        amplitude=np.hypot(*fit.coefficients.T)[order],
+        damping_error=problem.estimate_damping_errors(fit)[order],
+        misfit=float(np.sqrt(fit.mean_square)) / problem.scale,
     )
-
-
-def _are_distinct(time, poles) -> bool:
-    """Return whether all sinusoids differ in frequency and decay slower than they oscillate."""
-    omega, rate = poles.T
-    distances = np.diff(np.sort(omega))
-    are_apart = (distances >= MIN_SPECTRAL_LINE_SPACING * 2 * np.pi / time[-1]).all()
-    return bool(are_apart and (np.abs(rate) < omega).all())
 
 
 def _find_starts(time, fit: SinusoidFit) -> list[np.ndarray]:
@@ -110,14 +97,13 @@ def _find_starts(time, fit: SinusoidFit) -> list[np.ndarray]:
     Several decay rates are tried. Lines near a fitted sinusoid are excluded, because a residual there is due
     to a decay that is not exponential, which increases the misfit.
     """
-    even_times = np.linspace(0, time[-1], time.size)
-    n_padded = 4 * even_times.size
-    duration = n_padded * (even_times[1] - even_times[0])
+    even_times, step = np.linspace(0, time[-1], time.size, retstep=True)
+    n_padded = 4 * time.size
     lines = np.abs(np.fft.rfft(np.interp(even_times, time, fit.residual), n_padded))
+    omega = 2 * np.pi * np.fft.rfftfreq(n_padded, step)
     lines[:2] = 0.0
-    frequency = np.arange(lines.size) / duration
-    for known_frequency, rate in fit.poles / (2 * np.pi):
-        distance = max(MIN_SPECTRAL_LINE_SPACING / time[-1], rate)
-        lines[np.abs(frequency - known_frequency) < distance] = 0.0
-    omega = 2 * np.pi * int(np.argmax(lines)) / duration
-    return [np.array([omega, scaled_rate / time[-1]]) for scaled_rate in START_DECAY_RATES]
+    for known_omega, rate in fit.poles:
+        distance = max(2 * np.pi * MIN_SPECTRAL_LINE_SPACING / time[-1], rate)
+        lines[np.abs(omega - known_omega) < distance] = 0.0
+    start = omega[np.argmax(lines)]
+    return [np.array([start, scaled_rate / time[-1]]) for scaled_rate in START_DECAY_RATES]

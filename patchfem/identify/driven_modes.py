@@ -14,16 +14,13 @@ from scipy.fft import irfft, rfft, rfftfreq
 from ..core import PatchfemError
 from ..structure.modal_fit import ModalFit
 from .frequency_response import MAX_NYQUIST_FRACTION, FrequencyResponse, estimate_response
-from .sinusoids import Forced, SinusoidFit, SinusoidProblem
+from .sinusoids import Limits, SinusoidFit, SinusoidProblem
 
 # order of the time derivative of the displacement, by the quantity of the response
 DERIVATIVE_ORDERS = {"displacement": 0, "velocity": 1, "acceleration": 2}
-MAX_MODES = 12  # largest number of modes in one fit
-# Smallest relative reduction of the sum of squares by a further mode.
-MIN_RESIDUAL_DECREASE = 0.02
-# Smallest rms of a further mode, relative to the rms of the response.
-MIN_RMS_RATIO = 3e-3
-MIN_MISFIT = 1e-8  # smallest residual above round-off, relative to the response
+# Smallest relative reduction of the sum of squares by a further mode, and smallest rms of the mode relative to that
+# of the response.
+LIMITS = Limits(count=12, decrease=0.02, rms=3e-3)
 # Number of samples at each end that are not fitted, because of the jump of the periodic continuation.
 N_EDGE_SAMPLES = 32
 # Largest number of fitted samples, from the beginning of the record.
@@ -73,26 +70,23 @@ class _DrivenRecord:
         lower = -self.input / np.maximum(self.omega, self.omega[1]) ** 2
         lower[0] = 0.0
         time = (step * np.arange(force.size))[self.inner]
-        fixed = [np.ones(time.size), self._transform(lower), self._transform(self.input)]
+        fixed = [np.ones(time.size), *self._transform(lower, self.input)]
         low = np.array([self.omega[1] / 2, MIN_ZETA * self.omega[1] / 2])
         high = np.array([1.0, MAX_ZETA]) * np.pi / step
         self.problem = SinusoidProblem(
             time, response[self.inner], fixed, self._compute_forced, (low, high)
         )
 
-    def _transform(self, spectrum) -> np.ndarray:
-        """Return the fitted samples (k,) of a spectrum."""
-        return irfft(spectrum, self.force.size)[self.inner]
+    def _transform(self, *spectra) -> np.ndarray:
+        """Return the fitted samples (n, k) of n spectra."""
+        return irfft(spectra, self.force.size)[:, self.inner]
 
-    def _compute_forced(self, omega: float, rate: float) -> Forced:
-        """Return the response of a mode to the input, with its derivatives."""
+    def _compute_forced(self, omega: float, rate: float) -> np.ndarray:
+        """Return the response of a mode to the input, with its derivatives (3, k)."""
         pole = 1 / (omega**2 + rate**2 - self.omega**2 + 2j * rate * self.omega)
         response = self.input * pole
-        return Forced(
-            self._transform(response),
-            self._transform(-2 * omega * response * pole),
-            self._transform(-2 * (rate + 1j * self.omega) * response * pole),
-        )
+        by_rate = -2 * (rate + 1j * self.omega) * response * pole
+        return self._transform(response, -2 * omega * response * pole, by_rate)
 
     def find_starts(self, fit: SinusoidFit, estimate: FrequencyResponse) -> list[np.ndarray]:
         """Return initial poles (2,) at the frequency where the input explains most of the residual."""
@@ -150,23 +144,13 @@ def fit_driven_modes(
     )
     problem = record.problem
 
-    def is_better(before: SinusoidFit, after: SinusoidFit) -> bool:
-        """Return whether a further mode reduces the sum of squares enough."""
-        reduction = before.rms**2 - after.rms**2
-        least = (MIN_RMS_RATIO * problem.scale) ** 2
-        return reduction >= max(MIN_RESIDUAL_DECREASE * before.rms**2, least)
-
-    fit = problem.fit(
-        lambda one: record.find_starts(one, estimate), is_better, MAX_MODES, MIN_MISFIT
-    )
+    fit = problem.fit(lambda fit: record.find_starts(fit, estimate), LIMITS)
     if not fit.poles.size:
         raise PatchfemError(
             "no mode is visible in the response; a record over a resonance is needed"
         )
     w = fit.omega
     zeta = fit.damping
-    linear = problem.project(problem.tabulate(fit.poles)[0])
-    residue = problem.split_coefficients(linear)[:, -1]
     min_frequency, max_frequency = band
     min_w = 2 * np.pi * max(min_frequency, estimate.frequency[0])
     max_w = 2 * np.pi * min(max_frequency, MAX_NYQUIST_FRACTION / (2 * step))
@@ -185,11 +169,11 @@ def fit_driven_modes(
     return DrivenModes(
         frequency=frequency,
         damping=zeta[order],
-        residue=residue[order],
-        damping_error=(problem.estimate_rate_errors(fit) / w)[order],
+        residue=fit.coefficients[order, 2],
+        damping_error=problem.estimate_damping_errors(fit)[order],
         estimate_damping=_fit_estimate(estimate, w, zeta, derivative)[order],
         coherence=coherence,
-        misfit=fit.rms / problem.scale,
+        misfit=float(np.sqrt(fit.mean_square)) / problem.scale,
     )
 
 

@@ -12,6 +12,7 @@ import numpy as np
 
 from ..core import PatchfemError
 from ..response.decay_curve import HalfCycles, smooth_slopes
+from .sinusoids import MAX_EVALUATIONS, START_TOL, SinusoidProblem
 
 MIN_SAMPLES = 5  # smallest number of samples in a half cycle
 # Smallest relative standard deviation of the midpoint (relative to the half period) and the size of a half cycle,
@@ -23,34 +24,37 @@ MAX_NOISE_RATIO = 0.25
 N_PASSES = 3
 MAX_ITERATIONS = 4  # largest number of iterations for the midpoint of a half cycle
 MAX_MIDDLE_SHIFT = 0.35  # largest distance of a midpoint from its prediction, in half periods
-# Number of half cycles on each side for the estimate of the noise of a half cycle.
-N_NEIGHBOURS = 8
-# Trial frequencies of the first cycle, relative to that of the highest spectral line.
-FREQUENCY_RATIOS = np.linspace(0.75, 1.3, 56)
+N_NEIGHBOURS = 8  # half cycles on each side from which the noise of a half cycle is estimated
+# Lower and upper bounds of the frequency of the first cycle, relative to that of the highest spectral line, and of its
+# decay rate [1/s].
+FIRST_CYCLE_BOUNDS = ((0.75, -np.inf), (1.3, np.inf))
 MAX_STEP_RATIO = 10.0  # smallest length of a gap, relative to the 10 % quantile of the time steps
-# Largest relative difference between the first two half periods.
-MAX_PERIOD_CHANGE = 0.3
 PADDING_FACTOR = 8  # length of the zero-padded record relative to the record, for a finer spectrum
 
 
-class _HalfCycle(NamedTuple):
-    """Half cycle of a free decay, with the parameters of the fitted sine.
+class _FittedSines(NamedTuple):
+    """Sines fitted to n half cycles.
 
-    - middle: time of the midpoint [s].
-    - size: peak-to-peak value, with the sign of the half cycle.
-    - length: half period [s].
-    - middle_error, size_error: standard deviations of midpoint and size per unit of noise.
-    - sum_of_squares: sum of squares of the residual.
-    - n_free: degrees of freedom of the residual.
+    - middle, size, length (n,): midpoint [s], peak-to-peak value with its sign, and half period [s].
+    - middle_error, size_error (n,): standard deviations of midpoint and size per unit of noise.
+    - square, n_free (n,): sum of squares and degrees of freedom of the residual.
     """
 
-    middle: float
-    size: float
-    length: float
-    middle_error: float
-    size_error: float
-    sum_of_squares: float
-    n_free: int
+    middle: np.ndarray
+    size: np.ndarray
+    length: np.ndarray
+    middle_error: np.ndarray
+    size_error: np.ndarray
+    square: np.ndarray
+    n_free: np.ndarray
+
+    def compute_noise(self) -> np.ndarray:
+        """Return the standard deviation (n,) of the noise in the neighbourhood of each half cycle."""
+        window = np.ones(2 * N_NEIGHBOURS + 1)
+        inner = slice(N_NEIGHBOURS, -N_NEIGHBOURS)
+        square = np.convolve(self.square, window)[inner]
+        n_free = np.convolve(self.n_free, window)[inner]
+        return np.sqrt(np.maximum(square, 0.0) / n_free)
 
 
 def find_half_cycles(time, value) -> HalfCycles:
@@ -76,38 +80,42 @@ def find_half_cycles(time, value) -> HalfCycles:
         raise PatchfemError(
             f"the free decay has {time.size} samples; at least {4 * MIN_SAMPLES} are needed"
         )
-    first_half_cycle = _find_first_half_cycle(time, value)
-    half_cycles = _fit_successive_half_cycles(time, value, *first_half_cycle)
-    dry = viscous = half_cycles
-    if len(half_cycles) > 2:
+    middle, length = _find_first_half_cycle(time, value)
+    followed = _follow_half_cycles(time, value, middle, length)
+    candidates = []
+    for is_viscous in (False, True):
+        sines = followed
         for _ in range(N_PASSES):
-            dry = _refine_half_cycles(time, value, dry, is_viscous=False)
-            viscous = _refine_half_cycles(time, value, viscous, is_viscous=True)
-    best = min(dry, viscous, key=_compute_mean_noise)
-    if len(best) < 3:
-        _raise_for_short_decay(time, *first_half_cycle)
-    noise = _compute_noise(best)
-    half_period = np.array([half_cycle.length for half_cycle in best])
-    size = np.abs([half_cycle.size for half_cycle in best])
-    middle_error = np.array([half_cycle.middle_error for half_cycle in best])
-    size_error = np.array([half_cycle.size_error for half_cycle in best])
+            sines = _refine_half_cycles(time, value, sines, is_viscous=is_viscous)
+        if len(sines) > 2:
+            candidates.append(_FittedSines(*np.array(sines).T))
+    if not candidates:
+        _raise_for_short_decay(time, middle, length)
+
+    best = min(candidates, key=lambda sines: sines.compute_noise().mean())
+    noise = best.compute_noise()
+    size = np.abs(best.size)
     return HalfCycles(
-        np.array([half_cycle.middle for half_cycle in best]),
+        best.middle,
         size,
-        np.maximum(noise * middle_error, SINE_FIT_ERROR * half_period),
-        np.maximum(noise * size_error, SINE_FIT_ERROR * size),
+        np.maximum(noise * best.middle_error, SINE_FIT_ERROR * best.length),
+        np.maximum(noise * best.size_error, SINE_FIT_ERROR * size),
     )
 
 
 def _raise_for_short_decay(time, middle: float, length: float) -> None:
     """Raise a PatchfemError with the reason why a decay has fewer than three half cycles."""
     reasons = [_describe_missing_samples(time, middle + k * length, length) for k in range(3)]
-    reasons.append(_describe_gaps(time))
-    for reason in reasons:
-        if reason:
-            raise PatchfemError(
-                f"fewer than three half cycles of a free decay have samples enough: {reason}"
-            )
+    usual_step, max_step = np.quantile(np.diff(time), (0.1, 1.0))
+    if max_step > MAX_STEP_RATIO * usual_step:
+        reasons.append(
+            f"the samples lie up to {max_step:.3g} s apart, elsewhere {usual_step:.3g} s"
+        )
+    reason = next(filter(None, reasons), "")
+    if reason:
+        raise PatchfemError(
+            f"fewer than three half cycles of a free decay have samples enough: {reason}"
+        )
     raise PatchfemError(
         "fewer than three half cycles of a free decay rise above the noise; begin the record after "
         "the drive has ended (--begin), and take at least 10 samples per cycle"
@@ -116,8 +124,8 @@ def _raise_for_short_decay(time, middle: float, length: float) -> None:
 
 def describe_missing_samples_at_end(time, half_cycles: HalfCycles) -> str:
     """Return a sentence if samples are missing after the last half cycle; "" at the end of the record."""
-    length = half_cycles.middle[-1] - half_cycles.middle[-2]
-    return _describe_missing_samples(time, float(half_cycles.middle[-1] + length), float(length))
+    before, last = half_cycles.middle[-2:].tolist()
+    return _describe_missing_samples(time, 2 * last - before, last - before)
 
 
 def _describe_missing_samples(time, middle: float, length: float) -> str:
@@ -133,107 +141,84 @@ def _describe_missing_samples(time, middle: float, length: float) -> str:
     return f"the half cycle from {low:.4g} s to {high:.4g} s has {count} samples, and at least {MIN_SAMPLES} are needed"
 
 
-def _describe_gaps(time) -> str:
-    """Return a sentence about gaps between the samples of a record; "" if there are none."""
-    usual_step, max_step = np.quantile(np.diff(time), (0.1, 1.0))
-    if max_step <= MAX_STEP_RATIO * usual_step:
-        return ""
-    return f"the samples lie up to {max_step:.3g} s apart, elsewhere {usual_step:.3g} s"
+def _find_first_half_cycle(time, value) -> tuple[float, float]:
+    """Return the midpoint [s] and the half period [s] of the first half cycle of a decay.
 
+    Raises PatchfemError if there is no oscillation or a cycle has too few samples.
+    """
+    # half of a Hann window emphasizes the beginning of the decay
+    n = time.size
+    even_times, step = np.linspace(time[0], time[-1], n, retstep=True)
+    weighted = np.interp(even_times, time, value - value.mean()) * np.hanning(2 * n)[n:]
+    spectrum = np.abs(np.fft.rfft(weighted, PADDING_FACTOR * n))
+    spectrum[:PADDING_FACTOR] = 0.0
+    frequency = float(np.argmax(spectrum)) / (PADDING_FACTOR * n * step)
+    if not frequency > 0 or not np.ptp(value) > 0:
+        raise PatchfemError("the record contains no oscillation")
 
-def _find_first_half_cycle(time, value) -> tuple:
-    """Return the midpoint [s] and the half period [s] of the first half cycle of a decay."""
-    frequency = _find_dominant_frequency(time, value)
-    best = None
-    for f in frequency * FREQUENCY_RATIOS:
-        is_first_cycle = time - time[0] <= 1 / f
-        n_samples = np.count_nonzero(is_first_cycle)
-        if n_samples < 2 * MIN_SAMPLES:
-            raise PatchfemError(
-                f"the record has {n_samples} samples per cycle of {f:.4g} Hz; at least "
-                f"{2 * MIN_SAMPLES} are needed"
-            )
-        angle = 2 * np.pi * f * (time[is_first_cycle] - time[0])
-        columns = np.stack([np.ones(angle.size), np.cos(angle), np.sin(angle)], axis=1)
-        coefficients = np.linalg.lstsq(columns, value[is_first_cycle], rcond=None)[0]
-        mean_square = float(np.mean((columns @ coefficients - value[is_first_cycle]) ** 2))
-        if best is None or mean_square < best[0]:
-            phase = float(np.arctan2(-coefficients[1], coefficients[2]))
-            best = (mean_square, f, phase)
-    _, f, phase = best
-    half_period = 0.5 / f
-    start = phase / (2 * np.pi * f) % half_period
+    # a sinusoid that is fitted to the first cycle
+    is_first = time - time[0] <= 1.2 / frequency
+    n_samples = round(np.count_nonzero(is_first) / 1.2)
+    if n_samples < 2 * MIN_SAMPLES:
+        raise PatchfemError(
+            f"the record has {n_samples} samples per cycle of {frequency:.4g} Hz; at least "
+            f"{2 * MIN_SAMPLES} are needed"
+        )
+    omega = 2 * np.pi * frequency
+    bounds = tuple(np.array([ratio * omega, rate]) for ratio, rate in FIRST_CYCLE_BOUNDS)
+    record = (time[is_first] - time[0], value[is_first])
+    problem = SinusoidProblem(*record, [np.ones(record[0].size)], bounds=bounds)
+    cycle = problem.refine([[omega, 0.0]], MAX_EVALUATIONS, START_TOL)
+    cosine, sine = cycle.coefficients[0]
+
     # the first half cycle must lie completely in the record
-    if start < 0.24 / f:
+    half_period = np.pi / cycle.poles[0, 0]
+    start = -np.arctan2(cosine, sine) / np.pi % 1.0 * half_period
+    if start < 0.48 * half_period:
         start += half_period
     return time[0] + start, half_period
 
 
-def _find_dominant_frequency(time, value) -> float:
-    """Return the frequency [Hz] of the highest spectral line of a decay.
-
-    Raises PatchfemError if there is no oscillation.
-    """
-    n = time.size
-    even_times = np.linspace(time[0], time[-1], n)
-    # half of a Hann window emphasizes the beginning of the decay
-    weighted = np.interp(even_times, time, value - value.mean()) * np.hanning(2 * n)[n:]
-    spectrum = np.abs(np.fft.rfft(weighted, PADDING_FACTOR * n))
-    spectrum[:PADDING_FACTOR] = 0.0
-    frequency = int(np.argmax(spectrum)) / (PADDING_FACTOR * n * (even_times[1] - even_times[0]))
-    if not frequency > 0 or not np.ptp(value) > 0:
-        raise PatchfemError("the record contains no oscillation")
-    return frequency
-
-
-def _fit_successive_half_cycles(time, value, middle: float, length: float) -> list:
+def _follow_half_cycles(time, value, middle: float, length: float) -> list[_FittedSines]:
     """Fit the half cycles of a decay one after the other, until the noise is too large."""
-    half_cycles = []
+    sines = []
     while middle + length / 2 <= time[-1]:
-        half_cycle = _fit_half_cycle(time, value, middle, length, 0.0)
-        if half_cycle is None or (half_cycles and half_cycle.size * half_cycles[-1].size > 0):
+        sine = _fit_half_cycle(time, value, middle, length, 0.0)
+        if sine is None or (sines and sine.size * sines[-1].size > 0):
             break
-        noise = np.sqrt(half_cycle.sum_of_squares / half_cycle.n_free) * half_cycle.size_error
-        if noise > MAX_NOISE_RATIO * abs(half_cycle.size):
+        noise = np.sqrt(sine.square / sine.n_free) * sine.size_error
+        if noise > MAX_NOISE_RATIO * abs(sine.size):
             break
-        half_cycles.append(half_cycle)
-        if len(half_cycles) > 2:
-            last_half_cycles = half_cycles[-6:]
-            length = (last_half_cycles[-1].middle - last_half_cycles[0].middle) / (
-                len(last_half_cycles) - 1
-            )
-        elif len(half_cycles) == 2:
-            distance = half_cycles[1].middle - half_cycles[0].middle
-            if abs(distance - length) < MAX_PERIOD_CHANGE * length:
-                length = distance
-        middle = half_cycle.middle + length
-    return half_cycles
+        sines.append(sine)
+        if len(sines) > 2:
+            recent = [sine.middle for sine in sines[-6:]]
+            length = (recent[-1] - recent[0]) / (len(recent) - 1)
+        middle = sine.middle + length
+    return sines
 
 
-def _refine_half_cycles(time, value, half_cycles: list, *, is_viscous: bool) -> list:
+def _refine_half_cycles(time, value, sines: list, *, is_viscous: bool) -> list[_FittedSines]:
     """Refit half cycles with half periods and decay rates estimated from their neighbours."""
-    if len(half_cycles) < 3:
-        return half_cycles
-    noise = _compute_noise(half_cycles)
-    middle = np.array([half_cycle.middle for half_cycle in half_cycles])
-    size = np.abs([half_cycle.size for half_cycle in half_cycles])
-    middle_noise = noise * np.array([half_cycle.middle_error for half_cycle in half_cycles])
-    size_noise = noise * np.array([half_cycle.size_error for half_cycle in half_cycles])
-    lengths = smooth_slopes(middle, middle_noise)
-    rates = np.zeros(len(half_cycles))
+    if len(sines) < 3:
+        return sines
+    fitted = _FittedSines(*np.array(sines).T)
+    noise = fitted.compute_noise()
+    size = np.abs(fitted.size)
+    lengths = smooth_slopes(fitted.middle, noise * fitted.middle_error)
+    rates = np.zeros(len(sines))
     if is_viscous:
-        rates = -smooth_slopes(np.log(size), size_noise / size) / lengths
+        rates = -smooth_slopes(np.log(size), noise * fitted.size_error / size) / lengths
     refined = []
-    for half_cycle, length, rate in zip(half_cycles, lengths, rates):
-        new_half_cycle = _fit_half_cycle(time, value, half_cycle.middle, length, rate)
-        if new_half_cycle is None:
+    for middle, length, rate in zip(fitted.middle, lengths, rates):
+        sine = _fit_half_cycle(time, value, middle, length, rate)
+        if sine is None:
             break
-        refined.append(new_half_cycle)
+        refined.append(sine)
     return refined
 
 
-def _fit_half_cycle(time, value, middle: float, length: float, rate: float) -> _HalfCycle | None:
-    """Fit a sine to the samples around the predicted midpoint of a half cycle.
+def _fit_half_cycle(time, value, middle: float, length: float, rate: float) -> _FittedSines | None:
+    """Fit a sine to the samples around the predicted midpoint of one half cycle.
 
     Returns None with too few samples, or if the midpoint is too far from its prediction. `length` is the half
     period [s], `rate` the decay rate [1/s].
@@ -250,41 +235,24 @@ def _fit_half_cycle(time, value, middle: float, length: float, rate: float) -> _
             [np.ones(t.size), envelope * np.sin(angle), envelope * np.cos(angle)], axis=1
         )
         coefficients = np.linalg.lstsq(columns, value[low:high], rcond=None)[0]
-        correction = (
-            -float(np.arctan2(coefficients[2] * np.sign(coefficients[1]), abs(coefficients[1])))
-            * length
-            / np.pi
-        )
+        _, sine, cosine = coefficients
+        correction = -np.arctan2(cosine * np.sign(sine), abs(sine)) * length / np.pi
         if not abs(middle + correction - predicted) <= MAX_MIDDLE_SHIFT * length:
             return None
         if abs(correction) < 1e-9 * length:
             break
         middle += correction
+
+    # standard deviations of the coefficients per unit of noise
     errors = np.sqrt(np.diag(np.linalg.pinv(columns.T @ columns)))
     residual = columns @ coefficients - value[low:high]
-    amplitude = float(np.hypot(coefficients[1], coefficients[2]) * np.sign(coefficients[1]))
-    return _HalfCycle(
+    amplitude = np.hypot(sine, cosine) * np.sign(sine)
+    return _FittedSines(
         middle=middle,
         size=2 * amplitude,
         length=length,
-        middle_error=float(errors[2]) / max(abs(amplitude), 1e-300) * length / np.pi,
-        size_error=2 * float(errors[1]),
-        sum_of_squares=float(residual @ residual),
+        middle_error=errors[2] / max(abs(amplitude), 1e-300) * length / np.pi,
+        size_error=2 * errors[1],
+        square=residual @ residual,
         n_free=t.size - 3,
     )
-
-
-def _compute_noise(half_cycles: list) -> np.ndarray:
-    """Return the standard deviation (k,) of the noise in the neighbourhood of each half cycle."""
-    n = len(half_cycles)
-    index = np.arange(n)
-    low = np.maximum(index - N_NEIGHBOURS, 0)
-    high = np.minimum(index + N_NEIGHBOURS + 1, n)
-    squares = np.cumsum([0.0, *(half_cycle.sum_of_squares for half_cycle in half_cycles)])
-    n_free = np.cumsum([0.0, *(half_cycle.n_free for half_cycle in half_cycles)])
-    return np.sqrt((squares[high] - squares[low]) / (n_free[high] - n_free[low]))
-
-
-def _compute_mean_noise(half_cycles: list) -> float:
-    """Return the mean noise of half cycles; inf if there are fewer than three."""
-    return _compute_noise(half_cycles).mean() if len(half_cycles) > 2 else np.inf

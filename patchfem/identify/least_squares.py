@@ -39,50 +39,20 @@ class IntervalKind(StrEnum):
 
     - ROWS: the rows are independent.
     - SERIES: the rows are a time series, in which correlated neighbours count as fewer rows.
-    - BOUNDS: no intervals are computed (NaN), but parameters near a bound are tried on it.
     - NONE: no intervals are computed, and no parameter is tried on a bound.
     """
 
     ROWS = "rows"
     SERIES = "series"
-    BOUNDS = "bounds"
     NONE = ""
 
 
 class SearchCounts(NamedTuple):
-    """Number of residual evaluations of a search, and of failures.
-
-    - evaluations: number of evaluations.
-    - failures: number of failed evaluations.
-    - reason: reason of the first failure; "" if none failed.
-    """
+    """Number of residual evaluations of a search and of failures, and the reason of the first failure or ""."""
 
     evaluations: int
     failures: int
     reason: str
-
-
-@dataclass(frozen=True, eq=False, slots=True)
-class Fit:
-    """Result of a least-squares fit of n parameters.
-
-    - values: fitted parameters (n,).
-    - at_bound: "low", "high" or "" for each parameter.
-    - intervals: 95 % intervals, and undetermined directions.
-    - rms: root mean square of the residual.
-    - agreed: number of descents with the same final sum of squares.
-    - counts: number of evaluations of the residual.
-    - outcome: DONE if the best descent converged, or if another one reached the same minimum. With
-      round-off noise in the residual, a descent may not converge formally.
-    """
-
-    values: np.ndarray
-    at_bound: tuple
-    intervals: FitIntervals
-    rms: float
-    agreed: int
-    counts: SearchCounts
-    outcome: Outcome
 
 
 class Descent(NamedTuple):
@@ -99,14 +69,9 @@ class Descent(NamedTuple):
     is_converged: bool
     rows: int
 
-    @property
-    def rms(self) -> float:
-        """Root mean square of the residual; NaN if the evaluation at the start failed."""
-        return float(np.sqrt(self.cost / self.rows)) if np.isfinite(self.cost) else np.nan
-
 
 class Descents(NamedTuple):
-    """Descents of a search with an expensive residual.
+    """Descents of a search.
 
     starts, ends: parameters (s, n) at the starting and at the final points, NaN if a descent failed; rms: (s,) root mean
     square of the residual at the ends.
@@ -116,6 +81,36 @@ class Descents(NamedTuple):
     ends: np.ndarray
     rms: np.ndarray
 
+    @property
+    def n_best(self) -> int:
+        """Number of descents that ended within 1 % of the smallest residual."""
+        return int((self.rms <= np.nanmin(self.rms) * 1.01).sum())
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Fit:
+    """Result of a least-squares fit of n parameters.
+
+    - values: fitted parameters (n,).
+    - at_bound: "low", "high" or "" for each parameter.
+    - intervals: 95 % intervals, and undetermined directions.
+    - rms: root mean square of the residual.
+    - agreed: number of descents with the same final sum of squares.
+    - counts: number of evaluations of the residual.
+    - outcome: DONE if the best descent converged, or if another one reached the same minimum. With
+      round-off noise in the residual, a descent may not converge formally.
+    - descents: starting and final points of all descents.
+    """
+
+    values: np.ndarray
+    at_bound: tuple[str, ...]
+    intervals: FitIntervals
+    rms: float
+    agreed: int
+    counts: SearchCounts
+    outcome: Outcome
+    descents: Descents
+
 
 @dataclass(frozen=True, slots=True)
 class Search:
@@ -124,17 +119,17 @@ class Search:
     Derivatives are one-sided differences; the best descent is continued with central ones.
 
     - starts, seed: number of starting points, and seed of the random numbers.
-    - load, save: functions of the number of a start that return the stored descent or None, and store one.
     - before_descent: called before each descent.
     - report: called with 1 after each descent.
+    - load, save: functions of the number of a start that return the stored descent or None, and store one.
     """
 
     starts: int
     seed: int = 0
-    load: Callable = lambda start: None
-    save: Callable = lambda start, descent: None
     before_descent: Callable = lambda: None
     report: Callable = lambda count: None
+    load: Callable = lambda start: None
+    save: Callable = lambda start, descent: None
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -178,38 +173,35 @@ class Problem:
         NotConverged
             If the evaluations at all starting points fail.
         """
-        space = self.search_space
-        model = UnitCubeResidual(self.residual, space)
-        n = space.low.size
-        start = None if self.start is None else space.to_unit_cube(self.start)
+        model = UnitCubeResidual(self.residual, self.search_space)
+        starts = self._choose_starts(model, max_descents)
+        n = len(self.low)
+        if model.rows < n:
+            raise ValueError(f"{model.rows} rows of data cannot determine {n} values")
         ends = []
-        for point in choose_starting_points(model, start, max_descents):
-            if model.rows < n:
-                raise ValueError(f"{model.rows} rows of data cannot determine {n} values")
-            ends.append(descend(model, point, range(n)))
+        for start in starts:
+            ends.append(descend(model, start, range(n)))
             # a fit that is exact to round-off is not repeated
             if ends[-1].cost <= (EXACT_FIT_RATIO * model.largest) ** 2 * model.rows:
                 break
-        return _assemble_fit(model, min(ends, key=lambda end: end.cost), ends, interval_kind)
+        best = min(ends, key=lambda end: end.cost)
+        return _assemble_fit(model, best, starts[: len(ends)], ends, interval_kind)
 
-    def search(
-        self, search: Search, interval_kind: str = IntervalKind.ROWS
-    ) -> tuple[Fit, Descents]:
+    def search(self, search: Search, interval_kind: str = IntervalKind.ROWS) -> Fit:
         """Minimize the sum of squares of an expensive residual from random starting points.
 
         Raises NotConverged if all descents fail.
         """
-        space = self.search_space
-        n = space.low.size
-        model = UnitCubeResidual(self.residual, space, is_expensive=True)
+        model = UnitCubeResidual(self.residual, self.search_space, is_expensive=True)
+        n = len(self.low)
         starts = np.random.default_rng(search.seed).random((search.starts, n))
         ends = []
-        for k, start in enumerate(starts):
-            end = search.load(k)
+        for number, start in enumerate(starts):
+            end = search.load(number)
             if end is None:
                 search.before_descent()
                 end = descend(model, start, range(n))
-                search.save(k, end)
+                search.save(number, end)
             ends.append(end)
             search.report(1)
         best = min(ends, key=lambda end: end.cost)
@@ -218,118 +210,71 @@ class Problem:
                 f"fit: all {search.starts} searches failed; the first failed for this reason: {model.reason}"
             )
         search.before_descent()
-        best = descend(UnitCubeResidual(self.residual, space), best.u, range(n))
-        final = [
-            space.to_values(end.u) if np.isfinite(end.cost) else np.full(n, np.nan) for end in ends
-        ]
-        descents = Descents(
-            starts=np.array([space.to_values(start) for start in starts]),
-            ends=np.array(final),
-            rms=np.array([end.rms for end in ends]),
-        )
-        return _assemble_fit(model, best, ends, interval_kind), descents
+        best = descend(UnitCubeResidual(self.residual, model.space), best.u, range(n))
+        # all descents may be stored ones
+        model.sum_of_squares(best.u)
+        return _assemble_fit(model, best, starts, ends, interval_kind)
+
+    def _choose_starts(self, model: UnitCubeResidual, max_points: int) -> list[np.ndarray]:
+        """Return the starting points (n,) in the unit cube: that of the problem, then the best of some trial points."""
+        n = len(self.low)
+        given = []
+        if self.start is not None:
+            given = [model.space.to_unit_cube(self.start)]
+            if not np.isfinite(model.sum_of_squares(given[0])):
+                given = []
+        trials = []
+        if max_points > 1 or not given:
+            trials = list(make_space_filling_points(N_TRIALS_PER_VALUE * n, n))
+        costs = {tuple(point): model.sum_of_squares(point) for point in trials}
+        trials = [point for point in trials if np.isfinite(costs[tuple(point)])]
+        points = given + sorted(trials, key=lambda point: costs[tuple(point)])
+        if not points:
+            raise NotConverged(
+                f"the model failed at all {model.evaluations} starting points of the search: {model.reason}"
+            )
+        return points[: max(1, max_points)]
 
 
 def _assemble_fit(
-    model: UnitCubeResidual, best: Descent, ends: list[Descent], interval_kind: str
+    model: UnitCubeResidual, best: Descent, starts: Sequence, ends: list[Descent], kind: str
 ) -> Fit:
-    """Return the result of a fit from its best descent and the descents from all starting points."""
-    max_difference = SAME_RESULT_TOL * best.cost + 1e-20 * model.largest**2 * model.rows
-    agreed = sum(abs(end.cost - best.cost) <= max_difference for end in ends)
-    u = best.u
-    cost = best.cost
-    if interval_kind != IntervalKind.NONE:
-        u, cost = _move_onto_bounds(model, u, cost)
-    intervals = make_unknown_intervals(u.size)
-    if interval_kind in (IntervalKind.ROWS, IntervalKind.SERIES):
-        is_series = interval_kind == IntervalKind.SERIES
-        intervals = compute_intervals(model, u, cost, descend, is_series=is_series)
+    """Return the result of a fit from its best descent and the descents from all starting points (s, n).
 
-    # with round-off noise in the residual a descent may not converge formally
-    n_same_minimum = sum(end.cost <= SAME_MINIMUM_RATIO * cost for end in ends)
-    is_converged = best.is_converged or n_same_minimum > 1
-    at_bound = np.where(u <= 0, "low", np.where(u >= 1, "high", ""))
-    return Fit(
-        values=frozen_array(model.space.to_values(u)),
-        at_bound=tuple(at_bound.tolist()),
-        intervals=intervals,
-        rms=float(np.sqrt(cost / model.rows)),
-        agreed=agreed,
-        counts=SearchCounts(model.evaluations, model.failures, model.reason),
-        outcome=Outcome.DONE if is_converged else Outcome.NOT_CONVERGED,
+    kind: value of `IntervalKind`.
+    """
+    n = best.u.size
+    costs = np.array([end.cost for end in ends])
+    max_difference = SAME_RESULT_TOL * best.cost + 1e-20 * model.largest**2 * model.rows
+    finals = np.full((len(ends), n), np.nan)
+    for final, end in zip(finals, ends):
+        if np.isfinite(end.cost):
+            final[:] = model.space.to_values(end.u)
+    descents = Descents(
+        starts=np.array([model.space.to_values(start) for start in starts]),
+        ends=finals,
+        rms=np.where(np.isfinite(costs), np.sqrt(costs / model.rows), np.nan),
     )
 
-
-def choose_starting_points(
-    model: UnitCubeResidual, given_start, max_points: int, n_trials: int = 0
-) -> list:
-    """Return the points of the unit cube from which the local minimisations start.
-
-    Parameters
-    ----------
-    model : UnitCubeResidual
-    given_start : (n,) ndarray or None
-        First starting point, unless the evaluation there fails.
-    max_points : int
-        Largest number of points.
-    n_trials : int
-        Number of space-filling trial points, of which the best are chosen; 0 for the default of
-        N_TRIALS_PER_VALUE per parameter.
-
-    Returns
-    -------
-    list of (n,) ndarray
-
-    Raises
-    ------
-    NotConverged
-        If the evaluations at all trial points fail.
-    """
-    n = model.space.low.size
-    if max_points == 1 and given_start is not None and model(given_start) is not None:
-        return [given_start]
-    costs = []
-    points = []
-    for u in make_space_filling_points(n_trials or N_TRIALS_PER_VALUE * n, n):
-        residual = model(u)
-        if residual is not None:
-            costs.append(float(residual @ residual))
-            points.append(u)
-    starting_points = [points[k] for k in np.argsort(costs, kind="stable")]
-    if given_start is not None and model(given_start) is not None:
-        starting_points = [given_start, *starting_points]
-    if not starting_points:
-        raise NotConverged(
-            f"the model failed at all {model.evaluations} starting points of the search: {model.reason}"
-        )
-    return starting_points[: max(1, max_points)]
-
-
-class _CubeSlice(NamedTuple):
-    """Residual as a function of the free coordinates of the unit cube, with the others fixed.
-
-    - model: residual on the whole unit cube.
-    - u: point (n,) with the fixed coordinates.
-    - free: indices of the free coordinates (f,).
-    """
-
-    model: UnitCubeResidual
-    u: np.ndarray
-    free: list
-
-    def full_point(self, free_coordinates) -> np.ndarray:
-        """Return the point (n,) of the unit cube with given free coordinates (f,)."""
-        point = self.u.copy()
-        point[self.free] = free_coordinates
-        return point
-
-    def residual(self, free_coordinates) -> np.ndarray:
-        """Return the residual (r,), or a penalty if the evaluation fails."""
-        return self.model.with_penalty(self.full_point(free_coordinates))
-
-    def jacobian(self, free_coordinates) -> np.ndarray:
-        """Return the derivatives (r, f) of the residual with respect to the free coordinates."""
-        return self.model.jacobian(self.full_point(free_coordinates), self.free)
+    u = best.u
+    cost = best.cost
+    intervals = make_unknown_intervals(n)
+    if kind != IntervalKind.NONE:
+        u, cost = _move_onto_bounds(model, u, cost)
+        is_series = kind == IntervalKind.SERIES
+        intervals = compute_intervals(model, u, cost, descend, is_series=is_series)
+    n_same_minimum = int(np.sum(costs <= SAME_MINIMUM_RATIO * cost))
+    is_converged = best.is_converged or n_same_minimum > 1
+    return Fit(
+        values=frozen_array(model.space.to_values(u)),
+        at_bound=tuple(np.where(u <= 0, "low", np.where(u >= 1, "high", "")).tolist()),
+        intervals=intervals,
+        rms=float(np.sqrt(cost / model.rows)),
+        agreed=int(np.sum(np.abs(costs - best.cost) <= max_difference)),
+        counts=SearchCounts(model.evaluations, model.failures, model.reason),
+        outcome=Outcome.DONE if is_converged else Outcome.NOT_CONVERGED,
+        descents=descents,
+    )
 
 
 def descend(model: UnitCubeResidual, u, free) -> Descent:
@@ -340,6 +285,7 @@ def descend(model: UnitCubeResidual, u, free) -> Descent:
     Parameters
     ----------
     model : UnitCubeResidual
+        Residual as a function on the unit cube.
     u : (n,) array_like
         Starting point.
     free : sequence of int
@@ -351,43 +297,44 @@ def descend(model: UnitCubeResidual, u, free) -> Descent:
     """
     u = np.array(u, float)
     free = list(free)
-    start_residual = model(u)
-    if start_residual is None:
-        return Descent(u, np.inf, False, model.rows)
-    start = Descent(u, float(start_residual @ start_residual), True, model.rows)
-    if not free:
+    cost = model.sum_of_squares(u)
+    start = Descent(u, cost, bool(np.isfinite(cost)), model.rows)
+    if not (free and start.is_converged):
         return start
 
-    slice_of_cube = _CubeSlice(model, u, free)
+    # the point with the free coordinates v is fixed + select v
+    select = np.eye(u.size)[:, free]
+    fixed = u - select @ u[free]
+
     # the trust-region method needs a start inside the bounds
     for margin in (1e-3, 1e-9):
-        inner_start = np.clip(u[free], margin, 1 - margin)
-        if model(slice_of_cube.full_point(inner_start)) is not None:
+        inner = np.clip(u[free], margin, 1 - margin)
+        residual = model(fixed + select @ inner)
+        if residual is not None:
             break
     else:
         return start._replace(is_converged=False)
-    residual_scale = max(float(np.abs(slice_of_cube.residual(inner_start)).max()), 1e-300)
+    scale = max(float(np.abs(residual).max()), 1e-300)
+
+    # the residual is scaled because the method stops at an absolute gradient
     ftol = QUICK_COST_TOL if model.is_expensive else COST_TOL
     result = least_squares(
-        lambda part: slice_of_cube.residual(part) / residual_scale,
-        inner_start,
+        lambda part: model.with_penalty(fixed + select @ part) / scale,
+        inner,
+        jac=lambda part: model.jacobian(fixed + select @ part, free) / scale,
         bounds=(0, 1),
-        method="trf",
-        jac=lambda part: slice_of_cube.jacobian(part) / residual_scale,
         ftol=ftol,
         xtol=10 * ftol,
         gtol=1e-15,
         max_nfev=MAX_EVALUATIONS,
     )
-    end = slice_of_cube.full_point(result.x)
-    residual = model(end)
-    is_converged = result.status > 0
-    if residual is None or residual @ residual > start.cost:
-        return start._replace(is_converged=is_converged)
-    return Descent(end, float(residual @ residual), is_converged, model.rows)
+    end = fixed + select @ result.x
+    cost = model.sum_of_squares(end)
+    best = start if cost > start.cost else Descent(end, cost, True, model.rows)
+    return best._replace(is_converged=result.status > 0)
 
 
-def _move_onto_bounds(model: UnitCubeResidual, u, cost: float) -> tuple:
+def _move_onto_bounds(model: UnitCubeResidual, u, cost: float) -> tuple[np.ndarray, float]:
     """Move parameters near a bound onto it, unless the sum of squares increases.
 
     A parameter is moved only if the sum of squares decreases towards the bound. The other parameters are

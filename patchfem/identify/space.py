@@ -1,20 +1,22 @@
 """Mapping of bounded parameters to the unit cube, and the residual as a function on this cube."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 
 from ..core import Missing, PatchfemError
 
 DIFFERENCE_STEP = 1e-5  # step of finite differences, relative to the range of a parameter
-# Largest ratio of upper to lower bound for a linear scale.
-MIN_BOUND_RATIO_FOR_LOG = 10
+MIN_BOUND_RATIO_FOR_LOG = 10  # largest ratio of upper to lower bound of a linear scale
 PENALTY_FACTOR = 1e3  # residual of a failed evaluation, relative to the largest residual
+N_KNOWN_RESIDUALS = (
+    32  # number of the last residuals that are kept: a search returns to its neighbours
+)
 
 
-@dataclass(frozen=True, eq=False, slots=True)
-class SearchSpace:
+class SearchSpace(NamedTuple):
     """Mapping of n bounded parameters to the unit cube, u in [0, 1]^n.
 
     - low, high: bounds (n,), low < high.
@@ -25,32 +27,31 @@ class SearchSpace:
     high: np.ndarray
     is_log: np.ndarray
 
+    def _scale(self, values) -> np.ndarray:
+        """Return the parameters (n,), or their logarithms where the scale is logarithmic."""
+        values = np.asarray(values, float)
+        return np.where(self.is_log, np.log(np.where(self.is_log, values, 1.0)), values)
+
+    @property
+    def _span(self) -> np.ndarray:
+        """Length (n,) of the ranges on their scales."""
+        return self._scale(self.high) - self._scale(self.low)
+
     def to_values(self, u) -> np.ndarray:
         """Return the parameters (n,) of a point u of the unit cube, exactly at the bounds."""
         u = np.asarray(u, float)
-        inside = np.where(
-            self.is_log, self.low * self._ratio**u, self.low + (self.high - self.low) * u
-        )
+        scaled = self._scale(self.low) + self._span * u
+        inside = np.where(self.is_log, np.exp(np.where(self.is_log, scaled, 0.0)), scaled)
         return np.where(u <= 0, self.low, np.where(u >= 1, self.high, inside))
 
     def to_unit_cube(self, values) -> np.ndarray:
         """Return the point of the unit cube nearest to given parameters (n,)."""
-        values = np.asarray(values, float)
-        u = (values - self.low) / (self.high - self.low)
-        logs = self.is_log
-        u[logs] = np.log(np.maximum(values, self.low)[logs] / self.low[logs])
-        u[logs] /= np.log(self._ratio[logs])
-        return np.clip(u, 0.0, 1.0)
-
-    @property
-    def _ratio(self) -> np.ndarray:
-        """Ratio (n,) of the bounds of the parameters with a logarithmic scale; 1 for the others."""
-        return np.divide(self.high, self.low, out=np.ones(self.low.size), where=self.is_log)
+        inside = np.clip(np.asarray(values, float), self.low, self.high)
+        return np.clip((self._scale(inside) - self._scale(self.low)) / self._span, 0.0, 1.0)
 
     def derivatives(self, u) -> np.ndarray:
         """Return the derivatives (n,) of the parameters with respect to the coordinates u."""
-        logs = self.to_values(u) * np.log(self._ratio)
-        return np.where(self.is_log, logs, self.high - self.low)
+        return self._span * np.where(self.is_log, self.to_values(u), 1.0)
 
 
 def make_search_space(low, high) -> SearchSpace:
@@ -61,6 +62,7 @@ def make_search_space(low, high) -> SearchSpace:
     Parameters
     ----------
     low, high : (n,) array_like
+        Bounds.
 
     Returns
     -------
@@ -78,7 +80,7 @@ def make_search_space(low, high) -> SearchSpace:
             f"'low' and 'high' must be one-dimensional and of the same length, got shapes {low.shape} and "
             f"{high.shape}"
         )
-    if not (np.isfinite(low).all() and np.isfinite(high).all() and (low < high).all()):
+    if not (np.isfinite([low, high]).all() and (low < high).all()):
         raise ValueError("bounds must be finite with low < high")
     return SearchSpace(low, high, (low > 0) & (high > MIN_BOUND_RATIO_FOR_LOG * low))
 
@@ -95,8 +97,7 @@ class UnitCubeResidual:
         Function of the parameters (n,) that returns the residual (r,).
     space : SearchSpace
     is_expensive : bool
-        Whether evaluations are expensive. Derivatives are then one-sided differences of first order, and
-        profile intervals are accurate to 1 %.
+        Whether derivatives are one-sided differences.
     """
 
     def __init__(self, residual: Callable, space: SearchSpace, *, is_expensive: bool = False):
@@ -108,88 +109,69 @@ class UnitCubeResidual:
         self.reason = ""
         self.largest = 0.0
         self.rows = 0
-        self._last_point = None
-        self._last_residual = None
+        self._evaluate_once = lru_cache(N_KNOWN_RESIDUALS)(self._evaluate)
 
     def __call__(self, u) -> np.ndarray | None:
         """Return the residual (r,) at u (n,), or None if the evaluation fails."""
-        if self._last_point is None or not np.array_equal(self._last_point, u):
-            self._cache_residual(u, self._evaluate(u))
-        return self._last_residual
+        return self._evaluate_once(tuple(np.asarray(u, float).tolist()))
 
-    def _cache_residual(self, u, residual) -> None:
-        """Store the residual at u (n,), because it is often evaluated there again."""
-        self._last_point = np.array(u)
-        self._last_residual = residual
-
-    def _evaluate(self, u) -> np.ndarray | None:
-        """Evaluate the residual at u (n,), and count evaluations and failures."""
-        self.evaluations += 1
-        reason = ""
-        try:
-            residual = np.asarray(self.residual(self.space.to_values(u)), float)
-            if not np.isfinite(residual).all():
-                reason = "the residual is not finite"
-        except Missing:
-            raise
-        except (PatchfemError, ArithmeticError, np.linalg.LinAlgError) as error:
-            reason = str(error)
-        if reason:
-            self.failures += 1
-            self.reason = self.reason or reason
-            return None
-        self.rows = residual.size
-        self.largest = max(self.largest, float(np.abs(residual).max(initial=0.0)))
-        return residual
+    def sum_of_squares(self, u) -> float:
+        """Return the sum of squares of the residual at u (n,); infinite if the evaluation fails."""
+        residual = self(u)
+        return np.inf if residual is None else float(residual @ residual)
 
     def with_penalty(self, u) -> np.ndarray:
-        """Return the residual (r,) at u (n,), or a penalty if the evaluation fails.
-
-        The penalty is larger than all previous residuals.
-        """
+        """Return the residual (r,) at u (n,), or one larger than all before if the evaluation fails."""
         residual = self(u)
         if residual is None:
             return np.full(self.rows, PENALTY_FACTOR * max(self.largest, 1e-300))
         return residual
 
+    def _evaluate(self, u: tuple[float, ...]) -> np.ndarray | None:
+        """Evaluate the residual at u (n,), and count evaluations and failures."""
+        self.evaluations += 1
+        reason = "the residual is not finite"
+        try:
+            residual = np.asarray(self.residual(self.space.to_values(u)), float)
+            if np.isfinite(residual).all():
+                self.rows = residual.size
+                self.largest = max(self.largest, float(np.abs(residual).max(initial=0.0)))
+                return residual
+        except Missing:
+            raise
+        except (PatchfemError, ArithmeticError, np.linalg.LinAlgError) as error:
+            reason = str(error)
+        self.failures += 1
+        self.reason = self.reason or reason
+        return None
+
     def jacobian(self, u, free) -> np.ndarray:
         """Compute the derivatives (r, f) of the residual along selected coordinates by finite differences.
 
-        The differences are central. They are one-sided at a bound, next to a failed evaluation, and for an
-        expensive residual.
+        The differences are central, or one-sided at a bound, beside a failed evaluation and for an expensive residual.
 
         Parameters
         ----------
         u : (n,) array_like
+            Point of the unit cube.
         free : sequence of int
             Indices of the f coordinates that vary.
         """
-        residual_at_u = self(u)
-        columns = [self._differentiate(u, i, residual_at_u) for i in free]
-        self._cache_residual(u, residual_at_u)
-        return np.column_stack(columns) if columns else np.zeros((self.rows, 0))
-
-    def _differentiate(self, u, i: int, here: np.ndarray) -> np.ndarray:
-        """Return the derivative (r,) along coordinate i at u with the residual `here`; 0 if no neighbour is known."""
-        near = {}
-        for k in (1, -1):
-            if not (self.is_expensive and near):
-                residual = self._evaluate_neighbour(u, i, k)
-                near |= {} if residual is None else {k: residual}
-        if len(near) == 2:
-            return (near[1] - near[-1]) / (2 * DIFFERENCE_STEP)
-        for k, residual in near.items():
-            far = None if self.is_expensive else self._evaluate_neighbour(u, i, 2 * k)
-            if far is None:
-                return k * (residual - here) / DIFFERENCE_STEP
-            return k * (4 * residual - 3 * here - far) / (2 * DIFFERENCE_STEP)
-        return np.zeros_like(here)
-
-    def _evaluate_neighbour(self, u, i: int, n_steps: int) -> np.ndarray | None:
-        """Return the residual (r,) some difference steps along coordinate i; None outside the cube or if it fails."""
-        point = np.array(u, float)
-        point[i] += n_steps * DIFFERENCE_STEP
-        return self(point) if 0 <= point[i] <= 1 else None
+        columns = np.zeros((len(free), self.rows))
+        for column, coordinate in zip(columns, free):
+            known = []
+            for step in (DIFFERENCE_STEP, -DIFFERENCE_STEP, 0.0):
+                point = np.array(u, float)
+                point[coordinate] += step
+                is_wanted = len(known) < 2 and not (self.is_expensive and known and step)
+                if is_wanted and 0 <= point[coordinate] <= 1:
+                    residual = self(point)
+                    if residual is not None:
+                        known.append((point[coordinate], residual))
+            if len(known) == 2:
+                (place, residual), (other_place, other) = known
+                column[:] = (residual - other) / (place - other_place)
+        return columns.T
 
 
 def make_space_filling_points(count: int, n: int) -> np.ndarray:

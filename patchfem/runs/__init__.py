@@ -51,10 +51,7 @@ PUBLIC = {
         "has_error_meshes",
     ),
     "patch.jenkins_elements": ("elements",),
-    "patch.mesh_levels": (
-        "solve_with_coarser",
-        "solve_on_split_mesh",
-    ),
+    "patch.mesh_levels": ("solve_with_coarser",),
     "patch.press": ("nodal_areas",),
     "probe": ("run_probe",),
     "patch.result": ("make_piece_meshes_of_run",),

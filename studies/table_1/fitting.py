@@ -24,8 +24,8 @@ from rungs import (
 )
 
 from patchfem.campaigns.rows.cells import compute_rms_scores, read_response_table
+from patchfem.campaigns.rows.fit import make_residual
 from patchfem.campaigns.rows.model_readings import ModelReadings
-from patchfem.campaigns.rows.search import make_residual
 from patchfem.core import G_N
 from patchfem.identify.least_squares import NEAR_BOUND_FRACTION, Descent, descend
 from patchfem.identify.space import UnitCubeResidual, make_search_space

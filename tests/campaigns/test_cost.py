@@ -2,13 +2,11 @@
 
 import csv
 import json
-import re
 
 import pytest
 from command_line import run_cli
-from scene_texts import BENCH, PIECE
+from scene_texts import PIECE
 
-import patchfem as pf
 from patchfem import build
 from patchfem.campaigns import (
     Cost,
@@ -63,7 +61,7 @@ def build_model(keys="", tolerance=0.05):
     return build(TEXT.format(keys=keys, tolerance=tolerance))
 
 
-def make_cost(label, seconds, error, distance=None, value=1.0):
+def make_cost(label, seconds, error, value=1.0):
     """Return the Cost of a synthetic run with two measures of equal error."""
     return Cost(
         label,
@@ -75,7 +73,6 @@ def make_cost(label, seconds, error, distance=None, value=1.0):
         {"a": 1.0, "b": 2.0},
         {"a": error, "b": error},
         {"a": 0.0, "b": 0.0},
-        {} if distance is None else {"a": distance},
     )
 
 
@@ -92,8 +89,8 @@ def test_exact_error_at_setting_of_scene_agrees_with_run(keys, own, monkeypatch)
     assert row.values == pytest.approx({name: m.value for name, m in measures.items()}, rel=1e-9)
 
 
-def test_exact_table_contains_values_errors_and_distances(tmp_path):
-    """The table contains the errors of each run and its distances from the best run."""
+def test_exact_table_contains_values_and_errors(tmp_path):
+    """The table contains the errors of each run."""
     scene = tmp_path / "a.toml"
     scene.write_text(TEXT.format(keys='element_size = "0.254 mm"', tolerance=0.05), "utf-8")
     process = run_cli(
@@ -106,11 +103,7 @@ def test_exact_table_contains_values_errors_and_distances(tmp_path):
         [LENGTH / n for n in (12, 25, 50, 100)]
     )
     assert adaptive["value"] is None
-    assert adaptive["distances"] == {}
     assert {one["timings"] for one in answer["runs"]} == {3}
-    for one in uniform:
-        distance = abs(one["values"]["normal_stiffness"] - adaptive["values"]["normal_stiffness"])
-        assert one["distances"]["normal_stiffness"] == pytest.approx(distance)
     with open(tmp_path / "out" / "cost.csv", encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
     for row, one in zip(rows, answer["runs"], strict=True):
@@ -125,21 +118,16 @@ def test_exact_table_contains_values_errors_and_distances(tmp_path):
 
 def test_exact_summary_states_fastest_run_or_worst_measure():
     """The summary states the fastest run within the tolerance, or else the measure with the largest error."""
-    runs = [make_cost("2", 1, 4e-2, 3e-2), make_cost("4", 2, 8e-3, 6e-3), make_cost("8", 5, 2e-3)]
+    runs = [make_cost("2", 1, 4e-2), make_cost("4", 2, 8e-3), make_cost("8", 5, 2e-3)]
     within = "a knob at 4: 2 CPU s per run, with every measure within the tolerance 0.01"
     assert describe_fastest_setting(runs, 1e-2) == within
     assert describe_fastest_setting(runs, 1e-3) == (
         "no setting meets the tolerance 0.001: the best run, with a knob at 8, has an error of 0.002 in a and takes 5 "
         "CPU s"
     )
-    constant = [make_cost("2", 1, 2.22), make_cost("4", 2, 2.22), make_cost("8", 5, 2.22)]
-    assert (
-        describe_fastest_setting(constant, 1e-2)
-        == "no setting meets the tolerance 0.01: with every setting the error of a is 2.2"
-    )
-    # The stated error of the first run is below its distance from the best run.
-    optimistic = [make_cost("2", 1, 1e-3, 3e-2), *runs[1:]]
-    assert describe_fastest_setting(optimistic, 1e-2) == within
+    # a coarse run that is accurate by chance does not count
+    by_chance = [make_cost("1", 0.5, 1e-4), *runs]
+    assert describe_fastest_setting(by_chance, 1e-2) == within
 
 
 def test_exact_smallest_of_equally_fast_settings_is_proposed():
@@ -149,48 +137,11 @@ def test_exact_smallest_of_equally_fast_settings_is_proposed():
     results.
     """
     seconds = {"100": 0.0402, "200": 0.0401, "400": 0.0404, "800": 0.0415, "1600": 0.0423}
-    equal = [make_cost(label, each, 1e-3, 0.0) for label, each in seconds.items()]
-    assert find_fastest_run(equal, 1e-2).label == "100" and describe_fastest_setting(
-        equal, 1e-2
-    ) == (
-        "this setting changes no result by more than the tolerance 0.01; fastest in these timings: a knob at 100, 0.04 "
-        "CPU s per run"
-    )
-    slow = [
-        make_cost("2", 1.0, 8e-3, 6e-3),
-        make_cost("4", 0.96, 2e-3, 1e-3),
-        make_cost("8", 1.2, 1e-3),
-    ]
+    equal = [make_cost(label, each, 1e-3) for label, each in seconds.items()]
+    assert find_fastest_run(equal, 1e-2).label == "100"
+    slow = [make_cost("2", 1.0, 8e-3), make_cost("4", 0.96, 2e-3), make_cost("8", 1.2, 1e-3)]
     assert find_fastest_run(slow, 1e-2).label == "2" and find_fastest_run(slow, 5e-3).label == "4"
-    assert describe_fastest_setting(slow, 1e-2).endswith(
-        "fastest in these timings: a knob at 2, 1 CPU s per run"
-    )
     assert describe_fastest_setting(slow, 5e-3).endswith("within the tolerance 0.005")
-
-
-def test_exact_proposed_steps_meet_the_tolerance_in_a_run(
-    tmp_path,
-):
-    """A run with the proposed number of steps meets the tolerance of the row."""
-    text = BENCH.replace('law = "coulomb"', 'law = "nonlocal"\nbond_length = "1 um"')
-    text += "[accuracy]\nsteps_per_cycle = 100\n" if "[accuracy]" not in text else ""
-    scene = tmp_path / "bench.toml"
-    scene.write_text(text, "utf-8")
-    process = run_cli("cost", scene, "-o", tmp_path / "out", "-q", "--json")
-    assert process.code == 0, process.err
-    runs = json.loads(process.out)["tolerance"]["runs"]
-    assert list(dict.fromkeys(run["tolerance"] for run in runs)) == [0.1, 0.01, 0.001, 0.0001]
-    labels = [run["label"] for run in runs if run["meets_tolerance"]]
-    proposed_steps = [re.search(r", (\d+) steps per cycle", label) for label in labels]
-    proposed_steps = [match[1] for match in proposed_steps if match]
-    assert proposed_steps
-    result = pf.run(
-        text, **{"accuracy.tolerance": 1e-4, "accuracy.steps_per_cycle": int(proposed_steps[-1])}
-    )
-    assert not any("the tolerance is" in one for one in result.warnings)
-    with open(tmp_path / "out" / "cost.csv", encoding="utf-8") as file:
-        settings = [(row["knob"], row["setting"]) for row in csv.DictReader(file)]
-    assert ("tolerance", f"0.0001, {proposed_steps[-1]} steps per cycle") in settings
 
 
 @pytest.mark.parametrize(

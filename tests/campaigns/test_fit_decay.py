@@ -121,7 +121,8 @@ def test_fit_command_reads_curve_and_refuses_invalid_curves(tmp_path, monkeypatc
     """The command fits a curve from a file and refuses tables that are no single valid curve."""
     monkeypatch.chdir(tmp_path)
     (tmp_path / "rig.toml").write_text(START)
-    write_decay(tmp_path / "decay.csv", IWAN)
+    # a residual of zero has no chart
+    write_decay(tmp_path / "decay.csv", IWAN, 1e-3)
     command = ["fit", "rig.toml", "--to", "decay.csv", "--free", "friction.chi=-0.9..-0.05"]
     assert "--hold" in run_cli(*command, "--hold", "frequency=1 Hz").err
     answer = run_cli(*command, "--set", "friction.stiffness=1e6 N/m", "--starts", "1", "-o", "out")

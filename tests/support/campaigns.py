@@ -45,6 +45,7 @@ KINDS = {  # Name on the command line -> module and function.
     "hybrid-rigs": ("hybrid_campaign", "compare_rig"),
     "stick-together": ("sticks_together", "compare_rig"),
     "decay-fits": ("decay_fits", "compare_fit"),
+    "made-fits": ("made_fits", "compare_fit"),
     "trace-pairs": ("surface_pairs", "compare_traces"),
     "scan-pairs": ("surface_pairs", "compare_scans"),
     "backbone-bands": ("backbone_band", "compare_band"),

@@ -157,7 +157,7 @@ def chi_square(fit) -> float:
 
 def minimize_from_truth(case: DecayCase, path: Path, keys: list) -> float:
     """Return chi square after a descent from the true values, with all curves by harmonic balance."""
-    amplitude, measured, error = read_damping_curve(path)
+    measured = read_damping_curve(path)
     base = BaseScene(pf.load(case.scene))
 
     def residual(values) -> np.ndarray:
@@ -166,9 +166,9 @@ def minimize_from_truth(case: DecayCase, path: Path, keys: list) -> float:
             base.override([key.format_assignment(float(value)) for key, value in zip(keys, values)])
         )
         curve = compute_backbone(
-            model, "", np.unique(amplitude), ("balance",), errors=False
+            model, "", np.unique(measured.amplitude), ("balance",), errors=False
         ).curves["balance"]
-        return ((np.array([curve.frequency, curve.damping]) - measured) / error).ravel()
+        return measured.normalized_residual(np.array([curve.frequency, curve.damping]))
 
     box = make_search_space([key.low for key in keys], [key.high for key in keys])
     return descend(

@@ -292,21 +292,18 @@ def _fit_exponents(joint: JointMode, curve: Curve | None) -> LossExponents:
     relative_error = words.MIN_LOSS_RATIO * 2 * np.pi * curve.damping_error
     known = loss > np.maximum(ROUND_OFF_ERROR, relative_error) * energy
     slip = joint.slip_amplitude
-    micro = np.flatnonzero(known & (amplitude < words.MAX_MICRO_SLIP_RATIO * slip))
-    gross = np.flatnonzero(known & (amplitude > MIN_GROSS_SLIP_RATIO * slip))[-2:]
-    return LossExponents(_loss_slope(curve, micro), _loss_slope(curve, gross), theory)
-
-
-def _loss_slope(curve: Curve, points) -> float | None:
-    """Return the log-log slope of the loss between the first and the last of the given points.
-
-    It is None for fewer than two points.
-    """
-    if points.size < 2:
-        return None
-    ends = points[[0, -1]]
-    loss_step = np.diff(np.log(curve.loss[ends]))
-    return float(loss_step[0] / np.diff(np.log(curve.amplitude[ends]))[0])
+    ranges = (
+        known & (amplitude < words.MAX_MICRO_SLIP_RATIO * slip),
+        known & (amplitude > MIN_GROSS_SLIP_RATIO * slip),
+    )
+    slopes = []
+    for points, first in zip(map(np.flatnonzero, ranges), (0, -2)):
+        slope = None
+        if points.size > 1:
+            ends = points[[first, -1]]
+            slope = float(np.diff(np.log(loss[ends]))[0] / np.diff(np.log(amplitude[ends]))[0])
+        slopes.append(slope)
+    return LossExponents(*slopes, theory)
 
 
 def _theoretical_exponent(joint: JointMode) -> float | None:
@@ -339,23 +336,18 @@ def _find_flutter_amplitude(joint: JointMode, curves: dict[str, Curve]) -> float
     if not falls:
         return None
     method, place = next(iter(falls.items()))
-    bracket = slice(place, place + 2)
-    amplitudes = curves[method].amplitude[bracket]
-    losses = (curves[method].damping * curves[method].amplitude)[bracket]
-    known = dict(zip(np.log(amplitudes), losses))
+    amplitudes = curves[method].amplitude[place : place + 2]
+    losses = amplitudes * curves[method].damping[place : place + 2]
     joint = joint._replace(has_errors=False, has_force=False)
 
     def net_loss(log_amplitude: float) -> float:
         """Return the product of damping ratio and amplitude [m], given the log of the amplitude."""
-        if log_amplitude not in known:
-            amplitude = np.array([np.exp(log_amplitude)])
-            point = CURVES[method](joint, amplitude)
-            known[log_amplitude] = float(point.damping[0] * amplitude[0])
-        return known[log_amplitude]
+        point = CURVES[method](joint, np.exp([log_amplitude]))
+        return float(point.damping[0] * point.amplitude[0])
 
     try:
-        return float(np.exp(brentq(net_loss, *known, xtol=FLUTTER_TOL)))
-    except (NotConverged, PatchfemError):
+        return float(np.exp(brentq(net_loss, *np.log(amplitudes), xtol=FLUTTER_TOL)))
+    except (NotConverged, PatchfemError, ValueError):
         # No further point is known, so the root of the chord between the two points is used.
         fraction = losses[0] / (losses[0] - losses[1])
         return float(amplitudes[0] + fraction * (amplitudes[1] - amplitudes[0]))

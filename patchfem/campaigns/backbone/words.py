@@ -13,8 +13,6 @@ MAX_MICRO_SLIP_RATIO = 0.3
 # Smallest ratio of a loss to its error at which the loss is used to determine an exponent.
 MIN_LOSS_RATIO = 4.0
 MAX_LISTED_AMPLITUDES = 6  # Largest number of amplitudes that a sentence lists individually.
-# Smallest ratio of two values that is reported as a ratio and not as a percentage.
-MIN_REPORTED_FACTOR = 2.0
 AGREEMENT = 0.02  # Largest relative difference of the damping at which two methods agree.
 MIN_REPORTED_LOSS = 0.05  # Smallest decrease of the amplitude per cycle that is reported.
 MIN_REPORTED_RATIO = 0.05  # Smallest relative motion of other modes that is reported.
@@ -33,10 +31,6 @@ PURPOSES = {
 NO_CURVE = (
     "No method gives a curve at these amplitudes; give others with --amplitudes, or run a release with "
     'drive.kind = "free".'
-)
-DIFFERENCE = (
-    "The values of {name} by quasi-static and by balance differ most at the amplitude {amplitude}, {size}: the static "
-    "curve uses the secant stiffness between the turning points; harmonic balance uses the first harmonic of the force."
 )
 SECANT = (
     "--method quasi-static takes the stiffness from the two turning points of the motion; --method balance takes the "
@@ -130,32 +124,6 @@ def _note_gaps(amplitudes, method: str, curve: Curve) -> list[str]:
     ]
 
 
-class _Difference:
-    """Difference of frequency or damping of the quasi-static curve from harmonic balance at common amplitudes.
-
-    Attributes
-    ----------
-    amplitude : (k,) array
-        [m]
-    static, balance, error : (k,) array
-        Values by the methods, and the sum of their errors.
-    """
-
-    def __init__(self, name: str, curves: dict[str, Curve]):
-        here, there = match_amplitudes(curves["balance"], curves["quasi-static"])
-        balance = curves["balance"].at(here)
-        static = curves["quasi-static"].at(there)
-        self.amplitude = balance.amplitude
-        self.static = getattr(static, name)
-        self.balance = getattr(balance, name)
-        self.error = getattr(static, f"{name}_error") + getattr(balance, f"{name}_error")
-
-    @property
-    def size(self) -> np.ndarray:
-        """Absolute difference (k,)."""
-        return np.abs(self.static - self.balance)
-
-
 def write_advice(joint: JointMode, backbone: Backbone) -> tuple[str, ...]:
     """Write the advice on which curve to use, its band, and the ranges of validity of the methods."""
     band = backbone.band
@@ -170,8 +138,6 @@ def write_advice(joint: JointMode, backbone: Backbone) -> tuple[str, ...]:
         *_describe_slip(joint, curve),
         _describe_band_width(backbone),
         *_describe_static_curve(curves),
-        *_describe_largest_difference("frequency", curves),
-        *_describe_largest_difference("damping", curves),
         *_describe_coupling(joint, curve),
     ]
 
@@ -219,8 +185,13 @@ def _describe_band_width(backbone: Backbone) -> str:
     """Describe where the band of the damping ratio is widest, and the largest deviation of the frequency."""
     band = backbone.band
     curve = backbone.best
-    frequency = _largest_distance(curve.frequency, band.frequency_low, band.frequency_high)
-    damping = _largest_distance(curve.damping, band.damping_low, band.damping_high)
+    deviations = []
+    for name in ("frequency", "damping"):
+        value = getattr(curve, name)
+        above = getattr(band, f"{name}_high") - value
+        below = value - getattr(band, f"{name}_low")
+        deviations.append(np.maximum(above, below) / np.maximum(np.abs(value), 1e-300))
+    frequency, damping = deviations
     k = int(np.argmax(damping))
     content = "the numerical error"
     if len(backbone.curves) > 1:
@@ -232,50 +203,31 @@ def _describe_band_width(backbone: Backbone) -> str:
     )
 
 
-def _largest_distance(value, low, high) -> np.ndarray:
-    """Return the largest relative deviation (k,) of a value from the limits of its band."""
-    return np.maximum(high - value, value - low) / np.maximum(np.abs(value), 1e-300)
-
-
 def _describe_static_curve(curves: dict[str, Curve]) -> list[str]:
-    """Describe where the quasi-static curve holds."""
+    """Describe up to which amplitude frequency and damping of the quasi-static curve agree with harmonic balance."""
     if len(curves) < 2:
         return []
-    is_beyond = np.False_
+    here, there = match_amplitudes(curves["balance"], curves["quasi-static"])
+    balance = curves["balance"].at(here)
+    static = curves["quasi-static"].at(there)
+    agrees = np.ones(balance.amplitude.size, bool)
     for name in ("frequency", "damping"):
-        difference = _Difference(name, curves)
-        limit = AGREEMENT * np.abs(difference.balance) + difference.error + ROUND_OFF_ERROR
-        is_beyond = is_beyond | (difference.size > limit)
-    if not is_beyond.size:
-        return []
+        value = getattr(balance, name)
+        error = getattr(balance, f"{name}_error") + getattr(static, f"{name}_error")
+        limit = AGREEMENT * np.abs(value) + error + ROUND_OFF_ERROR
+        agrees &= np.abs(getattr(static, name) - value) <= limit
+
+    # the range ends at the first amplitude at which they differ
     tolerance = f"{100 * AGREEMENT:g} %"
-    if not is_beyond.any():
+    if agrees.all():
         return [f"The quasi-static curve holds within {tolerance} at all its amplitudes."]
-    first = int(np.argmax(is_beyond))
+    first = int(np.argmin(agrees))
     if not first:
         return [
             f"The quasi-static curve differs by more than {tolerance} from its smallest amplitude on."
         ]
-    edge = format_length(difference.amplitude[first - 1], 3)
+    edge = format_length(balance.amplitude[first - 1], 3)
     return [f"The quasi-static curve holds up to {edge} within {tolerance}."]
-
-
-def _describe_largest_difference(name: str, curves: dict[str, Curve]) -> list[str]:
-    """Describe the largest difference of "frequency" or "damping" beyond the errors of both methods."""
-    if len(curves) < 2:
-        return []
-    difference = _Difference(name, curves)
-    is_large = difference.size > difference.error
-    relative = np.where(is_large, difference.size / np.abs(difference.balance), 0.0)
-    if not relative.size or not relative.max() > 0:
-        return []
-    k = int(np.argmax(relative))
-    ratio = difference.static[k] / difference.balance[k]
-    size = f"by {100 * relative[k]:.2g} %"
-    if ratio >= MIN_REPORTED_FACTOR:
-        size = f"where the value by quasi-static is {ratio:.2g} times the value by balance"
-    amplitude = format_length(difference.amplitude[k], 3)
-    return [DIFFERENCE.format(name=name, amplitude=amplitude, size=size)]
 
 
 def _describe_coupling(joint: JointMode, curve: Curve) -> list[str]:

@@ -9,24 +9,17 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from time import perf_counter
-from typing import NamedTuple
 
 import numpy as np
 
 from ...core import NotConverged, PatchfemError
 from ...effects import law_has_trait
-from ...identify.least_squares import Fit, Problem, SearchCounts
 from ...inputs.loops import Loop, read_loop
 from ...scene.scene import Scene, SceneError
 from .loop_model import BenchModel
 from .loop_path import DEFAULT_OPTIONS, LoopOptions, make_offsets
 from .problem import FittedKeys, FreeKeys, parse_ranges
 
-# Number of time steps between two rows at which the steps are not halved any more.
-MAX_STEPS_PER_ROW = 64
-# Largest ratio of a change of the force to the tolerance at which the change is negligible in a
-# fit.
-STEP_FRACTION = 0.1
 # Smallest fraction of independent rows for which no warning about correlation is issued.
 MIN_INDEPENDENT = 0.6
 # Ratio of the residual to the peak force up to which round-off dominates the residual.
@@ -136,79 +129,40 @@ def fit_hysteresis_loop(
             f"{loop_file}: only {n_used} rows are used for the fit (rows that are held out do not count), "
             f"too few to determine {n_values} values and their intervals"
         )
+
+    # least squares of the deviations, as fractions of the largest force
     bench = BenchModel(scene, loop, ranges, offsets, warm_up=options.warm, say=say)
     scale = float(np.abs(loop.reading[~held_out]).max())
-
-    def residual(values) -> np.ndarray:
-        """Return the residual (r,) of the fitted rows, divided by the largest measured force."""
-        return (bench(values) - loop.reading)[~held_out] / scale
-
     offset_ranges = [offset.range for offset in offsets]
     keys = FreeKeys(scene, ranges, offset_ranges, bench.assignments, bench.notes)
+    problem = keys.make_problem(lambda values: (bench(values) - loop.reading)[~held_out] / scale)
     try:
-        refined = _solve_with_refined_steps(keys.make_problem(residual), bench, say)
+        if bench.is_exact:
+            fit = problem.solve(interval_kind="series")
+        else:
+            # the steps are chosen at the result of a fit with the largest steps
+            first = problem.solve(interval_kind="")
+            bench.refine_steps(first.values)
+            fit = replace(problem, start=first.values).solve(1, "series")
+            fit = replace(fit, agreed=first.agreed)
     except NotConverged as error:
         if bench.n_computed == 0:
             raise bench.first_error or error from None
         raise
-    model = bench(refined.fit.values)
+    step_error = 0.0 if bench.is_exact else bench.measure_step_error(fit.values)
     fitted = FittedLoop(
-        keys=keys.make_fitted_keys(refined.fit, begin),
+        keys=keys.make_fitted_keys(fit, begin),
         loop=loop,
         offsets=offsets,
         held_out=held_out,
-        model=model,
-        step_error=refined.step_error,
+        model=bench(fit.values),
+        step_error=step_error,
         steps_per_row=bench.steps_per_row,
     )
     has_lead_in = bool(offsets) or options.warm
     doubts = _warn_of_doubtful_fit(fitted, scene, has_lead_in=has_lead_in)
     warnings = [*fitted.keys.warnings, *doubts]
     return replace(fitted, keys=replace(fitted.keys, warnings=warnings))
-
-
-class RefinedFit(NamedTuple):
-    """Fit, and the largest change of the computed force when the time steps are halved."""
-
-    fit: Fit
-    step_error: float
-
-
-def _solve_with_refined_steps(problem: Problem, bench_model: BenchModel, say) -> RefinedFit:
-    """Solve the fit, halving the time steps until their effect on the force is negligible."""
-    if bench_model.is_exact:
-        return RefinedFit(problem.solve(interval_kind="series"), 0.0)
-    fit = problem.solve(interval_kind="")
-    agreed = fit.agreed
-    while True:
-        coarse = bench_model(fit.values)
-        bench_model.steps_per_row *= 2
-        fine = bench_model(fit.values)
-        change = float(np.abs(fine - coarse).max())
-        peak = float(np.abs(fine).max())
-        tolerance = STEP_FRACTION * bench_model.scene.accuracy.tolerance * peak
-        problem = replace(problem, start=fit.values)
-        if (
-            bench_model.has_fixed_steps
-            or change <= tolerance
-            or bench_model.steps_per_row >= MAX_STEPS_PER_ROW
-        ):
-            bench_model.steps_per_row //= 2
-            last = _add_search_counts(problem.solve(1, "series"), fit)
-            return RefinedFit(replace(last, agreed=agreed), change)
-        if say:
-            say(f"{bench_model.steps_per_row} time steps between neighbouring rows of the record")
-        fit = _add_search_counts(problem.solve(1, ""), fit)
-
-
-def _add_search_counts(fit: Fit, previous: Fit) -> Fit:
-    """Add the numbers of evaluations and failures of a previous fit to those of a fit."""
-    counts = SearchCounts(
-        fit.counts.evaluations + previous.counts.evaluations,
-        fit.counts.failures + previous.counts.failures,
-        previous.counts.reason or fit.counts.reason,
-    )
-    return replace(fit, counts=counts)
 
 
 def _warn_of_doubtful_fit(fitted: FittedLoop, scene: Scene, *, has_lead_in: bool) -> list:

@@ -1,7 +1,5 @@
 """Friction force along a measured displacement as a function of free parameters."""
 
-from itertools import product
-
 import numpy as np
 
 from ...core import PatchfemError
@@ -19,9 +17,11 @@ from ...scene.scene import Scene, SceneError
 from .loop_path import count_warm_up_rows, prepend_warm_up
 from .problem import format_assignments, solve_contact
 
-# Largest number of free [contact] parameters whose bounds and middles determine the shared meshes;
-# they require 3**3 models.
-MAX_MESH_KEYS = 3
+# Number of time steps between two rows at which the steps are not halved any more.
+MAX_STEPS_PER_ROW = 64
+# Largest ratio of a change of the force to the tolerance at which the change is negligible in a
+# fit.
+STEP_FRACTION = 0.1
 # Ratio of the rest speed of growing bonds to the largest measured speed.
 REST_SPEED_FRACTION = 1e-3
 AMPLITUDE_TOL = 0.02  # Largest relative difference of two amplitudes that is not reported.
@@ -168,31 +168,41 @@ class BenchModel:
             self.patch = solve_contact(model)
         return self.patch
 
-    def _get_shared_meshes(self):
+    def _get_shared_meshes(self) -> meshes.SharedMeshes:
         """Return the meshes that all values of the free parameters have in common.
 
-        They are chosen on the first call, for the bounds and the middle of each [contact] range.
+        They are chosen on the first call, for the lower ends, the middles and the upper ends of the ranges.
         """
-        if self.meshes is not None:
-            return self.meshes
-        range_middles = [(bound.low + bound.high) / 2 for bound in self.ranges]
-        keys = [bound.key for bound in self.ranges]
-        contact_keys = [k for k, key in enumerate(keys) if key.startswith("contact.")]
-        contact_keys = contact_keys[:MAX_MESH_KEYS]
-        levels = [(self.ranges[k].low, range_middles[k], self.ranges[k].high) for k in contact_keys]
-        models = []
-        first_error = self.first_error
-        for values in product(*levels):
-            parameters = list(range_middles)
-            for k, value in zip(contact_keys, values):
-                parameters[k] = value
-            try:
-                models.append(build(self.build_scene(parameters)))
-            except PatchfemError:
-                continue  # The search counts this error as a failed evaluation too.
-        self.first_error = first_error
-        self.meshes = meshes.SharedMeshes(models, False)
+        if self.meshes is None:
+            models = []
+            first_error = self.first_error
+            for part in (0.0, 0.5, 1.0):
+                values = [bound.low + part * (bound.high - bound.low) for bound in self.ranges]
+                try:
+                    models.append(build(self.build_scene(values)))
+                except PatchfemError:
+                    continue  # The search counts this error as a failed evaluation too.
+            self.first_error = first_error
+            self.meshes = meshes.SharedMeshes(models, False)
         return self.meshes
+
+    def measure_step_error(self, values) -> float:
+        """Return the largest change of the computed reading when the time steps are halved."""
+        coarse = self(values)
+        self.steps_per_row *= 2
+        fine = self(values)
+        self.steps_per_row //= 2
+        return float(np.abs(fine - coarse).max())
+
+    def refine_steps(self, values) -> None:
+        """Halve the time steps until their effect on the reading is negligible, unless the scene sets them."""
+        limit = STEP_FRACTION * self.scene.accuracy.tolerance
+        while not self.has_fixed_steps and self.steps_per_row < MAX_STEPS_PER_ROW:
+            if self.measure_step_error(values) <= limit * np.abs(self(values)).max():
+                return
+            self.steps_per_row *= 2
+            if self.say:
+                self.say(f"{self.steps_per_row} time steps between neighbouring rows of the record")
 
     def _find_row_times(self) -> np.ndarray:
         """Return the time of each measured row [s].

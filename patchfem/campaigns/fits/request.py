@@ -3,6 +3,7 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
+from typing import NamedTuple
 
 from ...core import PatchfemError
 from ...inputs.cells import read_lines
@@ -11,8 +12,13 @@ from ...model.model import build
 from ...scene.scene import Scene
 from ..rows.checkpoint import SearchCheckpoint
 from ..rows.condition_models import FitRequest
-from ..rows.fit import FittedRows, RowsOptions, fit_rows
-from ..rows.search import UNSTABLE, SearchSettings
+from ..rows.fit import (
+    UNSTABLE_MEANINGS,
+    FittedRows,
+    RowsOptions,
+    SearchSettings,
+    fit_rows,
+)
 from .curve import DEFAULT_STARTS, HEADER, UNITS, FittedCurve, fit_curve
 from .loop import FittedLoop, fit_hysteresis_loop
 from .loop_path import LoopOptions
@@ -20,27 +26,27 @@ from .problem import parse_ranges
 from .wear import FittedCoefficient, fit_wear
 
 DEFAULT_ROW_STARTS = 8  # default number of random starting points of a fit to rows
-LOOP_OPTIONS = ("offset", "warm_up")
-ROW_OPTIONS = ("leave_out", "seed", "unstable", "resume")
-OPTIONS_BY_KIND = {
-    "loop": ("hold", *LOOP_OPTIONS),
-    "rows": ("hold", "starts", *ROW_OPTIONS),
-    "curve": ("starts",),
-    "wear": (),
-}
+
+
+class Kind(NamedTuple):
+    """Kind of fit: what is fitted, what scene that needs, and the options that it has."""
+
+    target: str
+    scene: str
+    options: tuple[str, ...] = ()
+
+
 KINDS = {
-    "loop": "a bench",
-    "rows": "a rig",
-    "wear": "one with [wear]",
-    "curve": "a rig, fitted to a curve of frequency and damping against amplitude",
-}
-_LOOP_FITS = "fits to a loop under a prescribed slide"
-_ROW_FITS = "fits to rows of a rig"
-FITS_BY_OPTION = {
-    "hold": f"{_LOOP_FITS} or to rows of a rig",
-    "starts": f"{_ROW_FITS} or to its curve of frequency and damping against amplitude",
-    **dict.fromkeys(LOOP_OPTIONS, _LOOP_FITS),
-    **dict.fromkeys(ROW_OPTIONS, _ROW_FITS),
+    "loop": Kind("a loop under a prescribed slide", "a bench", ("hold", "offset", "warm_up")),
+    "rows": Kind(
+        "rows of a rig", "a rig", ("hold", "starts", "leave_out", "seed", "unstable", "resume")
+    ),
+    "curve": Kind(
+        "frequency and damping of a rig against amplitude",
+        "a rig, fitted to a curve of frequency and damping against amplitude",
+        ("starts",),
+    ),
+    "wear": Kind("a worn depth", "one with [wear]"),
 }
 
 
@@ -201,14 +207,16 @@ def check_options(kind: str, options: FitOptions, format_option: Callable) -> No
     PatchfemError
         If an option is invalid or belongs to another kind of fit.
     """
-    others = [name for name in options.names_given() if name not in OPTIONS_BY_KIND[kind]]
-    if others:
-        reasons = [
-            f"{format_option(name)} applies only to {FITS_BY_OPTION[name]}" for name in others
-        ]
-        belong = "; ".join(reasons)
-        these = "this option" if len(others) == 1 else "these options"
-        raise PatchfemError(f"{belong}; this scene is {KINDS[kind]}; leave {these} out")
+    reasons = []
+    for name in options.names_given():
+        targets = [other.target for other in KINDS.values() if name in other.options]
+        if KINDS[kind].target not in targets:
+            reasons.append(f"{format_option(name)} applies only to fits to {' or '.join(targets)}")
+    if reasons:
+        these = "this option" if len(reasons) == 1 else "these options"
+        raise PatchfemError(
+            f"{'; '.join(reasons)}; this scene is {KINDS[kind].scene}; leave {these} out"
+        )
     starts = options.starts
     if starts is not None and (not isinstance(starts, int) or starts < 1):
         raise PatchfemError(f"{format_option('starts')} {starts}: at least one is needed")
@@ -216,7 +224,7 @@ def check_options(kind: str, options: FitOptions, format_option: Callable) -> No
         raise PatchfemError(
             f"{format_option('seed')} {options.seed}: a whole number >= 0 is needed"
         )
-    if options.unstable not in UNSTABLE:
+    if options.unstable not in UNSTABLE_MEANINGS:
         raise PatchfemError(
-            f"{format_option('unstable')} {options.unstable}: one of {', '.join(UNSTABLE)} is needed"
+            f"{format_option('unstable')} {options.unstable}: one of {', '.join(UNSTABLE_MEANINGS)} is needed"
         )

@@ -6,7 +6,6 @@ then checked and corrected by further runs.
 """
 
 import json
-import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -27,8 +26,6 @@ from .problem import parse_ranges
 # Names of the wear depths in compare.json, the more accurate one first.
 QUANTITIES = ("worn_depth_mean", "worn_depth_max")
 MAX_RUNS = 6  # Largest number of wear runs; the correction converges within two or three runs.
-# Largest size of a file that is read [bytes]; files of `compare` are far smaller.
-MAX_FILE_BYTES = 1 << 20
 # Largest ratio of the relative error of the computed depth to the specified tolerance.
 DEPTH_TOL = 0.1
 COEFFICIENT_KEY = "wear.coefficient"
@@ -85,12 +82,10 @@ class WearCurve(NamedTuple):
 
     def make_inverse(self) -> Callable:
         """Return a function that interpolates the fraction of the cycles at a given wear depth."""
-        is_growing = np.concatenate([[True], np.diff(self.depth) > 0])
-        depth = self.depth[is_growing]
-        fraction = self.fraction[is_growing]
-        if depth.size > 2:
-            return PchipInterpolator(depth, fraction, extrapolate=False)
-        return lambda value: np.interp(value, depth, fraction)
+        is_growing = np.diff(self.depth, prepend=-1.0) > 0
+        return PchipInterpolator(
+            self.depth[is_growing], self.fraction[is_growing], extrapolate=False
+        )
 
 
 def read_measured_depth(text: str) -> MeasuredDepth:
@@ -121,11 +116,6 @@ def read_measured_depth(text: str) -> MeasuredDepth:
 def _read_depth_file(path: Path) -> MeasuredDepth:
     """Read a measured depth from a JSON file written by `compare`."""
     try:
-        if path.stat().st_size > MAX_FILE_BYTES:
-            raise PatchfemError(
-                f"{path}: the file is larger than {MAX_FILE_BYTES} bytes; give the JSON file that "
-                "compare writes"
-            )
         content = json.loads(path.read_text("utf-8"))
     except FileNotFoundError:
         raise Missing(
@@ -138,28 +128,17 @@ def _read_depth_file(path: Path) -> MeasuredDepth:
         ) from None
     measures = content.get("measures", content) if isinstance(content, dict) else {}
     for name in QUANTITIES:
-        measure = measures.get(name) if isinstance(measures, dict) else None
-        numbers = _read_interval(measure)
-        if numbers is not None and numbers[0] > 0:
+        try:
+            numbers = [float(measures[name][part]) for part in ("value", "low", "high")]
+        except (KeyError, TypeError, ValueError):
+            continue
+        if np.isfinite(numbers).all() and numbers[0] > 0:
             value, low, high = numbers
             return MeasuredDepth(name, value, max(low, 0.0), high, str(path))
     raise PatchfemError(
         f"{path}: the file contains no worn depth above zero; compare writes a depth only if the "
         "traces have a common reference"
     )
-
-
-def _read_interval(measure) -> list | None:
-    """Return value, low and high of a measure in a file written by `compare`.
-
-    Returns None if one of them is not a finite number.
-    """
-    if not isinstance(measure, dict):
-        return None
-    parts = [measure.get(key) for key in ("value", "low", "high")]
-    if not all(isinstance(part, int | float) and math.isfinite(part) for part in parts):
-        return None
-    return [float(part) for part in parts]
 
 
 def fit_wear(
@@ -189,7 +168,13 @@ def fit_wear(
     NotConverged
         If the runs do not converge to a coefficient.
     """
-    bounds = _parse_coefficient_range(free_parameters)
+    ranges = parse_ranges(free_parameters)
+    if [bound.key for bound in ranges] != [COEFFICIENT_KEY]:
+        raise PatchfemError(
+            f"--free: in a scene with [wear] only {COEFFICIENT_KEY} can be fitted, for example {COEFFICIENT_KEY}=1e-16 "
+            "m^2/N..1e-12 m^2/N"
+        )
+    bounds = ranges[0]
     target = read_measured_depth(measured_depth)
     if model.patch is None:
         raise PatchfemError(
@@ -207,12 +192,12 @@ def fit_wear(
         """Compute the wear depth over the cycles for a wear coefficient [m2/N]."""
         return _compute_wear_curve(model, patch, coefficient, target.name, progress)
 
+    # one run with the largest coefficient gives the depth for all smaller ones
     curve = compute(bounds.high)
     max_depth = float(curve.depth[-1])
     if not max_depth >= target.value:
-        is_worn_through = curve.fraction[-1] < 1
         advice = "raise the high bound"
-        if is_worn_through:
+        if curve.fraction[-1] < 1:
             advice = (
                 "with this bound as the coefficient the coating is worn through before the last "
                 "cycle"
@@ -221,17 +206,16 @@ def fit_wear(
             f"--free {COEFFICIENT_KEY}: with the high bound {bounds.high:.4g} m^2/N the scene reaches only "
             f"{target.name} = {max_depth:.4g}, but {target.value:.4g} was measured; {advice}"
         )
+
+    # the interpolated coefficient is corrected until a run with it has the measured depth
     inverse = curve.make_inverse()
     value = float(bounds.high * inverse(target.value))
     n_runs = 1
-    computed_depth = math.nan
     while n_runs < MAX_RUNS:
         n_runs += 1
         computed_depth = float(compute(value).depth[-1])
-        if (
-            abs(computed_depth - target.value)
-            <= DEPTH_TOL * model.accuracy.tolerance * target.value
-        ):
+        error = abs(computed_depth / target.value - 1)
+        if error <= DEPTH_TOL * model.accuracy.tolerance:
             break
         value *= float(inverse(target.value) / inverse(computed_depth))
     else:
@@ -255,17 +239,6 @@ def fit_wear(
         runs=n_runs,
         curve=np.array([bounds.high * curve.fraction, curve.depth]),
     )
-
-
-def _parse_coefficient_range(free_parameters) -> Range:
-    """Parse the range of the wear coefficient; raise PatchfemError for other parameters."""
-    ranges = parse_ranges(free_parameters)
-    if [bound.key for bound in ranges] != [COEFFICIENT_KEY]:
-        raise PatchfemError(
-            f"--free: in a scene with [wear] only {COEFFICIENT_KEY} can be fitted, for example {COEFFICIENT_KEY}=1e-16 "
-            "m^2/N..1e-12 m^2/N"
-        )
-    return ranges[0]
 
 
 def _compute_wear_curve(model: Model, patch, coefficient: float, name: str, progress) -> WearCurve:

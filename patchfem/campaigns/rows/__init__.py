@@ -7,7 +7,6 @@ fitted, the held-out and the left-out readings.
 - `cells`: readings of the table
 - `condition_models`: models of the rig at the measured conditions
 - `model_readings`: readings that these models predict
-- `search`: descents from random starting points
 
 Read `fit` first.
 """

@@ -15,6 +15,7 @@ MIN_DISPLACEMENT = 0.01 * 25.4e-6
 # Largest absolute log ratio, which is also assigned to unbounded and to vanishing motions.
 MAX_LOG_RATIO = log(1e3)
 EQUAL_TOL = 1e-9  # Largest relative difference at which two inputs count as equal.
+INPUT_DIGITS = 8  # digits of the logarithm of an input at which two inputs count as equal
 CONDITION_COLUMNS = {"frequency": "frequency", "input": "acceleration"}
 
 
@@ -169,6 +170,8 @@ def read_response_table(path: Path) -> Readings:
                 f"{path}: row {k + 1}: the acceleration is 0, but the fit takes its logarithm; leave "
                 "the cell empty"
             )
+
+        # a row has an acceleration, a displacement or both
         for value, is_felt in ((row.acceleration, True), (row.displacement, False)):
             if value is not None:
                 row_numbers.append(k)
@@ -178,32 +181,21 @@ def read_response_table(path: Path) -> Readings:
         raise PatchfemError(
             f"{path}: no row has an acceleration or a displacement, so nothing can be fitted"
         )
+
+    # inputs that differ only by the round-off of a unit conversion are one condition
     inputs = np.array([(rows[k].frequency, rows[k].input) for k in row_numbers])
-    conditions = _find_distinct_conditions(inputs)
-    condition = [int(np.argmin(np.abs(conditions / pair - 1).max(axis=1))) for pair in inputs]
-    is_unstable = [("U" in rows[k].flag) for k in row_numbers]
+    rounded = np.round(np.log(inputs), INPUT_DIGITS)
+    _, first, condition = np.unique(rounded, axis=0, return_index=True, return_inverse=True)
     return Readings(
-        Path(path),
-        rows,
-        frozen_array(row_numbers, np.int64),
-        frozen_array(felt, bool),
-        frozen_array(measured),
-        frozen_array(is_unstable, bool),
-        frozen_array(conditions),
-        frozen_array(condition, np.int64),
+        path=Path(path),
+        rows=rows,
+        row=frozen_array(row_numbers, np.int64),
+        is_acceleration=frozen_array(felt, bool),
+        measured=frozen_array(measured),
+        unstable=frozen_array(["U" in rows[k].flag for k in row_numbers], bool),
+        conditions=frozen_array(inputs[first]),
+        condition=frozen_array(condition.ravel(), np.int64),
     )
-
-
-def _find_distinct_conditions(inputs) -> np.ndarray:
-    """Return the distinct pairs (c, 2) of frequency and input in ascending order.
-
-    Values that differ only by the round-off of a unit conversion count as equal.
-    """
-    conditions: list = []
-    for pair in sorted(set(map(tuple, inputs.tolist()))):
-        if not conditions or not np.allclose(pair, conditions[-1], rtol=EQUAL_TOL, atol=0):
-            conditions.append(pair)
-    return np.array(conditions)
 
 
 def compute_rms_scores(readings: Readings, log_ratios, selected) -> dict | None:
@@ -225,12 +217,10 @@ def compute_rms_scores(readings: Readings, log_ratios, selected) -> dict | None:
     """
     if not np.any(selected):
         return None
-    log_ratios = np.asarray(log_ratios)
-    is_any = np.ones(len(log_ratios), bool)
     kinds = {
         "acceleration": readings.is_acceleration,
         "displacement": ~readings.is_acceleration,
-        "all": is_any,
+        "all": True,
     }
     out: dict = {}
     for name, is_of_kind in kinds.items():

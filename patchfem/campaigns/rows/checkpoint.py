@@ -2,7 +2,7 @@
 
 import hashlib
 import json
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 
 import numpy as np
@@ -39,16 +39,22 @@ class SearchCheckpoint:
             if isinstance(content, dict) and content.get("question") == self.key:
                 self.known = content["ends"]
 
-    def load(self, name: str) -> Descent | None:
-        """Return the stored descent of a name; None if there is none."""
-        stored = self.known.get(name)
-        if not stored:
-            return None
-        *u, cost, rows, is_converged = stored
-        return Descent(np.array(u), np.inf if cost is None else cost, is_converged, rows)
+    def make_callbacks(self, name: str) -> dict[str, Callable]:
+        """Return the functions `load` and `save` of a `Search` with this name."""
 
-    def save(self, name: str, descent: Descent) -> None:
-        """Store a finished descent; JSON has no infinite number."""
-        cost = descent.cost if np.isfinite(descent.cost) else None
-        self.known[name] = [*descent.u.tolist(), cost, descent.rows, bool(descent.is_converged)]
-        write_text(self.path, json.dumps({"question": self.key, "ends": self.known}))
+        def load(start: int) -> Descent | None:
+            """Return the stored descent from a start; None if there is none."""
+            stored = self.known.get(f"{name}/{start}")
+            if not stored:
+                return None
+            *u, cost, rows, is_converged = stored
+            return Descent(np.array(u), np.inf if cost is None else cost, is_converged, rows)
+
+        def save(start: int, descent: Descent) -> None:
+            """Store a finished descent; JSON has no infinite number."""
+            cost = descent.cost if np.isfinite(descent.cost) else None
+            content = [*descent.u.tolist(), cost, descent.rows, bool(descent.is_converged)]
+            self.known[f"{name}/{start}"] = content
+            write_text(self.path, json.dumps({"question": self.key, "ends": self.known}))
+
+        return {"load": load, "save": save}

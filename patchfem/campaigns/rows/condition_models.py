@@ -1,7 +1,5 @@
 """Rig models at the measured conditions, for given values of the free parameters."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 from ...core import PatchfemError, SineDrive
@@ -23,7 +21,7 @@ class FitRequest:
         self.ranges = ranges
         self.measured = measured
 
-    def make_condition_models(self, conditions, *sets: str) -> ConditionModels:
+    def make_condition_models(self, conditions, *sets: str) -> "ConditionModels":
         """Return the rig models at conditions (c, 2), with additional --set strings."""
         scene = self.scene
         if sets:

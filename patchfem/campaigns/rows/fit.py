@@ -5,12 +5,9 @@ and the left-out readings. A search does not use the readings that are held out 
 predicted after the fit.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from time import perf_counter
-from typing import NamedTuple
 
 import numpy as np
 
@@ -18,16 +15,38 @@ from ...core import PatchfemError
 from ...identify.least_squares import Descents, Fit, Search
 from ..fits.problem import FittedKeys, FreeKeys
 from .cells import MAX_LOG_RATIO, Readings, compute_rms_scores, read_response_table
+from .checkpoint import SearchCheckpoint
 from .condition_models import ConditionModels, FitRequest
 from .model_readings import ModelReadings
-from .search import SearchSettings, make_residual
 
-SAME_SCORE = 1.01  # Largest ratio of scores at which two descents count as the same fit.
+# Treatments of a reading flagged U (unstable), and their meanings.
 UNSTABLE_MEANINGS = {
     "bound": "count in the fit as lower bounds",
     "out": "are left out of the fit",
     "read": "count in the fit like all other readings",
 }
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class SearchSettings:
+    """Settings of a search from random starting points.
+
+    Attributes
+    ----------
+    starts : int
+        Number of random starting points.
+    seed : int
+        Seed of the random numbers.
+    unstable : str
+        Treatment of readings flagged U, a key of UNSTABLE_MEANINGS.
+    checkpoint : SearchCheckpoint or None
+        Finished descents, which are not repeated.
+    """
+
+    starts: int = 8
+    seed: int = 0
+    unstable: str = "bound"
+    checkpoint: SearchCheckpoint | None = None
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -45,8 +64,6 @@ class FittedRows:
     settings : SearchSettings
     held_out : (n,) bool
         Mask of the readings that were held out.
-    search : Descents
-        Search from random starting points.
     computed : (2, c) array
         Acceleration reading [m s-2] and displacement [m] of every condition.
     logs : (n,) array
@@ -62,11 +79,15 @@ class FittedRows:
     cells: Readings
     settings: SearchSettings
     held_out: np.ndarray
-    search: Descents
     computed: np.ndarray
     logs: np.ndarray
     left_out_logs: np.ndarray
     n_motions: int
+
+    @property
+    def search(self) -> Descents:
+        """Descents from random starting points."""
+        return self.keys.fit.descents
 
     def compute_scores(self, *, only_stable: bool = False) -> dict[str, dict | None]:
         """Return the scores of the fitted, the held-out and the left-out readings.
@@ -136,48 +157,72 @@ def fit_rows(
     """
     begin = perf_counter()
     settings = options.search
-    n_values = len(request.ranges)
     cells = read_response_table(request.measured)
     held_out = np.zeros(cells.row.size, bool)
     for selector in options.hold:
         held_out |= cells.select_readings(selector)
-    fitted = ~held_out
-    _require_enough_readings(cells, fitted, n_values, settings)
-    models = request.make_condition_models(cells.conditions)
-    computed = ModelReadings(models, say)
-    groups = cells.group_by_column(options.leave_out, fitted) if options.leave_out else {}
+    groups = cells.group_by_column(options.leave_out, ~held_out) if options.leave_out else {}
     if len(groups) == 1:
         raise PatchfemError(
             f"--leave-out {options.leave_out}: all rows that are not held out have the same value "
             "in this column, so leaving this value out leaves no rows for the fit; choose another "
             "column"
         )
-    for group in groups.values():
-        _require_enough_readings(cells, fitted & ~group, n_values, settings)
-    n_searches = 1 + len(groups)
-    report = None if progress is None else _StartCounter(progress, settings.starts * n_searches)
-    keys = FreeKeys(models.scene, models.ranges, sets=models.sets, notes=models.notes)
-    every_condition = range(len(cells.conditions))
+    trainings = {"all": ~held_out}
+    trainings |= {f"without {name}": ~held_out & ~group for name, group in groups.items()}
+    for training in trainings.values():
+        _require_enough_readings(cells, training, len(request.ranges), settings)
 
-    fitter = _RowsFitter(cells, keys, settings, report)
-    best, descents = fitter.fit(computed, fitted, "all", "rows")
-    prediction = _predict_from_rest(computed, best.values, every_condition)
+    # readings of the model, and the counter of finished descents
+    models = request.make_condition_models(cells.conditions)
+    computed = ModelReadings(models, say)
+    keys = FreeKeys(models.scene, models.ranges, sets=models.sets, notes=models.notes)
+    n_finished = 0
+
+    def report(count: int) -> None:
+        """Report the fraction of the descents that are finished."""
+        nonlocal n_finished
+        n_finished += count
+        if progress is not None:
+            progress(n_finished / (settings.starts * len(trainings)))
+
+    def fit(name: str, training, interval_kind: str) -> Fit:
+        """Fit the parameters to some of the readings.
+
+        The first motions of each descent start from rest, so that its result depends only on its starting point and on
+        the training readings.
+
+        Parameters
+        ----------
+        name : str
+            Under which the finished descents are stored.
+        training : (n,) bool
+            Mask of the readings.
+        interval_kind : str
+            As in `Problem.solve`.
+        """
+        search = Search(settings.starts, settings.seed, computed.reset_motions, report)
+        if settings.checkpoint is not None:
+            search = replace(search, **settings.checkpoint.make_callbacks(name))
+        residual = make_residual(cells, computed, training, settings.unstable)
+        return keys.make_problem(residual).search(search, interval_kind)
+
+    best = fit("all", ~held_out, "rows")
+    prediction = computed.predict(best.values, range(len(cells.conditions)))
     logs = cells.compute_log_ratios(*prediction)
     left_out_logs = np.full(held_out.size, np.nan)
     for name, group in groups.items():
-        fold, _ = fitter.fit(computed, fitted & ~group, f"without {name}")
+        fold = fit(f"without {name}", ~held_out & ~group, "")
         conditions = sorted(set(cells.condition[group].tolist()))
-        fold_prediction = _predict_from_rest(computed, fold.values, conditions)
-        left_out_logs[group] = cells.compute_log_ratios(*fold_prediction)[group]
+        fold_logs = cells.compute_log_ratios(*computed.predict(fold.values, conditions))
+        left_out_logs[group] = fold_logs[group]
+    warnings = _warn_of_doubtful_fit(cells, best.descents, logs, settings)
     return FittedRows(
-        keys=keys.make_fitted_keys(
-            best, begin, _warn_of_doubtful_fit(cells, descents, logs, settings)
-        ),
+        keys=keys.make_fitted_keys(best, begin, warnings),
         models=models,
         cells=cells,
         settings=settings,
         held_out=held_out,
-        search=descents,
         computed=prediction,
         logs=logs,
         left_out_logs=left_out_logs,
@@ -195,68 +240,6 @@ def _require_enough_readings(
             f"{readings.path}: only {int(is_used.sum())} readings are used for the fit (neither held out "
             f"nor left out), too few to determine {n_values} values and their intervals"
         )
-
-
-def _predict_from_rest(model_readings: ModelReadings, values, conditions) -> np.ndarray:
-    """Predict the readings (2, c) at given conditions with motions that start from rest."""
-    model_readings.reset_motions()
-    return np.array(model_readings(values, list(conditions)))
-
-
-class _RowsFitter(NamedTuple):
-    """Fits of the free parameters to subsets of a table of readings.
-
-    report: callback that is called with 1 after each descent, or None.
-    """
-
-    cells: Readings
-    keys: FreeKeys
-    settings: SearchSettings
-    report: Callable | None
-
-    def fit(
-        self, readings: ModelReadings, training, search_name: str, interval_kind: str = ""
-    ) -> tuple[Fit, Descents]:
-        """Fit the free parameters to the readings in the mask `training` (n,).
-
-        The first motions of each descent start from rest, so that its result depends only on its starting point and on
-        the training readings.
-
-        Parameters
-        ----------
-        readings : ModelReadings
-            Readings that the model predicts.
-        training : (n,) bool
-        search_name : str
-            Name under which the finished descents are stored.
-        interval_kind : str
-            As in `Problem.solve`.
-        """
-        settings = self.settings
-        residual = make_residual(self.cells, readings, training, settings.unstable)
-        options = {"before_descent": readings.reset_motions}
-        if self.report is not None:
-            options["report"] = self.report
-        if settings.checkpoint is not None:
-            checkpoint = settings.checkpoint
-            options["load"] = lambda start: checkpoint.load(f"{search_name}/{start}")
-            options["save"] = lambda start, end: checkpoint.save(f"{search_name}/{start}", end)
-        search = Search(settings.starts, settings.seed, **options)
-        return self.keys.make_problem(residual).search(search, interval_kind)
-
-
-class _StartCounter:
-    """Progress callback that counts finished descents and reports their fraction of the total."""
-
-    def __init__(self, progress: Callable, total: int):
-        self.progress = progress
-        self.total = total
-        self.finished = 0
-
-    def __call__(self, count: int) -> None:
-        """Add to the number of finished descents and report the fraction."""
-        self.finished += count
-        self.progress(self.finished / self.total)
 
 
 def _warn_of_doubtful_fit(
@@ -284,10 +267,39 @@ def _warn_of_doubtful_fit(
             f"no bounded motion is found at {'; '.join(sorted(unbounded))}: each row at these inputs "
             f"counts as if the model were wrong by a factor of {np.exp(MAX_LOG_RATIO):.0f}"
         )
-    n_best = int((search.rms <= np.nanmin(search.rms) * SAME_SCORE).sum())
-    if n_best == 1 and settings.starts > 1:
+    if search.n_best == 1 and settings.starts > 1:
         warnings.append(
             f"only one of {settings.starts} searches ended within 1 % of the best training score, so "
             "a better fit may exist; raise --starts"
         )
     return warnings
+
+
+def make_residual(
+    readings: Readings, model_readings: ModelReadings, training, unstable: str
+) -> Callable:
+    """Return the function that computes the log ratios of selected readings from free parameters.
+
+    Parameters
+    ----------
+    readings : Readings
+    model_readings : ModelReadings
+    training : (n,) bool
+        Mask of the readings in the residual.
+    unstable : str
+        Treatment of readings flagged U. "bound": such a reading is a lower bound, because the
+        motion was still growing, so that only a smaller computed value gives a residual; "out":
+        the reading is excluded; "read": it is treated like any other reading.
+    """
+    is_used = training & ~readings.unstable if unstable == "out" else training
+    conditions = sorted(set(readings.condition[is_used].tolist()))
+    is_lower_bound = (
+        readings.unstable[is_used] if unstable == "bound" else np.zeros(int(is_used.sum()), bool)
+    )
+
+    def residual(values):
+        """Return the log ratios (r,) of computed to measured readings for parameters (n,)."""
+        logs = readings.compute_log_ratios(*model_readings(values, conditions))[is_used]
+        return np.where(is_lower_bound, np.minimum(logs, 0.0), logs)
+
+    return residual

@@ -43,7 +43,12 @@ class ModelReadings:
         self.last_motions = {}
         self.last_readings = (None, {})
 
-    def __call__(self, values, conditions) -> tuple:
+    def predict(self, values, conditions) -> np.ndarray:
+        """Predict the readings (2, c) with motions that start from rest."""
+        self.reset_motions()
+        return self(values, conditions)
+
+    def __call__(self, values, conditions) -> np.ndarray:
         key_values = tuple(float(values[k]) for k in self.models.model_parameters)
         last_values, last_readings = self.last_readings
         readings = last_readings if last_values == key_values else {}

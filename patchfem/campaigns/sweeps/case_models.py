@@ -4,8 +4,6 @@ In: the text of a scene, and the keys of a case as strings. Out: a Model. If a c
 earlier one only in plain numbers, its model is derived without parsing the scene again.
 """
 
-from __future__ import annotations
-
 import json
 import tomllib
 from collections.abc import Callable, Sequence

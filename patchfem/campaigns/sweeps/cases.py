@@ -1,7 +1,5 @@
 """Cases of a sweep: all combinations of the values of its keys, or the rows of a table."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -94,18 +92,13 @@ class Cases:
         """
         if len(self) <= max_cases:
             return list(range(len(self)))
-        counts = [1] * len(self.shape)
-        while True:
-            extensible_axes = [k for k, size in enumerate(self.shape) if counts[k] < size]
-            k = min(extensible_axes, key=lambda k: counts[k])
-            if prod(counts) // counts[k] * (counts[k] + 1) > max_cases:
-                break
-            counts[k] += 1
-        numbers = np.zeros(1, int)
-        for size, count in zip(self.shape, counts):
-            indices = [round(j * (size - 1) / max(count - 1, 1)) for j in range(count)]
-            numbers = np.add.outer(numbers * size, indices).ravel()
-        return numbers.tolist()
+        counts = list(self.shape)
+        while prod(counts) > max_cases:
+            largest = int(np.argmax(counts))
+            counts[largest] = (counts[largest] + 1) // 2
+        places = [np.linspace(0, size - 1, count) for size, count in zip(self.shape, counts)]
+        grid = np.meshgrid(*(np.rint(place).astype(int) for place in places), indexing="ij")
+        return np.ravel_multi_index(grid, self.shape).ravel().tolist()
 
     def representative_case_numbers(self, max_cases: int) -> list[int]:
         """Return the numbers of at most `max_cases` cases that represent the whole sweep.

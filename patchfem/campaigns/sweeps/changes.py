@@ -1,7 +1,5 @@
 """Change of measures over a sweep: the measure that changes most, and all results of an analysis."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import NamedTuple
 

@@ -6,8 +6,6 @@ it, where the numerical errors of both cases are added to the change. It is inte
 or over the logarithm of a key whose values are spaced by factors.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -3,8 +3,6 @@
 In: a file, --set strings and a `Request`. Out: `SweepScene` and `Cases`, or a SceneError.
 """
 
-from __future__ import annotations
-
 import os
 import re
 from collections.abc import Sequence

@@ -5,8 +5,6 @@ which is exact for a single mode without friction. Its error combines the errors
 the differences from polynomials through more cases.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

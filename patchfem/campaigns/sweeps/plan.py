@@ -1,7 +1,5 @@
 """Plan of a sweep: that of its first case, with the number of cases and of the values of each key."""
 
-from __future__ import annotations
-
 from ...core import PatchfemError
 from ...runs.plan import SKIPPING_NOTE, plan
 from .case_models import SweepScene

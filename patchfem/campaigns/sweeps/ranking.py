@@ -7,8 +7,6 @@ Saltelli 1996). On a grid both are means over the cases. For random cases a smoo
 come from surfaces that are fitted to one half of the cases and validated on the other.
 """
 
-from __future__ import annotations
-
 import warnings
 from typing import NamedTuple
 
@@ -76,25 +74,28 @@ def rank_keys(table: SweepTable, requested: str = "") -> dict[str, list[SobolInd
         return {}
     names = [name for name in dict.fromkeys((requested, *RANKED_MEASURES)) if _varies(table, name)]
     columns = {name: table.measures[name].values for name in names}
-    arrays = {}
     if table.is_grid:
-        for name in [name for name in names if np.isfinite(columns[name]).all()]:
-            indices = compute_grid_indices(columns[name].reshape(table.shape))
-            arrays[name] = indices[:, varied]
+        names = [name for name in names if np.isfinite(columns[name]).all()]
+        grids = [columns[name].reshape(table.shape) for name in names]
+        found = [compute_grid_indices(grid)[:, varied] for grid in grids]
     else:
         known = np.isfinite(list(columns.values())).all(axis=0) if columns else np.zeros(1, bool)
         if known.sum() < MIN_CASES_PER_KEY * len(varied):
             return {}
-        fractions = [_rank_fractions(table.keys[axis].values)[known] for axis in varied]
+        from scipy.stats import rankdata
+
+        # the ranks of the values, as fractions, are uniform in [0, 1]
+        ranks = [rankdata(table.keys[axis].values)[known] for axis in varied]
+        coordinates = (np.stack(ranks, axis=1) - 0.5) / len(table)
         values = np.stack([column[known] for column in columns.values()], axis=1)
-        found = estimate_random_indices(np.stack(fractions, axis=1), values)
-        arrays = {name: array for name, array in zip(names, found) if array is not None}
+        found = estimate_random_indices(coordinates, values)
 
     ranking = {}
-    for name, array in arrays.items():
-        rows = zip((table.keys[axis].key for axis in varied), array.T.tolist())
-        indices = [SobolIndex(key, *numbers) for key, numbers in rows]
-        ranking[name] = sorted(indices, key=lambda index: -index.total)
+    for name, array in zip(names, found):
+        if array is not None:
+            keys = [table.keys[axis].key for axis in varied]
+            indices = [SobolIndex(key, *numbers) for key, numbers in zip(keys, array.T.tolist())]
+            ranking[name] = sorted(indices, key=lambda index: -index.total)
     return ranking
 
 
@@ -109,12 +110,6 @@ def _varies(table: SweepTable, name: str) -> bool:
         return False
     error = np.sqrt(np.mean(np.nan_to_num(column.errors[known]) ** 2.0))
     return bool(values.std() > max(ROUND_OFF * np.abs(values).max(), error))
-
-
-def _rank_fractions(values: np.ndarray) -> np.ndarray:
-    """Return the rank of each value (n,) as a fraction in [0, 1]; equal values have their mean rank."""
-    _, same, counts = np.unique(values, return_inverse=True, return_counts=True)
-    return ((np.cumsum(counts) - counts / 2) / values.size)[same]
 
 
 def compute_grid_indices(values: np.ndarray) -> np.ndarray:
@@ -143,43 +138,42 @@ def estimate_random_indices(coordinates: np.ndarray, values: np.ndarray) -> list
         First and total index and the limits of the total index of each measure; None if no surface
         explains enough of its variance.
     """
-    rng = np.random.default_rng(0)
-    if len(coordinates) > MAX_SURFACE_CASES:
-        chosen = np.sort(rng.choice(len(coordinates), MAX_SURFACE_CASES, replace=False))
-        coordinates = coordinates[chosen]
-        values = values[chosen]
-    scaled = (values - values.mean(axis=0)) / values.std(axis=0)
-    halves = [np.array_split(rng.permutation(len(coordinates)), 2) for _ in range(N_HALVES)]
-
-    def find_unexplained(half: list[np.ndarray], smoothing: float) -> np.ndarray:
-        """Return the variance (measures,) of one half that a surface through the other leaves."""
-        fitted, others = half
-        surface = _fit_surface(coordinates[fitted], scaled[fitted], smoothing)
-        deviation = surface(coordinates[others]) - scaled[others]
-        return np.mean(deviation**2, axis=0) / np.maximum(scaled[others].var(axis=0), ROUND_OFF)
-
-    # The smoothing is that with the smallest median over the measures.
-    medians = [np.median(find_unexplained(halves[0], one)) for one in SMOOTHING_PARAMETERS]
-    smoothing = SMOOTHING_PARAMETERS[int(np.argmin(medians))]
-    unexplained = np.mean([find_unexplained(half, smoothing) for half in halves], axis=0)
-    first, total = _compute_surface_indices(_fit_surface(coordinates, scaled, smoothing))
-    totals = [total]
-    for fitted, _ in halves:
-        surface = _fit_surface(coordinates[fitted], scaled[fitted], smoothing)
-        totals.append(_compute_surface_indices(surface)[1])
-    margin = unexplained[:, None] + INDEX_ERROR
-    low = np.min(totals, axis=0) - margin
-    high = np.max(totals, axis=0) + margin
-    arrays = np.clip([first, total, low, high], 0.0, 1.0).transpose(1, 0, 2)
-    is_usable = unexplained < 1 - MIN_EXPLAINED
-    return [array if usable else None for array, usable in zip(arrays, is_usable)]
-
-
-def _fit_surface(coordinates: np.ndarray, values: np.ndarray, smoothing: float):
-    """Return the RBFInterpolator of values (n, measures) at coordinates (n, keys) in [0, 1]."""
     from scipy.interpolate import RBFInterpolator
 
-    return RBFInterpolator(coordinates, values, kernel="cubic", smoothing=smoothing)
+    rng = np.random.default_rng(0)
+    every = np.arange(len(coordinates))
+    if every.size > MAX_SURFACE_CASES:
+        every = rng.choice(every, MAX_SURFACE_CASES, replace=False)
+    scaled = (values - values.mean(axis=0)) / values.std(axis=0)
+    halves = [np.array_split(rng.permutation(every), 2) for _ in range(N_HALVES)]
+
+    def fit(cases: np.ndarray, smoothing: float) -> RBFInterpolator:
+        """Return the surface through some of the cases."""
+        return RBFInterpolator(
+            coordinates[cases], scaled[cases], kernel="cubic", smoothing=smoothing
+        )
+
+    def find_unexplained(surface: RBFInterpolator, cases: np.ndarray) -> np.ndarray:
+        """Return the fraction (measures,) of the variance of cases that a surface does not explain."""
+        deviation = surface(coordinates[cases]) - scaled[cases]
+        return np.mean(deviation**2, axis=0) / np.maximum(scaled[cases].var(axis=0), ROUND_OFF)
+
+    # The smoothing is that with the smallest median over the measures.
+    fitted, others = halves[0]
+    medians = [
+        np.median(find_unexplained(fit(fitted, one), others)) for one in SMOOTHING_PARAMETERS
+    ]
+    smoothing = SMOOTHING_PARAMETERS[int(np.argmin(medians))]
+    surfaces = [fit(fitted, smoothing) for fitted, _ in halves]
+    left = [find_unexplained(surface, half[1]) for surface, half in zip(surfaces, halves)]
+    unexplained = np.mean(left, axis=0)
+    first, total = _compute_surface_indices(fit(every, smoothing))
+    totals = [total, *(_compute_surface_indices(surface)[1] for surface in surfaces)]
+    margin = unexplained[:, None] + INDEX_ERROR
+    limits = [np.min(totals, axis=0) - margin, np.max(totals, axis=0) + margin]
+    arrays = np.clip([first, total, *limits], 0.0, 1.0).transpose(1, 0, 2)
+    is_usable = unexplained < 1 - MIN_EXPLAINED
+    return [array if usable else None for array, usable in zip(arrays, is_usable)]
 
 
 def _compute_surface_indices(surface) -> tuple[np.ndarray, np.ndarray]:

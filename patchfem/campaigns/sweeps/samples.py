@@ -1,7 +1,5 @@
 """Random cases of a sweep, either independent or from a Sobol sequence."""
 
-from __future__ import annotations
-
 import warnings
 from collections.abc import Sequence
 

@@ -1,11 +1,9 @@
 """Computation of the cases of a sweep in chunks by an executor.
 
-If a worker dies, its chunk is split into halves and repeated.
+If a worker dies, the cases of its chunk are repeated one by one.
 
 In: `WorkerData`, case numbers and an executor of `executors/`. Out: results by chunk from `iterate_chunks`.
 """
-
-from __future__ import annotations
 
 from collections import Counter, deque
 from collections.abc import Callable, Iterator, Sequence
@@ -24,7 +22,7 @@ from ...runs.batch.meshes import SharedMeshes
 from .case_models import SweepScene
 from .cases import Cases
 
-# Number of failures after which a case is abandoned; in the last one it is alone in its chunk.
+# Number of deaths of a worker after which a case is abandoned: another case may have caused the first one.
 MAX_DEATHS = 3
 # Target time of a chunk [s], which is long compared with its transfer to a worker and short compared
 # with a sweep.
@@ -190,21 +188,21 @@ class ChunkQueue:
     def __init__(self, numbers: Sequence[int], workers: int, min_size: int = 1):
         self.min_size = min_size
         self.remaining = deque(numbers)
-        self.suspects: deque = deque()
-        self.workers = max(workers, 1)
+        self.suspects: deque[int] = deque()
         self.deaths: Counter[int] = Counter()
+        self.workers = max(workers, 1)
         # Elapsed time per case of the last chunk, with a guess before the first chunk.
         self.seconds_per_case = CHUNK_SECONDS
 
     def take_chunk(self, *, is_idle: bool = True) -> list | None:
         """Return the case numbers of the next chunk; None if none is available at present.
 
-        Cases of failed chunks are returned last, and only if `is_idle`, that is, if no other chunk
+        Cases of failed chunks are returned last and one by one, and only if `is_idle`, that is, if no other chunk
         is being computed. This identifies the case that kills a worker.
         """
         n_remaining = len(self.remaining)
         if not n_remaining:
-            return self.suspects.popleft() if self.suspects and is_idle else None
+            return [self.suspects.popleft()] if self.suspects and is_idle else None
         max_size = n_remaining
         if self.workers > 1:
             # A chunk has at most half of the remaining cases per worker, so that all workers finish
@@ -218,17 +216,11 @@ class ChunkQueue:
         """Record the elapsed time [s] of a chunk."""
         self.seconds_per_case = seconds / len(numbers)
 
-    def record_death(self, numbers: Sequence[int]) -> list:
-        """Record the failure of a chunk: return the cases to abandon, and requeue the others in halves.
-
-        A case is abandoned if it was alone in its chunk and has failed MAX_DEATHS times.
-        """
+    def record_death(self, numbers: Sequence[int]) -> list[int]:
+        """Record the failure of a chunk: return the cases to abandon, and queue the others to be repeated alone."""
         self.deaths.update(numbers)
-        if len(numbers) == 1 and self.deaths[numbers[0]] >= MAX_DEATHS:
-            return list(numbers)
-        half = (len(numbers) + 1) // 2
-        self.suspects += filter(None, (list(numbers[:half]), list(numbers[half:])))
-        return []
+        self.suspects += [number for number in numbers if self.deaths[number] < MAX_DEATHS]
+        return [number for number in numbers if self.deaths[number] >= MAX_DEATHS]
 
 
 def iterate_chunks(
@@ -266,5 +258,5 @@ def iterate_chunks(
             yield chunk, *answer
         elif abandoned := chunks.record_death(chunk):
             failed = CaseResults.blank(1)
-            failed.fail(0, f"{answer.reason}, {chunks.deaths[abandoned[0]]} times")
+            failed.fail(0, f"{answer.reason}, also when the case was computed alone")
             yield abandoned, failed, None

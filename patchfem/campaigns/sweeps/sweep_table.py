@@ -4,8 +4,6 @@ Values are float64. Errors and floors are float32, because they are estimates. A
 for each measure.
 """
 
-from __future__ import annotations
-
 import re
 from collections import Counter
 from collections.abc import Sequence
@@ -72,7 +70,7 @@ class MeasureColumn:
     floors: np.ndarray
 
     @classmethod
-    def blank(cls, unit: str, count: int) -> MeasureColumn:
+    def blank(cls, unit: str, count: int) -> "MeasureColumn":
         """Return the column of `count` cases without a value."""
         unknown = np.full(count, np.nan, np.float32)
         return cls(unit, np.full(count, np.nan), unknown, np.zeros(count, np.float32))
@@ -117,7 +115,7 @@ class SweepTable:
         return len(self.outcome)
 
     @classmethod
-    def blank(cls, cases: Cases, tolerance: float = np.nan) -> SweepTable:
+    def blank(cls, cases: Cases, tolerance: float = np.nan) -> "SweepTable":
         """Return the table of cases without results.
 
         tolerance: that of all cases, unless it is swept.

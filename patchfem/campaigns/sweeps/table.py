@@ -4,8 +4,6 @@ The unit of a key is given in the header or in the cells. The tables that a swee
 as well.
 """
 
-from __future__ import annotations
-
 import csv
 import io
 import re

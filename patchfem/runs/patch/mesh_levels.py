@@ -26,28 +26,6 @@ MAX_COLUMNS_WITHOUT_COARSER = 8
 MAX_DECADES = 6
 
 
-def solve_on_split_mesh(patch_model, level: int, estimate: bool) -> tuple:
-    """Solve a patch on a mesh file whose edges are halved a given number of times.
-
-    Parameters
-    ----------
-    patch_model : PatchModel
-    level : int
-        Number of halvings.
-    estimate : bool
-        Whether to solve the meshes of the error estimate as well.
-
-    Returns
-    -------
-    tuple
-        Patches as in `solve_with_coarser`.
-    """
-    bodies = make_piece_meshes(patch_model)
-    for _ in range(level):
-        bodies = tuple(None if body is None else body.refine() for body in bodies)
-    return _solve_on_given_meshes(patch_model, bodies, None, estimate)
-
-
 def solve_with_coarser(patch_model, tolerance: float, estimate: bool = True) -> tuple:
     """Solve a patch on its mesh and on the coarser meshes of its error estimate.
 

@@ -12,9 +12,8 @@ from patchfem import SceneError, run
 from patchfem.campaigns.rows.cells import read_response_table
 from patchfem.campaigns.rows.checkpoint import SearchCheckpoint
 from patchfem.campaigns.rows.condition_models import ConditionModels, FitRequest
-from patchfem.campaigns.rows.fit import RowsOptions, SearchSettings, fit_rows
+from patchfem.campaigns.rows.fit import RowsOptions, SearchSettings, fit_rows, make_residual
 from patchfem.campaigns.rows.model_readings import ModelReadings
-from patchfem.campaigns.rows.search import make_residual
 from patchfem.core import G_N, PatchfemError
 from patchfem.export.fits import describe_rows_fit
 from patchfem.scene import BOUNDS, load, loads, read_assignments

@@ -25,7 +25,7 @@ from patchfem.campaigns.sweeps import executors
 from patchfem.campaigns.sweeps.executors import LocalExecutor
 from patchfem.campaigns.sweeps.executors.cluster import Cluster
 from patchfem.campaigns.sweeps.executors.pool import Pool
-from patchfem.campaigns.sweeps.sweep import MAX_DEATHS, ChunkQueue
+from patchfem.campaigns.sweeps.sweep import ChunkQueue
 from patchfem.core import Missing, PatchfemError
 from patchfem.export.sweeps.run import SweepTarget, sweep_into
 from patchfem.runs import FAILED_OUTCOME, CaseResults
@@ -88,10 +88,7 @@ def assert_only_killing_case_fails(tmp_path: Path, once: bool, executor) -> None
     assert_same_results(results, expected, rest)
     assert reported == {number: number for number in rest}
     for number in deadly:
-        # The chunk is halved after each death of a worker.
-        assert len((tmp_path / str(number)).read_text()) in (
-            [1] if once else [MAX_DEATHS, MAX_DEATHS + 1]
-        )
+        assert len((tmp_path / str(number)).read_text()) == (1 if once else 3)
     for number in lost:
         assert results.outcome[number] == FAILED_OUTCOME and "died" in results.messages[number]
 
@@ -135,18 +132,17 @@ class IdleExecutor:
             yield chunk, 1.0, (None, [])
 
 
-def test_exact_failed_chunk_is_bisected():
-    """A chunk of 1000 cases with a failing case is bisected into at most 10 chunks of the others."""
-    chunks = ChunkQueue(range(1000), 1, 1000)
+def test_exact_cases_of_failed_chunk_are_repeated_alone():
+    """The cases of a chunk with a failing case are repeated alone, and only the failing one is lost."""
+    chunks = ChunkQueue(range(100), 1, 100)
     attempts = []
     lost = []
+    assert chunks.record_death(chunks.take_chunk()) == []
+    assert chunks.take_chunk(is_idle=False) is None
     while (chunk := chunks.take_chunk()) is not None:
         attempts.append(chunk)
-        lost += chunks.record_death(chunk) if 617 in chunk else []
-    assert lost == [617] and [617] in attempts
-    completed = [chunk for chunk in attempts if 617 not in chunk]
-    assert sorted(n for chunk in completed for n in chunk) == [n for n in range(1000) if n != 617]
-    assert len(completed) <= 10
+        lost += chunks.record_death(chunk) if 61 in chunk else []
+    assert lost == [61] and attempts == [*([number] for number in range(100)), [61]]
 
 
 @pytest.mark.slow

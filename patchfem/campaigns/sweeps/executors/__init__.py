@@ -4,7 +4,7 @@ Each executor has the attribute `workers` and the method `run(work, next_chunk, 
 (chunk, seconds, answer) for every chunk that `next_chunk` returns, where the answer is the result of
 `sweep.compute_chunk` or a WorkerDeath. `make_executor` returns an executor by its name.
 
-Read `LocalExecutor` first.
+Read `LocalExecutor` first, then `pool.FutureExecutor`.
 """
 
 from collections.abc import Callable, Iterator

@@ -3,11 +3,9 @@
 The cluster is started on this machine, or belongs to a scheduler at a given address.
 """
 
-from __future__ import annotations
-
 import os
 import sys
-from collections.abc import Callable, Iterator
+from concurrent.futures import Future
 from dataclasses import replace
 from functools import cache
 from hashlib import sha256
@@ -18,16 +16,15 @@ import numpy as np
 
 from .... import __version__
 from ....core import Missing, PatchfemError
-from ..sweep import WorkerData, WorkerDeath, compute_chunk
+from ..sweep import WorkerData, compute_chunk
+from .pool import FutureExecutor
 
 _TLS = "DASK_DISTRIBUTED__COMM__TLS__"
 CERTIFICATES = f"{_TLS}CA_FILE, {_TLS}CLIENT__CERT and {_TLS}CLIENT__KEY"
-# Number of chunks that are assigned to each worker, so that it does not wait for the next one.
-CHUNKS_PER_WORKER = 2
 CONNECT_TIMEOUT = "10s"  # Longest time to wait for a connection to the scheduler.
 
 
-class Cluster:
+class Cluster(FutureExecutor):
     """Executor that computes the chunks of a sweep on the workers of a Dask cluster.
 
     Parameters
@@ -101,66 +98,36 @@ class Cluster:
                 self.client.close()
                 raise self._worker_error(worker_versions, environment_versions())
 
-    def run(
-        self, work: WorkerData, next_chunk: Callable, say: Callable | None = None
-    ) -> Iterator[tuple]:
-        """Compute the chunks that the callback `next_chunk` returns, and yield their results.
+    def begin(self, work: WorkerData, *, is_silent: bool) -> None:
+        """Store the data of the sweep on the cluster."""
+        path = work.sweep_scene.path
+        self.origin = (environment_versions(work), path)
+        scene = replace(work.sweep_scene, path=Path(os.path.abspath(path)))
+        # Dask repeats this task if the workers that store its result die.
+        self.shared = self.client.submit(_identity, replace(work, sweep_scene=scene), pure=False)
+        self.executor = self.client.get_executor(pure=False)
 
-        Parameters
-        ----------
-        work : WorkerData
-        next_chunk : callable
-            Returns the case numbers of the next chunk, or None if none is left.
-        say : callable, optional
-            Called with a line of text.
-
-        Yields
-        ------
-        tuple
-            (chunk, seconds, answer or WorkerDeath), in the order in which the chunks finish.
-        """
-        from distributed import as_completed
+    def submit(self, chunk: list) -> Future:
+        """Submit a chunk; raise Missing if the connection to the scheduler is lost."""
         from distributed.client import ClosedClientError
 
-        path = work.sweep_scene.path
-        versions = environment_versions(work)
-        shared_work = replace(
-            work, sweep_scene=replace(work.sweep_scene, path=Path(os.path.abspath(path)))
-        )
         try:
-            # Dask repeats this task if the workers that store its result die.
-            shared = self.client.submit(_identity, shared_work, pure=False)
-            ready = as_completed(loop=self.client.loop, with_results=True, raise_errors=False)
-            pending = {}
-            while True:
-                while len(pending) < CHUNKS_PER_WORKER * self.workers:
-                    chunk = next_chunk(is_idle=not pending)
-                    if chunk is None:
-                        break
-                    future = self.client.submit(
-                        _compute_on_worker, shared, chunk, (versions, path), pure=False
-                    )
-                    pending[future] = chunk
-                    ready.add(future)
-                if not pending:
-                    return
-                future, answer = next(ready)
-                chunk = pending.pop(future)
-                if isinstance(answer, dict):
-                    raise self._worker_error(answer, versions)
-                if future.status != "finished":
-                    answer = self._make_failed_result(future)
-                yield chunk, *answer
+            return self.executor.submit(_compute_on_worker, self.shared, chunk, self.origin)
         except ClosedClientError:
-            raise self._connection_error() from None
-        finally:
-            self.client.close()
-            if self.local_cluster is not None:
-                self.local_cluster.close()
+            raise self.make_connection_error() from None
 
-    def _connection_error(self) -> Missing:
-        """Return the error for a lost connection to the scheduler."""
-        return Missing(f"{self.name}: the connection to the scheduler is lost")
+    def receive(self, future: Future) -> tuple:
+        """Return the result of a chunk; raise Missing if its worker has other versions or files."""
+        answer = super().receive(future)
+        if isinstance(answer, dict):
+            raise self._worker_error(answer, self.origin[0])
+        return answer
+
+    def end(self) -> None:
+        """Close the connection, and the cluster if it was started here."""
+        self.client.close()
+        if self.local_cluster is not None:
+            self.local_cluster.close()
 
     def _worker_error(self, on_worker: dict | Exception, local: dict) -> Missing:
         """Return the error for a worker whose software or files do not match.
@@ -185,18 +152,6 @@ class Cluster:
             f"{self.name}: the files named in the scene differ between a worker and this machine; put the "
             "files where all machines can read them"
         )
-
-    def _make_failed_result(self, future) -> tuple:
-        """Return (0 s, WorkerDeath) for a chunk whose worker died or failed.
-
-        Raises Missing if the connection to the scheduler is lost.
-        """
-        if future.status == "cancelled":  # This process never cancels a task itself.
-            raise self._connection_error()
-        error = future.exception()
-        kind = type(error).__name__
-        reason = f"the worker of this case failed ({kind}: {error})"
-        return 0.0, WorkerDeath("its worker died" if kind == "KilledWorker" else reason)
 
 
 @cache

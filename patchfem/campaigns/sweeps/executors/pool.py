@@ -1,108 +1,41 @@
-"""Executor with several processes on this machine, which replaces processes that die.
+"""Executors that compute chunks in other processes, as futures of the standard library."""
 
-If a process dies, only its current chunk is lost. The standard pools of Python abandon all chunks in
-this case, and they run the main script of the caller again in spawned processes. Therefore each worker
-is a new interpreter that is connected by a pipe.
-"""
-
-from __future__ import annotations
-
+import multiprocessing
 import os
-import subprocess
+import signal
 import sys
 from collections.abc import Callable, Iterator
-from multiprocessing import Pipe
-from multiprocessing.connection import Connection, wait
-from pathlib import Path
-from typing import NamedTuple
+from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, ProcessPoolExecutor, wait
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager
+from threading import Thread
+from types import ModuleType
 
 from ....core import Missing
-from ..sweep import WorkerData, WorkerDeath
+from ..sweep import WorkerData, WorkerDeath, compute_chunk
 
-ONE_THREAD = {
-    name: "1"
-    for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
+# Number of chunks that are assigned to each worker, so that it does not wait for the next one.
+CHUNKS_PER_WORKER = 2
+# Environment of a worker: one thread, and no imports from the current folder.
+WORKER_ENVIRONMENT = {
+    "PYTHONSAFEPATH": "1",
+    "OMP_NUM_THREADS": "1",
+    "OPENBLAS_NUM_THREADS": "1",
+    "MKL_NUM_THREADS": "1",
+    "NUMBA_NUM_THREADS": "1",
 }
-PACKAGE = Path(__file__).parents[3]
-MODULE = __name__.rpartition(".")[0] + ".worker"
-# The worker imports this package from its file, and nothing from the current folder. The parent folder
-# of the package is appended to the path, because all dependencies may be installed there.
-WORKER_SCRIPT = f"""\
-import sys
-from importlib.util import module_from_spec, spec_from_file_location
-spec = spec_from_file_location({PACKAGE.name!r}, sys.argv[3])
-sys.modules[spec.name] = package = module_from_spec(spec)
-spec.loader.exec_module(package)
-sys.path.append(sys.argv[4])
-from {MODULE} import main
-main()
-"""
+# Names of the errors of a worker process that ended.
+DEATHS = ("BrokenProcessPool", "KilledWorker")
 
 
-class ComputedChunk(NamedTuple):
-    """Result of a chunk: its cases, its elapsed time [s], and its results or a WorkerDeath."""
+class FutureExecutor:
+    """Executor that computes the chunks of a sweep as futures.
 
-    chunk: list
-    seconds: float
-    answer: tuple | WorkerDeath
+    A subclass has the number of `workers` and the methods `begin`, `submit` and `end`.
+    """
 
-
-class Worker:
-    """Worker process that computes chunks sequentially."""
-
-    def __init__(self, work: WorkerData, *, silent: bool = False):
-        here, there = Pipe()
-        words = [
-            sys.executable,
-            "-P",
-            "-c",
-            WORKER_SCRIPT,
-            str(there.fileno()),
-            "silent" * silent,
-            str(PACKAGE / "__init__.py"),
-            str(PACKAGE.parent),
-        ]
-        self.process = subprocess.Popen(
-            words, pass_fds=[there.fileno()], stdin=subprocess.DEVNULL, env=os.environ | ONE_THREAD
-        )
-        there.close()  # The pipe is then closed by the death of the process.
-        self.pipe: Connection = here
-        self.chunk = None
-        self.pipe.send(work)
-
-    def send_chunk(self, chunk: list) -> None:
-        """Send the case numbers of a chunk to the worker process."""
-        self.chunk = chunk
-        try:
-            self.pipe.send(chunk)
-        except OSError:
-            pass  # The process is dead, which `receive_result` detects next.
-
-    def receive_result(self) -> ComputedChunk:
-        """Receive the results of the current chunk, or a WorkerDeath if the process died."""
-        try:
-            seconds, answer = self.pipe.recv()
-        except (EOFError, OSError):
-            seconds = 0.0
-            answer = WorkerDeath(
-                f"the process that ran this case died ({_describe_exit_status(self.process.wait())})"
-            )
-        chunk = self.chunk
-        self.chunk = None
-        return ComputedChunk(chunk, seconds, answer)
-
-    def kill(self) -> None:
-        """Kill the worker process."""
-        self.pipe.close()
-        self.process.kill()
-        self.process.wait()
-
-
-class Pool:
-    """Executor that computes the chunks of a sweep in several processes on this machine."""
-
-    def __init__(self, workers: int):
-        self.workers = workers
+    workers = 1
+    name = ""
 
     def run(
         self, work: WorkerData, next_chunk: Callable, say: Callable | None = None
@@ -113,59 +46,140 @@ class Pool:
         ----------
         work : WorkerData
         next_chunk : callable
-            Returns the case numbers of the next chunk, or None if none is left.
+            Returns the case numbers of the next chunk, or None if none is available; takes `is_idle`, whether no other
+            chunk is being computed.
         say : callable, optional
             Called with a line of text.
 
         Yields
         ------
-        ComputedChunk
-            In the order in which the chunks finish.
+        tuple
+            (chunk, seconds, answer or WorkerDeath), in the order in which the chunks finish.
         """
-        workers: list[Worker] = []
+        pending: dict[Future, list] = {}
         try:
+            self.begin(work, is_silent=say is None)
             while True:
-                # Idle processes continue, and processes are started while chunks remain.
-                idle = [worker for worker in workers if worker.chunk is None]
-                while idle or len(workers) < self.workers:
-                    chunk = next_chunk()
+                while len(pending) < CHUNKS_PER_WORKER * self.workers:
+                    chunk = next_chunk(is_idle=not pending)
                     if chunk is None:
                         break
-                    if not idle:
-                        idle.append(_start_worker(work, silent=say is None))
-                        workers.append(idle[0])
-                    idle.pop().send_chunk(chunk)
-
-                busy = {worker.pipe: worker for worker in workers if worker.chunk is not None}
-                if not busy:
+                    pending[self.submit(chunk)] = chunk
+                if not pending:
                     return
-                for pipe in wait(list(busy)):
-                    worker = busy[pipe]
-                    computed = worker.receive_result()
-                    if isinstance(computed.answer, WorkerDeath):
-                        workers.remove(worker)
-                        worker.kill()
-                    elif (chunk := next_chunk()) is not None:
-                        # The worker continues with its next chunk while the result is written.
-                        worker.send_chunk(chunk)
-                    yield computed
+                for future in wait(pending, return_when=FIRST_COMPLETED).done:
+                    yield pending.pop(future), *self.receive(future)
         finally:
-            for worker in workers:
-                worker.kill()
+            self.end()
+
+    def receive(self, future: Future) -> tuple:
+        """Return seconds and answer of a finished future; 0 s and a WorkerDeath if its worker died or failed.
+
+        Raises Missing if the connection to the workers is lost.
+        """
+        try:
+            return future.result()
+        except CancelledError:
+            raise self.make_connection_error() from None
+        except Exception as error:
+            kind = type(error).__name__
+            if kind in DEATHS:
+                return 0.0, WorkerDeath(
+                    "its worker process died (killed by a user, or for lack of memory)"
+                )
+            return 0.0, WorkerDeath(f"the worker of this case failed ({kind}: {error})")
+
+    def make_connection_error(self) -> Missing:
+        """Return the error for a lost connection to the workers."""
+        return Missing(f"{self.name}: the connection to the scheduler is lost")
 
 
-def _start_worker(work: WorkerData, *, silent: bool) -> Worker:
-    """Start a worker process; raise Missing if the operating system cannot create it."""
+class Pool(FutureExecutor):
+    """Executor that computes the chunks of a sweep in several processes on this machine."""
+
+    def __init__(self, workers: int):
+        self.workers = workers
+        self.executor: ProcessPoolExecutor | None = None
+
+    def begin(self, work: WorkerData, *, is_silent: bool) -> None:
+        """Keep the data that each new process receives."""
+        self.initial_data = (work, None if is_silent else _print_to_stderr)
+        self.other_processes = multiprocessing.active_children()
+
+    def submit(self, chunk: list) -> Future:
+        """Submit a chunk, to new processes if those before have died; raise Missing if none can be started."""
+        try:
+            with _worker_environment():
+                if self.executor is not None:
+                    try:
+                        return self.executor.submit(_compute_in_process, chunk)
+                    except BrokenProcessPool:
+                        pass
+                self.executor = ProcessPoolExecutor(
+                    self.workers,
+                    multiprocessing.get_context("spawn"),
+                    _begin_process,
+                    self.initial_data,
+                )
+                return self.executor.submit(_compute_in_process, chunk)
+        except OSError as error:
+            raise Missing(
+                f"a process of the sweep cannot be started ({error.strerror}); lower -j"
+            ) from None
+
+    def end(self) -> None:
+        """Kill the processes."""
+        for process in multiprocessing.active_children():
+            if process not in self.other_processes:
+                process.kill()
+        if self.executor is not None:
+            self.executor.shutdown(cancel_futures=True)
+
+
+@contextmanager
+def _worker_environment() -> Iterator[None]:
+    """Set the environment of processes that start, and hide the script of the caller, which they would run again."""
+    before = {name: os.environ.get(name) for name in WORKER_ENVIRONMENT}
+    script = sys.modules["__main__"]
+    os.environ.update(WORKER_ENVIRONMENT)
+    sys.modules["__main__"] = ModuleType("__main__")
     try:
-        return Worker(work, silent=silent)
-    except OSError as error:
-        raise Missing(
-            f"a process of the sweep cannot be started ({error.strerror}); lower -j"
-        ) from None
+        yield
+    finally:
+        sys.modules["__main__"] = script
+        for name, value in before.items():
+            if value is None:
+                del os.environ[name]
+            else:
+                os.environ[name] = value
 
 
-def _describe_exit_status(status: int) -> str:
-    """Describe the exit status of a worker process."""
-    if status == -9:
-        return "killed by a user, or for lack of memory"
-    return f"signal {-status}" if status < 0 else f"exit code {status}"
+# Data of the sweep in a worker process, and the function that prints a line of text.
+_PROCESS_DATA: list = []
+
+
+def _begin_process(work: WorkerData, say: Callable | None) -> None:
+    """Keep the data of the sweep in a new process, which ends with the process that started it."""
+    # The process that started the sweep handles interrupts.
+    for name in ("SIGINT", "SIGHUP"):
+        if hasattr(signal, name):
+            signal.signal(getattr(signal, name), signal.SIG_IGN)
+    _PROCESS_DATA[:] = work, say
+    Thread(target=_end_with_parent, daemon=True).start()
+
+
+def _end_with_parent() -> None:
+    """End this process when the process that started it has ended."""
+    multiprocessing.parent_process().join()
+    os._exit(1)
+
+
+def _compute_in_process(chunk: list) -> tuple:
+    """Compute a chunk in a worker process; return the result of `compute_chunk`."""
+    work, say = _PROCESS_DATA
+    return compute_chunk(work, chunk, say)
+
+
+def _print_to_stderr(text: str) -> None:
+    """Print a line of text to the standard error stream."""
+    print(text, file=sys.stderr, flush=True)
