@@ -38,17 +38,13 @@ KINDS = {  # Name on the command line -> module and function.
     "patches": ("random_patches", "compare_coarse_patch"),
     "patches-fine": ("random_patches", "compare_fine_patch"),
     "boundary-traces": ("boundary_traces", "compare_trace"),
-    "traces": ("random_traces", "compare_trace"),
     "wear": ("wear_scenes", "compare_bench"),
     "predicted-wear": ("predicted_pairs", "compare_pair"),
     "hybrid-rigs": ("hybrid_campaign", "compare_rig"),
-    "stick-together": ("sticks_together", "compare_rig"),
     "decay-fits": ("decay_fits", "compare_fit"),
     "trace-pairs": ("surface_pairs", "compare_traces"),
     "scan-pairs": ("surface_pairs", "compare_scans"),
     "backbone-bands": ("backbone_band", "compare_band"),
-    "backbone-forces": ("backbone_forces", "compare_force"),
-    "backbone-preload": ("backbone_forces", "compare_preload"),
 }
 # Time limit of a scene with its reference; a longer one is recorded as failed.
 MAX_CPU_SECONDS = 60
