@@ -224,6 +224,18 @@ def test_exact_engines_of_chain_agree_within_errors(chain_result):
         assert_agree(chain_result.measures, result.measures, names)
 
 
+@pytest.mark.xfail(raises=IndexError, strict=True)  # a kind of event that is not a number
+def test_exact_patch_without_load_changes_nothing():
+    """A second interface without load changes nothing, whether it is a patch or a point."""
+    point = f'[[structure.interface]]\nbetween = [2, 1]\n{STIFF_LAW}load = "0 N"\n'
+    head = CHAIN[: CHAIN.rindex("[[structure.interface]]")]
+    patch, unloaded = (
+        pf.run(head + face + DRIVE, **{"accuracy.method": "exact"}).measures
+        for face in (format_interface("[2, 1]", 0, 2.0), point)
+    )
+    assert_agree(patch, unloaded, "relative_displacement_amplitude loop_area friction_work", 1e-9)
+
+
 def test_always_rigid_patch_moves_as_point_with_warning():
     """Without [contact.shear], a patch moves as a point contact; a warning says so."""
     rigid = SINGLE_INTERFACE.replace("[structure.interface.contact.shear]\n", "")

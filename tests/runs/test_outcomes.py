@@ -73,7 +73,6 @@ RUNS = [
     (STEP, DAMPED, "steady", "", ""),
     (POINT + COULOMB + SWEPT, "", "transient", "changes until the end", ""),
     (SWEPT, "drive.from=100 Hz; drive.to=143 Hz", "transient", "changes until the end", ""),
-    (POINT + COULOMB + SWEPT, "drive.acceleration=3 g", "stuck", "", ""),
     (POINT + COULOMB + LEVELS, "", "transient", "", ""),
     (POINT + COULOMB + LEVELS, 'drive.levels=["6 g", "3 g"]; drive.cycles=80', "stuck", "", ""),
     (POINT + PLASTIC + RELEASE, "", "stuck", "", ""),
