@@ -4,10 +4,10 @@ import json
 import re
 from pathlib import Path
 
+import adding
 import numpy as np
 import pytest
 import xarray
-from support import adding
 
 from patchfem.core import G_N, Response
 

@@ -329,7 +329,7 @@ ITEMS = (
         "the normal load is varied by changing the weight",
         RIG,
         "",
-        "tests/runs/batch/test_every_kind.py",
+        "tests/runs/test_batches.py",
         "works",
     ),
     Item(

@@ -9,7 +9,6 @@ from bond_moments import advance_bonds
 from friction_paths import march_path, random_walk, upper_pressure
 from march_paths import OMEGA, follow_path, make_one_mode
 from modal_bases import make_modal_basis
-from printed_sums import NodeBonds, solve_displacements
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 from scipy.special import gammainc
@@ -22,6 +21,8 @@ from patchfem.points.time_march import march
 from patchfem.response import energy_balance
 from patchfem.slip.shear_modes import shear_modes
 from patchfem.structure import drives
+
+from .printed_sums import NodeBonds, solve_displacements
 
 ROW = np.ones(1)
 FORCE = np.array([0.7, 1.3, 2.0, 0.4]) / 0.4  # normal forces of four points [N]

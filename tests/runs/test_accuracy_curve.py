@@ -49,6 +49,7 @@ def test_always_errors_of_curve_cover_true_errors(marched_result):
     of the steps has a smaller error and takes twice the time."""
     exact = pf.run(BLOCK, **{"accuracy.method": "exact"}).measures
     curve = compute_accuracy_curve(marched_result)
+    assert marched_result.plot.accuracy()
     settings = [*curve.coarser[::-1], curve.present, curve.finer]
     assert [setting.steps for setting in settings] == [400, 800, 1600, 3200]
     for setting in settings:
@@ -65,7 +66,3 @@ def test_refuses_curve_if_steps_do_not_limit_accuracy(scene):
     assert compute_accuracy_curve(result) is None
     with pytest.raises(pf.PatchfemError, match=r"plot\.accuracy: nothing to draw"):
         result.plot.accuracy()
-
-
-def test_scene_of_guide_has_picture_of_accuracy():
-    assert pf.run(pf.new("rig"), **MARCH).plot.accuracy()

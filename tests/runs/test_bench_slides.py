@@ -1,14 +1,11 @@
 """Benches with a dwell or a table as sliding path: the path itself, and the growth of friction at
 rest."""
 
-import math
-
 import numpy as np
 import pytest
-from command_line import run_cli
 from friction_forms import steady_bond_length
 from scene_texts import COULOMB, POINT
-from scipy.integrate import quad, solve_ivp
+from scipy.integrate import solve_ivp
 
 from patchfem import build, plan, run
 from patchfem.core import PatchfemError
@@ -90,21 +87,6 @@ def write_path_scene(tmp_path):
 # ---- the dwell
 
 
-@pytest.mark.parametrize("hold", [0.0, 3.0])
-def test_exact_breakaway_agrees_with_growth_at_rest(hold):
-    """The peak friction after a rest agrees with the same law integrated by a Runge-Kutta method of
-    order 8."""
-    response = run_bench(
-        POINT + NONLOCAL + DWELL, f"slide.hold={hold} s", "accuracy.steps_per_cycle=6000"
-    )
-    friction_ratio = response.force[response.slide >= 39.999e-6] / (0.3 * response.load[0])
-    assert friction_ratio[0] == pytest.approx(bond_lengths_at_rest(hold)[0] / LENGTH, rel=1e-5)
-    assert friction_ratio.max() == pytest.approx(breakaway_ratios(hold)[0], rel=2e-5)
-    assert response.values["friction_ratio_end"] == pytest.approx(
-        0.3 * bond_lengths_at_rest(hold)[0] / LENGTH, rel=1e-4
-    )
-
-
 def test_order_of_friction_after_rest_is_two():
     """The error of the whole force after a rest is of second order in the step; the largest sample
     alone would jump between samples."""
@@ -119,30 +101,6 @@ def test_order_of_friction_after_rest_is_two():
     assert (
         errors[1:] == pytest.approx([errors[0] / 4, errors[0] / 16], rel=0.02) and errors[2] < 2e-6
     )
-
-
-@pytest.mark.parametrize("order", [0, 1])
-def test_exact_report_law_grows_at_rest(order):
-    """With the law of the report each bond grows its own length while it slides and then at rest;
-    the force agrees with a quadrature over all bonds."""
-    response = run_bench(
-        POINT + NONLOCAL + DWELL, "friction.reading=report", f"friction.order={order}", steps=1200
-    )
-    rest = np.flatnonzero(np.diff(response.slide) == 0)
-    sliding_length, _ = bond_lengths_at_rest(0)
-    for k in (*rest, rest[-1] + 1):
-        decay = np.exp(-A_S * (response.time[k] - 0.04) / FLOOR)
-
-        def force(y, remaining=decay):
-            bond_length = (
-                LENGTH
-                - (LENGTH + sliding_length * np.expm1(-(A_S / SPEED**2 + 1 / L_K) * y)) * remaining
-            )
-            return (y / bond_length) ** order * np.exp(-y / bond_length)
-
-        reference = quad(force, 0, 40e-6, epsabs=1e-16, epsrel=1e-10, limit=400)[0] / LENGTH
-        assert response.force[k] / (0.3 * response.load[0]) == pytest.approx(reference, rel=2e-5)
-    assert response.force[rest[-1] + 1] > 1.2 * response.force[rest[0]]
 
 
 # ---- the table
@@ -192,28 +150,3 @@ def test_exact_coulomb_bench_breaks_away_at_static_friction():
     assert response.values["friction_ratio_peak"] == pytest.approx(0.3)
     assert response.values["friction_ratio_end"] == 0.2
     assert response.values["friction_work"] == pytest.approx(0.2 * load * 60e-6, rel=1e-12)
-
-
-@pytest.mark.parametrize("keys", ["", 'reading = "report"\n'])
-def test_exact_extremely_slow_slide_has_full_bond_length(keys, recwarn):
-    """At a speed of 1e-300 m/s, the bonds grow to their full length, and no overflow
-    warning occurs."""
-    slow = run_bench(
-        POINT
-        + NONLOCAL
-        + keys
-        + '[slide]\nkind = "constant"\nspeed = "1e-300 m/s"\ndistance = "20 um"\n'
-    )
-    assert slow.values["friction_ratio_end"] == pytest.approx(0.3 * (1 - math.exp(-10)), rel=1e-3)
-    assert all(np.isfinite(value) for value in slow.values.values()) and not recwarn.list
-
-
-def test_refuses_slide_with_more_steps_than_memory(tmp_path):
-    """A slide with more steps than fit in memory is refused with the key to change."""
-    scene = tmp_path / "a.toml"
-    scene.write_text(
-        POINT + COULOMB + '[slide]\nkind = "triangle"\namplitude = "1 um"\nspeed = "1 mm/s"\n'
-        "cycles = 1e9\n"
-    )
-    answer = run_cli("plan", scene)
-    assert answer.code == 4 and "lower slide.cycles" in answer.err

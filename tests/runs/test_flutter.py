@@ -60,70 +60,6 @@ def test_exact_flutter_amplitude_separates_decay_and_growth(ratio, outcome):
     assert "10.08" not in "".join(result.notes) and "decays to rest" in result.notes[-1]
 
 
-WEAKENING_SCENE = {
-    "normal": {"load": 100.0},
-    "friction": {
-        "law": "lugre",
-        "static": 0.3,
-        "kinetic": 0.2,
-        "stiffness": 2e5,
-        "stribeck_speed": 0.05,
-    },
-    "structure": {
-        "moving_mass": 1.0,
-        "mode": [{"name": "a", "frequency": 50.0, "damping": -0.01, "slide": 1.0}],
-    },
-    "drive": {"kind": "free", "cycles": 40.0},
-}
-
-
-@pytest.mark.share(1)
-@pytest.mark.parametrize("ratio, grows", [(0.995, False), (1.005, True)])
-def test_exact_flutter_amplitude_of_weakening_law(ratio, grows):
-    """Under a velocity-weakening law, releases 0.5 % below the flutter amplitude decay, and those 0.5 % above it grow.
-
-    The flutter amplitude cannot be followed from micro-slip there. Den Hartog's balance with the
-    kinetic coefficient alone gives 12.90 mm for rigid stick.
-    """
-    result = pf.run(WEAKENING_SCENE, **{"drive.displacement": ratio * 12.797e-3})
-    final_amplitude = result.measures["relative_displacement_amplitude"].value
-    flutter_amplitude = result.measures["flutter_amplitude"]
-    assert (
-        flutter_amplitude.value == pytest.approx(12.797e-3, rel=1e-3)
-        and flutter_amplitude.error < 1e-3 * flutter_amplitude.value
-    )
-    assert any("smaller motions could not be followed" in note for note in result.notes)
-    assert (
-        final_amplitude > 1.03 * flutter_amplitude.value
-        if grows
-        else final_amplitude < 0.97 * flutter_amplitude.value
-    )
-
-
-SECOND = '[[structure.mode]]\nname = "second"\nfrequency = "{} Hz"\ndamping = 0.02\nslide = 0.3\n[structure.start]\n'
-
-
-@pytest.mark.filterwarnings("error")
-def test_exact_flutter_amplitude_with_two_modes():
-    """With a second mode, the free vibration of a stuck interface may gain energy, so the note does
-    not predict rest. With a rigid mode, the flutter amplitude has no value and gives a reason."""
-    two_modes, with_rigid_mode = (
-        format_scene(start=0.9 * FLUTTER_AMPLITUDE)
-        .replace("[structure.start]\n", SECOND.format(frequency))
-        .replace(' mm"]', ' mm", "0 mm"]')
-        for frequency in (400, 0)
-    )
-    result = pf.run(pf.load(two_modes))
-    flutter_amplitude = result.measures["flutter_amplitude"]
-    assert (
-        flutter_amplitude.value == pytest.approx(1e-3 * FLUTTER_AMPLITUDE, rel=0.1)
-        and 0 < flutter_amplitude.error < 1e-6 * flutter_amplitude.value
-    )
-    assert "a free oscillation of smaller amplitude decays, and" in result.notes[-1]
-    flutter_amplitude = pf.run(pf.load(with_rigid_mode)).measures["flutter_amplitude"]
-    assert flutter_amplitude.value is None and "a mode of 0 Hz" in flutter_amplitude.reason
-
-
 @pytest.mark.filterwarnings("error")
 @pytest.mark.parametrize("law", ["coulomb", 'tanh"\nreference_speed = "1 mm/s'])
 def test_always_unbounded_growth_ends_run_early(law):
@@ -140,30 +76,3 @@ def test_always_unbounded_growth_ends_run_early(law):
         for name, measure in result.measures.items()
         if name != "flutter_amplitude"
     )
-
-
-def test_refuses_negative_damping_without_friction():
-    """Negative damping is refused without friction, and below -1 in any case."""
-    frictionless = (
-        format_scene()
-        .replace('[friction]\nlaw = "coulomb"\nstatic = 0.3\n', "")
-        .replace('[normal]\nload = "30 N"\n', "")
-    )
-    with pytest.raises(
-        pf.SceneError, match=r"damping: -0\.02 is negative damping, and without friction"
-    ):
-        pf.load(frictionless)
-    with pytest.raises(pf.SceneError, match="damping: must be > -1"):
-        pf.load(format_scene(damping=-1.5))
-
-
-def test_always_missing_flutter_amplitude_has_reason():
-    """If the flutter amplitude cannot be computed, the measure states a reason."""
-    small_release = format_scene(
-        law="nonlocal",
-        more='bond_length = "20 um"\nreading = "report"',
-        start=0.01,
-        cycles=3,
-    )
-    flutter_amplitude = pf.run(pf.load(small_release)).measures["flutter_amplitude"]
-    assert flutter_amplitude.value is None and flutter_amplitude.reason

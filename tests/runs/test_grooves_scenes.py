@@ -3,10 +3,8 @@ outcomes."""
 
 import numpy as np
 import pytest
-from scene_texts import BLOCK
 
 import patchfem as pf
-from patchfem import SceneError
 from patchfem.core import Outcome
 from patchfem.scene import loads
 
@@ -43,13 +41,7 @@ cycles = 30
 steps_per_cycle = 100
 """
 )
-PIECES = f'\n{BLOCK}element_size = "1 mm"\n'
 WAVE = 2 * np.pi / 80e-6
-
-
-def remove_grooves(text):
-    """Return a scene without its grooves."""
-    return text.replace(GROOVES, "")
 
 
 def run_with_keys(text, **keys):
@@ -109,22 +101,6 @@ def test_exact_breakaway_on_grooves_uses_static_coefficient():
     )
 
 
-def test_exact_rig_on_grooves_slips_with_kinetic_coefficient():
-    """A rig on grooves with a slope of 1e-12 agrees with the exact engine without grooves."""
-    grooved = run_with_keys(
-        RIG,
-        **{"friction.kinetic": "0.3", "normal.grooves.amplitude": "1e-11 um", "drive.cycles": "10"},
-    )
-    ungrooved = run_with_keys(
-        remove_grooves(RIG), **{"friction.kinetic": "0.3", "drive.cycles": "10"}
-    )
-    assert grooved.extra["engine"] == ungrooved.extra["engine"] == "hybrid"
-    for name in ("friction_work", "loop_area", "relative_displacement_amplitude"):
-        assert measure_value(grooved, name) == pytest.approx(
-            measure_value(ungrooved, name), rel=1e-5
-        )
-
-
 def test_exact_tanh_loop_on_grooves_agrees_with_limits():
     """Far above the speed v_0 the loop is that of Coulomb's law; far below it is that of a dashpot
     along the slope, c ds/dt with c = mu N/v_0."""
@@ -139,126 +115,12 @@ def test_exact_tanh_loop_on_grooves_agrees_with_limits():
     assert measure_value(viscous, "loop_area") == pytest.approx(dashpot, rel=1e-6)
 
 
-@pytest.mark.parametrize("law", ["elastic-plastic", "nonlocal"])
-def test_always_hysteretic_laws_on_grooves_close_energy_balance(law):
-    """The energy balance closes for laws with memory along the slope; with bonds far shorter than a
-    groove, the loop is that of Coulomb's law."""
-
-    def format_law(base_text, length):
-        return base_text.replace('law = "coulomb"', f'law = "{law}"\nbond_length = "{length}"')
-
-    result = run_with_keys(format_law(BENCH, "0.1 um"), **{"accuracy.steps_per_cycle": "4000"})
-    assert (
-        measure_value(result, "energy_balance") < 1e-10
-        and measure_value(result, "work_check") < 1e-3
-    )
-    assert measure_value(result, "loop_area") == pytest.approx(
-        groove_loop_area(115, 0.4, 7.5e-6, 30e-6), rel=0.01
-    )
-    assert measure_value(result, "friction_work") - measure_value(
-        result, "energy_stored"
-    ) == pytest.approx(measure_value(result, "energy_dissipated"), rel=1e-9)
-    result = run_with_keys(
-        format_law(RIG, "1 um"),
-        **{"normal.grooves.lifted_mass": "0.3 kg", "accuracy.steps_per_cycle": "400"},
-    )
-    assert (
-        measure_value(result, "energy_balance") < 1e-10
-        and measure_value(result, "work_check") < 2e-3
-    )
-
-
-def test_refuses_normal_motion_with_grooves():
-    """A mode with normal motion is not supported with grooves."""
-    text = (
-        RIG.replace("[normal]", PIECES)
-        .replace('load = "115 N"\ngrooves', "grooves")
-        .replace("slide = 1.0}", "slide = 1.0, normal = 0.1}")
-    )
-    with pytest.raises(
-        SceneError, match=r"structure\.mode\.\S+: not supported yet with \[contact\.grooves\]"
-    ):
-        loads(text)
-
-
-@pytest.mark.parametrize(
-    ("text", "sets", "key", "message"),
-    [
-        (
-            BENCH,
-            ["friction.static=2"],
-            "normal.grooves.amplitude",
-            "on which the pieces lock with static = 2",
-        ),
-        (
-            RIG,
-            ["friction.law=convolution", "friction.bond_length=1 um"],
-            "friction.law",
-            "with [normal.grooves] is not supported yet; use law 'coulomb'",
-        ),
-        (
-            RIG,
-            ["friction.law=nonlocal", "friction.bond_length=1 um", "accuracy.quadrature=direct"],
-            "accuracy.quadrature",
-            "'direct' with [normal.grooves]",
-        ),
-        (
-            BENCH,
-            ["wear.coefficient=1e-14 m^2/N", "wear.cycles=1000"],
-            "wear",
-            "with [normal.grooves]; a [normal] contact has no area",
-        ),
-        (BENCH, ["normal.grooves.amplitude=-1 um"], "normal.grooves.amplitude", ""),
-    ],
-)
-def test_refuses_keys_incompatible_with_grooves(text, sets, key, message):
-    """Keys that are not supported with grooves are refused with a message that names them."""
-    with pytest.raises(SceneError) as error:
-        loads(text, sets=sets)
-    assert any(f" {key}: " in line and message in line for line in error.value.mistakes), (
-        error.value.mistakes
-    )
-
-
-def test_refuses_grooves_in_static_patch_or_unsuitable_shear():
-    """Grooves need a sliding motion; with [contact.shear], the law tanh and a holder spring are refused."""
-    patch = BLOCK + GROOVES
-    with pytest.raises(SceneError, match=r"contact\.grooves: .*needs a sliding motion"):
-        loads(patch)
-    sheared = BENCH.replace(f'[normal]\nload = "115 N"\n{GROOVES}', patch + "\n[contact.shear]")
-    with pytest.raises(SceneError, match=r"friction\.law: 'tanh' with \[contact\.shear\]"):
-        loads(sheared.replace('law = "coulomb"', 'law = "tanh"\nreference_speed = "1 mm/s"'))
-    sheared = sheared.replace('law = "coulomb"', 'law = "elastic-plastic"\nbond_length = "1 um"')
-    with pytest.raises(
-        SceneError,
-        match=r"contact\.holder\.tangential_stiffness: not supported yet with "
-        r"\[contact\.grooves\]",
-    ):
-        loads(sheared + '\n[contact.holder]\ntangential_stiffness = "1e7 N/m"')
-
-
 LEAVING_KEYS = {
     "normal.grooves.lifted_mass": "1.5 kg",
     "drive.acceleration": "60 g",
     "normal.load": "60 N",
     "structure.moving_mass": "8 kg",
 }
-
-
-@pytest.mark.parametrize("law", ['law = "coulomb"', 'law = "tanh"\nreference_speed = "5 mm/s"'])
-def test_exact_energy_balance_ends_with_exceeded_travel(law):
-    """The energy sums end with the sample that exceeds the travel, wherever it lies in a block of
-    steps."""
-    text = RIG.replace('law = "coulomb"', law).replace(
-        "moving_mass", 'travel = "0.08 mm"\nmoving_mass'
-    )
-    for level in ("9 g", "12 g"):
-        result = run_with_keys(text, **{"drive.acceleration": level})
-        assert result.outcome is Outcome.EXCEEDS_TRAVEL
-        assert (
-            measure_value(result, "energy_balance") < 1e-9
-            and measure_value(result, "work_check") < 5e-3
-        )
 
 
 @pytest.mark.parametrize(

@@ -90,28 +90,6 @@ def test_exact_worn_amplitude_agrees_with_differential_equation():
     assert (np.diff(history["groove_amplitude"]) < 0).all()
 
 
-@pytest.mark.share(1)
-@pytest.mark.parametrize("lifted", ["0 kg", "0.4 kg"])
-def test_exact_wear_of_rig_agrees_with_friction_work(lifted):
-    """With Coulomb's law, the wear kappa int R ds is kappa/mu times the friction work, which is the
-    loop area; with the form 'energy' it is kappa times this work."""
-    for form, divisor in (("archard", MU), ("energy", 1.0)):
-        result = run_with_keys(
-            PIECES + RIG,
-            False,
-            **{
-                "wear.form": f'"{form}"',
-                "wear.cycles": 10,
-                "drive.acceleration": "5 g",
-                "contact.grooves.lifted_mass": lifted,
-                "wear.jumps": 1,
-            },
-        )
-        assert measure_value(result, "worn_volume") == pytest.approx(
-            KAPPA * 10 * measure_value(result, "loop_area") / divisor, rel=1e-4
-        )
-
-
 SHEARED_PIECES = PIECES.replace("[friction]", "[contact.shear]\n[friction]")
 
 
@@ -157,35 +135,6 @@ def test_exact_wear_of_sheared_patch_agrees_with_friction_work(text, keys):
             0.5 * volume, rel=1e-9
         )
         assert measure_value(result, "energy_balance") < 1e-8
-
-
-def test_exact_wear_on_flat_grooves_agrees_with_contact_elements():
-    """The worn depth of every point on grooves with a slope of 1e-12 agrees with that of the exact
-    contact elements, for an amplitude about three times that of the first complete slip."""
-    keys = {"slide.amplitude": "0.3 um", "wear.cycles": 1000, "wear.jumps": 1}
-    grooved = run_with_keys(
-        SHEARED_PIECES + SLIDE, False, **keys, **{"contact.grooves.amplitude": "1e-11 um"}
-    )
-    ungrooved = run_with_keys(
-        SHEARED_PIECES + SLIDE, False, **keys, **{"contact.grooves.amplitude": "0 um"}
-    )
-    np.testing.assert_allclose(grooved.patch.unloaded_gap, ungrooved.patch.unloaded_gap, rtol=2e-3)
-    slip_paths = grooved.patch.unloaded_gap / grooved.patch.pressure.sigma_n
-    assert np.ptp(slip_paths) > 0.05 * slip_paths.mean()
-
-
-def test_always_worn_grooves_let_motion_exceed_travel():
-    """At 7 g the motion stays in new grooves; once these are worn by a tenth, it grows and exceeds
-    the travel."""
-    result = run_with_keys(PIECES + RIG, False, **{"wear.cycles": 2e7, "wear.jumps": 12})
-    warning = next(
-        line for line in result.warnings if line.startswith("wear was computed only up to cycle")
-    )
-    assert "exceeded the travel" in warning
-    history = result.extra["wear"]
-    assert 6e-6 < history["groove_amplitude"][-1] < 7e-6
-    amplitudes = history["relative_displacement_amplitude"]
-    assert (np.diff(amplitudes) > 0).all() and amplitudes[-1] > 1.3 * amplitudes[0]
 
 
 def test_exact_removed_grooves_leave_coulomb_loop():

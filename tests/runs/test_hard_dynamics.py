@@ -6,10 +6,8 @@ from math import asin, cos, pi, sin
 
 import numpy as np
 import pytest
-from scene_texts import PIECE
 from scipy.optimize import brentq
 
-from patchfem.core import Missing, PatchfemError
 from patchfem.runs.run import run
 from patchfem.scene import loads
 
@@ -236,31 +234,6 @@ def test_exact_slip_and_loop_agree_with_independent_program(name, method):
         assert_energy_balance(result, 1e-7)
 
 
-@pytest.mark.parametrize("cycles", [4000, 60_000, pytest.param(1_000_000, marks=pytest.mark.slow)])
-def test_exact_phase_after_many_cycles(cycles):
-    """After up to a million cycles, the amplitude and the phase of the release, 0.538622 rad after
-    the drive, are those after 200 cycles."""
-    short_run, long_run = (
-        run_text(
-            format_rig("static = 0.3", format_base_drive(37.5, n)),
-            "accuracy.method=exact",
-            estimate=False,
-        )
-        for n in (200, cycles)
-    )
-    expected = 0.28704671337871602595 * 37.5 / OMEGA**2
-    assert measure_value(long_run) == pytest.approx(expected, rel=1e-9)
-    assert measure_value(long_run, "slip_start_phase") == pytest.approx(0.538622, abs=1e-6)
-    assert measure_value(long_run, "slip_start_phase") == pytest.approx(
-        measure_value(short_run, "slip_start_phase"), abs=1e-9
-    )
-    assert (
-        abs(measure_value(long_run, "drift_per_cycle")) <= 1e-10 * expected
-        and long_run.outcome == "steady"
-    )
-    assert_energy_balance(long_run, 1e-9)
-
-
 def test_exact_static_above_kinetic_has_two_steady_states():
     """Under 60 m/s^2 at 135/143 of the natural frequency, a mass of 1 kg with 70 N of static and 40
     N of kinetic friction stays at rest or moves with the amplitude 4.83011 a/omega^2, depending on
@@ -276,79 +249,3 @@ def test_exact_static_above_kinetic_has_two_steady_states():
         assert_energy_balance(result, 1e-7)
     marched = run_text(text, 'structure.start={velocity = ["0.5 m/s"]}', "accuracy.method=march")
     assert_within_error(marched, "relative_displacement_amplitude", measure_value(moving))
-
-
-HEAVE = (
-    PIECE
-    + """\
-load = "100 N"
-element_size = "1.27 mm"
-substrate = {young = "1e6 GPa", poisson = 0.3, density = "4370 kg/m^3"}
-[contact.asperities]
-law = "linear"
-normal_stiffness = "1e11 Pa/m"
-[friction]
-law = "%s"
-static = 0.3
-[structure]
-moving_mass = "1 kg"
-[[structure.mode]]
-name = "axial"
-frequency = "100 Hz"
-damping = 0.003
-slide = 0.9
-output = 0.9
-[[structure.mode]]
-name = "bounce"
-frequency = "250 Hz"
-damping = 0.02
-slide = 0.1
-normal = 0.8
-base = 0.4
-output = 1.0
-[drive]
-kind = "base"
-frequency = "100 Hz"
-acceleration = "400 m/s^2"
-cycles = 4
-"""
-)
-
-
-@pytest.mark.share(1, 2)  # The Coulomb case would compile a loop that no other test needs.
-@pytest.mark.parametrize(
-    "law", ["coulomb", 'elastic-plastic"\nbond_length = "1 um', 'nonlocal"\nbond_length = "1 um']
-)
-def test_always_energy_balance_closes_with_lift_off(law):
-    """The energy balance of a bouncing mode closes although the contact opens, and friction stays below mu N."""
-    result = run_text(HEAVE % law, estimate=False)
-    load = result.response.extra["normal_load"]
-    assert load.min() == 0.0 and (np.abs(result.response.force) <= 0.3 * load + 1e-9).all()
-    assert_energy_balance(result, 1e-7)
-
-
-def test_refuses_start_beyond_travel():
-    """A motion that starts beyond the travel is refused by every engine."""
-    text = format_rig(
-        "static = 0.05",
-        'kind = "free"\ndisplacement = "0.5 mm"\ncycles = 10',
-        extra_keys='travel = "0.4 mm"',
-    )
-    for method in ("exact", "march"):
-        with pytest.raises(
-            PatchfemError, match=r"structure\.travel: the motion starts beyond this travel"
-        ):
-            run_text(text, f"accuracy.method={method}")
-
-
-def test_refuses_block_with_unresolved_bond_frequency():
-    """A block of 6.5 mg vibrates on its bonds at a frequency far above any time step; the run is
-    refused instead of running without end."""
-    text = (
-        '[normal]\nload = "26 lbf"\n[friction]\nlaw = "nonlocal"\nreading = "report"\nstatic = 0.3\n'
-        'bond_length = "1 um"\n[structure]\nmoving_mass = "6.5 mg"\n[[structure.mode]]\nname = "axial"\n'
-        'frequency = "143 Hz"\ndamping = 0.0015\nslide = 1.0\n[drive]\nkind = "base"\nfrequency = "143 Hz"\n'
-        'acceleration = "2.9 g"\ncycles = 12\n[accuracy]\ntolerance = 1e-5\n'
-    )
-    with pytest.raises(Missing, match=r"the vibration of the block on its bonds, at 3\.68e\+05 Hz"):
-        run(loads(text))

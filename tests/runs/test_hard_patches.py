@@ -7,9 +7,8 @@ from scene_texts import PIECE
 
 from patchfem import run
 from patchfem.closed_forms.contact import hertz_half_width, hertz_peak
-from patchfem.core import Outcome, PatchfemError
+from patchfem.core import Outcome
 from patchfem.runs.patch import mesh_levels
-from patchfem.runs.patch.grids import predict_condensing_seconds
 from patchfem.scene import loads
 
 SIZE, WIDTH, LOAD = 12.7e-3, 12.7e-3, 115.653761996773
@@ -177,89 +176,3 @@ def test_exact_stiff_thick_coating_agrees_with_hertz(coarse_meshes):
         hertz_peak(line, radius, modulus), rel=0.01
     )
     assert measure_value(result, "contact_half_width") == pytest.approx(half, rel=0.02)
-
-
-def test_exact_patch_test_with_elongated_elements():
-    """With a Poisson ratio of 0, flat pieces act as bars: the approach is 2 p (t/E1 + (H - t)/E2)
-    and the pressure is uniform, with elements of 0.5 mm by 0.25 um."""
-    text = BLOCKS.replace("0.31", "0.0") + COATING.format(600e9, 0.0, 1e-6)
-    result = run_and_check("contact.element_size=0.5 mm", text=text)
-    rows = np.diff(result.patch.pair.grid.depth)
-    assert np.diff(result.patch.x).max() / rows.min() > 1000
-    mean = LOAD / (SIZE * WIDTH)
-    assert result.patch.pressure.sigma_n == pytest.approx(
-        np.full(result.patch.x.size, mean), rel=1e-8
-    )
-    assert measure_value(result, "approach") == pytest.approx(
-        2 * mean * (1e-6 / 600e9 + (6.35e-3 - 1e-6) / 121e9), rel=1e-8
-    )
-
-
-def test_exact_load_near_edge_is_carried_at_edge():
-    """A load close to an edge is carried by at most two nodes at this edge, and the piece rotates towards it."""
-    result = run_and_check(f"contact.load_line.offset={-0.499 * SIZE} m", COARSE)
-    assert measure_value(result, "pressure_centre") == pytest.approx(-0.499 * SIZE, rel=1e-9)
-    assert measure_value(result, "rotation") > 0
-    assert result.patch.active.sum() <= 2
-
-
-@pytest.mark.share(0)
-@pytest.mark.parametrize("mesh", [COARSE, "accuracy.tolerance=1e-2"])
-def test_exact_approach_below_first_contact_has_no_load(mesh):
-    """A crown at a step of -1 um lies 1 um above the flat piece; an approach of 0.9 um leaves a gap
-    of 0.1 um and no load."""
-    text = BLOCKS.replace('load = "26 lbf"\n', "")
-    result = run_and_check(
-        "contact.step.height=1 um",
-        "contact.step.at=-6.3 mm",
-        "contact.crown.radius=1 mm",
-        "contact.approach.distance=0.9 um",
-        mesh,
-        text=text,
-    )
-    assert result.outcome is Outcome.NO_CONTACT and not result.patch.active.any()
-    assert all(
-        measure_value(result, name) == 0
-        for name in ("normal_load", "contact_fraction", "pressure_peak")
-    )
-    assert result.patch.pressure.gap.min() == pytest.approx(0.1e-6, rel=1e-6)
-    assert Outcome.NO_CONTACT.sentence in result.warnings
-
-
-EXPONENTIAL = "contact.asperities.law=exponential"
-
-
-SCENE_SETTINGS = {
-    "corner": ("contact.tilt.angle=10 mrad",), "no load": ("contact.load=0 N",), "billionth": ("contact.load=1e-7 N", TILT),
-    "strips": (TILT, "contact.strips.count=5", "contact.strips.roll=0.1 mrad"),
-    "thin skin": (TILT, EXPONENTIAL, "contact.asperities.decay_length=1 nm"),
-    "flat": ("contact.height=0.127 mm", TILT), "tipping": ("contact.load_line.offset=6.337 mm",),
-    "held": ("contact.crown.radius=1 m", "contact.holder.rotational_stiffness=1e3 N m/rad",
-             "contact.load_line.offset=3 mm"),
-}  # fmt: skip
-COATING_THICKNESS = {"thin coating": 1e-6}
-
-
-@pytest.mark.parametrize("name", [*SCENE_SETTINGS, *COATING_THICKNESS])
-def test_always_automatic_mesh_stays_within_cost(name, coarse_meshes):
-    """Automatic meshes of extreme patches stay within the limit of the cost."""
-    text = (
-        BLOCKS + COATING.format(250e9, 0.24, COATING_THICKNESS[name])
-        if name in COATING_THICKNESS
-        else BLOCKS
-    )
-    result = run_and_check(*SCENE_SETTINGS.get(name, (TILT,)), "accuracy.tolerance=1e-2", text=text)
-    grids = {id(g): g for g in (result.patch.pair.grid, result.patch.pair.upper_grid)}.values()
-    assert predict_condensing_seconds(grids) <= 0.4 and np.diff(result.patch.x).min() > 0
-    if name in ("corner", "billionth"):  # The contact lies at the corner where the wedge closes.
-        assert measure_value(result, "pressure_centre") == pytest.approx(-SIZE / 2, rel=5e-3)
-
-
-def test_refuses_profile_without_heights(tmp_path):
-    """A profile whose heights are all missing is refused with its file name."""
-    path = tmp_path / "lost.csv"
-    path.write_text(
-        "x [mm],z [um]\n" + "\n".join(f"{a},nan" for a in np.linspace(0, 12.7, 50)), "utf-8"
-    )
-    with pytest.raises(PatchfemError, match=r"lost\.csv"):
-        run_and_check(f"contact.profile.file={path}", COARSE)

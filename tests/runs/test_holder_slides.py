@@ -3,7 +3,7 @@ rig."""
 
 import numpy as np
 import pytest
-from scene_texts import BENCH, PATCH, RIG, get_only_mistake
+from scene_texts import BENCH, PATCH, RIG
 from scipy.integrate import solve_ivp
 
 from patchfem.runs.run import run
@@ -93,11 +93,3 @@ def test_exact_stuck_rig_vibrates_with_holder_spring():
     )
     assert z == pytest.approx(expected, abs=2e-3 * np.abs(expected).max())
     assert result.measures["energy_balance"].value <= 1e-10
-
-
-def test_refuses_holder_spring_with_negative_order_bonds():
-    """A holder spring is refused with initial bonds of negative order."""
-    message = get_only_mistake(
-        RIG, HOLDER_SPRING[0], "friction.reading=report", "friction.order=-0.5"
-    )
-    assert "contact.holder.tangential_stiffness" in message and "initial_bonds" in message

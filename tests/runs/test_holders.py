@@ -1,13 +1,11 @@
 """Holders and pieces of a patch: springs, approach, unlike pieces, and a step."""
 
-import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scene_texts import COATING, PIECE
 
 from patchfem import build
-from patchfem.core import PatchfemError
 from patchfem.runs import solve_with_coarser
 from patchfem.runs.patch.values import compute_static_values
 from patchfem.scene import scene
@@ -85,45 +83,3 @@ def test_exact_compliances_of_unlike_pieces_add():
     assert a.pieces.normal == pytest.approx(
         (like_patch.pieces.normal + other_patch.pieces.normal) / 2, rel=1e-9
     )
-
-
-@pytest.mark.parametrize("angle", [5e-6, 1e-3])
-def test_exact_soft_linear_skin_agrees_with_wedge_on_foundation(angle):
-    """If the pieces are a thousand times stiffer than the skin, the contact length is sqrt(2 N/(k
-    theta b)), and contact is full below the angle 2 p/(k L)."""
-    stiffness = 1e10
-    load = 26 * 4.4482216152605
-    size = 12.7e-3
-    patch_values = solve_patch(
-        tables=f'[contact.tilt]\nangle = "{angle} rad"\n[contact.asperities]\nlaw = "linear"\n'
-        f'normal_stiffness = "{stiffness} Pa/m"\ntangential_ratio = 0.8\n'
-    )[1]
-    opening = 2 * load / size**2 / (stiffness * size)
-    length = min(size, np.sqrt(2 * load / (stiffness * angle * size)))
-    assert (patch_values["contact_fraction"] == 1) == (angle < opening)
-    assert patch_values["contact_fraction"] == pytest.approx(length / size, abs=0.02)
-    assert patch_values["normal_stiffness"] == pytest.approx(
-        stiffness * size * patch_values["contact_fraction"] * size, rel=2e-3
-    )
-    assert patch_values["tangential_stiffness"] == pytest.approx(
-        0.8 * patch_values["normal_stiffness"], rel=2e-2
-    )
-
-
-ROTATION_TABLES = {
-    "spring": '[contact.holder]\nrotational_stiffness = "1e4 N m/rad"\n[contact.tilt]\nangle = "0.01 mrad"\n',
-    "offset": '[contact.load_line]\noffset = "2 mm"\n',
-    "moment": '[contact.load_line]\nmoment = "0.05 N m"\n',
-    "spring and offset": '[contact.holder]\nrotational_stiffness = "1e3 N m/rad"\n'
-    '[contact.load_line]\noffset = "1 mm"\n',
-    "smooth skin": '[contact.load_line]\noffset = "2 mm"\n[contact.asperities]\nlaw = "hertz"\nradius = "10 um"\n'
-    'density = "1e8 1/m^2"\nheight_deviation = "0.05 um"\n',
-    "strips": '[contact.load_line]\noffset = "2 mm"\n[contact.strips]\ncount = 4\nroll = "0.01 mrad"\n',
-}
-
-
-@pytest.mark.parametrize("tables", ROTATION_TABLES.values(), ids=ROTATION_TABLES)
-def test_refuses_approach_of_piece_that_can_rotate(tables):
-    """A prescribed approach of a piece that can rotate is refused with the remedy."""
-    with pytest.raises(PatchfemError, match=r"removed in patchfem 2\.0; give contact\.load"):
-        solve_patch("", tables + '[contact.approach]\ndistance = "1 um"\n')

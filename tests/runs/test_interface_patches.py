@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from command_line import run_cli
+from scene_runs import assert_agree, find_sentences
 from scipy.io import loadmat
 
 import patchfem as pf
@@ -18,7 +19,6 @@ from patchfem.runs.patch import faces
 SPRING, DAMPER, MASS = 1e6, 10.0, 0.5
 LAW = 'law = "coulomb"\nstatic = 0.3\n'
 STIFF_LAW = 'law = "elastic-plastic"\nstatic = 0.3\nbond_length = "50 nm"\n'
-EXACT = {"accuracy.method": "exact"}
 DRIVE = '[drive]\nkind = "base"\nfrequency = "240 Hz"\nacceleration = "8 g"\ncycles = 40\n'
 
 
@@ -220,47 +220,19 @@ def test_exact_engines_of_chain_agree_within_errors(chain_result):
     """The march and the harmonic balance agree with the exact engine within the errors."""
     for method in ("march", "harmonic"):
         result = pf.run(CHAIN, **{"accuracy.method": method})
-        for name in (
-            "relative_displacement_amplitude",
-            "loop_area",
-            "loop_area_2",
-            "slip_amplitude_2",
-        ):
-            expected = chain_result.measures[name]
-            actual = result.measures[name]
-            assert abs(expected.value - actual.value) <= expected.error + actual.error, (
-                method,
-                name,
-            )
+        names = "relative_displacement_amplitude loop_area loop_area_2 slip_amplitude_2"
+        assert_agree(chain_result.measures, result.measures, names)
 
 
-def test_exact_patch_with_point_interface_and_without_load():
-    """A second interface without load changes nothing, whether it is a patch or a point. A rigid point agrees with a
-    very stiff one."""
-    point = f'[[structure.interface]]\nbetween = [2, 1]\n{LAW}load = "0 N"\n'
-    head = (
-        format_masses(2)
-        + format_spring_and_damper(1, 0)
-        + format_spring_and_damper(2, 1)
-        + format_interface("[1, 0]", 100, 0.5)
+def test_exact_patch_without_load_changes_nothing():
+    """A second interface without load changes nothing, whether it is a patch or a point."""
+    point = f'[[structure.interface]]\nbetween = [2, 1]\n{STIFF_LAW}load = "0 N"\n'
+    head = CHAIN[: CHAIN.rindex("[[structure.interface]]")]
+    patch, unloaded = (
+        pf.run(head + face + DRIVE, **{"accuracy.method": "exact"}).measures
+        for face in (format_interface("[2, 1]", 0, 2.0), point)
     )
-    with_patch, with_point = (
-        pf.run(head + interface + DRIVE, **EXACT)
-        for interface in (format_interface("[2, 1]", 0, 2.0), point.replace(LAW, STIFF_LAW))
-    )
-    for name in ("relative_displacement_amplitude", "loop_area", "friction_work"):
-        assert with_patch.measures[name].value == pytest.approx(
-            with_point.measures[name].value, rel=1e-9
-        ), name
-    assert with_patch.measures["normal_load_2"].value == 0
-    rigid_point, stiff_point = (
-        pf.run(head + point.replace('"0 N"', '"20 N"').replace(LAW, law) + DRIVE)
-        for law in (LAW, STIFF_LAW.replace("50 nm", "1 nm"))
-    )
-    for name in ("relative_displacement_amplitude", "loop_area", "loop_area_2"):
-        assert rigid_point.measures[name].value == pytest.approx(
-            stiff_point.measures[name].value, rel=1e-2
-        ), name
+    assert_agree(patch, unloaded, "relative_displacement_amplitude loop_area friction_work", 1e-9)
 
 
 def test_always_rigid_patch_moves_as_point_with_warning():
@@ -273,20 +245,10 @@ def test_always_rigid_patch_moves_as_point_with_warning():
         + DRIVE
     )
     patch_result = pf.run(rigid)
-    point_result = pf.run(point)
-    for name, expected in point_result.measures.items():
-        actual = patch_result.measures[name]
-        assert actual.reason == expected.reason, name
-        assert (
-            actual.value is None
-            if expected.value is None
-            else actual.value == pytest.approx(expected.value, rel=1e-12)
-        ), name
+    assert_agree(pf.run(point).measures, patch_result.measures, rel=1e-12)
     assert patch_result.measures["pressure_peak"].value > 1e7
-    assert any(
-        "interface 1-0: the shape of the patch does not affect" in text
-        and "[structure.interface.contact.shear]" in text
-        for text in patch_result.warnings
+    assert find_sentences(
+        patch_result.warnings, "interface 1-0: the shape of the patch does not affect"
     )
 
 
@@ -324,80 +286,3 @@ def test_always_files_contain_fields_of_every_interface(tmp_path, monkeypatch, c
     assert pf.load("out/scene.resolved.toml").structure.interface[1].contact.load == 60
     assert run_cli("export", "chain.toml", "-o", "elements.mat").code == 0
     assert loadmat("elements.mat")["M"].shape == (2, 2)
-
-
-def test_always_lost_contact_of_interface_ends_run():
-    """A relative displacement beyond the length of a piece ends the run as `leaves_contact`,
-    interfaces without load as `no_contact`."""
-    assert (
-        str(pf.run(CHAIN, **{"drive.acceleration": "3000 g", "drive.cycles": 5.0}).outcome)
-        == "leaves_contact"
-    )
-    unloaded = pf.run(CHAIN, **{f"structure.interface.{k}.contact.load": "0 N" for k in (0, 1)})
-    assert str(unloaded.outcome) == "no_contact" and set(unloaded.measures) == {"normal_load"}
-
-
-def test_always_coarse_interface_mesh_gives_no_motion_errors():
-    """An interface of a few elements has no errors of the motion, and a warning names the key to leave out."""
-    coarse = pf.run(CHAIN, **{"structure.interface.0.contact.element_size": "5 mm"})
-    assert (
-        coarse.measures["loop_area_2"].error is None
-        and coarse.measures["pressure_peak_2"].error > 0
-    )
-    assert any(
-        "interface 1-0: the interface has too" in warning
-        and "leave out structure.interface.contact.element_size" in warning
-        for warning in coarse.warnings
-    )
-
-
-@pytest.mark.parametrize(
-    "old, new, message",
-    [
-        (
-            "[drive]",
-            '[structure.interface.contact.approach]\ndistance = "1 um"\n[drive]',
-            "contact.approach",
-        ),
-        (
-            "[drive]",
-            '[structure.interface.contact.grooves]\nwavelength = "80 um"\namplitude = "2 um"\n[drive]',
-            "structure.interface[2].contact.grooves: not supported yet with [[structure.interface]]; leave out this entry",
-        ),
-        (
-            "static = 0.3\n[structure",
-            'static = 0.3\nload = "5 N"\n[structure',
-            "`load` and `contact` exclude each other",
-        ),
-        ('radius = "2.0 m"', 'radius = "2.0 m"\non = "lower"', "put the shapes on the upper piece"),
-        (
-            LAW + "[structure.interface.contact]\nlength",
-            'law = "nonlocal"\nstatic = 0.3\nbond_length = "1 um"\n'
-            "[structure.interface.contact]\nlength",
-            "or use law 'coulomb' or 'elastic-plastic'",
-        ),
-        (
-            LAW,
-            LAW + "kinetic = 0.2\n",
-            "structure.interface[1].kinetic: 0.2 below static = 0.3 with "
-            "[structure.interface.contact.shear] is not supported yet; leave out the key kinetic",
-        ),
-        (
-            "[drive]",
-            '[wear]\ncoefficient = "1e-14 m^2/N"\ncycles = 1000\n[drive]',
-            "wear: not supported yet",
-        ),
-        (
-            "[drive]",
-            '[structure.interface.contact.profile]\nfile = "none.csv"\n[drive]',
-            "structure.interface[2].contact.profile.file: there is no file",
-        ),
-    ],
-)
-def test_refuses_unsupported_keys_of_interface_patch(old, new, message, tmp_path):
-    """Each fault is reported with its line and a remedy."""
-    text = CHAIN.replace(old, new)
-    assert text != CHAIN
-    (tmp_path / "chain.toml").write_text(text)
-    answer = run_cli("check", str(tmp_path / "chain.toml"))
-    assert answer.code == 2 and message in answer.err and "chain.toml:" in answer.err, answer.err

@@ -35,7 +35,7 @@ cycles = 2
 """
 )
 REFERENCE_LOOP = 1.84e-9  # Loop area [J] of an independent finite-element program, within 1 %.
-TOLERANCES = ("1e-2", "1e-3", "1e-4")
+TOLERANCES = ("1e-2", "1e-3")
 
 
 @pytest.fixture(scope="module")
@@ -62,14 +62,6 @@ def test_exact_tangential_stiffness_agrees_with_static_patch(results_by_toleranc
     sliding = results_by_tolerance["1e-3"].measures["tangential_stiffness"]
     assert sliding.value == pytest.approx(at_rest.value, rel=1e-12)
     assert sliding.error == pytest.approx(at_rest.error, rel=1e-9)
-
-
-def test_exact_arrays_of_patch_are_those_of_last_frame(results_by_tolerance):
-    """The arrays of the patch of a sliding bench are the fields of the last frame."""
-    result = results_by_tolerance["1e-3"]
-    for name in ("normal_stress", "gap", "shear_stress", "slip"):
-        array = getattr(result.patch, name)
-        assert array.any() and np.array_equal(array, result.fields[name][-1]), name
 
 
 def test_exact_stuck_flat_joint_has_no_loop_area():

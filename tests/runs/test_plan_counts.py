@@ -3,44 +3,11 @@
 import json
 from time import perf_counter
 
-import numpy as np
 import pytest
 from command_line import run_cli
 
 from patchfem import load, plan
 from patchfem.runs.run import run
-
-APPROACH_WITH_MOMENT = """[contact]
-length = "11.85 mm"
-width = "18.38 mm"
-height = "6.926 mm"
-substrate = "steel"
-element_size = "0.2 mm"
-[contact.approach]
-distance = "42.73 nm"
-[contact.load_line]
-moment = "10.78 kN m"
-[friction]
-law = "tanh"
-static = 0.552
-reference_speed = "2.391 mm/s"
-[structure]
-moving_mass = "0.821 kg"
-[[structure.mode]]
-name = "m0"
-frequency = "57.41 Hz"
-damping = 0.2
-slide = 1.0
-base = 0.8
-[drive]
-kind = "base"
-acceleration = "6.357 m/s^2"
-frequency = "218.5 Hz"
-cycles = 14
-[accuracy]
-tolerance = 0.003
-"""
-
 
 BARELY_STUCK = """[normal]
 load = "12.9 N"
@@ -78,47 +45,6 @@ def test_always_plan_estimates_bond_list_near_friction_limit(order):
     assert any(
         "bonds of order 0 keep the block from sliding" in text for text in run_plan.verdict
     ) == (order == "0.0")
-
-
-FORCED_BLOCK = """[normal]
-load = "100 N"
-[friction]
-law = "coulomb"
-static = 0.9
-kinetic = {kinetic}
-[structure]
-moving_mass = "1 kg"
-[[structure.mode]]
-name = "axial"
-frequency = "50 Hz"
-damping = 0.02
-slide = 1.0
-[drive]
-kind = "force"
-frequency = "50 Hz"
-force = "100 N"
-cycles = 200
-"""
-
-
-@pytest.mark.parametrize("kinetic, sticks", [(0.2, False), (0.85, True)])
-def test_exact_kinetic_coefficient_decides_about_sticking(kinetic, sticks):
-    """Whether a sliding block sticks again depends on the kinetic coefficient, in the run and in
-    the verdict of the plan."""
-    text = FORCED_BLOCK.format(kinetic=kinetic)
-    run_plan = plan(text)
-    result = run(load(text))
-    sentence = next(line for line in run_plan.verdict if line.startswith("D = 0.9 is below 1"))
-    assert (
-        (result.measures["stick_fraction"].value > 0)
-        == sticks
-        == ("alternates between stick and slip" in sentence)
-    )
-    assert ("does not limit the amplitude" in sentence) != sticks
-    assert run_plan.groups["D"] == pytest.approx(0.9) and run_plan.groups[
-        "D_kinetic"
-    ] == pytest.approx(kinetic)
-    assert run_plan.groups["knee_force"] == pytest.approx(4 / np.pi * kinetic * 100)
 
 
 PROBED = """[contact]

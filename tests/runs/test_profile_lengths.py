@@ -12,10 +12,6 @@ from patchfem.closed_forms import contact as closed_forms
 from patchfem.runs.patch import profile_points as trace
 from patchfem.scene import loads
 
-SKIN = (
-    '[contact.asperities]\nlaw = "linear"\nnormal_stiffness = "1e14 Pa/m"\ntangential_ratio = 0.8\n'
-)
-
 
 def run_profile(tmp_path, x, z, text, *settings):
     """Return the result of a scene with a profile x, z [m]."""
@@ -54,26 +50,6 @@ def test_exact_rounded_punch_as_profile_agrees_with_closed_form(tmp_path, tolera
         assert measure.error <= tolerance * reference or result.warnings
 
 
-@pytest.mark.share(0)
-@pytest.mark.parametrize("size", ["", "32 um"])
-def test_exact_stiffness_with_asperities_does_not_depend_on_mesh(tmp_path, size):
-    """Waves of the profile that are longer than 1/100 of the length form the gap on every mesh;
-    shorter ones belong to the asperity law. A warning names this length."""
-    x = np.linspace(-6.35e-3, 6.35e-3, 3176)
-    z = 0.2e-6 * np.cos(2 * np.pi * x / 1.27e-3) + 0.1e-6 * np.cos(2 * np.pi * x / 90e-6)
-    text = PIECE + 'load = "26 lbf"\nsubstrate = "steel"\n' + SKIN
-    uniform_mesh = run_profile(tmp_path, x, z, text, "contact.element_size=16 um").measures[
-        "normal_stiffness"
-    ]
-    result = run_profile(tmp_path, x, z, text, *([f"contact.element_size={size}"] if size else []))
-    stiffness = result.measures["normal_stiffness"]
-    assert abs(stiffness.value - uniform_mesh.value) <= stiffness.error + uniform_mesh.error
-    assert stiffness.value == pytest.approx(uniform_mesh.value, rel=5e-3)
-    assert any(
-        "waves longer than 127 um give the shape of the gap" in text for text in result.warnings
-    )
-
-
 # Contact length [m], approach [m], peak [Pa] and stiffness [N/m] of the independent program
 # studies/contact/order_four.py.
 CROWN_REFERENCE = (2 * 3.7177189e-4, 2.8687086e-7, 1.46972585e7, 3.66814797e10 * 12.7e-3)
@@ -104,30 +80,3 @@ def test_exact_profile_on_points_agrees_with_independent_program(tmp_path):
         value, error, _ = measures[name]
         assert abs(value - reference) <= error + 5e-6 * reference, name
         assert error <= 1e-3 * reference, name
-
-
-@pytest.mark.parametrize(
-    "pieces",
-    [
-        "contact.lower.coating=none",
-        pytest.param("contact.load_line.offset=1.5 mm", marks=pytest.mark.slow),
-        pytest.param("contact.plane=stress", marks=pytest.mark.slow),
-    ],
-)
-def test_exact_profile_on_points_agrees_with_mesh_within_errors(tmp_path, pieces):
-    """A profile with a wavelength of a tenth of the length, with free rotation, unlike pieces or
-    plane stress, agrees between points and elements."""
-    x = np.linspace(-6.35e-3, 6.35e-3, 1271)
-    z = 0.1e-6 * np.cos(2 * np.pi * x / 1.27e-3)
-    text = PIECE + 'load = "500 N"\nsubstrate = "steel"\n' + COATING
-    points = solve_profile_on_points(tmp_path, x, z, text, pieces)
-    uniform_mesh = run_profile(tmp_path, x, z, text, pieces, "contact.element_size=16 um").measures
-    # The shear stiffness of unlike pieces is computed on the mesh only.
-    assert len(points) == (11 if "lower" in pieces else 12)
-    for name, (value, error, _) in points.items():
-        assert (
-            abs(value - uniform_mesh[name].value)
-            <= error + uniform_mesh[name].error + uniform_mesh[name].floor
-        ), name
-        if name in ("approach", "pressure_peak", "normal_stiffness"):
-            assert error <= 2e-3 * abs(value), name

@@ -3,7 +3,6 @@ of its files."""
 
 import json
 import socket
-from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 from types import SimpleNamespace
@@ -12,17 +11,15 @@ import numpy as np
 import pytest
 import xarray as xr
 from command_line import run_cli
+from scene_runs import assert_agree, find_sentences, run_scene
 from scene_texts import BENCH, COULOMB, NONLOCAL, POINT, SHEAR, SLIDE, SMALL_PATCH, STRUCTURE
 from vtkmodules.util.numpy_support import vtk_to_numpy
 from vtkmodules.vtkCommonDataModel import vtkCompositeDataSet
 from vtkmodules.vtkIOHDF import vtkHDFReader
 
 from patchfem.effects import EFFECTS
-from patchfem.runs import choose_numerics
 from patchfem.runs.plan import plan
-from patchfem.runs.rig import rig
-from patchfem.runs.run import run
-from patchfem.scene import load, loads
+from patchfem.scene import load
 
 STUDIES = Path(__file__).parents[2] / "studies"
 LOAD, WIDTH, OMEGA = 115.653761996773, 0.0127, 2 * np.pi * 143
@@ -51,18 +48,6 @@ def run_case(tmp_path_factory):
         return results[name]
 
     return run_once
-
-
-@pytest.fixture
-def write_scene(tmp_path):
-    """Return a function that writes a scene to a file."""
-
-    def write_text(text, name="scene.toml"):
-        path = tmp_path / name
-        path.write_text(text, "utf-8")
-        return path
-
-    return write_text
 
 
 def read_netcdf(folder):
@@ -110,18 +95,6 @@ class FieldReader:
 
 
 # Files that every run writes.
-
-
-@pytest.mark.parametrize("name", SCENES)
-def test_exact_resolved_scene_equals_scene(run_case, name):
-    """The resolved scene of a results folder has the effects and values of the original scene."""
-    folder, _ = run_case(name)
-    original = load(folder.with_suffix(".toml"))
-    resolved = load(folder / "scene.resolved.toml")
-    assert (
-        resolved.effect_names() == original.effect_names()
-        and resolved.resolved() == original.resolved()
-    )
 
 
 @pytest.mark.parametrize("name", WITH_FIELDS)
@@ -240,36 +213,15 @@ def test_exact_every_row_of_elements_carries_the_load(run_case, name):
 # Results of two different ways that must agree.
 
 
-def test_exact_rigid_patch_agrees_with_point_contact(monkeypatch):
-    """For a rigid slide under constant load, the friction of every interface point adds up to that
-    of a point contact."""
-    text = SMALL_PATCH + NONLOCAL + STRUCTURE + STEPS
-    lumped = run(loads(text), estimate=False)
-    point = run(loads(POINT + NONLOCAL + STRUCTURE + STEPS), estimate=False)
-    with monkeypatch.context() as patched:
-        patched.setattr(
-            rig, "choose_numerics", lambda model: replace(choose_numerics(model), per_point=True)
-        )
-        per_point = run(loads(text), estimate=False)
-    assert not any("the shape of the patch does not affect" in text for text in per_point.warnings)
-    for name in (
-        "relative_displacement_amplitude",
-        "absolute_acceleration_peak",
-        "slip_amplitude",
-        "loop_area",
-        "friction_force_peak",
-        "equivalent_stiffness",
-    ):
-        assert per_point.measures[name].value == pytest.approx(
-            point.measures[name].value, rel=1e-10
-        )
-    for name in ("slide", "force", "slip", "acceleration"):
-        actual = getattr(per_point.response, name)
-        expected = getattr(point.response, name)
-        np.testing.assert_allclose(actual, expected, rtol=0, atol=1e-10 * np.abs(expected).max())
-    assert any("the shape of the patch does not affect" in sentence for sentence in lumped.warnings)
-    assert lumped.measures["loop_area"].value == pytest.approx(
-        point.measures["loop_area"].value, rel=1e-10
+def test_exact_rigid_patch_agrees_with_point_contact():
+    """A rigid patch under constant load has the motion of a point contact, and a warning says so."""
+    patch, point = (
+        run_scene(text + NONLOCAL + STRUCTURE + STEPS, estimate=False)
+        for text in (SMALL_PATCH, POINT)
+    )
+    assert find_sentences(patch.warnings, "the shape of the patch does not affect")
+    assert_agree(
+        patch.measures, point.measures, "loop_area slip_amplitude friction_force_peak", 1e-10
     )
 
 
@@ -285,63 +237,3 @@ def test_always_shipped_scenes_load_and_plan(path):
 
 
 # Exit codes.
-
-
-def test_refuses_too_long_run_and_unwritable_folder(write_scene, tmp_path):
-    """A run with a too long bond list, or with a results folder inside a file, ends with exit code 4."""
-    scene = write_scene(POINT + NONLOCAL + STRUCTURE)
-    answer = run_cli(
-        "run",
-        scene,
-        "--set",
-        "friction.reading=report",
-        "--set",
-        "drive.cycles=10000000",
-        "-o",
-        tmp_path / "out",
-    )
-    assert answer.code == 4 and "list of bonds" in answer.err
-    assert run_cli("run", write_scene(POINT + COULOMB + SLIDE), "-o", scene / "inside").code == 4
-
-
-def test_exact_unconverged_run_is_written_and_marked(write_scene, tmp_path, monkeypatch):
-    """A run with a step that did not converge is written with the outcome not_converged and without errors."""
-    from patchfem.points.march_rows import Total
-    from patchfem.points.time_march import March
-
-    out = tmp_path / "out"
-    advance = March.advance
-
-    def advance_with_fault(self, count):  # One step is recorded as not converged.
-        samples = advance(self, count)
-        self.system.totals[Total.UNSOLVED] += 1
-        return samples
-
-    monkeypatch.setattr(March, "advance", advance_with_fault)
-    answer = run_cli(
-        "run", write_scene(SCENES["rig patch"]), "-o", out, "-q", "--set", "drive.cycles=5"
-    )
-    assert answer.code == 3 and "above the permitted" in answer.err
-    summary = json.loads((out / "summary.json").read_text("utf-8"))
-    assert summary["outcome"] == "not_converged" and (out / "fields.vtkhdf").is_file()
-    amplitude = summary["measures"]["relative_displacement_amplitude"]
-    # The value is written, but no error is stated.
-    assert amplitude["error"] is None and amplitude["value"] is not None
-
-
-def test_refuses_to_replace_other_folders(write_scene, tmp_path, monkeypatch):
-    """A run does not replace a folder that is not a results folder, nor one that another run is writing."""
-    scene = write_scene(POINT + COULOMB + SLIDE)
-    user_folder = tmp_path / "mine"
-    user_folder.mkdir()
-    (user_folder / "data.txt").write_text("years of work", "utf-8")
-    for target in (user_folder, user_folder / "data.txt", tmp_path):
-        answer = run_cli("run", scene, "-o", target)
-        assert answer.code == 2 and len(answer.err.splitlines()) == 1
-    assert (user_folder / "data.txt").read_text("utf-8") == "years of work"
-    monkeypatch.chdir(user_folder)
-    for target in (".", "..", ""):
-        assert run_cli("run", scene, "-o", target).code == 2
-    (tmp_path / ".next.writer").write_text("1", "utf-8")  # The number of a running process.
-    locked_answer = run_cli("run", scene, "-o", tmp_path / "next")
-    assert locked_answer.code == 4 and "another run" in locked_answer.err

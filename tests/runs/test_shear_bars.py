@@ -1,7 +1,7 @@
 """Errors of random joints and rigs with partial slip cover results on much finer meshes and steps."""
 
 import pytest
-from shear_scenes import RIG, compare_chain, compare_joint, compare_rig
+from shear_scenes import compare_chain, compare_joint, compare_rig
 
 import patchfem as pf
 from patchfem.scene import loads
@@ -16,32 +16,6 @@ def test_always_errors_of_random_sheared_scenes_cover_fine_results(compare, seed
     from a single coarser mesh were up to 22 times too small."""
     rows = compare(seed, tmp_path)["rows"]
     assert len(rows) >= 7 and all(row.holds for row in rows), rows
-
-
-@pytest.mark.parametrize("kind", ["joint", "rig"])
-def test_exact_motion_on_two_elements_has_no_errors(kind):
-    """A motion on two elements has no errors, because there is no coarser mesh to estimate them
-    from. An earlier version stated 0.0113 +- 1e-12 J for a loop of 0.0128 J."""
-    text = pf.new("joint") if kind == "joint" else RIG
-    coarse = pf.run(
-        loads(
-            text,
-            "few.toml",
-            ["contact.element_size=25 mm" if kind == "joint" else "contact.element_size=8 mm"],
-        )
-    )
-    assert any(
-        "the 2 elements along the interface are too few" in warning for warning in coarse.warnings
-    )
-    assert all(
-        coarse.measures[name].error is None
-        for name in ("loop_area", "friction_force_peak", "pressure_peak")
-    )
-    rigid = pf.run(
-        loads(text.replace("[contact.shear]", ""), "few.toml", ["contact.element_size=8 mm"])
-    )
-    # The motion of a rigid patch does not depend on the mesh.
-    assert rigid.measures["loop_area"].error is not None
 
 
 def test_always_error_covers_too_few_shear_modes_with_remedy():

@@ -5,7 +5,6 @@ import pytest
 from scene_texts import DRIVE, MODE, NONLOCAL, POINT
 
 import patchfem as pf
-from patchfem.runs import choose_numerics
 
 SCENE = (
     POINT
@@ -17,91 +16,6 @@ GROWING_BONDS = (
     'bond_length = "5 um"\nkinetic = 0.2\nrest_growth = "10 m/s^2"\nslip_growth = "0.2 um"'
 )
 CONSTANT_BONDS = 'bond_length = "5 um"'
-
-
-SHORT_BONDS = (
-    'bond_length = "0.1 nm"\nkinetic = 0.2\nrest_growth = "10 m/s^2"\nslip_growth = "0.01 nm"'
-)
-LAW_NAME = 'law = "nonlocal"'
-ACCURACY_TABLE = "cycles = 30\n[accuracy]\n"
-
-
-@pytest.mark.parametrize(
-    "name, old, new",
-    [
-        ("hybrid", CONSTANT_BONDS, GROWING_BONDS),
-        ("hybrid", LAW_NAME, 'law = "lugre"\nstiffness = "1e7 N/m"\nstribeck_speed = "1 cm/s"'),
-        ("march", CONSTANT_BONDS, SHORT_BONDS),
-        ("march", CONSTANT_BONDS, CONSTANT_BONDS + "\norder = 0.5"),
-        ("march", "cycles = 30", ACCURACY_TABLE + "steps_per_cycle = 400"),
-        ("hybrid", 'waveform = "sine"', 'waveform = "levels"\nlevels = ["3 g", "5 g"]'),
-        ("hybrid", "slide = 1.0", 'slide = 1.0\n[structure.stiffening]\ncubic = "1e12 N/m^3"'),
-    ],
-)
-def test_exact_smooth_laws_use_engine_hybrid(name, old, new):
-    """Smooth friction laws are integrated by the engine `hybrid`, with drives in levels and nonlinear springs too; laws
-    that are too stiff or have no finite number of states, and prescribed steps, by the march."""
-    text = SCENE.replace(old, new)
-    text = text.replace(CONSTANT_BONDS, "") if old == LAW_NAME else text
-    text = text.replace('acceleration = "5 g"\n', "") if "levels" in new else text
-    assert choose_numerics(pf.build(text)).engine == name
-
-
-@pytest.mark.parametrize("law", [CONSTANT_BONDS, GROWING_BONDS])
-def test_always_hybrid_and_march_agree_within_errors(law):
-    """The engine `hybrid` and a march of 1600 steps per cycle agree within their errors."""
-    text = SCENE.replace(CONSTANT_BONDS, law)
-    hybrid = pf.run(text)
-    march = pf.run(text, **{"accuracy.steps_per_cycle": 1600})
-    assert (hybrid.extra["engine"], march.extra["engine"]) == (
-        "hybrid",
-        "march",
-    ) and hybrid.outcome == march.outcome
-    assert hybrid.measures.keys() == march.measures.keys()
-    for name, hybrid_measure in hybrid.measures.items():
-        march_measure = march.measures[name]
-        if hybrid_measure.value is not None and name not in ("work_check", "energy_balance"):
-            assert (
-                abs(hybrid_measure.value - march_measure.value)
-                <= hybrid_measure.error + 2 * march_measure.error + march_measure.floor
-            ), name
-    main = hybrid.measures["relative_displacement_amplitude"]
-    assert main.error < 1e-5 * main.value and hybrid.measures["energy_balance"].value < 1e-8
-    times = hybrid.window.time
-    # The histories contain the reversals between the samples.
-    steps = np.diff(times)
-    assert times.size > 400 and steps.min() > 0 and steps.max() == pytest.approx(steps[0], rel=1e-6)
-
-
-def test_always_vanishing_acceleration_at_reversal_agrees_with_march():
-    """A motion whose velocity and acceleration vanish together, so that it would reverse at once in
-    either direction, continues and agrees with a march."""
-    text = """
-[normal]
-load = "84.82758620689656 N"
-[friction]
-law = "nonlocal"
-static = 0.3
-bond_length = "1 um"
-[structure]
-moving_mass = "0.884 kg"
-mode = [{name = "axial", frequency = "143 Hz", damping = 0.003, slide = 1.0}]
-[drive]
-kind = "base"
-frequency = "143 Hz"
-acceleration = "33.333333333333336 m/s^2"
-cycles = 20
-"""
-    hybrid = pf.run(text)
-    marched = pf.run(text, **{"accuracy.method": "march"})
-    hybrid_measure, march_measure = (
-        run.measures["relative_displacement_amplitude"] for run in (hybrid, marched)
-    )
-    assert hybrid.extra["engine"] == "hybrid"
-    assert (
-        abs(hybrid_measure.value - march_measure.value)
-        <= hybrid_measure.error + march_measure.error
-    )
 
 
 STICKING_BONDS = """
@@ -205,13 +119,3 @@ def test_exact_run_that_ends_in_first_cycle_has_rising_times():
     for histories in (result.window, result.response):
         assert (np.diff(histories.time) > 0).all()
     assert np.abs(result.window.output).max() == pytest.approx(20e-6, rel=1e-9)
-
-
-def test_exact_part_of_a_cycle_does_not_change_a_steady_motion():
-    """Half a cycle more changes neither the amplitude nor the loop of a motion that repeats, and no measure is of the part
-    of a cycle alone."""
-    text = SCENE.replace("cycles = 30", "cycles = 300").replace("damping = 0.003", "damping = 0.05")
-    whole, longer = (pf.run(text, **{"drive.cycles": cycles}) for cycles in (300, 300.5))
-    for name in ("relative_displacement_amplitude", "loop_area", "friction_force_peak"):
-        one, other = whole.measures[name], longer.measures[name]
-        assert abs(one.value - other.value) <= one.error + other.error, name

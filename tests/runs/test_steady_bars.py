@@ -2,7 +2,6 @@
 not too large."""
 
 import numpy as np
-import pytest
 
 import patchfem as pf
 
@@ -77,35 +76,3 @@ def test_always_errors_of_balance_cover_and_are_sharp():
     is_small = error <= SMALL_ERROR * value
     is_known = true_error > 2 * reference_error
     assert np.mean((is_small | (error <= MAX_SHARP_RATIO * true_error))[is_small | is_known]) >= 0.7
-
-
-@pytest.mark.parametrize("harmonics", [1, 2])
-def test_always_error_of_few_harmonics_covers_reference(harmonics):
-    """An odd friction law has only odd harmonics, so that twice as many harmonics could show no
-    change; the error still covers the reference and is not below round-off."""
-    for seed in (400, 401):
-        run, fine = (
-            pf.run(draw_rig("tanh", seed), **{"accuracy.harmonics": n}).measures
-            for n in (harmonics, 63)
-        )
-        measure, reference = (m["relative_displacement_amplitude"] for m in (run, fine))
-        assert 1e-9 * reference.value <= reference.error < 1e-6 * reference.value
-        assert abs(measure.value - reference.value) <= measure.error + reference.error
-        assert measure.error < 0.5 * measure.value
-
-
-def test_exact_secant_stiffness_at_reversal():
-    """A law that depends on the velocity alone has no force at a reversal, so its secant stiffness
-    is zero; stuck elements have their own stiffness."""
-    viscous = pf.run(draw_rig("tanh", 4)).measures
-    assert (
-        abs(viscous["secant_stiffness"].value)
-        < 1e-6 * viscous["loop_area"].value / viscous["relative_displacement_amplitude"].value ** 2
-    )
-    stuck = pf.run(draw_rig("stiffening", 4), **{"drive.acceleration": "0.1 g"}).measures
-    limit = 0.3 * 116
-    length = float(draw_rig("stiffening", 4).split('bond_length = "')[1].split()[0]) * 1e-6
-    assert stuck["secant_stiffness"].value == pytest.approx(limit / length, rel=1e-12)
-    assert stuck["friction_force_peak"].value == pytest.approx(
-        limit / length * stuck["relative_displacement_amplitude"].value, rel=1e-9
-    )

@@ -3,16 +3,13 @@
 import numpy as np
 import pytest
 from support.scene_texts import (
-    COATED,
     DRIVE,
     FORCED,
-    KILOGRAM,
     MODE,
     PAIR,
     PLASTIC,
     POINT,
     SECOND,
-    SHEAR,
 )
 
 import patchfem as pf
@@ -62,30 +59,6 @@ def test_exact_long_run_settles_to_steady_state(text, cycles):
         < 1e-7 * run.measures["relative_displacement_amplitude"].value
     )
     assert np.abs(steady.extra["multipliers"]).max() < 1 and steady.extra["residual"] < 1e-9
-
-
-def test_exact_stress_of_sheared_patch_agrees_with_long_run():
-    """The shear stress of every node in the frames of the steady state agrees with that of a long
-    run."""
-    text = COATED + SHEAR + PLASTIC + KILOGRAM + DRIVE
-    keys = {"contact.element_size": "0.4 mm"}
-    keys |= {"drive.frequency": "120 Hz", "structure.mode.axial.damping": "0.05"}
-    steady, run = (
-        pf.run(text, **keys, **accuracy)
-        for accuracy in (STEADY, {"accuracy.method": "exact", "drive.cycles": "120"})
-    )
-    assert steady.extra["map"] == "shooting" and list_differences(steady, run, 1e-7) == []
-    steady_stress = steady.fields["shear_stress"][1:]
-    run_stress = run.fields["shear_stress"][1:]
-    np.testing.assert_allclose(steady_stress, run_stress, atol=1e-7 * np.abs(run_stress).max())
-    # The error includes that of the mesh.
-    assert steady.measures["relative_displacement_amplitude"].error > 0
-
-
-def test_always_unbounded_motion_grows():
-    """An undamped mode driven at its natural frequency is unbounded for a friction limit below pi/4 of the drive."""
-    changes = {"structure.mode.axial.damping": "0", "drive.acceleration": "8 g"}
-    assert pf.run(RIG, **STEADY, **changes).outcome == "grows"
 
 
 def test_exact_steady_amplitude_of_transient_run():

@@ -79,29 +79,3 @@ def test_order_of_stick_fraction_from_samples(law, omega, second_mode):
             assert phase is None and start is None
             continue
         assert abs((phase - start + pi / 2) % pi - pi / 2) < 4 * pi / steps
-
-
-UNDEFINED_MEASURES = (
-    "equivalent_stiffness",
-    "secant_stiffness",
-    "equivalent_damping",
-    "acceleration_distortion",
-    "slip_start_phase",
-)
-
-
-@pytest.mark.parametrize(
-    "load, reason", [("0.8 N", "never sticks"), ("8 N", "the whole interface sticks throughout")]
-)
-def test_exact_slip_phase_needs_stick_and_slip(load, reason):
-    """Far above the friction limit the block never sticks, far below it never slips: neither motion
-    has a phase of the first slip."""
-    scene = format_scene('law = "coulomb"', 1.0).replace("0.8 N", load).replace('"1 N"', '"4 N"')
-    measures = run(loads(scene)).measures
-    assert (
-        measures["slip_start_phase"].value is None and reason in measures["slip_start_phase"].reason
-    )
-    is_stuck = load == "8 N"
-    assert measures["stick_fraction"].value == is_stuck
-    for name in UNDEFINED_MEASURES[:3]:
-        assert (measures[name].value is None) is is_stuck, name

@@ -1,14 +1,9 @@
 """Blocks that stick under the law of the report: each step adds a group of bonds (a strip) to the list, in plan and run."""
 
-import re
-from time import process_time
-
 import numpy as np
 import pytest
 
 from patchfem import load, plan
-from patchfem.core import Missing
-from patchfem.runs.rig import bond_lists
 from patchfem.runs.run import run
 
 GROWTH_SENTENCE = "each reversal makes the list of bonds longer"
@@ -146,46 +141,3 @@ def test_exact_report_law_sticks_up_to_half_friction_limit(text, is_stuck):
     """Only with the law of the report, the plan predicts that a block sticks on a growing list of
     bonds, up to half of the friction limit."""
     assert any(GROWTH_SENTENCE in sentence for sentence in plan(text).verdict) is is_stuck
-
-
-LEVELS = (
-    MASSES[: MASSES.index("[drive]")]
-    + """[drive]
-kind = "force"
-waveform = "levels"
-mass = 1
-levels = ["7 N", "20 N"]
-frequency = "91.94 Hz"
-cycles = 1
-[accuracy]
-tolerance = 0.2
-"""
-)
-
-
-def test_always_plan_estimates_growing_bonds_under_levels():
-    """The plan estimates one strip per step; two are left of the subdivisions of a step. The largest level is
-    1/1.2 of the friction limit."""
-    run_plan = plan(LEVELS)
-    result = run(load(LEVELS), estimate=False)
-    counts = result.extra["book"]
-    assert any(GROWTH_SENTENCE in sentence for sentence in run_plan.verdict)
-    estimate = run_plan.unknowns["bond_list_about"]
-    assert estimate < counts["strips"] < 2.5 * estimate < counts["substeps"]
-
-
-def test_refuses_stuck_block_with_too_long_bond_list(monkeypatch):
-    """The computing time grows with the square of the number of cycles. The run is stopped early,
-    with an estimate of its time."""
-    scene = load(RIG.format(reading="report", push=5.739).replace("cycles = 6", "cycles = 600"))
-    start = process_time()
-    assert GROWTH_SENTENCE in str(plan(scene))
-    monkeypatch.setattr(bond_lists, "MAX_LIST_SECONDS", 3.0)
-    with pytest.raises(
-        Missing,
-        match=r"the list of bonds would need a computing time of about \d+ s, more than the "
-        r"limit of 3 s; lower drive.cycles",
-    ) as error:
-        run(scene, estimate=False)
-    assert float(re.search(r"about (\d+) s", str(error.value))[1]) >= 3
-    assert process_time() - start < 30

@@ -18,7 +18,7 @@ length = "6 mm"
 width = "10 mm"
 height = "6 mm"
 load = "{load!r} N"
-element_size = "8 um"
+element_size = "10 um"
 substrate = "steel"
 [contact.crown]
 radius = "14.5 mm"

@@ -5,7 +5,6 @@ import numpy as np
 import pytest
 
 import patchfem as pf
-from patchfem.structure.tones import count_beat_cycles
 
 MODE = {"name": "axial", "frequency": 100.0, "damping": 0.02, "slide": 1.0}
 RIG = {
@@ -67,31 +66,3 @@ def test_exact_energies_under_two_tones_balance():
     assert measures["energy_balance"].value < 1e-7
     assert measures["energy_dissipated"].value > 0
     assert measures["work_check"].value < 1e-7
-
-
-@pytest.mark.parametrize(
-    "frequencies, cycles",
-    [((96.0, 102.0), 16), ((0.3, 0.2), 3)],
-)
-def test_exact_beat_is_shortest_common_period(frequencies, cycles):
-    """The beat is the shortest number of cycles after which all tones repeat."""
-    assert count_beat_cycles(frequencies) == cycles
-
-
-@pytest.mark.parametrize(
-    "changes, message",
-    [
-        ({"kind": "force"}, "can only shake the base"),
-        ({"phases": ["0 deg"] * 3}, "3 values for 2 values of `frequencies`"),
-        ({"frequencies": None}, "waveform 'tones' needs this key"),
-        ({"accelerations": ["0 g", "0 g"]}, "nothing moves"),
-        ({"frequencies": [96.0, "1 um"]}, "frequency"),
-    ],
-)
-def test_refuses_faulty_tones(changes, message):
-    """Tones with missing, contradictory or impossible keys are refused."""
-    drive = {name: value for name, value in (RIG["drive"] | changes).items() if value is not None}
-    with pytest.raises(pf.PatchfemError, match=message):
-        pf.run(RIG | {"drive": drive})
-    with pytest.raises(pf.PatchfemError, match="under a sine"):
-        pf.run(RIG, **{"accuracy.method": "harmonic"})

@@ -68,28 +68,3 @@ def test_exact_fields_of_sheared_patch_satisfy_friction_law():
         assert (stretch > 0).all() and stretch.max() <= 1 + 1e-6
         n_checked += in_contact.sum()
     assert n_checked > 100
-
-
-def test_exact_holder_spring_of_rigid_piece_is_one_mode():
-    """The tangential spring of the holder with a rigid piece is one mode for any number of shear
-    modes; a very stiff spring changes nothing."""
-    stiff_spring, without_spring = (
-        run_rig(*SETTINGS[:2], *settings)
-        for settings in (["contact.holder.tangential_stiffness=1e14 N/m"], [])
-    )
-    assert displacement_amplitude(stiff_spring) == pytest.approx(
-        displacement_amplitude(without_spring), rel=1e-5
-    )
-    one_mode, many_modes = (
-        run_rig(
-            *SETTINGS[:2],
-            "contact.holder.tangential_stiffness=2e7 N/m",
-            f"accuracy.shear_modes={k}",
-        )
-        for k in (1, 16)
-    )
-    assert (
-        displacement_amplitude(one_mode) == displacement_amplitude(many_modes)
-        and abs(displacement_amplitude(one_mode) / displacement_amplitude(without_spring) - 1)
-        > 0.01
-    )

@@ -3,10 +3,9 @@ and closed forms."""
 
 import numpy as np
 import pytest
-from scene_texts import COATED, COULOMB, MODE, PIECE, list_mistakes
+from scene_texts import COATED, COULOMB, MODE, PIECE
 
 import patchfem as pf
-from patchfem.runs.rig.strips import estimate_lateral_motion
 from patchfem.scene import loads
 
 STRIPS = "[contact.strips]\ncount = 4\n"
@@ -98,17 +97,6 @@ def test_exact_strips_of_rig_wear_by_their_own_slip():
     assert volumes == pytest.approx(1e-14 * LOAD / 4 * 4 * expected * 1e3, rel=5e-3)
     (note,) = [note for note in result.extra["notes"] if "across x" in note]
     # Lateral motion lengthens the path by the load-weighted mean of (20 x)^2/2.
-    lateral_amplitude, fraction = estimate_lateral_motion(result.patch, result.window, 1 / 143)
-    assert lateral_amplitude == pytest.approx(
-        20 * 6.35e-3 * result.measures["relative_displacement_amplitude"].value, rel=0.05
-    )
     load = result.patch.strips.force.sum(axis=0)
-    expected_fraction = load @ (20 * result.patch.x) ** 2 / (2 * load.sum())
-    assert fraction == pytest.approx(expected_fraction, rel=0.01)
+    fraction = load @ (20 * result.patch.x) ** 2 / (2 * load.sum())
     assert f"lengthen the sliding path of the last cycle by {100 * fraction:.2g} %" in note
-
-
-def test_refuses_wear_of_strips_with_shear():
-    """Wear of strips with [contact.shear] is refused."""
-    sheared = TILTED + STRIPS + "[contact.shear]\n" + COULOMB + MODE + BASE_DRIVE + WEAR
-    assert any("contact.strips and [contact.shear]" in line for line in list_mistakes(sheared))

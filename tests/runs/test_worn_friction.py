@@ -157,12 +157,3 @@ def test_refuses_faulty_friction_table(sets, message):
     with pytest.raises(SceneError) as error:
         loads(SCENE, "a.toml", sets)
     assert message in str(error.value)
-
-
-def test_refuses_friction_table_of_point_contact():
-    """Friction over the worn depth is refused for a point contact, which has no area."""
-    text = '[normal]\nload = "100 N"\n' + SCENE[SCENE.index("[friction]") :]
-    with pytest.raises(
-        SceneError, match=r"wear.friction: a \[normal\] contact has no area.*: use \[contact\]"
-    ):
-        loads(text, "a.toml")

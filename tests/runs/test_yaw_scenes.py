@@ -2,88 +2,10 @@
 
 import numpy as np
 import pytest
-from scene_texts import DRIVE, MODE, PIECE, list_mistakes
+from scene_texts import DRIVE, MODE, PIECE
 
 from patchfem import load
 from patchfem.runs.run import run
-
-TEXT = (
-    PIECE
-    + """\
-load = "26 lbf"
-element_size = "1 mm"
-substrate = "Ti-8Al-1Mo-1V"
-[contact.strips]
-count = 4
-roll = "{roll}"
-[friction]
-law = "{law}"
-static = 0.3
-{keys}
-"""
-    + MODE
-    + """\
-[[structure.mode]]
-name = "yaw"
-frequency = "129 Hz"
-damping = 0.003
-slide = 0.0
-yaw = "{yaw}"
-"""
-    + DRIVE
-    + """\
-[accuracy]
-method = "{method}"
-"""
-)
-
-
-def run_with_measures(law="coulomb", keys="", yaw="30 rad/m", roll="0.01 mrad", method="auto"):
-    """Return the result of a scene and its measures."""
-    result = run(load(TEXT.format(law=law, keys=keys, yaw=yaw, roll=roll, method=method)))
-    return result, result.measures
-
-
-def test_exact_yawing_strips_agree_between_engines():
-    """For rolled strips with Coulomb's law the exact engine and the march agree within their
-    errors; the yaw moment is sum y f of the friction forces."""
-    result, exact = run_with_measures()
-    _, march = run_with_measures(method="march")
-    for name in (
-        "relative_displacement_amplitude",
-        "loop_area",
-        "friction_work",
-        "absolute_acceleration_peak",
-    ):
-        a = exact[name]
-        b = march[name]
-        assert abs(a.value - b.value) <= a.error + 3 * b.error + 1e-3 * abs(a.value), name
-    extra = result.window.extra
-    assert extra["slides"].shape[1] == 4
-    offsets = (np.arange(4) - 1.5) * 12.7e-3 / 4
-    np.testing.assert_allclose(extra["yaw_moment"], extra["forces"] @ offsets, atol=1e-12)
-    np.testing.assert_allclose(result.window.force, extra["forces"].sum(axis=1), atol=1e-9)
-    # Displacement of strip j: q_j = q - y_j yaw.
-    yaw_angle = (extra["slides"][:, 0] - extra["slides"][:, -1]) / (offsets[-1] - offsets[0])
-    assert np.abs(yaw_angle).max() > 1e-4
-
-
-def test_refuses_yaw_without_strips_or_with_bond_list():
-    """A yaw mode is refused without strips and with a law that needs a list of bonds."""
-    text = TEXT.format(law="coulomb", keys="", yaw="30 rad/m", roll="0 rad", method="auto")
-    assert any(
-        "structure.mode.yaw.yaw" in line and "contact.strips" in line
-        for line in list_mistakes(text.replace('[contact.strips]\ncount = 4\nroll = "0 rad"\n', ""))
-    )
-    with_bond_list = TEXT.format(
-        law="nonlocal",
-        keys='bond_length = "1 um"\norder = 2',
-        yaw="30 rad/m",
-        roll="0 rad",
-        method="auto",
-    )
-    assert any("structure.mode.yaw.yaw" in line for line in list_mistakes(with_bond_list))
-
 
 SHEARED_TEXT = (
     PIECE
@@ -124,30 +46,6 @@ def run_sheared_strips(law, strips="", yaw="", method="march"):
     return run(
         load(SHEARED_TEXT.format(law=law, strips=strips, yaw=yaw, method=method)), estimate=False
     )
-
-
-@pytest.mark.parametrize("law", ['"elastic-plastic"\nbond_length = "1 um"'])
-@pytest.mark.parametrize("method", ["march", "exact", "harmonic"])
-def test_exact_level_strips_with_shear_agree_with_patch(law, method):
-    """With four strips, each is four times as compliant and carries a quarter of the load: the
-    measures agree with those of the patch."""
-    patch_measures = run_sheared_strips(law, method=method).measures
-    cases = [run_sheared_strips(law, STRIPS.format("0 rad"), method=method)]
-    if method == "march":
-        cases.append(run_sheared_strips(law, STRIPS.format("0 rad"), YAW_MODE))
-    for result in cases:
-        for name in (
-            "relative_displacement_amplitude",
-            "absolute_acceleration_peak",
-            "loop_area",
-            "friction_work",
-            "slip_amplitude",
-            "friction_force_peak",
-            "tangential_stiffness",
-        ):
-            assert result.measures[name].value == pytest.approx(
-                patch_measures[name].value, rel=5e-12
-            ), name
 
 
 @FRICTION_LAWS
@@ -221,22 +119,3 @@ def step_yielding_points(compliance, limit, length, slide):
             remaining = 0.0 if step == abs(remaining) else remaining - np.sign(remaining) * step
         history.append(forces.sum())
     return np.array(history)
-
-
-def test_refuses_unsupported_strips_with_shear():
-    """Strips with [contact.shear] are refused with nonlocal friction, kinetic friction or a holder spring."""
-    for law, key in (
-        ('"nonlocal"\nbond_length = "1 um"', "contact.strips"),
-        ('"coulomb"\nkinetic = 0.2', "kinetic"),
-    ):
-        text = SHEARED_TEXT.format(
-            law=law, strips=STRIPS.format("0 rad"), yaw=YAW_MODE, method="auto"
-        )
-        assert any(key in line for line in list_mistakes(text))
-    with_holder = SHEARED_TEXT.format(
-        law='"coulomb"',
-        strips=STRIPS.format("0 rad") + '[contact.holder]\ntangential_stiffness = "5e6 N/m"\n',
-        yaw="",
-        method="auto",
-    )
-    assert any("contact.strips" in line for line in list_mistakes(with_holder))

@@ -1,0 +1,252 @@
+"""Many models solved together, and models on shared meshes, agree with single runs of each model."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from point_cases import LAWS, MANY, compare_answers, draw_points
+from scene_runs import load_scene
+from scene_texts import (
+    BENCH,
+    COATED,
+    COATING,
+    COULOMB,
+    CROWNED_JOINT,
+    MODE,
+    PIECE,
+    PLASTIC,
+    POINT,
+    SHEAR,
+    SHORT,
+    SLIDE,
+)
+
+import patchfem as pf
+from patchfem.core import PatchfemError
+from patchfem.runs import FAILED_OUTCOME, with_shared_meshes
+from patchfem.runs.batch import batches, lumped, one_by_one
+from patchfem.runs.patch import store
+
+PATCH = COATED + '[contact.tilt]\nangle = "0.02 mrad"\n'
+SINE = '[drive]\nkind = "base"\nfrequency = "143 Hz"\nacceleration = "5 g"\ncycles = 20\n'
+YAW = '[[structure.mode]]\nname = "yaw"\nfrequency = "129 Hz"\ndamping = 0.003\nslide = 0.095\n'
+SKIN = (
+    '[contact.asperities]\nlaw = "linear"\nnormal_stiffness = "1e14 Pa/m"\ntangential_ratio = 0.8\n'
+)
+WEAR = '[wear]\ncoefficient = "1e-14 m^2/N"\ncycles = 1000\n'
+SHEARED_RIG = PATCH + SHEAR + PLASTIC + MODE + YAW + SINE
+TEXTS = {
+    "static": PATCH,
+    "static skin": PATCH + SKIN,
+    "harmonic": SHEARED_RIG + '[accuracy]\nmethod = "harmonic"\n',
+    "patch": SHEARED_RIG,
+    "patch coulomb": PATCH + SHEAR + COULOMB + MODE + YAW + SINE,
+    "bench": PATCH + SHEAR + PLASTIC + SLIDE,
+    "bench wear": PATCH + PLASTIC + SLIDE + WEAR,
+}
+# Relative tolerance of measures of the pressure at an end of uncoated pieces, a mean over one cell.
+END_TOLERANCES = {"pressure_peak": 1e-9, "loaded_fraction": 1e-9}
+RIG = POINT + COULOMB + SHORT
+STEADY = "relative_displacement_amplitude_steady"
+
+
+def assert_equal_case(results, case: int, single, rel: float = 0.0) -> None:
+    """Assert that a case of a batch has the texts, reasons and measures of a single run of one case."""
+    assert results.outcome[case] == single.outcome[0] != FAILED_OUTCOME, results.messages
+    for name in ("warnings", "notes", "numerics"):
+        assert getattr(results, name).get(case) == getattr(single, name).get(0), name
+    names = {name for name in single.values if single.has(name, 0)}
+    assert names == {name for name in results.values if results.has(name, case)}
+    for name, values in single.values.items():
+        assert results.reasons.get(name, {}).get(case) == single.reasons.get(name, {}).get(0)
+        limit = rel and END_TOLERANCES.get(name, rel) * np.nansum(
+            [abs(values[0]), single.floors[name][0]]
+        )
+        for kind in ("values", "errors", "floors"):
+            actual, expected = (getattr(one, kind)[name] for one in (results, single))
+            np.testing.assert_allclose(actual[case], expected[0], 0, limit, err_msg=name)
+
+
+def solve_single(model):
+    """Return the results of a single run that starts with an empty cache."""
+    store.clear_cache()
+    return one_by_one.solve([model])
+
+
+@pytest.mark.parametrize("kind", TEXTS)
+def test_exact_batch_agrees_with_single_runs(kind):
+    """A batch of each kind of run agrees with single runs of its cases on the same mesh, which share a tilt."""
+    sets = {"contact.tilt.angle": 3e-4}
+    sets |= {"drive.acceleration": 40.0} if "drive" in TEXTS[kind] else {}
+    sets |= {"slide.amplitude": 2e-5} if "bench" in kind else {}
+    loads = (50.0, 400.0)
+    models = with_shared_meshes(
+        [pf.build(TEXTS[kind], **sets, **{"contact.load": load}) for load in loads]
+    )
+    batch = batches.solve_models(models)
+    for case, model in enumerate(models):
+        assert_equal_case(batch, case, solve_single(model), 1e-12)
+
+
+# ---- points that are marched together
+
+
+@pytest.mark.share(2, 4, 5)
+@pytest.mark.parametrize("law", LAWS)
+def test_always_95_of_100_measures_lie_within_both_errors(law):
+    """Outcomes are those of single runs, and at least 95 % of the measures agree within the sum of both errors."""
+    cases = draw_points(law, 11, 12)
+    results = batches.solve_models(cases, n_study_cases=MANY)
+    assert sum(one["engine"] == lumped.ENGINE for one in results.numerics.values()) >= 4
+    singles = one_by_one.solve(cases)
+    assert (results.outcome == singles.outcome).all() and not results.notes
+    rows = [row for case_rows in compare_answers(results, singles) for row in case_rows]
+    assert np.mean([row.holds for row in rows]) >= 0.95
+
+
+# Changes after which a rig is not one mode with one point under a sine, or has no motion.
+OTHER_KINDS = [
+    "wear.coefficient=1e-14 m^2/N; wear.cycles=1000",
+    "structure.travel=10 um",
+    "drive.cycles=20.5",
+    "drive.cycles=12",
+    "structure.mode.axial.output=0",
+    "structure.mode.axial.gauge=0.5",
+    "friction.law=convolution; friction.bond_length=1 um",
+    "normal.amplitude=10 N; normal.frequency=50 Hz",
+    "structure.stiffening.cubic=1e12 N/m^3",
+    "accuracy.method=march",
+    "normal.load=0 N",
+]
+
+
+@pytest.mark.parametrize("changes", OTHER_KINDS)
+def test_exact_other_kinds_of_motion_run_alone(changes):
+    """A rig that is not one mode with one sliding point under a sine runs alone, also in a large study."""
+    model = pf.build(load_scene(RIG, changes))
+    results = batches.solve_models([model], n_study_cases=MANY)
+    assert_equal_case(results, 0, one_by_one.solve([model]))
+
+
+OUTCOMES = {  # Changes of the rig: outcome, and whether the steady amplitude is estimated.
+    "structure.mode.axial.damping=0; normal.load=1 lbf": ("grows", False),
+    "drive.cycles=60; structure.mode.axial.damping=0.01; normal.load=12 lbf": ("transient", True),
+    "drive.cycles=200; drive.acceleration=40 g; normal.load=1 lbf; drive.frequency=120 Hz": (
+        "transient",
+        True,
+    ),
+    "structure.mode.axial.damping=0.3": ("steady", False),
+    "drive.acceleration=0.1 g": ("stuck", False),
+    "drive.onset_length=0.01 mil": ("steady", True),
+}
+
+
+@pytest.mark.parametrize("law", ["coulomb", "elastic-plastic; friction.bond_length=1 um"])
+@pytest.mark.parametrize("changes", OUTCOMES)
+def test_always_outcomes_agree_with_single_runs(changes, law):
+    """A batch gives the outcome of a single run, whether a motion grows, settles, beats, is steady or sticks.
+
+    It has the same measures, reasons and warnings, except those on the size of errors, which are other numbers; values
+    agree within the sum of both errors.
+    """
+    outcome, has_steady_estimate = OUTCOMES[changes]
+    model = pf.build(load_scene(RIG, f"{changes}; friction.law={law}"))
+    batch, single = batches.solve_models([model], n_study_cases=MANY), one_by_one.solve([model])
+    assert batches.find_group(model, MANY).key and batch.outcome[0] == single.outcome[0]
+    texts = [text for text in single.warnings.get(0, ()) if "has an estimated error" not in text]
+    assert list(batch.warnings.get(0, ())) == texts and batch.reasons == single.reasons
+    # The extrapolation of a motion that has almost settled is a measure if its error is large enough.
+    rows = compare_answers(batch, single)[0]
+    assert all(row.holds for row in rows if law == "coulomb" or row.name != STEADY)
+    if law == "coulomb":
+        assert batch.outcome[0] == outcome and (STEADY in batch.values) == has_steady_estimate
+        assert bool(batch.warnings) == ("onset_length" in changes)
+
+
+def test_exact_mixed_cases_agree_with_single_runs_in_order():
+    """Cases of different kinds keep their order and agree with single runs; a model that is an error fails with its
+    message."""
+    models = [
+        pf.build(text)
+        for text in (RIG, BENCH, POINT + PLASTIC + SHORT, RIG.replace("26 lbf", "1 N"))
+    ]
+    refused = PatchfemError("friction.static: refused here")
+    results = batches.solve_models([models[0], refused, *models[1:]])
+    assert results.outcome[1] == FAILED_OUTCOME and results.messages == {1: str(refused)}
+    for case, model in zip((0, 2, 3, 4), models):
+        assert_equal_case(results, case, one_by_one.solve([model]))
+
+
+@pytest.mark.parametrize("fault", [ZeroDivisionError("a fault"), PatchfemError("refused here")])
+def test_always_fault_of_batch_falls_back_to_single_runs(fault, monkeypatch):
+    """If computing cases together fails, they run one by one. A fault is printed once and noted for each rig; an error
+    of a case is left to its single run."""
+
+    def fail(models, say):
+        raise fault
+
+    monkeypatch.setattr(batches, "MIN_CASES", 1)
+    monkeypatch.setattr(lumped, "solve", fail)
+    models = [pf.build(text) for text in (RIG, BENCH, RIG)]
+    messages = []
+    results = batches.solve_models(models, report=messages.append)
+    is_noted = isinstance(fault, ZeroDivisionError)
+    for case, model in enumerate(models):
+        notes = results.notes.pop(case, [])
+        has_note = any("ZeroDivisionError" in note for note in notes)
+        assert has_note == (is_noted and case != 1)
+        single = one_by_one.solve([model])
+        results.notes[case] = single.notes.get(0)
+        assert_equal_case(results, case, single)
+    sentences = [text for text in messages if text.startswith("2 cases are run one by one")]
+    assert len(sentences) == is_noted
+
+
+# ---- shared meshes
+
+TILTED = PIECE + 'load = "100 N"\nsubstrate = "Ti-8Al-1Mo-1V"\n' + COATING
+LOOP = '[slide]\nkind = "sine"\namplitude = "0.2 um"\nfrequency = "1 Hz"\ncycles = 3\n'
+
+
+def build_family(text: str, changes: str, key: str, values) -> list:
+    """Return models of a scene for several values of a key."""
+    return [pf.build(load_scene(text, f"{changes}; {key}={value}")) for value in values]
+
+
+def test_always_shared_mesh_meets_tolerance_of_every_case():
+    """The mesh is refined until the errors of the worst case are below the tolerance."""
+    cases = build_family(
+        TILTED, "accuracy.tolerance=1e-3", "contact.tilt.angle", ("2e-5 rad", "1e-3 rad")
+    )
+    for case in with_shared_meshes(cases):
+        measures = pf.run(case).measures
+        for measure in (measures["pressure_peak"], measures["normal_stiffness"]):
+            assert measure.error <= 1e-3 * measure.value + measure.floor
+
+
+@pytest.mark.filterwarnings("error")
+def test_always_case_that_fails_keeps_shared_mesh_of_others():
+    """A case that is refused, has its own mesh or tips over does not change the shared mesh of the others."""
+    valid = build_family(
+        TILTED, "accuracy.tolerance=1e-2", "contact.tilt.angle", ("1e-5 rad", "1e-4 rad")
+    )
+    patch = valid[0].patch.with_loading(load=100.0, line_moment=10.0, can_rotate=True)
+    tipping = replace(valid[0], patch=patch)
+    alone = pf.build(load_scene(TILTED, "contact.element_size=0.4 mm"))
+    fault = PatchfemError("a case that was refused")
+    models = with_shared_meshes([*valid, fault, alone, tipping])
+    assert models[2] is fault and models[3].patch.mesh.shared is None
+    assert models[0].patch.mesh.shared.name == with_shared_meshes(valid)[0].patch.mesh.shared.name
+    with pytest.raises(PatchfemError, match="tips over"):
+        pf.run(models[4])
+
+
+def test_always_loop_errors_of_sweep_are_close_to_single_runs():
+    """On a shared mesh the error of the loop area is at most 1.5 times that of a single run, and the values agree."""
+    cases = build_family(
+        CROWNED_JOINT + LOOP, "accuracy.tolerance=1e-2", "slide.amplitude", ("0.2 um", "10 um")
+    )
+    for pair in zip(cases, with_shared_meshes(cases), strict=True):
+        single, shared = (pf.run(case).measures["loop_area"] for case in pair)
+        assert shared.error <= 1.5 * single.error
+        assert abs(shared.value - single.value) <= shared.error + single.error

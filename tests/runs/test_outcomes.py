@@ -1,0 +1,334 @@
+"""Outcome of runs, engine that they choose, and the sentences that warn of what a reader would not expect."""
+
+import re
+
+import numpy as np
+import pytest
+from scene_runs import load_scene, run_scene
+from scene_texts import (
+    COATED,
+    COULOMB,
+    DRIVE,
+    KILOGRAM,
+    MODE,
+    NONLOCAL,
+    PIECE,
+    PLASTIC,
+    POINT,
+    SECOND,
+    SHEAR,
+    SLIDE,
+    STRUCTURE,
+    SWEEP,
+    make_friction_table,
+)
+
+import patchfem as pf
+
+SINE = '[slide]\nkind = "sine"\nfrequency = "1 Hz"\ncycles = 1\namplitude = "1 um"\n'
+COULOMB_RIG = POINT + COULOMB + STRUCTURE
+PLASTIC_RIG = POINT + PLASTIC + STRUCTURE
+TANH_RIG = POINT + make_friction_table("tanh") + STRUCTURE
+COATED_RIG = COATED + COULOMB + STRUCTURE
+TILTED = COATED + '[contact.tilt]\nangle = "0.02 mrad"\n'
+RELEASE = MODE + '[drive]\nkind = "free"\ndisplacement = "0.3 mm"\nduration = "0.1 s"\n'
+STEP = MODE + '[drive]\nkind = "force"\nwaveform = "step"\nforce = "100 N"\nduration = "0.1 s"\n'
+SWEPT = MODE + SWEEP.replace("3 g", "6 g").replace("80", "60").replace("120", "135")
+LEVELS = (
+    MODE + '[drive]\nkind = "base"\nwaveform = "levels"\nfrequency = "143 Hz"\n'
+    'levels = ["3 g", "6 g"]\ncycles = 15\n'
+)
+BOUNDED_SWEEP = (
+    MODE + SWEEP.replace("3 g", "0.1 g").replace("80", "1") + '[accuracy]\nmethod = "harmonic"\n'
+)
+TWO_MODES = POINT + COULOMB + MODE + SECOND + DRIVE
+DAMPED = "structure.mode.axial.damping=0.3; "
+UNDAMPED = "structure.mode.axial.damping=0; "
+HARMONIC = "accuracy.method=harmonic; "
+GROWING = "friction.kinetic=0.06; friction.rest_growth=2 m/s^2; friction.slip_growth=50 um; friction.rest_speed=10 um/s; "
+DWELL = (
+    POINT + NONLOCAL.replace("1 um", "2 um") + '[slide]\nkind = "dwell"\nspeed = "10 mm/s"\n'
+    'distance = "200 um"\nhold = "1 ms"\ndistance_after = "20 um"\n'
+    "[accuracy]\nsteps_per_cycle = 2000\n"
+)
+TILTED_COLUMN = (
+    '[contact]\nlength = "10 mm"\nwidth = "1 m"\nheight = "{} mm"\nload = "{} N"\nelement_size = "0.5 mm"\n'
+    'substrate = {{young = "100 GPa", poisson = 0.3, density = "4000 kg/m^3"}}\n'
+)
+# Euler's load [N] of a clamped-free column 100 mm high, pi^2 E' I/(4 H^2) with I = width length^3/12.
+EULER = np.pi**2 * 100e9 / 0.91 * (1e-2**3 / 12) / (4 * 0.1**2)
+BLOCK = PIECE + 'load = "26 lbf"\nsubstrate = "steel"\nelement_size = "0.5 mm"\n'
+IWAN_RIG = POINT + make_friction_table("iwan") + STRUCTURE
+BOUC_WEN = (
+    POINT + '[friction]\nlaw = "bouc-wen"\nstatic = 0.3\nstiffness = "1e8 N/m"\nexponent = 2.0\n'
+    '[slide]\nkind = "sine"\namplitude = "2 um"\nfrequency = "1 Hz"\ncycles = 1\n'
+)
+# Scene, changes, outcome, a pattern of one of its warnings and notes, and a pattern of none of them.
+RUNS = [
+    # ---- drives
+    (POINT + COULOMB + RELEASE, "", "stuck", "", ""),
+    (RELEASE, "", "transient", "", ""),
+    (RELEASE, DAMPED, "steady", "", ""),
+    (POINT + COULOMB + STEP, "drive.duration=0.5 s", "stuck", "", ""),
+    (STEP, DAMPED, "steady", "", ""),
+    (POINT + COULOMB + SWEPT, "", "transient", "changes until the end", ""),
+    (SWEPT, "drive.from=100 Hz; drive.to=143 Hz", "transient", "changes until the end", ""),
+    (POINT + COULOMB + LEVELS, "", "transient", "", ""),
+    (POINT + COULOMB + LEVELS, 'drive.levels=["6 g", "3 g"]; drive.cycles=80', "stuck", "", ""),
+    (POINT + PLASTIC + RELEASE, "", "stuck", "", ""),
+    (PLASTIC_RIG, UNDAMPED + HARMONIC + "drive.acceleration=8 g", "grows", "", ""),
+    # ---- ends of a run
+    (
+        COULOMB_RIG,
+        "structure.travel=5 mm; structure.stiffening.cubic=-1e14 N/m^3; drive.acceleration=60 g",
+        "exceeds_travel",
+        "softening spring",
+        "",
+    ),
+    (
+        COULOMB_RIG,
+        "structure.stiffening.cubic=-1e14 N/m^3; drive.acceleration=60 g",
+        "grows",
+        "softening spring",
+        "",
+    ),
+    (COATED_RIG, "drive.acceleration=60 g", "leaves_contact", "", ""),
+    (COATED_RIG, HARMONIC + "drive.acceleration=60 g", "leaves_contact", "", ""),
+    (
+        COATED + COULOMB + LEVELS,
+        'drive.levels=["5 g", "60 g", "5 g"]',
+        "leaves_contact",
+        "",
+        "",
+    ),
+    (
+        COATED_RIG,
+        UNDAMPED + "drive.acceleration=9 g; drive.cycles=100; wear.coefficient=1e-14 m^2/N; wear.cycles=9",
+        "leaves_contact",
+        "nothing was worn",
+        "",
+    ),
+    (
+        COULOMB_RIG,
+        UNDAMPED + "drive.acceleration=9 g; drive.cycles=100; wear.coefficient=1e-14 m^2/N; wear.cycles=9",
+        "grows",
+        "nothing was worn",
+        "",
+    ),
+    # ---- effects outside the model
+    (COATED + COULOMB + SINE, "slide.amplitude=1.1 mm", "done", "", "^the slide amplitude"),
+    (
+        COATED + COULOMB + SINE,
+        "slide.amplitude=12.573 mm",
+        "done",
+        "^the slide amplitude, 12.6 mm, is 0.99 of the contact length 12.7 mm",
+        "",
+    ),
+    (COATED + COULOMB + SINE, "slide.amplitude=12.827 mm", "leaves_contact", "is 1 of", ""),
+    (
+        TILTED + COULOMB + SINE,
+        "slide.amplitude=3 mm",
+        "done",
+        r"^the slide amplitude, 3 mm, is 0.\d+ of the contact length [89]\.\d* mm",
+        "",
+    ),
+    (
+        TILTED_COLUMN.format(100, 0.05 * EULER),
+        "",
+        "done",
+        "10 times as tall as it is long and carries 0.05 of the load.*buckle",
+        "",
+    ),
+    (TILTED_COLUMN.format(100, 0.015 * EULER), "", "done", "", "buckle"),
+    (TILTED_COLUMN.format(10, 0.05 * EULER), "", "done", "", "buckle"),
+    (
+        BLOCK,
+        'contact.upper.substrate={young = "1 MPa", poisson = 0.3, density = "1 kg/m^3"}',
+        "done",
+        "lowest Young",
+        "",
+    ),
+    (
+        BLOCK,
+        'contact.upper.substrate={young = "1 GPa", poisson = 0.4995, density = "1 kg/m^3"}',
+        None,
+        "the elements become too stiff",
+        "",
+    ),
+    (
+        BLOCK,
+        "contact.tilt.angle=18 mrad; contact.element_size=0.55 mm; accuracy.tolerance=0.1",
+        None,
+        "leave out contact.element_size",
+        "",
+    ),
+    (BLOCK, "contact.element_size=3 mm", "done", "the 5 elements along the interface are too few", ""),
+    # ---- bonds and loops
+    (DWELL, GROWING + "friction.order=3", "done", "order = 3 and a growing", ""),
+    (DWELL, "friction.order=3", "done", "", "times mu_s N"),
+    (
+        DWELL,
+        GROWING + "friction.reading=report",
+        "done",
+        "the initial bonds keep the bond length eps_0",
+        "",
+    ),
+    (
+        DWELL,
+        GROWING + "friction.reading=report; friction.initial_bonds=0",
+        "done",
+        "",
+        "initial bonds",
+    ),
+    (
+        POINT + NONLOCAL + STRUCTURE,
+        "friction.reading=report; friction.order=-0.5; drive.cycles=1; accuracy.steps_per_cycle=100",
+        None,
+        "infinite at the first instant",
+        "",
+    ),
+    (BOUC_WEN, "", "done", "loop of the last cycle does not close.*set slide.cycles = 2$", ""),
+    (BOUC_WEN, "slide.cycles=2", "done", "", "does not close"),
+    # ---- steady states and sweeps
+    (
+        IWAN_RIG,
+        HARMONIC + "drive.acceleration=0.2 g; drive.frequency=120 Hz",
+        None,
+        "the steady motion is therefore not unique",
+        "",
+    ),
+    (
+        IWAN_RIG,
+        HARMONIC + "drive.acceleration=40 g; drive.frequency=120 Hz; normal.load=10 N",
+        None,
+        "",
+        "not unique",
+    ),
+    (
+        BOUNDED_SWEEP,
+        "drive.from=100 Hz; drive.to=140 Hz",
+        None,
+        "the largest response lies at drive.to = 140 Hz.*axial has its resonance at 143 Hz; raise drive.to",
+        "",
+    ),
+    (
+        BOUNDED_SWEEP,
+        "drive.from=300 Hz; drive.to=320 Hz",
+        None,
+        "the largest response lies at drive.from = 300 Hz.*axial has its resonance at 143 Hz; lower drive.from",
+        "",
+    ),
+    (BOUNDED_SWEEP, "drive.from=120 Hz; drive.to=160 Hz", None, "", "the largest response lies at"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("text, changes, outcome, sentence, absent", RUNS)
+def test_exact_outcome_and_sentences(text, changes, outcome, sentence, absent):
+    """A run has its outcome and its sentence. A run that changes until its end has no steady amplitude."""
+    result = run_scene(
+        text,
+        changes,
+        estimate="loop" in sentence or ("[slide]" not in text and "[drive]" not in text),
+    )
+    assert outcome in (None, str(result.outcome)), result.outcome
+    sentences = [*result.warnings, *result.extra.get("notes", ())]
+    assert any(re.search(sentence, one, re.S) for one in ["", *sentences]), sentences
+    assert not absent or not any(re.search(absent, one) for one in sentences)
+    if "changes until" in sentence:
+        assert "relative_displacement_amplitude_steady" not in result.measures
+    if "worn" in sentence:
+        assert "worn_volume" not in result.measures
+
+
+SHORT_BONDS = "friction.bond_length=0.1 nm; friction.kinetic=0.2; friction.rest_growth=9 m/s^2; friction.slip_growth=0.01 nm"
+MANY = COATED.replace("0.5 mm", "10 um") + SHEAR + PLASTIC + KILOGRAM + DRIVE
+BOND_RIG = POINT + NONLOCAL.replace("1 um", "5 um") + STRUCTURE
+ENGINES = [  # Scene, changes and the engine that a plan chooses.
+    (PLASTIC_RIG, "", "hybrid"),
+    (PLASTIC_RIG, "friction.bond_length=1e-9 um", "march"),  # too many events of the stiff spring
+    (PLASTIC_RIG, "accuracy.steps_per_cycle=400", "march"),
+    (PLASTIC_RIG, "structure.stiffening.cubic=1e12 N/m^3", "hybrid"),
+    (POINT + PLASTIC + MODE + SWEEP, "", "hybrid"),
+    (IWAN_RIG, "", "hybrid"),
+    (MANY, "", "hybrid"),  # 1271 elements slip one after the other
+    (MANY, "drive.cycles=10030", "march"),
+    (BOND_RIG, GROWING, "hybrid"),
+    (POINT + make_friction_table("lugre") + STRUCTURE, "friction.stribeck_speed=1 cm/s", "hybrid"),
+    (BOND_RIG, SHORT_BONDS, "march"),
+    (BOND_RIG, "friction.order=0.5", "march"),
+    (BOND_RIG, "accuracy.steps_per_cycle=400", "march"),
+    (POINT + NONLOCAL + LEVELS, "", "hybrid"),
+    (BOND_RIG, "structure.stiffening.cubic=1e12 N/m^3", "hybrid"),
+    (COULOMB_RIG, UNDAMPED + "drive.frequency=0.00034 Hz; drive.acceleration=18 g; drive.cycles=12", "march"),
+    (POINT + COULOMB + SLIDE, "", "bench, closed form"),
+    (POINT + PLASTIC + SLIDE, "", "bench, parallel elements"),
+    (POINT + NONLOCAL + SLIDE, "", "bench, recursion"),
+    (POINT + NONLOCAL + SLIDE, "friction.order=2", "bench, merged bond list"),
+    (POINT + NONLOCAL + SLIDE, "friction.reading=report", "bench, truncated bond list"),
+    (TILTED + NONLOCAL + SLIDE, "contact.tilt.on=lower", "bench, law step by step"),
+    (TILTED + NONLOCAL + SLIDE, "contact.shear={}", "bench, bond points"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("text, changes, engine", ENGINES)
+def test_exact_plan_chooses_engine(text, changes, engine):
+    """The plan names the cheapest engine that applies; a bench runs with it."""
+    scene = load_scene(text, changes)
+    run_plan = pf.plan(scene)
+    assert run_plan.engine == engine
+    if "bench" in engine:
+        result = run_scene(text, changes + "; accuracy.steps_per_cycle=200", estimate=False)
+        assert result.extra["engine"] == engine
+        assert ("bond_list_about" in run_plan.unknowns) == engine.endswith("list")
+
+
+@pytest.mark.parametrize(
+    "changes", ["10 urad", "1 urad", "1 urad; contact.step.height=1 um; contact.step.at=0 mm"]
+)
+def test_always_plan_predicts_full_contact_correctly(changes):
+    """The plan predicts full contact only where the run finds it: at 10 urad elastic pieces touch on 94 % of the length."""
+    text = COATED.replace('element_size = "0.5 mm"\n', "")
+    changes = f"accuracy.tolerance=1e-2; contact.tilt.angle={changes}"
+    verdict = pf.plan(load_scene(text, changes)).verdict
+    fraction = run_scene(text, changes).measures["contact_fraction"].value
+    assert any(line.endswith("the pieces touch everywhere") for line in verdict) == (fraction == 1)
+
+
+def test_exact_motion_without_bound_or_energy_has_exact_measures():
+    """With a damping ratio of 1e6 the mass moves with the base; an unbounded motion has no measures but its load; the
+    energy of a stuck rig is round-off, and its balance zero."""
+    peak = run_scene(
+        TANH_RIG, "structure.mode.axial.damping=1e6; accuracy.method=march; drive.cycles=12"
+    )
+    measures = peak.measures
+    assert measures["absolute_acceleration_peak"].value == pytest.approx(5 * 9.80665, rel=1e-6)
+    assert measures["energy_balance"].value < 1e-12 and peak.outcome == "steady"
+    unbounded = run_scene(COULOMB_RIG, UNDAMPED + HARMONIC + "normal.load=1 lbf")
+    assert unbounded.outcome == "grows"
+    amplitude = unbounded.measures["relative_displacement_amplitude"]
+    assert amplitude.value is None and "no bounded motion" in amplitude.reason
+    stuck = run_scene(COULOMB_RIG, "drive.acceleration=0.1 g; drive.cycles=12")
+    assert stuck.outcome == "stuck" and stuck.measures["energy_balance"].value == 0
+
+
+REMEDIES = [  # Scene, changes, beginning of the warning, and its remedy, which removes it.
+    (
+        '[normal]\nload = "32 N"\nwidth = "2 mm"\n' + NONLOCAL[: NONLOCAL.index("static")]
+        + 'static = 0.58\nbond_length = "12 um"\norder = 0.0\nspread = "47 um"\n[slide]\nkind = "constant"\n'
+        'speed = "49 mm/s"\ndistance = "137 nm"\n',
+        "accuracy.tolerance=0.01",
+    ),
+    (
+        POINT + NONLOCAL + '[slide]\nkind = "sine"\namplitude = "10 um"\nfrequency = "10 Hz"\n',
+        "accuracy.steps_per_cycle=60; accuracy.tolerance=0.9",
+    ),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("text, changes", REMEDIES)
+def test_exact_remedy_of_failed_work_check_works(text, changes):
+    """A work check above its limit has one warning, which names a number of steps with which the check closes."""
+    (warning,) = run_scene(text, changes).warnings
+    steps = re.search(r"steps_per_cycle = (\d+)", warning)[1]
+    remedied = run_scene(text, f"{changes}; accuracy.steps_per_cycle={steps}")
+    assert remedied.measures["work_check"].value < 1e-3 and not remedied.warnings

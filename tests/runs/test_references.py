@@ -1,0 +1,259 @@
+"""Measures of whole scenes agree within their errors with closed forms, independent programs and far finer runs.
+
+The scenes of the folder `found` and the scenes with a seed had errors that were too small in earlier versions.
+"""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from motion_scenes import draw_spec, write_scene
+from scene_runs import assert_covers, find_sentences, run_scene
+from scene_texts import COATING, PIECE
+from static_scenes import JUDGED, KINDS, draw_scene, format_scene, reliable_rows, solve_reference
+
+import patchfem as pf
+
+FOUND = Path(__file__).parent / "found"
+BLOCK = PIECE + 'load = "26 lbf"\nsubstrate = "Ti-8Al-1Mo-1V"\n' + COATING
+STEP = BLOCK + '[contact.step]\nheight = "0.1 um"\nat = "2 mm"\n'
+# External programs, DOP853 between reversals, a march of 4000 steps per cycle or the program `motion_reference`:
+# scene, measure, reference, half a unit of its last digit or uncertainty, and largest error relative to the reference.
+MOTIONS = [
+    ("s77_21", "relative_displacement_amplitude", 3.5862e-5, 5e-10, 0.1),
+    ("s77_41", "relative_displacement_amplitude", 6.458e-5, 5e-9, 0.1),
+    ("s20261120_51", "friction_force_peak", 28.747, 5e-4, 0.1),
+    ("s20261120_10", "drift_per_cycle", 1.891e-8, 5e-12, 0.1),
+    ("tanh_levels_114", "absolute_acceleration_peak", 664.244, 9e-3, 1e-2),
+    ("shear_bonds_14", "stick_fraction", 0.00377, 1.4e-3, 5.0),
+    (5046, "relative_displacement_amplitude", 8.20190559e-6, 5e-15, 1e-6),
+    (5046, "equivalent_stiffness", -74645.1102, 5e-5, 1e-6),
+    (97000034, "stick_fraction", 0.1762914152, 0.0, 0.06),
+    (97000034, "slip_start_phase", 2.2076168335, 0.0, 0.01),
+    ("ep_stiff_1e6", "relative_displacement_amplitude", 0.7365597, 1e-7, 1e-2),
+    ("peak_bouc_wen_53", "friction_force_peak", 20.594500409, 3e-8, 1e-2),
+    ("peak_bouc_wen_53", "absolute_acceleration_peak", 217.5187442529, 1e-8, 1e-2),
+    (7062, "stick_fraction", 0.048004613, 5e-10, 1e-5),
+    (7062, "slip_start_phase", 2.089609, 5e-7, 1e-5),
+    (9256, "relative_displacement_amplitude", 6.689247147339e-5, 5e-18, 1e-5),
+    (9256, "equivalent_stiffness", 4188.7310127, 5e-8, 1e-5),
+]
+
+
+# The last scenes take long or would compile loops that no other test needs.
+@pytest.mark.share(*range(10))
+@pytest.mark.parametrize("scene, name, reference, doubt, largest", MOTIONS)
+def test_exact_motion_agrees_with_independent_program(
+    scene, name, reference, doubt, largest, tmp_path
+):
+    """A measure of a motion agrees with an independent program within its error, which is small."""
+    if isinstance(scene, str):
+        path = FOUND / f"{scene}.toml"
+    else:
+        spec = draw_spec(scene) | ({"tolerance": 1e-6} if scene == 5046 else {})
+        path = write_scene(spec, tmp_path)
+    measure = pf.run(path).measures[name]
+    assert abs(measure.value - reference) <= measure.error + doubt
+    assert measure.error <= largest * abs(reference) + 0.0101 * measure.floor
+
+
+TITANIUM = 'substrate = {young = "120 GPa", poisson = 0.32, density = "4370 kg/m^3"}\n'
+NARROW = (
+    '[contact]\nlength = "40 mm"\nwidth = "1 m"\nheight = "20 mm"\nload = "9100 N"\n'
+    + TITANIUM
+    + '[contact.crown]\nradius = "1 m"\n'
+)
+CROWNED = """[contact]
+length = "22.837 mm"
+width = "2.1229 mm"
+height = "12.627 mm"
+load = "744.99 N"
+substrate = "WC-Co"
+plane = "stress"
+[contact.tilt]
+angle = "6.352e-06 rad"
+[contact.crown]
+radius = "2628.5 mm"
+[contact.step]
+height = "0.1773 um"
+at = "0.5519 mm"
+"""
+COATED = """[contact]
+length = "14.584 mm"
+width = "47.673 mm"
+height = "26.232 mm"
+load = "18.025 N"
+substrate = "WC-Co"
+[contact.coating]
+material = "alumina"
+thickness = "0.29487 mm"
+[contact.upper]
+substrate = {young = "102.25 GPa", poisson = 0.0927, density = "5000 kg/m^3"}
+[contact.tilt]
+angle = "-2.475e-06 rad"
+[contact.step]
+height = "0.03429 um"
+at = "-0.03108 mm"
+"""
+# Rigid pieces on a skin touch on 8.35 of 12.7 mm with a uniform pressure; the deformation of the pieces changes it by 1e-5.
+PAD = (
+    PIECE
+    + 'load = "2000 N"\nsubstrate = {young = "1e8 GPa", poisson = 0.3, density = "4400 kg/m^3"}\n'
+    '[contact.asperities]\nlaw = "linear"\nnormal_stiffness = "1e12 Pa/m"\n'
+    '[contact.step]\nheight = "20 um"\nat = "2 mm"\n'
+)
+PAD_PRESSURE = 2000 / (8.35e-3 * 12.7e-3)
+# Elements of order 5, a spectral program, `static_reference` and closed forms: scene, references, relative doubt, and
+# tolerances from large to small, over which the errors must not grow.
+PATCHES = {
+    "tilt": (
+        BLOCK + '[contact.tilt]\nangle = "0.1 mrad"\n',
+        {
+            "contact_fraction": 0.2193469,
+            "pressure_peak": 8317717.0,
+            "normal_stiffness": 5.349995e8,
+            "tangential_stiffness": 2.289488e8,
+        },
+        2e-6,
+        (1e-3,),
+    ),
+    "rigid pad": (
+        PAD,
+        {
+            "pressure_peak": PAD_PRESSURE,
+            "contact_fraction": 8.35 / 12.7,
+            "contact_half_width": 4.175e-3,
+            "moment": -2000 * 2.175e-3,
+            "approach": PAD_PRESSURE / 1e12,
+            "normal_stiffness": 1e12 * 8.35e-3 * 12.7e-3,
+        },
+        1e-5,
+        (1e-3,),
+    ),
+    "narrow": (
+        NARROW,
+        {"contact_half_width": 4.162623e-4, "contact_fraction": 4.162623e-4 / 20e-3},
+        0.0,
+        (1e-3,),
+    ),
+    "coated": (
+        COATED,
+        {"moment": -8.2501e-3, "contact_half_width": 9.5556e-4},
+        1e-5,
+        (1e-2, 1e-3),
+    ),
+    "contact interval of one element": (7005, {"moment": 0.17521083}, 6e-5, (1e-2, 1e-3)),
+    "short interval": (7047, {"contact_half_width": 8.724e-3}, 0.0, (1e-2, 1e-3)),
+    "crown": (
+        CROWNED,
+        {"contact_half_width": 2.99765e-3, "contact_fraction": 0.258252},
+        1e-5,
+        (1e-2, 1e-3, 1e-4),
+    ),
+    "balanced": (7017, {"moment": -6.73948e-5}, 2.1e-5, (1e-3, 1e-4)),
+    "stiffness": (
+        7029,
+        {"normal_stiffness": 220205694.0, "rotational_stiffness": 1541.8782},
+        4e-5,
+        (1e-2, 1e-3),
+    ),
+    "rotation": (7059, {"rotational_stiffness": 201.2822}, 3.2e-4, (1e-2, 1e-3)),
+    "steeper tilt": (
+        BLOCK + '[contact.tilt]\nangle = "1 mrad"\n',
+        {
+            "contact_fraction": 0.02391931,
+            "pressure_peak": 60.84458e6,
+            "normal_stiffness": 1.698824e8,
+            "tangential_stiffness": 1.196733e8,
+        },
+        2e-6,
+        (1e-3,),
+    ),
+}
+
+
+@pytest.mark.share(*range(6))
+@pytest.mark.parametrize("name", PATCHES)
+def test_always_errors_of_patch_cover_reference_and_decrease(name):
+    """The errors of a patch cover a reference and do not grow as the tolerance decreases."""
+    text, references, doubt, tolerances = PATCHES[name]
+    text = format_scene(draw_scene(text)) if isinstance(text, int) else text
+    previous = dict.fromkeys(references, np.inf)
+    for tolerance in tolerances:
+        measures = run_scene(text, f"accuracy.tolerance={tolerance}").measures
+        assert_covers(measures, references, doubt)
+        for key in references:
+            assert measures[key].error <= previous[key] * (1 + 1e-6) + 1e-14, tolerance
+            previous[key] = measures[key].error
+            # A contact of a few elements has a larger error.
+            assert measures[key].error <= 0.1 * abs(references[key]) or tolerance > 1e-3
+
+
+# Known exception of 60 scenes (seeds 8300000 to 8300059), of whose errors 99.4 % hold at 1e-2 and 98.3 % at 1e-3:
+# successive changes of the stiffness of seed 601 have the ratios 2.8, 5.8 and 4.3; the first suggests a wrong order.
+MISSES = {601: {("rotational_stiffness", 1e-3)}}
+MAX_MISS = 1.5  # Largest ratio of true to stated error of an exception.
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(600, 600 + len(KINDS)))
+def test_always_errors_of_random_patch_cover_independent_program(seed):
+    """For one random scene of each kind, the errors cover an independent program, apart from MISSES."""
+    scene = draw_scene(seed)
+    reference, reference_error = solve_reference(scene, 2e-3)
+    for tolerance in (1e-2, 1e-3, 1e-4):
+        measures = run_scene(format_scene(scene), f"accuracy.tolerance={tolerance}").measures
+        rows = reliable_rows(measures, reference, reference_error)
+        misses = [row for row in rows if not row.holds]
+        assert {(row.name, tolerance) for row in misses} <= MISSES.get(seed, set())
+        assert all(row.true_error <= MAX_MISS * row.error + row.doubt for row in misses)
+        assert len(rows) > 3 and {row.name for row in rows} <= set(JUDGED)
+
+
+def test_always_peak_at_loaded_step_has_no_value():
+    """The pressure under a sharp corner is unbounded, so that the peak has no value but a reason; behind a compliant
+    skin it has a value."""
+    peak = run_scene(STEP).measures["pressure_peak"]
+    assert peak.value is None and "edge of the step" in peak.reason
+    skin = "contact.asperities.law=linear; contact.asperities.normal_stiffness=1e13 Pa/m"
+    peak = run_scene(STEP, skin).measures["pressure_peak"]
+    assert peak.value > 0 and peak.error is not None
+
+
+def test_always_unlike_pieces_have_note_with_dundurs_parameter():
+    """A note for unlike pieces states Dundurs' beta, 1/2 for a rigid piece on one with a Poisson ratio of 0."""
+    soft = 'contact.upper.substrate={young = "1 GPa", poisson = 0, density = "1 kg/m^3"}'
+    hard = 'contact.substrate={young = "1e6 GPa", poisson = 0.3, density = "1 kg/m^3"}; contact.load=100 N; '
+    block = PAD.partition("[contact.asp")[0]
+    result = run_scene(block, hard + soft + "; contact.element_size=0.5 mm")
+    (note,) = find_sentences(result.extra["notes"], "Dundurs")
+    assert "beta 0.5 at the interface" in note
+    assert float(note.split("normal_stiffness would be ")[1].split(" %")[0]) > 0
+    assert not find_sentences(run_scene(NARROW).extra["notes"], "Dundurs")
+
+
+WORN = (
+    PIECE
+    + 'load = "2000 N"\n'
+    + TITANIUM.replace("120", "121")
+    + """[contact.crown]
+radius = "1 m"
+[friction]
+law = "coulomb"
+static = 0.3
+[slide]
+kind = "sine"
+amplitude = "20 um"
+frequency = "10 Hz"
+[wear]
+coefficient = "1e-14 m^2/N"
+cycles = 100000
+jumps = 1
+"""
+)
+
+
+def test_always_error_of_single_wear_step_covers_peak():
+    """A Hertz contact worn in a single step has a peak of 39.4 MPa instead of 30.56 MPa (19 steps)."""
+    peak = run_scene(WORN).measures["pressure_peak"]
+    assert abs(peak.value - 30.56e6) <= peak.error <= 0.5 * peak.value

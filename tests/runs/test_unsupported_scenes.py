@@ -1,0 +1,312 @@
+"""Scenes that a run does not support are refused with the key, the reason and a remedy."""
+
+import pytest
+from scene_runs import load_scene, run_scene
+from scene_texts import (
+    BENCH,
+    BLOCK,
+    COATED,
+    COULOMB,
+    DRIVE,
+    FORCED,
+    MODE,
+    NONLOCAL,
+    PAIR,
+    PLASTIC,
+    POINT,
+    RIG,
+    SHEAR,
+    SLIDE,
+    STRUCTURE,
+    make_friction_table,
+)
+
+from patchfem.core import Missing, PatchfemError
+
+TILTED = COATED + '[contact.tilt]\nangle = "0.1 mrad"\n'
+COULOMB_RIG = POINT + COULOMB + STRUCTURE
+BONDED_RIG = POINT + NONLOCAL + STRUCTURE
+STRIPS_RIG = COATED + "[contact.strips]\ncount = 4\n" + COULOMB + STRUCTURE
+RANDOM_RIG = (
+    MODE + '[drive]\nkind = "base"\nwaveform = "random"\nspectrum = "0.01 g^2/Hz"\n'
+    'from = "20 Hz"\nto = "300 Hz"\nduration = "3 s"\n'
+)
+TONES_RIG = (
+    MODE + '[drive]\nkind = "base"\nwaveform = "tones"\nfrequencies = ["96 Hz", "102 Hz"]\n'
+    'accelerations = ["1 g", "0.5 g"]\ncycles = 160\n'
+)
+GROOVES = "normal.grooves.wavelength=80 um; normal.grooves.amplitude=7.5 um; "
+CONTACT_GROOVES = GROOVES.replace("normal", "contact")
+BONDS = "friction.law=nonlocal; friction.bond_length=1 um; "
+ELASTIC = "friction.law=elastic-plastic; friction.bond_length=1 um; "
+TANH = "friction.law=tanh; friction.reference_speed=1 mm/s"
+FREE = "drive.kind=free; drive.displacement=0.5 mm; "
+WEAR = "wear.coefficient=1e-14 m^2/N; wear.cycles=1000"
+CHAIN_PATCH = """[structure]
+masses = ["1 kg", "1 kg"]
+[[structure.spring]]
+between = [1, 0]
+stiffness = "1e6 N/m"
+[[structure.interface]]
+between = [1, 0]
+law = "coulomb"
+static = 0.3
+[structure.interface.contact]
+length = "10 mm"
+width = "10 mm"
+height = "8 mm"
+load = "100 N"
+substrate = "steel"
+[structure.interface.contact.shear]
+[[structure.interface]]
+between = [2, 1]
+law = "coulomb"
+static = 0.3
+load = "60 N"
+"""
+CHAIN = CHAIN_PATCH + DRIVE
+FACE = "structure.interface.0.contact."
+REFUSALS = [
+    # ---- bonds and laws
+    (
+        BENCH,
+        BONDS
+        + "friction.order=2; accuracy.quadrature=direct; slide.cycles=400; accuracy.steps_per_cycle=4000",
+        r"more than the limit of \d+ s; lower accuracy.steps_per_cycle",
+    ),
+    (
+        TILTED + COULOMB + SLIDE,
+        BONDS + "friction.order=2; accuracy.quadrature=merged; contact.tilt.on=lower",
+        "'merged' with a shape on the lower piece",
+    ),
+    (
+        BONDED_RIG,
+        "friction.reading=report; drive.cycles=10000000",
+        "list of bonds .*; lower drive.cycles",
+    ),
+    (
+        BONDED_RIG,
+        "friction.reading=report; structure.moving_mass=6.5 mg; accuracy.tolerance=1e-5",
+        "the vibration of the block on its bonds, at .* Hz",
+    ),
+    (
+        COULOMB_RIG,
+        ELASTIC + "friction.stiffness=7e6 N/m",
+        "friction.stiffness: .*exclude each other",
+    ),
+    (
+        COULOMB_RIG,
+        "friction.law=elastic-plastic; friction.stiffness=7e6 N/m; normal.amplitude=3 N; normal.frequency=50 Hz",
+        "friction.stiffness: .*give bond_length in",
+    ),
+    (
+        COULOMB_RIG,
+        GROOVES + "friction.law=elastic-plastic; friction.stiffness=7e6 N/m",
+        "friction.stiffness: .*give bond_length",
+    ),
+    (
+        COULOMB_RIG,
+        "friction.law=elastic-plastic; friction.stiffness=7e6 N/m; friction.static=0",
+        "static: must be > 0",
+    ),
+    (BENCH, "slide.cycles=1e9", "lower slide.cycles"),
+    # ---- engines
+    (
+        MODE + POINT + COULOMB + DRIVE,
+        "structure.mode.axial.damping=0; drive.frequency=0.00003 Hz; drive.acceleration=18 g; accuracy.method=exact",
+        r'drive\.cycles .* accuracy\.method = "march"',
+    ),
+    (
+        POINT + PLASTIC + STRUCTURE,
+        "friction.bond_length=1e-13 um; accuracy.method=exact",
+        r"more than the limit of \d+ s; lower drive.cycles or the stiffness of",
+    ),
+    (
+        PAIR + FORCED,
+        "structure.interface.1.law=convolution; structure.interface.1.bond_length=1 um",
+        r"structure.interface\[2\].law: law 'convolution' with other interfaces is not supported",
+    ),
+    (
+        CHAIN.replace(
+            CHAIN[CHAIN.index("[structure.interface.c") : CHAIN.rindex("[[s")], 'load = "9 N"\n'
+        ),
+        "structure.interface.1.law=tanh; structure.interface.1.reference_speed=1 mm/s; accuracy.method=harmonic",
+        "accuracy.method: 'harmonic' with several inter",
+    ),
+    (
+        COULOMB_RIG,
+        FREE + "structure.travel=0.4 mm; accuracy.method=exact",
+        r"starts beyond this travel",
+    ),
+    (
+        COULOMB_RIG,
+        FREE + "structure.travel=0.4 mm; accuracy.method=march",
+        r"starts beyond this travel",
+    ),
+    (
+        STRUCTURE,
+        "structure.mode.axial.damping=-0.02",
+        r"damping: -0\.02 is negative damping, and without friction",
+    ),
+    (COULOMB_RIG, "structure.mode.axial.damping=-1.5", "damping: must be > -1"),
+    # ---- modes measured with the joint bolted
+    (
+        POINT + make_friction_table("iwan") + STRUCTURE,
+        "structure.measured=stuck; structure.mode.axial.frequency=14 Hz",
+        "(?s)stiffness of the joint is .* % of the stiffness.*multiply `slide` of every mode by 0.0",
+    ),
+    (
+        COATED + SHEAR + COULOMB + STRUCTURE,
+        "structure.measured=stuck",
+        "(?s)stiffness of the joint is .* % of the stiffness.*multiply `slide` of every mode by 0.0",
+    ),
+    (COULOMB_RIG, "structure.measured=stuck", "law 'coulomb' sticks rigidly"),
+    (COULOMB_RIG, "structure.measured=stuck; " + TANH, "law 'tanh' has no stiffness"),
+    (STRUCTURE, "structure.measured=stuck", r"add \[friction\]"),
+    (PAIR + FORCED, "structure.measured=stuck", "not supported yet; only modes can be measured"),
+    (
+        POINT + make_friction_table("iwan") + STRUCTURE,
+        "structure.measured=stuck; normal.amplitude=10 N; normal.frequency=50 Hz",
+        "normal.amplitude is not supported yet",
+    ),
+    # ---- grooves
+    (BENCH, GROOVES + "friction.static=2", "normal.grooves.amplitude: .*lock with static = 2"),
+    (BENCH, GROOVES + "normal.grooves.amplitude=-1 um", "normal.grooves.amplitude: "),
+    (BENCH, GROOVES + WEAR, r"wear: .*with \[normal.grooves\]; a \[normal\] contact has no area"),
+    (
+        COULOMB_RIG,
+        GROOVES + "friction.law=convolution; friction.bond_length=1 um",
+        r"friction.law: .*with \[normal.grooves\] is not supported yet; use law 'coulomb'",
+    ),
+    (
+        BONDED_RIG,
+        GROOVES + "accuracy.quadrature=direct",
+        r"accuracy.quadrature: 'direct' with \[normal.grooves\]",
+    ),
+    (
+        BLOCK + COULOMB + STRUCTURE,
+        CONTACT_GROOVES + "structure.mode.axial.normal=0.1",
+        r"structure\.mode\.\S+: not supported yet with \[contact\.grooves\]",
+    ),
+    (BLOCK, CONTACT_GROOVES, r"contact\.grooves: .*needs a sliding motion"),
+    (
+        BLOCK + COULOMB + SLIDE,
+        CONTACT_GROOVES + "contact.shear={}; " + TANH,
+        r"friction\.law: 'tanh' with \[contact\.shear\]",
+    ),
+    (
+        BLOCK + COULOMB + SLIDE,
+        CONTACT_GROOVES + ELASTIC + "contact.shear={}; contact.holder.tangential_stiffness=1e7 N/m",
+        r"contact\.holder\.tangential_stiffness: not supported yet with \[contact\.grooves\]",
+    ),
+    # ---- holders, strips and normal motion
+    (
+        RIG,
+        "contact.holder.tangential_stiffness=5e6 N/m; friction.reading=report; friction.order=-0.5",
+        "initial_bonds: 1 with order = -0.5 and contact.holder.tangential_stiffness",
+    ),
+    (
+        COATED.replace('load = "26 lbf"\n', "") + '[contact.approach]\ndistance = "1 um"\n',
+        "contact.load_line.offset=2 mm",
+        r"removed in patchfem 2\.0; give contact\.load",
+    ),
+    (
+        POINT + COULOMB + STRUCTURE,
+        "structure.mode.axial.normal=0.1",
+        r"use \[contact\] in place of",
+    ),
+    (
+        COATED + COULOMB + STRUCTURE,
+        "structure.mode.axial.yaw=30 rad/m",
+        "axial.yaw: .*contact.strips",
+    ),
+    (
+        STRIPS_RIG,
+        BONDS + "friction.order=2; structure.mode.axial.yaw=30 rad/m",
+        "structure.mode.axial.yaw: ",
+    ),
+    (STRIPS_RIG, BONDS + "contact.shear={}", "contact.strips"),
+    (STRIPS_RIG, "contact.shear={}; friction.kinetic=0.2", "kinetic"),
+    (
+        STRIPS_RIG,
+        "contact.shear={}; contact.holder.tangential_stiffness=5e6 N/m",
+        "contact.strips",
+    ),
+    # ---- instruments and drives
+    (COULOMB_RIG, "structure.mode.axial.gauge=0.2; structure.travel=5 mm", "with structure.travel"),
+    (
+        COULOMB_RIG,
+        "structure.mode.axial.gauge=0.2; structure.stiffening.cubic=1e12 N/m^3",
+        "with structure.stiffening",
+    ),
+    (
+        COULOMB_RIG,
+        "structure.mode.axial.gauge=0.2; drive.waveform=levels",
+        "waveform = 'levels'",
+    ),
+    (RANDOM_RIG, "drive.kind=force", r"drive\.kind: waveform .random. can only shake the base"),
+    (RANDOM_RIG, "drive.to=20 Hz", "is not above"),
+    (RANDOM_RIG, "drive.file=x.csv", "exclude each other"),
+    (RANDOM_RIG.replace('spectrum = "0.01 g^2/Hz"\n', ""), "", "needs this key or file"),
+    (RANDOM_RIG.replace('from = "20 Hz"\n', ""), "", r"drive\.from.*needs a lowest frequency"),
+    (RANDOM_RIG, "drive.spectrum=0.01 g", "acceleration spectrum"),
+    (RANDOM_RIG, "drive.spectrum=0 g^2/Hz", "spectrum"),
+    (RANDOM_RIG, "drive.duration=0.01 s", "short for a band"),
+    (TONES_RIG, "drive.kind=force", "can only shake the base"),
+    (
+        TONES_RIG,
+        'drive.phases=["0 deg", "0 deg", "0 deg"]',
+        "3 values for 2 values of `frequencies`",
+    ),
+    (
+        TONES_RIG.replace('frequencies = ["96 Hz", "102 Hz"]\n', ""),
+        "",
+        "waveform 'tones' needs this key",
+    ),
+    (TONES_RIG, 'drive.accelerations=["0 g", "0 g"]', "nothing moves"),
+    (TONES_RIG, 'drive.frequencies=["96 Hz", "1 um"]', "frequency"),
+    (TONES_RIG, "accuracy.method=harmonic", "under a sine"),
+    # ---- patches at interfaces
+    (CHAIN, FACE + "approach.distance=1 um", "contact.approach"),
+    (
+        CHAIN,
+        f"{FACE}grooves.wavelength=80 um; {FACE}grooves.amplitude=2 um",
+        r"contact.grooves: not supported yet with \[\[structure.interface\]\]; leave out this entry",
+    ),
+    (CHAIN, "structure.interface.0.load=5 N", "`load` and `contact` exclude each other"),
+    (
+        CHAIN,
+        f"{FACE}crown.radius=2 m; {FACE}crown.on=lower",
+        "put the shapes on the upper piece",
+    ),
+    (
+        CHAIN,
+        "structure.interface.0.law=nonlocal; structure.interface.0.bond_length=1 um",
+        "or use law 'coulomb' or 'elastic-plastic'",
+    ),
+    (
+        CHAIN,
+        "structure.interface.0.kinetic=0.2",
+        r"interface\[1\].kinetic: 0.2 below static = 0.3 with .*shear\] is not supported yet; leave out the key",
+    ),
+    (CHAIN, WEAR, "wear: not supported yet"),
+    (CHAIN, FACE + "profile.file=none.csv", "profile.file: none.csv: there is no such file"),
+    # ---- wear
+    (TILTED, WEAR, "wear"),
+    (COULOMB_RIG, FREE + WEAR, "steady motion"),
+    (STRIPS_RIG, "contact.shear={}; " + WEAR, r"contact.strips and \[contact.shear\]"),
+    (
+        BENCH,
+        WEAR + '; wear.friction.depth=["0 um", "8 um"]; wear.friction.coefficient_factor=[1, 0.2]',
+        r"wear.friction: a \[normal\] contact has no area.*: use \[contact\]",
+    ),
+]
+
+
+@pytest.mark.parametrize("text, changes, pattern", REFUSALS)
+def test_refuses_unsupported_scene(text, changes, pattern):
+    """A scene that is not supported is refused, at the latest when it is run."""
+    if changes:
+        load_scene(text)
+    with pytest.raises((PatchfemError, Missing), match=pattern):
+        run_scene(text, changes)
