@@ -76,7 +76,7 @@ def make_answer(curves: dict[str, list[Cost]], model: Model) -> Answer:
         verdict=tuple(sentences[:4]),
         quantities=_make_quantities(row, main, tolerance),
         data=_make_data(rows, main, tolerance),
-        remarks=Remarks(notes=tuple(dict.fromkeys(text for run in runs for text in run.remedies))),
+        remarks=Remarks(notes=tuple(f"{chosen.label}: {text}" for text in chosen.remedies)),
         details=details,
         origin=make_origin(model.source, "cost"),
     )

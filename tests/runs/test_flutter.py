@@ -76,3 +76,45 @@ def test_always_unbounded_growth_ends_run_early(law):
         for name, measure in result.measures.items()
         if name != "flutter_amplitude"
     )
+
+
+WEAKENING_SCENE = {
+    "normal": {"load": 100.0},
+    "friction": {
+        "law": "lugre",
+        "static": 0.3,
+        "kinetic": 0.2,
+        "stiffness": 2e5,
+        "stribeck_speed": 0.05,
+    },
+    "structure": {
+        "moving_mass": 1.0,
+        "mode": [{"name": "a", "frequency": 50.0, "damping": -0.01, "slide": 1.0}],
+    },
+    "drive": {"kind": "free", "cycles": 40.0},
+}
+
+
+@pytest.mark.parametrize("ratio, grows", [(0.995, False), (1.005, True)])
+def test_exact_flutter_amplitude_of_weakening_law(ratio, grows):
+    """Under a velocity-weakening law, releases 0.5 % below the flutter amplitude decay, and those 0.5 % above it grow.
+
+    Smaller motions end in a limit cycle of micro-slip. Den Hartog's balance with the kinetic coefficient alone gives
+    12.90 mm for rigid stick.
+    """
+    result = pf.run(WEAKENING_SCENE, **{"drive.displacement": ratio * 12.797e-3})
+    final_amplitude = result.measures["relative_displacement_amplitude"].value
+    flutter_amplitude = result.measures["flutter_amplitude"]
+    assert (
+        flutter_amplitude.value == pytest.approx(12.797e-3, rel=1e-3)
+        and flutter_amplitude.error < 1e-3 * flutter_amplitude.value
+    )
+    assert "ends in the limit cycle of 6.07 um, which is stable" in result.notes[-1]
+    assert (
+        final_amplitude > 1.03 * flutter_amplitude.value
+        if grows
+        else final_amplitude < 0.97 * flutter_amplitude.value
+    )
+
+
+SECOND = '[[structure.mode]]\nname = "second"\nfrequency = "{} Hz"\ndamping = 0.02\nslide = 0.3\n[structure.start]\n'

@@ -192,7 +192,7 @@ REFUSALS = [
     (
         BLOCK + COULOMB + SLIDE,
         CONTACT_GROOVES + "contact.shear={}; " + TANH,
-        r"friction\.law: 'tanh' with \[contact\.shear\]",
+        r"friction\.law: law 'tanh' with \[contact\.shear\]",
     ),
     (
         BLOCK + COULOMB + SLIDE,

@@ -391,7 +391,7 @@ def _integrate_panels(weight, row, increment, bonds, v0, dt):
     low = 0.0
     high = min(MAX_PANEL_LENGTH / path, 1.0)
     while low < 1:
-        is_short = path * (high - low) <= MAX_SHORT_PANEL and bonds.law[LAW.order] >= 0
+        is_short = path * (high - low) <= MAX_SHORT_PANEL and bonds.law[LAW.order] > 0
         rule = SHORT_RULE if is_short else LONG_RULE
         for point, point_weight in zip(rule[0], rule[1]):
             fraction = low + (high - low) * (1 + point) / 2

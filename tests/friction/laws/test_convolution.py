@@ -284,12 +284,12 @@ def test_refuses_asymmetric_pressure_on_rig():
         (
             SLIDE,
             [SHEAR],
-            "friction.law: 'convolution' with \\[contact.shear\\] is not supported yet; leave",
+            "friction.law: law 'convolution' with \\[contact.shear\\] is not supported yet; leave",
         ),
         (
             SHORT,
             [SHEAR],
-            "friction.law: 'convolution' with \\[contact.shear\\] is not supported yet; leave",
+            "friction.law: law 'convolution' with \\[contact.shear\\] is not supported yet; leave",
         ),
         (SHORT, ["contact.tilt.on=lower"], "a shape on the lower piece with law 'convolution'"),
         (
