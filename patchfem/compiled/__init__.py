@@ -46,6 +46,12 @@ from .no_jit import load_uncompiled
 
 # Names that other folders use, by module.
 PUBLIC = {
+    "flags_kernels": (
+        "FASTMATH_FLAGS",
+        "NJIT_CALL",
+        "NJIT_INLINE",
+        "NJIT_KERNEL",
+    ),
     "jit": (
         "NJIT_INTERNAL",
         "NJIT_NO_REFCOUNT",

@@ -57,10 +57,6 @@ PUBLIC = {
     "bonds.points_kernels": ("point_list",),
     "bonds.spread": ("carried_fraction",),
     "bonds.temperature": ("surface_temperature_rise",),
-    "flags_kernels": (
-        "FASTMATH_FLAGS",
-        "NJIT_KERNEL",
-    ),
     "grooves": ("Grooves",),
     "laws.coulomb": ("Coulomb",),
     "laws.elastic_plastic": (

@@ -6,8 +6,8 @@ output, and the regime is switched there.
 
 import numpy as np
 
+from ..compiled.flags_kernels import NJIT_KERNEL
 from ..compiled.jit import njit
-from ..friction.flags_kernels import NJIT_KERNEL
 from .event_kernels import (
     N_CHECKS,
     change_regime,

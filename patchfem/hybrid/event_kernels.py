@@ -8,8 +8,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..compiled.flags_kernels import NJIT_KERNEL
 from ..compiled.jit import njit
-from ..friction.flags_kernels import NJIT_KERNEL
 from .motion_kernels import find_rates, look, project, rests, update_grip
 from .records import Clock, Face, Margin, Memory, Setting
 from .step_kernels import POINT, RATES, read_curve

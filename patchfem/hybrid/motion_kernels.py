@@ -2,8 +2,8 @@
 
 import numpy as np
 
+from ..compiled.flags_kernels import NJIT_KERNEL
 from ..compiled.jit import njit
-from ..friction.flags_kernels import NJIT_KERNEL
 from .records import N_FACE_INTEGRALS, N_INTEGRALS, Clock, Face, Memory, Mode, Piece, Point, Setting
 from .table_kernels import force_and_rates
 

@@ -10,8 +10,8 @@ and at last the scales of the errors.
 import numpy as np
 from scipy.integrate import DOP853
 
+from ..compiled.flags_kernels import NJIT_KERNEL
 from ..compiled.jit import njit
-from ..friction.flags_kernels import NJIT_KERNEL
 from .motion_kernels import find_rates
 from .records import Clock
 

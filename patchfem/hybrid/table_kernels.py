@@ -2,8 +2,8 @@
 
 from importlib import import_module
 
+from ..compiled.flags_kernels import NJIT_KERNEL
 from ..compiled.jit import njit
-from ..friction.flags_kernels import NJIT_KERNEL
 from .laws import LAWS
 from .records import Friction
 

@@ -6,8 +6,8 @@ the sums of this rule; extremes inside are located by parabolas.
 
 import numpy as np
 
+from ..compiled.flags_kernels import NJIT_KERNEL
 from ..compiled.jit import njit
-from ..friction.flags_kernels import NJIT_KERNEL
 from .event_kernels import MAX_ROOT_STEPS, ROOT_TOL, find_vertex
 from .motion_kernels import (
     find_drive,

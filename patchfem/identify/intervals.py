@@ -98,7 +98,7 @@ class _Minimum(NamedTuple):
         return True
 
     def find_profile_end(self, k: int, sign: float, step: float, others: Sequence[int]) -> float:
-        """Find the end of the interval of parameter k on one side from the profile of the sum of squares.
+        """Find one end of the confidence interval of parameter k.
 
         There the sum of squares, minimized over the `others`, has grown by `growth`. The root of the growth is nearly
         linear. Returns infinity if the interval reaches the bound.

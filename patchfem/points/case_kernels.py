@@ -10,8 +10,8 @@ from math import cos, inf, nan, sin, sqrt, tanh
 
 import numpy as np
 
+from ..compiled.flags_kernels import NJIT_KERNEL
 from ..compiled.jit import njit
-from ..friction.flags_kernels import NJIT_KERNEL
 from .case_rows import SAME_CYCLE, Now, Number, Seen
 from .return_maps_kernels import (
     Law,
@@ -49,6 +49,17 @@ def write_responses(damping, stiffness, step, table):
 
     The columns belong to slide and velocity at the start, and to accelerations 1, t and t^2/2. The exponential of the
     shortest step is a Taylor series; that of a step of twice the length is its square.
+
+    Parameters
+    ----------
+    damping : float
+        Rate of the mode [1/s].
+    stiffness : float
+        Squared natural frequency [1/s2].
+    step : float
+        Duration of a whole step [s].
+    table : (LEVELS + 1, 2, 5) array
+        Responses, output.
     """
     shortest = step / TICKS
     for column in range(5):
@@ -87,6 +98,25 @@ def solve_step(free, response, h, case, now, numbers, memory, j):
     Over the step F(t) is linear with the time mean F_m and the change D from its value at the start. As the slide is
     nearly the parabola through its ends with the velocities v0 and v1, F_m is the path mean plus K h (v0 - v1)/12 with
     the secant K = D/dq of the elastic force; so steps without a kink of the law are of order 4.
+
+    Parameters
+    ----------
+    free : float
+        Increment of the slide without friction [m].
+    response : (2, 5) array
+        Response of slide and velocity in the step, see `write_responses`.
+    h : float
+        Duration of the step [s].
+    case : (12,) array
+        Numbers of the case, see `case_rows.Number`.
+    now : (20,) array
+        State of the case, see `case_rows.Now`; changed in place.
+    numbers : (k, m) array
+        Numbers of the laws of m points, see `return_maps_kernels`.
+    memory : (l, m) array
+        Memory of the laws of m points, see `return_maps_kernels`.
+    j : int
+        Number of the point.
 
     Returns
     -------
@@ -148,6 +178,27 @@ def end_at_event(q, v, h, hold, case, now, numbers, memory, j):
     """Resolve the event of a Coulomb point inside a shortest step, with slide q and velocity v at its end.
 
     `hold` is the force that would keep the point at rest at the end of the step.
+
+    Parameters
+    ----------
+    q : float
+        Slide [m].
+    v : float
+        Velocity at the end of the step [m/s].
+    h : float
+        Duration of the step [s].
+    hold : float
+        Force that would keep the point at rest at the end of the step [N].
+    case : (12,) array
+        Numbers of the case, see `case_rows.Number`.
+    now : (20,) array
+        State of the case, see `case_rows.Now`; changed in place.
+    numbers : (k, m) array
+        Numbers of the laws of m points, see `return_maps_kernels`.
+    memory : (l, m) array
+        Memory of the laws of m points, see `return_maps_kernels`.
+    j : int
+        Number of the point.
     """
     mobility = case[Number.MOBILITY]
     load = case[Number.LOAD]
@@ -186,6 +237,30 @@ def try_step(waves, h, response, is_shortest, max_bend, case, now, numbers, memo
 
     `waves` are the sines of the drive at the start, in the middle and at the end; `max_bend` [N] is the largest difference
     of the mean force from the mean of the forces at both ends, above which the law has a corner in the step.
+
+    Parameters
+    ----------
+    waves : tuple of float
+        Sines of the drive at the start, in the middle and at the end of the step.
+    h : float
+        Duration of the step [s].
+    response : (2, 5) array
+        Response of slide and velocity in the step, see `write_responses`.
+    is_shortest : bool
+        Whether the step cannot be halved.
+    max_bend : float
+        Largest difference [N] of the mean force from the mean of the forces at both ends; above it the law has a
+        corner in the step.
+    case : (12,) array
+        Numbers of the case, see `case_rows.Number`.
+    now : (20,) array
+        State of the case, see `case_rows.Now`; changed in place.
+    numbers : (k, m) array
+        Numbers of the laws of m points, see `return_maps_kernels`.
+    memory : (l, m) array
+        Memory of the laws of m points, see `return_maps_kernels`.
+    j : int
+        Number of the point.
     """
     now[Now.EVENT] = -1.0
     drive = case[Number.DRIVE]
@@ -254,7 +329,23 @@ def try_step(waves, h, response, is_shortest, max_bend, case, now, numbers, memo
 
 @njit(**NJIT_KERNEL)
 def find_force(wave, case, now, numbers, memory, j):
-    """Write the friction force and the irreversible slide at the end of a step."""
+    """Write the friction force and the irreversible slide at the end of a step.
+
+    Parameters
+    ----------
+    wave : float
+        Sine of the drive at the end of the step.
+    case : (12,) array
+        Numbers of the case, see `case_rows.Number`.
+    now : (20,) array
+        State of the case, see `case_rows.Now`; changed in place.
+    numbers : (k, m) array
+        Numbers of the laws of m points, see `return_maps_kernels`.
+    memory : (l, m) array
+        Memory of the laws of m points, see `return_maps_kernels`.
+    j : int
+        Number of the point.
+    """
     before = now[Now.FORCE]
     state = read(numbers, memory, j, case[Number.LOAD])
     now[Now.FORCE] = state.force
@@ -268,7 +359,21 @@ def find_force(wave, case, now, numbers, memory, j):
 
 @njit(**NJIT_KERNEL)
 def add_energies(waves, h, case, start, now):
-    """Add the energies per mass of a step; integrals of the velocity by Simpson's rule."""
+    """Add the energies per mass of a step; integrals of the velocity by Simpson's rule.
+
+    Parameters
+    ----------
+    waves : tuple of float
+        Sines of the drive at the start, in the middle and at the end of the step.
+    h : float
+        Duration of the step [s].
+    case : (12,) array
+        Numbers of the case, see `case_rows.Number`.
+    start : tuple of float
+        Slide [m], velocity [m/s], force [N] and irreversible slide [m] at the start of the step.
+    now : (20,) array
+        State of the case, see `case_rows.Now`; changed in place.
+    """
     middle = 1.5 * (now[Now.SLIDE] - start[0]) / h - 0.25 * (start[1] + now[Now.VELOCITY])
     end = now[Now.VELOCITY]
     power = case[Number.DRIVE] * h / 6
@@ -287,6 +392,15 @@ def find_turn(h, start, now):
     """Return the part of a step and the slide at which the velocity, a parabola in the step, is 0.
 
     Its mean is that of the slide; its signs at both ends differ.
+
+    Parameters
+    ----------
+    h : float
+        Duration of the step [s].
+    start : tuple of float
+        Slide [m], velocity [m/s], force [N] and irreversible slide [m] at the start of the step.
+    now : (20,) array
+        State of the case, see `case_rows.Now`; changed in place.
     """
     first = start[1]
     last = now[Now.VELOCITY]
@@ -306,7 +420,23 @@ def find_turn(h, start, now):
 
 @njit(**NJIT_KERNEL)
 def observe_extremes(h, law, start, now, seen, observes):
-    """Update the extremes of the slide in the cycle, and the friction forces there."""
+    """Update the extremes of the slide in the cycle, and the friction forces there.
+
+    Parameters
+    ----------
+    h : float
+        Duration of the step [s].
+    law : float
+        Number of the law, see `law_rows.Law`.
+    start : tuple of float
+        Slide [m], velocity [m/s], force [N] and irreversible slide [m] at the start of the step.
+    now : (20,) array
+        State of the case, see `case_rows.Now`; changed in place.
+    seen : (33,) array
+        What was observed, see `case_rows.Seen`; changed in place.
+    observes : bool
+        Whether the cycle is measured.
+    """
     q = now[Now.SLIDE]
     force = now[Now.FORCE]
     if start[1] * now[Now.VELOCITY] < 0 or (start[1] != 0 and now[Now.VELOCITY] == 0):
@@ -333,14 +463,38 @@ def observe_extremes(h, law, start, now, seen, observes):
 
 @njit(**NJIT_KERNEL)
 def find_acceleration(sine, q, v, force, case):
-    """Return the absolute acceleration at the output."""
+    """Return the absolute acceleration at the output.
+
+    Parameters
+    ----------
+    sine : float
+        Sine of the drive at this instant.
+    q : float
+        Slide [m].
+    v : float
+        Velocity [m/s].
+    force : float
+        Friction force [N].
+    case : (12,) array
+        Numbers of the case, see `case_rows.Number`.
+    """
     a = case[Number.DRIVE] * sine - case[Number.DAMPING] * v - case[Number.STIFFNESS] * q
     return case[Number.OUTPUT] * (a - case[Number.MOBILITY] * force) + case[Number.BASE] * sine
 
 
 @njit(**NJIT_KERNEL)
 def find_parabola_extreme(first, middle, last):
-    """Return the largest magnitude of the parabola through values at the start, in the middle and at the end of a step."""
+    """Return the largest magnitude of the parabola through values at the start, in the middle and at the end of a step.
+
+    Parameters
+    ----------
+    first : float
+        Value at the start.
+    middle : float
+        Value in the middle.
+    last : float
+        Value at the end.
+    """
     largest = max(abs(first), abs(last))
     bend = first - 2 * middle + last
     tilt = last - first
@@ -351,7 +505,23 @@ def find_parabola_extreme(first, middle, last):
 
 @njit(**NJIT_KERNEL)
 def observe_acceleration(waves, h, case, start, now, seen):
-    """Update the largest acceleration: that of a parabola through both ends and the middle, or beside an event."""
+    """Update the largest acceleration: that of a parabola through both ends and the middle, or beside an event.
+
+    Parameters
+    ----------
+    waves : tuple of float
+        Sines of the drive at the start, in the middle and at the end of the step.
+    h : float
+        Duration of the step [s].
+    case : (12,) array
+        Numbers of the case, see `case_rows.Number`.
+    start : tuple of float
+        Slide [m], velocity [m/s], force [N] and irreversible slide [m] at the start of the step.
+    now : (20,) array
+        State of the case, see `case_rows.Now`; changed in place.
+    seen : (33,) array
+        What was observed, see `case_rows.Seen`; changed in place.
+    """
     q = now[Now.SLIDE]
     v = now[Now.VELOCITY]
     last = find_acceleration(waves[2], q, v, now[Now.FORCE], case)
@@ -374,7 +544,23 @@ def observe_acceleration(waves, h, case, start, now, seen):
 
 @njit(**NJIT_KERNEL)
 def observe_harmonics(time, h, omega, start, now, seen):
-    """Add the integrals of slide and force, a cubic and a parabola in the step, by Gauss's rule with three points."""
+    """Add the integrals of slide and force, a cubic and a parabola in the step, by Gauss's rule with three points.
+
+    Parameters
+    ----------
+    time : float
+        Time at the start of the step [s].
+    h : float
+        Duration of the step [s].
+    omega : float
+        Circular frequency of the drive [rad/s].
+    start : tuple of float
+        Slide [m], velocity [m/s], force [N] and irreversible slide [m] at the start of the step.
+    now : (20,) array
+        State of the case, see `case_rows.Now`; changed in place.
+    seen : (33,) array
+        What was observed, see `case_rows.Seen`; changed in place.
+    """
     q = now[Now.SLIDE]
     v = now[Now.VELOCITY]
     bend = 6 * now[Now.TIME_MEAN] - 3 * (start[2] + now[Now.FORCE])
@@ -402,6 +588,23 @@ def observe_stick(time, h, omega, is_rigid, start, now, seen):
     """Add the time of stick, in which less than half of the slide is irreversible.
 
     The irreversible fraction is interpolated between the middles of steps.
+
+    Parameters
+    ----------
+    time : float
+        Time at the start of the step [s].
+    h : float
+        Duration of the step [s].
+    omega : float
+        Circular frequency of the drive [rad/s].
+    is_rigid : bool
+        Whether the law sticks without a stretch.
+    start : tuple of float
+        Slide [m], velocity [m/s], force [N] and irreversible slide [m] at the start of the step.
+    now : (20,) array
+        State of the case, see `case_rows.Now`; changed in place.
+    seen : (33,) array
+        What was observed, see `case_rows.Seen`; changed in place.
     """
     dq = now[Now.SLIDE] - start[0]
     event = now[Now.EVENT]
@@ -456,7 +659,25 @@ def observe_stick(time, h, omega, is_rigid, start, now, seen):
 
 @njit(**NJIT_KERNEL)
 def find_extreme_slip(h, start, now, numbers, memory, j, load):
-    """Return the irreversible slide at its extreme in a step, or at the end of the step."""
+    """Return the irreversible slide at its extreme in a step, or at the end of the step.
+
+    Parameters
+    ----------
+    h : float
+        Duration of the step [s].
+    start : tuple of float
+        Slide [m], velocity [m/s], force [N] and irreversible slide [m] at the start of the step.
+    now : (20,) array
+        State of the case, see `case_rows.Now`; changed in place.
+    numbers : (k, m) array
+        Numbers of the laws of m points, see `return_maps_kernels`.
+    memory : (l, m) array
+        Memory of the laws of m points, see `return_maps_kernels`.
+    j : int
+        Number of the point.
+    load : float
+        Normal load [N].
+    """
     if numbers[0, j] == Law.TANH and start[1] * now[Now.VELOCITY] < 0:
         return find_turn(h, start, now)[1]
     slip = now[Now.SLIP]
@@ -471,6 +692,21 @@ def find_largest_force(h, start, now, numbers, j, load):
 
     The force is smooth in the step if it follows the velocity, or holds a rigid point at rest, which is released at the
     static limit; other laws have their largest force where a step ends.
+
+    Parameters
+    ----------
+    h : float
+        Duration of the step [s].
+    start : tuple of float
+        Slide [m], velocity [m/s], force [N] and irreversible slide [m] at the start of the step.
+    now : (20,) array
+        State of the case, see `case_rows.Now`; changed in place.
+    numbers : (k, m) array
+        Numbers of the laws of m points, see `return_maps_kernels`.
+    j : int
+        Number of the point.
+    load : float
+        Normal load [N].
     """
     law = numbers[0, j]
     force = now[Now.FORCE]
@@ -490,7 +726,27 @@ def find_largest_force(h, start, now, numbers, j, load):
 
 @njit(**NJIT_KERNEL)
 def observe_forces(h, start, now, numbers, memory, j, load, seen):
-    """Add the extremes of force and slip, and the friction work."""
+    """Add the extremes of force and slip, and the friction work.
+
+    Parameters
+    ----------
+    h : float
+        Duration of the step [s].
+    start : tuple of float
+        Slide [m], velocity [m/s], force [N] and irreversible slide [m] at the start of the step.
+    now : (20,) array
+        State of the case, see `case_rows.Now`; changed in place.
+    numbers : (k, m) array
+        Numbers of the laws of m points, see `return_maps_kernels`.
+    memory : (l, m) array
+        Memory of the laws of m points, see `return_maps_kernels`.
+    j : int
+        Number of the point.
+    load : float
+        Normal load [N].
+    seen : (33,) array
+        What was observed, see `case_rows.Seen`; changed in place.
+    """
     dq = now[Now.SLIDE] - start[0]
     force = find_largest_force(h, start, now, numbers, j, load)
     slip = find_extreme_slip(h, start, now, numbers, memory, j, load)
@@ -513,7 +769,17 @@ def start_window(now, seen):
 
 @njit(**NJIT_KERNEL)
 def end_cycle(now, seen, history):
-    """Record extremes and phasor of a cycle, and those that belong to the window."""
+    """Record extremes and phasor of a cycle, and those that belong to the window.
+
+    Parameters
+    ----------
+    now : (20,) array
+        State of the case, see `case_rows.Now`; changed in place.
+    seen : (33,) array
+        What was observed, see `case_rows.Seen`; changed in place.
+    history : (4,) array
+        Smallest and largest slide [m] and the integrals for its phasor; output.
+    """
     history[0] = now[Now.MIN]
     history[1] = now[Now.MAX]
     history[2] = now[Now.COS]
@@ -547,19 +813,53 @@ def repeats(omega, now):
 
 @njit(**NJIT_KERNEL)
 def rotate(waves, k, part):
-    """Return the sine of the sum of two tabulated angles."""
+    """Return the sine of the sum of two tabulated angles.
+
+    Parameters
+    ----------
+    waves : (2, k) array
+        Sines and cosines of the drive.
+    k : int
+        Column of the first angle.
+    part : int
+        Column of the second angle.
+    """
     return waves[0, k] * waves[1, part] + waves[1, k] * waves[0, part]
 
 
 @njit(**NJIT_KERNEL)
 def rotate_cosine(waves, k, part):
-    """Return the cosine of the sum of two tabulated angles."""
+    """Return the cosine of the sum of two tabulated angles.
+
+    Parameters
+    ----------
+    waves : (2, k) array
+        Sines and cosines of the drive.
+    k : int
+        Column of the first angle.
+    part : int
+        Column of the second angle.
+    """
     return waves[1, k] * waves[1, part] - waves[0, k] * waves[0, part]
 
 
 @njit(**NJIT_KERNEL)
 def store_sample(sine, case, now, seen, samples):
-    """Store the state and the acceleration at the output at the end of a step, if there is room for it."""
+    """Store the state and the acceleration at the output at the end of a step, if there is room for it.
+
+    Parameters
+    ----------
+    sine : float
+        Sine of the drive at this instant.
+    case : (12,) array
+        Numbers of the case, see `case_rows.Number`.
+    now : (20,) array
+        State of the case, see `case_rows.Now`; changed in place.
+    seen : (33,) array
+        What was observed, see `case_rows.Seen`; changed in place.
+    samples : (S, 5) array
+        Samples of the case, see `march_cases`.
+    """
     row = int(seen[Seen.N_SAMPLES])
     if row >= samples.shape[0]:
         return
@@ -575,7 +875,33 @@ def store_sample(sine, case, now, seen, samples):
 
 @njit(**NJIT_KERNEL)
 def march_cycle(steps, table, waves, observes, case, now, numbers, memory, j, seen, samples):
-    """March a case over a cycle; `waves` are those of `march_cases`."""
+    """March a case over a cycle; `waves` are those of `march_cases`.
+
+    Parameters
+    ----------
+    steps : int
+        Steps per cycle.
+    table : (LEVELS + 1, 2, 5) array
+        Responses, see `write_responses`.
+    waves : (2, k) array
+        Sines and cosines of the drive, see `march_cases`.
+    observes : bool
+        Whether the cycle is measured.
+    case : (12,) array
+        Numbers of the case, see `case_rows.Number`.
+    now : (20,) array
+        State of the case, see `case_rows.Now`; changed in place.
+    numbers : (k, m) array
+        Numbers of the laws of m points, see `return_maps_kernels`.
+    memory : (l, m) array
+        Memory of the laws of m points, see `return_maps_kernels`.
+    j : int
+        Number of the point.
+    seen : (33,) array
+        What was observed, see `case_rows.Seen`; changed in place.
+    samples : (S, 5) array
+        Samples of the case, see `march_cases`.
+    """
     omega = case[Number.OMEGA]
     step = 2 * np.pi / omega / steps
     max_bend = (

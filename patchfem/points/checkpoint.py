@@ -128,7 +128,17 @@ def flatten(value, name: str = "") -> dict[str, np.ndarray]:
 
 
 def rebuild(value, arrays: dict, name: str = ""):
-    """Return nested tuples like `value` with the arrays of `flatten`."""
+    """Return nested tuples like `value` with the arrays of `flatten`.
+
+    Parameters
+    ----------
+    value : tuple
+        Nested tuples of the same form.
+    arrays : mapping
+        Arrays by name, see `flatten`.
+    name : str
+        Name of the value in the file.
+    """
     if isinstance(value, np.ndarray):
         return arrays[name]
     if isinstance(value, tuple):

@@ -192,7 +192,17 @@ def make_cubic_spring(stiffness: float, row) -> PointSet:
 
 
 def make_interlocking_spring(stiffness: float, wavelength: float, row) -> PointSet:
-    """Return a spring of sinusoidal force, of a stiffness at rest [N/m], on a port of displacement `row` (n,)."""
+    """Return a spring of sinusoidal force, of a stiffness at rest [N/m], on a port of displacement `row` (n,).
+
+    Parameters
+    ----------
+    stiffness : float
+        Stiffness at rest [N/m].
+    wavelength : float
+        Wavelength of the force [m].
+    row : (n,) array
+        Displacement of the port per modal coordinate.
+    """
     return PointSet([make_interlocking(stiffness, wavelength)], row, is_spring=True)
 
 

@@ -8,8 +8,8 @@ does exactly the work of height, lifted mass and law. The normal force at the en
 
 from math import cos, sin, sqrt
 
+from ..compiled.flags_kernels import NJIT_CALL
 from ..compiled.jit import njit
-from ..friction.flags_kernels import NJIT_CALL
 from .march_rows import Flank
 
 GAUSS_POINT = sqrt(0.6)  # outer node of the Gauss rule of three points
@@ -25,7 +25,19 @@ def find_slope(flank, q):
 
 @njit(**NJIT_CALL)
 def climb(flank, q, dq, dt):
-    """Write mean slope, path ratio and vertical force of a trial increment dq [m] from the slide q [m]."""
+    """Write mean slope, path ratio and vertical force of a trial increment dq [m] from the slide q [m].
+
+    Parameters
+    ----------
+    flank : (k,) array
+        Numbers of the flanks, see `march_rows.Flank`.
+    q : float
+        Slide [m].
+    dq : float
+        Increment of the slide [m].
+    dt : float
+        Duration of the step [s].
+    """
     wave = flank[Flank.WAVE_NUMBER]
     half = 0.5 * wave * dq
     ratio = sin(half) / half if abs(half) > MIN_PHASE else 1 - half * half / 6
@@ -42,7 +54,19 @@ def climb(flank, q, dq, dt):
 
 @njit(**NJIT_CALL)
 def find_stiffness(flank, q, dq, dt):
-    """Return the derivative of the mean climbing force V dz/dq by the increment [N/m]."""
+    """Return the derivative of the mean climbing force V dz/dq by the increment [N/m].
+
+    Parameters
+    ----------
+    flank : (k,) array
+        Numbers of the flanks, see `march_rows.Flank`.
+    q : float
+        Slide [m].
+    dq : float
+        Increment of the slide [m].
+    dt : float
+        Duration of the step [s].
+    """
     wave = flank[Flank.WAVE_NUMBER]
     phase = wave * (q + 0.5 * dq) - flank[Flank.PHASE]
     curvature = 0.5 * flank[Flank.AMPLITUDE] * wave * wave * cos(phase)
@@ -56,6 +80,17 @@ def find_normal(flank, q, friction, bound):
 
     The friction at the end is extrapolated from that at the start and the mean, and does not exceed mu times the normal
     force.
+
+    Parameters
+    ----------
+    flank : (k,) array
+        Numbers of the flanks, see `march_rows.Flank`.
+    q : float
+        Slide [m].
+    friction : float
+        Mean friction force of the step [N].
+    bound : float
+        Coefficient of friction mu.
     """
     t = find_slope(flank, q)
     limit = bound * flank[Flank.NORMAL]

@@ -43,17 +43,47 @@ def _pack(law: Law, numbers, memory=(), load=1.0, n_memory: int = N_MEMORY) -> P
 
 
 def make_jenkins(static: float, length: float, load: float = 1.0) -> PointLaw:
-    """Return an elastic-plastic point (eq. 3.12) of friction coefficient `static` and length [m]."""
+    """Return an elastic-plastic point (eq. 3.12) of friction coefficient `static` and length [m].
+
+    Parameters
+    ----------
+    static : float or (c,) array
+        Coefficient of friction.
+    length : float or (c,) array
+        Slide [m] at which an unstretched point slips.
+    load : float or (c,) array
+        Normal load [N].
+    """
     return _pack(Law.JENKINS, (static, np.maximum(length, MIN_LENGTH)), (0.0, load), load)
 
 
 def make_coulomb(static: float, kinetic: float, load: float = 1.0) -> PointLaw:
-    """Return a rigid point with static and kinetic friction."""
+    """Return a rigid point with static and kinetic friction.
+
+    Parameters
+    ----------
+    static : float or (c,) array
+        Coefficient of static friction.
+    kinetic : float or (c,) array
+        Coefficient of kinetic friction.
+    load : float or (c,) array
+        Normal load [N].
+    """
     return _pack(Law.COULOMB, (static, kinetic), load=load)
 
 
 def make_tanh(static: float, speed: float, load: float = 1.0) -> PointLaw:
-    """Return the regularised law static load tanh(v/speed) of eq. 2.4."""
+    """Return the regularised law static load tanh(v/speed) of eq. 2.4.
+
+    Parameters
+    ----------
+    static : float or (c,) array
+        Coefficient of friction.
+    speed : float or (c,) array
+        Reference speed v_0 [m/s].
+    load : float or (c,) array
+        Normal load [N].
+    """
     return _pack(Law.TANH, (static, speed), load=load)
 
 

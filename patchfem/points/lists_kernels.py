@@ -5,13 +5,13 @@ those of a point per unit of mu_s, which is numbers[1, j]. A bond keeps the load
 off loses its bonds with the energy that they store.
 """
 
+from ..compiled.flags_kernels import NJIT_CALL
 from ..compiled.jit import njit
 from ..friction.bonds.list_kernels import list_mean_and_slope
 from ..friction.bonds.list_rows_kernels import FORM_STRETCH, LAW, STATUS
 from ..friction.bonds.list_step_kernels import break_bonds, list_step
 from ..friction.bonds.points_kernels import point_list
 from ..friction.bonds.points_kernels import read as read_bonds
-from ..friction.flags_kernels import NJIT_CALL
 from .march_rows import Point
 from .return_maps_kernels import PointState
 
@@ -21,13 +21,37 @@ MAX_OWED = 1e-4
 
 @njit(**NJIT_CALL)
 def press_list(lists, j, load):
-    """Set the load [N] under which bonds of point j form."""
+    """Set the load [N] under which bonds of point j form.
+
+    Parameters
+    ----------
+    lists : BondLists
+        Lists of bonds of all points.
+    j : int
+        Number of the point.
+    load : float
+        Normal load [N].
+    """
     lists.statuses[j, STATUS.pressure] = load
 
 
 @njit(**NJIT_CALL)
 def write_list_mean(numbers, values, lists, j, dt):
-    """Write the mean force of point j over its slide, and the slope of that force."""
+    """Write the mean force of point j over its slide, and the slope of that force.
+
+    Parameters
+    ----------
+    numbers : (k, m) array
+        Numbers of the laws of m points, see `return_maps_kernels`.
+    values : (13, m) array
+        Values of the points, see `march_rows.Point`.
+    lists : BondLists
+        Lists of bonds of all points.
+    j : int
+        Number of the point.
+    dt : float
+        Duration of the step [s].
+    """
     bonds = point_list(lists, j)
     status = bonds.status
     dq = values[Point.SLIDE, j]
@@ -58,6 +82,23 @@ def advance_list(numbers, values, lists, j, v0, v1, dt):
     The work that is not stored is dissipated where it is positive; the reading "report" also creates energy, and both are
     summed apart. The reading "stretch" creates none: what its sums gain in a short step beyond the work, because strips
     change from one integration rule to another, was stored before, and is subtracted from the next loss.
+
+    Parameters
+    ----------
+    numbers : (k, m) array
+        Numbers of the laws of m points, see `return_maps_kernels`.
+    values : (13, m) array
+        Values of the points, see `march_rows.Point`.
+    lists : BondLists
+        Lists of bonds of all points.
+    j : int
+        Number of the point.
+    v0 : float
+        Velocity at the start of the step [m/s].
+    v1 : float
+        Velocity at the end of the step [m/s].
+    dt : float
+        Duration of the step [s].
     """
     bonds = point_list(lists, j)
     status = bonds.status
@@ -82,7 +123,19 @@ def advance_list(numbers, values, lists, j, v0, v1, dt):
 
 @njit(**NJIT_CALL)
 def read_list(numbers, lists, j, load):
-    """Return the `PointState` of point j under a load [N]."""
+    """Return the `PointState` of point j under a load [N].
+
+    Parameters
+    ----------
+    numbers : (k, m) array
+        Numbers of the laws of m points, see `return_maps_kernels`.
+    lists : BondLists
+        Lists of bonds of all points.
+    j : int
+        Number of the point.
+    load : float
+        Normal load [N].
+    """
     reading = read_bonds(lists, j, load)
     static = numbers[1, j]
     return PointState(static * reading.force, static * reading.energy, reading.stretch)

@@ -21,10 +21,10 @@ point at rest is released, is halved up to the last level.
 
 import numpy as np
 
+from ..compiled.flags_kernels import NJIT_CALL, NJIT_INLINE, NJIT_KERNEL
 from ..compiled.jit import njit
 from ..contact.set_arrays import REFERENCE_LOAD, REFERENCE_MOMENT
 from ..friction.bonds.point_kernels import MAX_SHORT_PATH
-from ..friction.flags_kernels import NJIT_CALL, NJIT_INLINE, NJIT_KERNEL
 from . import flanks_kernels as flanks
 from . import lists_kernels as lists
 from . import normal_kernels as normal
@@ -77,7 +77,17 @@ LOAD_RESIDUAL = 1e-11  # change of the loads relative to the resultant
 
 @njit(**NJIT_CALL)
 def solve_linear(matrix, vector, n):
-    """Solve a dense system in place by Gaussian elimination with partial pivoting; return whether it is regular."""
+    """Solve a dense system in place by Gaussian elimination with partial pivoting; return whether it is regular.
+
+    Parameters
+    ----------
+    matrix : (k, k) array
+        Matrix; overwritten.
+    vector : (k,) array
+        Right side, and the solution afterwards.
+    n : int
+        Number of unknowns, the first of the arrays.
+    """
     for k in range(n):
         best = k
         for i in range(k + 1, n):
@@ -105,7 +115,17 @@ def solve_linear(matrix, vector, n):
 
 @njit(**NJIT_CALL)
 def subtract_shear(slides, shapes, increments):
-    """Subtract the displacements of the pieces from the slides (m,) of the points, four coordinates in one pass."""
+    """Subtract the displacements of the pieces from the slides (m,) of the points, four coordinates in one pass.
+
+    Parameters
+    ----------
+    slides : (m,) array
+        Slides of the points [m].
+    shapes : (r, m) array
+        Slides of the points per shear coordinate.
+    increments : (r,) array
+        Shear coordinates.
+    """
     r = increments.size
     whole = r - r % 4
     for k in range(0, whole, 4):
@@ -137,7 +157,17 @@ def sum_products(first, second):
 
 @njit(**NJIT_CALL)
 def sum_triples(first, second, third):
-    """Return the sum of the products of the entries of three arrays."""
+    """Return the sum of the products of the entries of three arrays.
+
+    Parameters
+    ----------
+    first : (m,) array
+        First factors.
+    second : (m,) array
+        Second factors.
+    third : (m,) array
+        Third factors.
+    """
     total = 0.0
     for j in range(third.size):
         total += first[j] * second[j] * third[j]
@@ -158,6 +188,20 @@ def move_freely(system, level, drive, row, fraction):
     """Write the motion at the end of a step without interface forces, and that of the ports.
 
     `row` and `fraction` are the time at the start in whole steps.
+
+    Parameters
+    ----------
+    system : march_rows.System
+        Arrays of the march, changed in place.
+    level : int
+        Level of the step, which lasts a whole step over 2^level.
+    drive : tuple of float
+        Value, slope and second derivative of the drive at the start of the step [m s-2], per second and per second
+        squared.
+    row : int
+        Number of the whole step.
+    fraction : float
+        Time at the start of the step, as a fraction of the whole step.
     """
     response = system.structure.responses[level]
     state = system.state
@@ -222,6 +266,15 @@ def write_forces(system, level, h):
     """Write motion of ports and points under the assumed forces, and the mean forces of the laws with their slopes.
 
     The forces of rigid points at rest are not known here.
+
+    Parameters
+    ----------
+    system : march_rows.System
+        Arrays of the march, changed in place.
+    level : int
+        Level of the step, which lasts a whole step over 2^level.
+    h : float
+        Duration of the step [s].
     """
     ports = system.ports
     points = system.points
@@ -278,7 +331,17 @@ def write_forces(system, level, h):
 
 @njit(**NJIT_CALL)
 def keep_sliding(values, count, direction):
-    """Return whether no point moves against a direction."""
+    """Return whether no point moves against a direction.
+
+    Parameters
+    ----------
+    values : (13, m) array
+        Values of the points, see `march_rows.Point`.
+    count : int
+        Number of points.
+    direction : float
+        Sign of the slide.
+    """
     least = 0.0
     for j in range(count):
         least = min(least, direction * values[Point.SLIDE, j])
@@ -345,7 +408,17 @@ def find_steady_slide(system):
 
 @njit(**NJIT_INLINE)
 def write_point_forces(system, level, h):
-    """Write the mean forces of the points of any law, and their slopes."""
+    """Write the mean forces of the points of any law, and their slopes.
+
+    Parameters
+    ----------
+    system : march_rows.System
+        Arrays of the march, changed in place.
+    level : int
+        Level of the step, which lasts a whole step over 2^level.
+    h : float
+        Duration of the step [s].
+    """
     ports = system.ports
     points = system.points
     values = points.values
@@ -372,7 +445,17 @@ def write_point_forces(system, level, h):
 
 @njit(**NJIT_INLINE)
 def write_residual(system, level, h):
-    """Write the residuals of port forces and shear coordinates; return the largest one relative to its tolerance."""
+    """Write the residuals of port forces and shear coordinates; return the largest one relative to its tolerance.
+
+    Parameters
+    ----------
+    system : march_rows.System
+        Arrays of the march, changed in place.
+    level : int
+        Level of the step, which lasts a whole step over 2^level.
+    h : float
+        Duration of the step [s].
+    """
     ports = system.ports
     points = system.points
     moves = ports.values
@@ -579,7 +662,19 @@ def finish_step(system, level):
 
 @njit(**NJIT_INLINE)
 def take_step(system, level, h, fraction):
-    """Subtract a fraction of the step from the unknowns at its start; return the relative residual."""
+    """Subtract a fraction of the step from the unknowns at its start; return the relative residual.
+
+    Parameters
+    ----------
+    system : march_rows.System
+        Arrays of the march, changed in place.
+    level : int
+        Level of the step, which lasts a whole step over 2^level.
+    h : float
+        Duration of the step [s].
+    fraction : float
+        Fraction of the step of Newton's method.
+    """
     ports = system.ports
     shear = system.points.shear
     n_ports = ports.values.shape[1]
@@ -593,7 +688,17 @@ def take_step(system, level, h, fraction):
 
 @njit(**NJIT_INLINE)
 def solve_forces(system, level, h):
-    """Solve the port forces and shear increments by Newton's method; return whether it converged."""
+    """Solve the port forces and shear increments by Newton's method; return whether it converged.
+
+    Parameters
+    ----------
+    system : march_rows.System
+        Arrays of the march, changed in place.
+    level : int
+        Level of the step, which lasts a whole step over 2^level.
+    h : float
+        Duration of the step [s].
+    """
     ports = system.ports
     moves = ports.values
     shear = system.points.shear
@@ -684,6 +789,17 @@ def find_loads(system, row, fraction, is_solved):
 
     `row` and `fraction` are the time at the end of the step in whole steps; `is_solved` says whether the motion of the
     step is known. The change is relative to the resultant, and 0 for loads that do not follow from the motion.
+
+    Parameters
+    ----------
+    system : march_rows.System
+        Arrays of the march, changed in place.
+    row : int
+        Number of the whole step.
+    fraction : float
+        Time at the end of the step, as a fraction of the whole step.
+    is_solved : bool
+        Whether the motion of the step is known.
     """
     ports = system.ports
     points = system.points
@@ -754,7 +870,17 @@ def write_trial(system, level):
 
 @njit(**NJIT_CALL)
 def find_holds(system, state, drive):
-    """Write the forces of the ports at an instant that hold rigid points at rest."""
+    """Write the forces of the ports at an instant that hold rigid points at rest.
+
+    Parameters
+    ----------
+    system : march_rows.System
+        Arrays of the march, changed in place.
+    state : (2 n,) array
+        Modal coordinates and velocities.
+    drive : float
+        Drive at this instant [m s-2].
+    """
     ports = system.ports
     points = system.points
     structure = system.structure
@@ -803,7 +929,17 @@ def find_holds(system, state, drive):
 
 @njit(**NJIT_CALL)
 def find_event(system, drive, is_shortest):
-    """Return whether the trial step contains an event of a rigid point; at the last level, change its regime instead."""
+    """Return whether the trial step contains an event of a rigid point; at the last level, change its regime instead.
+
+    Parameters
+    ----------
+    system : march_rows.System
+        Arrays of the march, changed in place.
+    drive : float
+        Drive at the end of the step [m s-2].
+    is_shortest : bool
+        Whether the step cannot be halved.
+    """
     ports = system.ports
     points = system.points
     found = False
@@ -980,7 +1116,17 @@ def relax_pieces(system):
 
 @njit(**NJIT_INLINE)
 def commit_list(system, j, h):
-    """Advance the list of a point; without shear of the pieces it moves at the velocities of its port."""
+    """Advance the list of a point; without shear of the pieces it moves at the velocities of its port.
+
+    Parameters
+    ----------
+    system : march_rows.System
+        Arrays of the march, changed in place.
+    j : int
+        Number of the point.
+    h : float
+        Duration of the step [s].
+    """
     points = system.points
     values = points.values
     speed = abs(values[Point.SLIDE, j]) / h
@@ -1009,7 +1155,17 @@ def read_point(system, j):
 
 @njit(cache=True, **NJIT_KERNEL)
 def read_points(system, forces, stretch):
-    """Write friction force [N] and elastic stretch [m] of all points (m,)."""
+    """Write friction force [N] and elastic stretch [m] of all points (m,).
+
+    Parameters
+    ----------
+    system : march_rows.System
+        Arrays of the march, changed in place.
+    forces : (m,) array
+        Forces of the points [N], output.
+    stretch : (m,) array
+        Elastic stretches of the points [m], output.
+    """
     for j in range(system.points.port.size):
         state = read_point(system, j)
         forces[j] = state.force
@@ -1070,6 +1226,22 @@ def try_step(system, level, row, begin, end, drive):
 
     `row`, `begin` and `end` are the number of the whole step and the fractions of it; `drive` is the parabola of the
     drive at the start of this step.
+
+    Parameters
+    ----------
+    system : march_rows.System
+        Arrays of the march, changed in place.
+    level : int
+        Level of the step, which lasts a whole step over 2^level.
+    row : int
+        Number of the whole step.
+    begin : float
+        Start of the step, as a fraction of the whole step.
+    end : float
+        End of the step, as a fraction of the whole step.
+    drive : tuple of float
+        Value, slope and second derivative of the drive at the start of the step [m s-2], per second and per second
+        squared.
     """
     points = system.points
     shear = points.shear
@@ -1130,7 +1302,18 @@ def try_step(system, level, row, begin, end, drive):
 
 @njit(**NJIT_INLINE)
 def add_energies(system, level, drive):
-    """Add the energies of a step from the state before it, in `state[1]`."""
+    """Add the work of the drive and the viscous loss of a step, whose state at the start is in `state[1]`.
+
+    Parameters
+    ----------
+    system : march_rows.System
+        Arrays of the march, changed in place.
+    level : int
+        Level of the step, which lasts a whole step over 2^level.
+    drive : tuple of float
+        Value, slope and second derivative of the drive at the start of the step [m s-2], per second and per second
+        squared.
+    """
     structure = system.structure
     totals = system.totals
     ports = system.ports
@@ -1165,7 +1348,17 @@ def add_energies(system, level, drive):
 
 @njit(**NJIT_CALL)
 def write_bond_sample(system, sample, first):
-    """Write force and slip of bonds on one port, and the sum of the weights of the points; return their energy."""
+    """Write force and slip of bonds on one port, and the sum of the weights of the points; return their energy.
+
+    Parameters
+    ----------
+    system : march_rows.System
+        Arrays of the march, changed in place.
+    sample : (k,) array
+        Sample, see `march_rows.Sample`; output.
+    first : int
+        Column of the force of the port.
+    """
     points = system.points
     values = points.values
     force = 0.0
@@ -1190,7 +1383,17 @@ def write_bond_sample(system, sample, first):
 
 @njit(**NJIT_INLINE)
 def write_sample(system, row, sample):
-    """Write a sample of forces and energies at the present state."""
+    """Write a sample of forces and energies at the present state.
+
+    Parameters
+    ----------
+    system : march_rows.System
+        Arrays of the march, changed in place.
+    row : int
+        Number of the whole step.
+    sample : (k,) array
+        Sample, see `march_rows.Sample`; output.
+    """
     ports = system.ports
     points = system.points
     totals = system.totals
@@ -1338,7 +1541,19 @@ def march(system, steps, samples):
 
 @njit(**NJIT_INLINE)
 def add_work(system, sample, first_column, part):
-    """Add the mean forces of a part of a step to a sample; return the friction work of this part [J]."""
+    """Add the mean forces of a part of a step to a sample; return the friction work of this part [J].
+
+    Parameters
+    ----------
+    system : march_rows.System
+        Arrays of the march, changed in place.
+    sample : (k,) array
+        Sample, see `march_rows.Sample`; output.
+    first_column : int
+        Column of the mean force of the first port.
+    part : float
+        Duration of the part over that of the whole step.
+    """
     ports = system.ports
     points = system.points
     work = -system.totals[Total.REST]

@@ -1,7 +1,7 @@
 """Functions of `normal_kernels` for a march without a patch whose pressure changes, which calls none of them (compiled)."""
 
+from ..compiled.flags_kernels import NJIT_CALL
 from ..compiled.jit import njit
-from ..friction.flags_kernels import NJIT_CALL
 
 
 @njit(**NJIT_CALL)

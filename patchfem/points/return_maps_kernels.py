@@ -31,6 +31,7 @@ LIST          mu, length [m]                                       see `lists_ke
 from math import exp, inf, log1p, sin, sqrt, tanh
 from typing import NamedTuple
 
+from ..compiled.flags_kernels import NJIT_CALL, NJIT_KERNEL
 from ..compiled.jit import njit
 from ..friction.bonds.point_kernels import (
     MAX_SHORT_PATH,
@@ -42,7 +43,6 @@ from ..friction.bonds.point_kernels import (
     short_bond_mean,
     short_bond_step,
 )
-from ..friction.flags_kernels import NJIT_CALL, NJIT_KERNEL
 from .law_rows import Law, Masing
 
 SMALL_RATE = 1e-4  # rate times step below which series replace exponentials
@@ -98,7 +98,21 @@ class Relaxed(NamedTuple):
 
 @njit(**NJIT_CALL)
 def mean_force(numbers, memory, j, load, step):
-    """Return the `MeanForce` of point j under a load over a `Step`; a COULOMB point has to slip."""
+    """Return the `MeanForce` of point j under a load over a `Step`; a COULOMB point has to slip.
+
+    Parameters
+    ----------
+    numbers : (k, m) array
+        Numbers of the laws of m points, see `return_maps_kernels`.
+    memory : (l, m) array
+        Memory of the laws of m points, see `return_maps_kernels`.
+    j : int
+        Number of the point.
+    load : float
+        Normal load [N].
+    step : Step
+        Increment, duration and velocities of the step.
+    """
     law = numbers[0, j]
     dq = step.increment
     if law == Law.JENKINS:
@@ -419,7 +433,19 @@ def _walk(numbers, memory, j, dq, commits):
 
 @njit(**NJIT_CALL)
 def prepare(numbers, memory, j, step):
-    """Set the bond length in the middle of a step from the velocity at its start (Strang splitting)."""
+    """Set the bond length in the middle of a step from the velocity at its start (Strang splitting).
+
+    Parameters
+    ----------
+    numbers : (k, m) array
+        Numbers of the laws of m points, see `return_maps_kernels`.
+    memory : (l, m) array
+        Memory of the laws of m points, see `return_maps_kernels`.
+    j : int
+        Number of the point.
+    step : Step
+        Increment, duration and velocities of the step.
+    """
     if numbers[0, j] == Law.BONDS:
         memory[4, j] = memory[0, j]
         if numbers[3, j] < 0:
@@ -431,7 +457,21 @@ def prepare(numbers, memory, j, step):
 
 @njit(**NJIT_CALL)
 def advance(numbers, memory, j, load, step):
-    """Advance the memory of point j under a load over a `Step`."""
+    """Advance the memory of point j under a load over a `Step`.
+
+    Parameters
+    ----------
+    numbers : (k, m) array
+        Numbers of the laws of m points, see `return_maps_kernels`.
+    memory : (l, m) array
+        Memory of the laws of m points, see `return_maps_kernels`.
+    j : int
+        Number of the point.
+    load : float
+        Normal load [N].
+    step : Step
+        Increment, duration and velocities of the step.
+    """
     law = numbers[0, j]
     dq = step.increment
     if law == Law.JENKINS:
@@ -467,7 +507,19 @@ def advance(numbers, memory, j, load, step):
 
 @njit(**NJIT_CALL)
 def read(numbers, memory, j, load):
-    """Return the `PointState` of point j under a load; a COULOMB point has the force of its slip."""
+    """Return the `PointState` of point j under a load; a COULOMB point has the force of its slip.
+
+    Parameters
+    ----------
+    numbers : (k, m) array
+        Numbers of the laws of m points, see `return_maps_kernels`.
+    memory : (l, m) array
+        Memory of the laws of m points, see `return_maps_kernels`.
+    j : int
+        Number of the point.
+    load : float
+        Normal load [N].
+    """
     law = numbers[0, j]
     mu = numbers[1, j]
     state = memory[0, j]
@@ -507,6 +559,19 @@ def slip_since_zero(numbers, memory, j, load, velocity):
 
     Over the path the stretch s changes by ds/dq = 1 - s/l: for bonds with l = m eps/load, for the LuGre law with its
     stretch during steady slip at the velocity [m/s]. The rest of the path slips; that of the Bouc-Wen law is |z|^n dq.
+
+    Parameters
+    ----------
+    numbers : (k, m) array
+        Numbers of the laws of m points, see `return_maps_kernels`.
+    memory : (l, m) array
+        Memory of the laws of m points, see `return_maps_kernels`.
+    j : int
+        Number of the point.
+    load : float
+        Normal load [N].
+    velocity : float
+        Velocity [m/s].
     """
     law = numbers[0, j]
     if law == Law.BOUC_WEN:
@@ -528,7 +593,21 @@ def slip_since_zero(numbers, memory, j, load, velocity):
 
 @njit(**NJIT_CALL)
 def press(numbers, memory, j, before, after):
-    """Change the load of point j at rest: elastic forces are cut at the new limit, new bonds form."""
+    """Change the load of point j at rest: elastic forces are cut at the new limit, new bonds form.
+
+    Parameters
+    ----------
+    numbers : (k, m) array
+        Numbers of the laws of m points, see `return_maps_kernels`.
+    memory : (l, m) array
+        Memory of the laws of m points, see `return_maps_kernels`.
+    j : int
+        Number of the point.
+    before : float
+        Load before the change [N].
+    after : float
+        Load after the change [N].
+    """
     law = numbers[0, j]
     if before == after:
         return
@@ -546,7 +625,23 @@ def press(numbers, memory, j, before, after):
 
 @njit(**NJIT_CALL)
 def write_bond_means(numbers, memory, loads, slides, forces, slopes):
-    """Write mean forces (m,) and slopes of points with bonds, in a loop that vectorises; return False for long slides."""
+    """Write mean forces (m,) and slopes of points with bonds, in a loop that vectorises; return False for long slides.
+
+    Parameters
+    ----------
+    numbers : (k, m) array
+        Numbers of the laws of m points, see `return_maps_kernels`.
+    memory : (l, m) array
+        Memory of the laws of m points, see `return_maps_kernels`.
+    loads : (m,) array
+        Loads of the points [N].
+    slides : (m,) array
+        Slides of the points [m].
+    forces : (m,) array
+        Forces of the points [N], output.
+    slopes : (m,) array
+        Derivatives of the mean forces by the slides [N/m], output.
+    """
     for j in range(slides.size):
         if abs(slides[j]) > MAX_SHORT_PATH * memory[4, j]:
             return False
@@ -560,7 +655,17 @@ def write_bond_means(numbers, memory, loads, slides, forces, slopes):
 
 @njit(**NJIT_CALL)
 def advance_bonds(memory, loads, slides):
-    """Advance points with bonds of constant length after short slides (m,)."""
+    """Advance points with bonds of constant length after short slides (m,).
+
+    Parameters
+    ----------
+    memory : (l, m) array
+        Memory of the laws of m points, see `return_maps_kernels`.
+    loads : (m,) array
+        Loads of the points [N].
+    slides : (m,) array
+        Slides of the points [m].
+    """
     for j in range(slides.size):
         bonds = short_bond_step(
             memory[1, j], memory[2, j], memory[3, j], slides[j], loads[j], memory[4, j]
@@ -572,7 +677,19 @@ def advance_bonds(memory, loads, slides):
 
 @njit(**NJIT_KERNEL)
 def find_rest_limit(numbers, memory, j, load):
-    """Return the largest force at which a COULOMB point that sticks stays at rest; inf for other laws."""
+    """Return the largest force at which a COULOMB point that sticks stays at rest; inf for other laws.
+
+    Parameters
+    ----------
+    numbers : (k, m) array
+        Numbers of the laws of m points, see `return_maps_kernels`.
+    memory : (l, m) array
+        Memory of the laws of m points, see `return_maps_kernels`.
+    j : int
+        Number of the point.
+    load : float
+        Normal load [N].
+    """
     if numbers[0, j] != Law.COULOMB or memory[0, j] != 0:
         return inf
     return numbers[1, j] * load

@@ -5,6 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from .. import compiled
 from .contacts import Contact
 from .march_rows import LISTS_FULL, N_PORT_COLUMNS, Sample, Total
 from .time_march import (
@@ -59,7 +60,10 @@ def follow(contact: Contact, time, slide, frames=(), say=None, report=None) -> S
     Missing
         If lists of bonds become too long.
     """
-    kernels = load_kernels(contact, say)
+    if contact.has_loads or contact.bond_sum is not None or contact.reduction is not None:
+        kernels = load_kernels(contact, say)
+    else:
+        kernels = compiled.load("points.slide_kernels", say)
     time = np.asarray(time, float)
     slide = np.asarray(slide, float)
     last = slide.size - 1

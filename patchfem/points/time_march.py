@@ -62,7 +62,7 @@ MAX_STEPS_AT_ONCE = 8000
 SAME_CYCLE = 1e-11
 TAYLOR_DEGREE = 18  # degree whose remainder is below round-off for matrices of norm 1
 SAME_PLACE = 1e-12  # change of a slide relative to the largest displacement that counts as rest
-N_KEPT = 128  # samples per cycle of the histories before the window
+MAX_EARLY_SAMPLES_PER_CYCLE = 128  # samples per cycle of the histories before the window
 EDGE = 1e-9  # distance of the samples of a drive from the ends of a step, in steps
 RUNAWAY = (
     10.0  # output relative to the travel of a softening spring beyond which a step has diverged
@@ -73,7 +73,7 @@ PRESS_COLUMNS = ("normal_load", "normal_moment", "normal_energy", "heave", "turn
 
 
 class Snapshot(NamedTuple):
-    """State of the interface at an instant, m points.
+    """State of the m contact points of the first interface at an instant.
 
     - time [s], slide [m], rate [m/s], force [N], slip [m] of the first port; heave [m] and pitch [rad]
     - forces, stretch, bend, load (m,): friction force [N], elastic stretch [m] and load [N] of each point, and its
@@ -155,6 +155,15 @@ def make_responses(modes: ModalBasis, step: float, levels: int) -> Responses:
     """Return motion and energies of steps of several lengths.
 
     The matrix exponential is that of the modes with the chain of derivatives of the drive and with constant forces.
+
+    Parameters
+    ----------
+    modes : ModalBasis
+        Modes of the rig.
+    step : float
+        Duration of a whole step [s].
+    levels : int
+        Number of lengths of steps.
     """
     n = modes.omega.size
     matrix = np.zeros((3 * n + 3, 3 * n + 3))
@@ -195,6 +204,15 @@ def exponential(matrix, time: float, powers) -> np.ndarray:
     """Return exp(time matrix) (k, k) for a state (k,) of units [s^-powers].
 
     It is the Taylor polynomial of a fraction 2^-s of the exponent, squared s times.
+
+    Parameters
+    ----------
+    matrix : (k, k) array
+        Matrix of the rates of the state.
+    time : float
+        [s]
+    powers : (k,) array
+        Powers of the unit of each state.
     """
     # In units of the time the entries of the exponent are of order 1.
     units = time**-powers
@@ -461,6 +479,17 @@ def sample_drive(drive, step: float, first: int, count: int) -> np.ndarray:
     """Return value, slope and second derivative (count, 3) of parabolas through the drive in each step.
 
     The ends are taken inside of the step, because the drive may jump there.
+
+    Parameters
+    ----------
+    drive : core.SineDrive or another drive
+        Acceleration or force over mass as a function of time.
+    step : float
+        Duration of a step [s].
+    first : int
+        Number of the first step.
+    count : int
+        Number of steps.
     """
     starts = first + np.arange(count)[:, None]
     times = step * (starts + np.array([EDGE, 0.5, 1 - EDGE]))
@@ -763,6 +792,15 @@ def split_losses(samples, n: int, scale: float) -> np.ndarray:
     """Return the loss [J] in each step between samples, friction work less the gain of stored energy.
 
     A loss below 0 within round-off is 0. `n` is the number of columns of the motion, `scale` the friction limit [N].
+
+    Parameters
+    ----------
+    samples : (k + 1, w) array
+        Samples, see `march_rows.Sample`.
+    n : int
+        Number of columns of the motion.
+    scale : float
+        Friction limit [N].
     """
     energy = samples[:, n + Sample.ENERGY]
     losses = samples[:-1, n + Sample.WORK] - np.diff(energy)
@@ -776,7 +814,17 @@ def split_losses(samples, n: int, scale: float) -> np.ndarray:
 
 
 def make_snapshot(kernels, system: System, motion: tuple) -> Snapshot:
-    """Return the state of the points on the first port; `motion` has the first seven fields of Snapshot."""
+    """Return the state of the points on the first port; `motion` has the first seven fields of Snapshot.
+
+    Parameters
+    ----------
+    kernels : module
+        Compiled march.
+    system : march_rows.System
+        Arrays of the march.
+    motion : tuple
+        The first seven fields of Snapshot.
+    """
     points = system.points
     count = points.port.size
     read = kernels.read_points
@@ -889,6 +937,15 @@ def advance_with_frames(run: March, size: int, frames: int) -> tuple[int, np.nda
     """March over a number of steps, with snapshots at the ends of equal parts.
 
     Returns the number of the first step, the samples and the snapshots.
+
+    Parameters
+    ----------
+    run : March
+        March, which goes on.
+    size : int
+        Number of steps.
+    frames : int
+        Number of snapshots.
     """
     first = run.done
     if not frames:
@@ -933,11 +990,21 @@ class Record:
         self.last = None
         self.recent = []
         # The distance of early samples divides a cycle, so that each one begins with a sample.
-        longest = max(1, run.steps // N_KEPT)
+        longest = max(1, run.steps // MAX_EARLY_SAMPLES_PER_CYCLE)
         self.stride = max(k for k in range(1, longest + 1) if run.steps % k == 0)
 
     def add(self, first: int, samples, snapshots=()) -> None:
-        """Add the samples (k + 1, w) from the step `first` on."""
+        """Add the samples (k + 1, w) from the step `first` on.
+
+        Parameters
+        ----------
+        first : int
+            Number of the first step.
+        samples : (k + 1, w) array
+            Samples of the steps and of the end.
+        snapshots : sequence of Snapshot
+            Snapshots of the steps.
+        """
         run = self.run
         n = 2 * run.modes.omega.size
         count = len(samples) - 1
@@ -1045,6 +1112,15 @@ def find_extremes(q, v, step: float) -> list[tuple[float, float]]:
     """Return the smallest and largest of samples q (c, k) of each cycle, those of the cubics between them included.
 
     `v` (c, k) are the velocities, `step` [s] the distance of the samples.
+
+    Parameters
+    ----------
+    q : (c, k) array
+        Samples of each cycle [m].
+    v : (c, k) array
+        Velocities [m/s].
+    step : float
+        Distance of the samples [s].
     """
     low = q.min(axis=1)
     high = q.max(axis=1)
@@ -1071,6 +1147,17 @@ def make_response(run: March, rows, numbers, energies) -> Response:
     `extra` has the energies: friction work, stored, dissipated and created energy [J]; slides, slide rates, forces and
     slips (k, i) of several interfaces, and forces of springs (k, s); load, moment and energy of the contact, heave and
     pitch of a contact that moves.
+
+    Parameters
+    ----------
+    run : March
+        March that was run.
+    rows : (k, w) array
+        Samples, see `march_rows.Sample`.
+    numbers : (k,) array
+        Numbers of their steps.
+    energies : (3, k) array
+        Friction work, dissipated and created energy up to them [J].
     """
     modes = run.modes
     contact = run.contact

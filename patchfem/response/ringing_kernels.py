@@ -9,8 +9,8 @@ the others is ignored.
 
 from math import cos, exp, inf, sin, sqrt
 
+from ..compiled.flags_kernels import FASTMATH_FLAGS, NJIT_NO_REFCOUNT
 from ..compiled.jit import njit
-from ..friction.flags_kernels import FASTMATH_FLAGS, NJIT_NO_REFCOUNT
 
 EPS = 2.0**-52
 # Ratio of the norm of a column after projection to its norm; below it the column depends on the others.

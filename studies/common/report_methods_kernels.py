@@ -11,7 +11,7 @@ from math import tanh
 import numpy as np
 
 from patchfem.compiled import njit
-from patchfem.friction.flags_kernels import NJIT_NO_REFCOUNT
+from patchfem.compiled.flags_kernels import NJIT_NO_REFCOUNT
 
 # kinds of laws
 COULOMB = 0

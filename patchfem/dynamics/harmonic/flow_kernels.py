@@ -5,8 +5,8 @@ From one node of the cycle to the next the slide changes linearly; the force is 
 
 from math import inf
 
+from ...compiled.flags_kernels import NJIT_NO_REFCOUNT
 from ...compiled.jit import njit
-from ...friction.flags_kernels import NJIT_NO_REFCOUNT
 from ...friction.laws import stretch_kernels as law
 
 MAX_CYCLES = 60  # largest number of cycles until the stretch is periodic

@@ -1,7 +1,7 @@
 """Forces of a velocity-dependent law without memory along a cycle (compiled)."""
 
+from ...compiled.flags_kernels import NJIT_NO_REFCOUNT
 from ...compiled.jit import njit
-from ...friction.flags_kernels import NJIT_NO_REFCOUNT
 from ...friction.laws import tanh_kernels as law
 
 

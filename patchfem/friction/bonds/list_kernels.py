@@ -14,8 +14,8 @@ from typing import NamedTuple
 import numpy as np
 from numba import uint64
 
+from ...compiled.flags_kernels import NJIT_KERNEL, NJIT_NO_REFCOUNT
 from ...compiled.jit import njit
-from ..flags_kernels import NJIT_KERNEL, NJIT_NO_REFCOUNT
 from .list_math_kernels import LONG_RULE, MAX_SHORT_PANEL, SHORT_RULE, fast_exp, power
 from .list_rows_kernels import (
     FORM_GROWING,

@@ -7,8 +7,8 @@
 import numpy as np
 from numpy.polynomial.legendre import leggauss
 
+from ...compiled.flags_kernels import NJIT_NO_REFCOUNT
 from ...compiled.jit import njit
-from ..flags_kernels import NJIT_NO_REFCOUNT
 from .list_rows_kernels import N_TABLE_STEPS
 
 N_SERIES_TERMS = (

@@ -5,8 +5,8 @@ Arguments are those of `list_kernels`.
 
 from math import exp
 
+from ...compiled.flags_kernels import NJIT_NO_REFCOUNT
 from ...compiled.jit import njit
-from ..flags_kernels import NJIT_NO_REFCOUNT
 from .list_kernels import divide, find_end, find_path, sum_list, target_length, total
 from .list_math_kernels import power
 from .list_rows_kernels import (

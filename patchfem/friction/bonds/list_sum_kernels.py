@@ -16,8 +16,8 @@ from typing import NamedTuple
 import numpy as np
 from numba import uint64
 
+from ...compiled.flags_kernels import FASTMATH_FLAGS, NJIT_NO_REFCOUNT
 from ...compiled.jit import njit
-from ..flags_kernels import FASTMATH_FLAGS, NJIT_NO_REFCOUNT
 from .list_math_kernels import bond_gammainc, fast_exp, fast_log, power, whole_power
 from .list_rows_kernels import (
     FORM_REPORT,

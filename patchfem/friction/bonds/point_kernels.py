@@ -23,8 +23,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ...compiled.flags_kernels import FASTMATH_FLAGS, NJIT_NO_REFCOUNT
 from ...compiled.jit import njit
-from ..flags_kernels import FASTMATH_FLAGS, NJIT_NO_REFCOUNT
 
 # Largest path in bond lengths for which the power series are exact to round-off
 MAX_SHORT_PATH = 0.5

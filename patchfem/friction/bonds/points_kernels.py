@@ -7,8 +7,8 @@ share its path and its strips.
 
 from typing import NamedTuple
 
+from ...compiled.flags_kernels import NJIT_NO_REFCOUNT
 from ...compiled.jit import njit
-from ..flags_kernels import NJIT_NO_REFCOUNT
 from . import list_kernels, list_step_kernels
 from .list_rows_kernels import LAW, STATUS, STRIP, BondList
 from .list_sum_kernels import MIN_POSITIVE

@@ -10,8 +10,8 @@ from math import exp, expm1, log, log1p
 
 import numpy as np
 
+from ...compiled.flags_kernels import FASTMATH_FLAGS, NJIT_NO_REFCOUNT
 from ...compiled.jit import njit
-from ..flags_kernels import FASTMATH_FLAGS, NJIT_NO_REFCOUNT
 from ..protocol_kernels import Rates, RelaxedStretch
 
 GAUSS_POINTS = np.polynomial.legendre.leggauss(8)[0]  # Gauss points of a piece in (-1, 1)

@@ -8,9 +8,9 @@ path.
 from math import exp
 from typing import NamedTuple
 
+from ...compiled.flags_kernels import FASTMATH_FLAGS, NJIT_NO_REFCOUNT
 from ...compiled.jit import njit
 from ..bonds.point_kernels import shape_functions
-from ..flags_kernels import FASTMATH_FLAGS, NJIT_NO_REFCOUNT
 from ..protocol_kernels import Rates, RelaxedStretch
 
 # Smallest friction limit relative to the static force; z relaxes over limit/stiffness, which must

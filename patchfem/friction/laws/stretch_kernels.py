@@ -9,8 +9,8 @@ numbers: sum of mu_s area pressure/eps_0 over the points [N/m], eps_0 [m], the g
 
 from math import exp, expm1
 
+from ...compiled.flags_kernels import FASTMATH_FLAGS, NJIT_NO_REFCOUNT
 from ...compiled.jit import njit
-from ..flags_kernels import FASTMATH_FLAGS, NJIT_NO_REFCOUNT
 from ..protocol_kernels import Rates, RelaxedStretch
 
 

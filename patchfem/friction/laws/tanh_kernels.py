@@ -5,8 +5,8 @@ numbers: mu N [N], 1/v_0 [s/m]. NumPy form: `tanh.TanhLaw`.
 
 from math import tanh
 
+from ...compiled.flags_kernels import NJIT_NO_REFCOUNT
 from ...compiled.jit import njit
-from ..flags_kernels import NJIT_NO_REFCOUNT
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)

@@ -1,4 +1,4 @@
-"""Contact points of a time integration, and laws of single interfaces, from friction law, load and patch.
+"""Contact points of a march in time steps, and laws of single interfaces, made from friction law, load and patch.
 
 In: a Model, its Numerics and its Patch. Out: a `points.contacts.Contact`, or the Elements of the interfaces.
 """

@@ -150,7 +150,7 @@ def _check_load_line(patch: TableFacts, half_length: float) -> None:
 
 
 def _check_asperities(patch: TableFacts) -> None:
-    """Report keys of [contact.asperities] without a trace or a first touch to which they refer."""
+    """Report what [contact.asperities] lacks: a trace for its cutoff, or its stiffness at first touch."""
     layer = patch.asperities
     has_trace = patch.has("profile", "asperities.from", "asperities.rms_height")
     if layer and patch.has("asperities.cutoff") and not has_trace:

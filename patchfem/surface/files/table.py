@@ -28,7 +28,7 @@ MIN_ROUNDED = (
 MAX_ROUNDING = (
     0.75  # largest distance from even positions in printed digits, half of which is rounding
 )
-MIN_DIGIT = 1e-11  # smallest printed digit of a position [m]
+MIN_PRINTED_DIGIT = 1e-11  # smallest printed digit of a position [m]
 DIGIT_TOL = 1e-4  # largest deviation from a multiple of a digit, relative to it, that is round-off
 # Largest distance of positions that count as equal, relative to the length of the axis.
 ROUND_OFF = 1e-9
@@ -278,7 +278,7 @@ def _undo_rounding(table: Table, role: str, x) -> tuple[np.ndarray, tuple[str, .
     for even in evens:
         distance = float(np.abs(x - even).max())
         step = float(even[1] - even[0])
-        if step > 0 and 1e-6 * step < distance <= MAX_ROUNDING * max(digit, MIN_DIGIT):
+        if step > 0 and 1e-6 * step < distance <= MAX_ROUNDING * max(digit, MIN_PRINTED_DIGIT):
             note = (
                 f"{role} is rounded to {format_length(digit)} in the file; the samples are taken as evenly spaced by "
                 f"{format_length(step)}"

@@ -1,6 +1,6 @@
 """Flags of compiled code: fast-math is limited to options under which NaN and infinity keep their meaning."""
 
-from ..compiled.jit import NJIT_INTERNAL, NJIT_NO_REFCOUNT
+from .jit import NJIT_INTERNAL, NJIT_NO_REFCOUNT
 
 FASTMATH_FLAGS = {"reassoc", "contract", "arcp"}
 
