@@ -226,6 +226,7 @@ class PatchMesh:
     - can_gather_points: whether no fields of the motion are needed, so that few points may
       represent the patch.
     - slip: slide whose partial slip the mesh has to resolve.
+    - n_finer: halvings of the elements beyond those that the static measures need.
     """
 
     element_size: float | None
@@ -236,6 +237,7 @@ class PatchMesh:
     shared: SharedMeshes | None = None
     can_gather_points: bool = False
     slip: PrescribedSlip | None = None
+    n_finer: int = 0
 
     @property
     def is_automatic(self) -> bool:

@@ -7,7 +7,7 @@ In: a Result whose `extra["step_runs"]` has the run and its runs with fewer step
 from typing import NamedTuple
 
 from ..response.errors import ERROR_MEASURES, MIN_ORDER, absolute_change
-from .accuracy_warnings import MAIN_MEASURES
+from .refine import MAIN_MEASURES
 
 ROUND_OFF = 1e-9  # Largest relative error that counts as round-off in long sums.
 # Smallest ratio of the errors with finer and coarser steps at which the steps do not matter.

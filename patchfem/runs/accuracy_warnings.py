@@ -8,7 +8,7 @@ error of a measure is `safety * change / (ratio**order - 1)` (`response.errors`)
 
 from collections.abc import Mapping
 from dataclasses import replace
-from math import ceil, log2, pi
+from math import ceil, floor, log2, log10, pi
 from types import MappingProxyType
 from typing import NamedTuple
 
@@ -16,6 +16,7 @@ from ..effects import law_has_trait
 from ..formatting import format_number
 from ..model.gap import longest_loaded_cell
 from ..response import rows
+from . import refine
 from .patch import faces, mesh_levels, press
 from .results import notes, patch_rows
 from .rig import costs, engines
@@ -47,15 +48,6 @@ STEADY_AMPLITUDE = "relative_displacement_amplitude_steady"
 USE_ERROR_ADVICE = "use the value with its stated error"
 NO_ADVICE = f"no known setting makes this value more accurate; {USE_ERROR_ADVICE}"
 ELEMENT_SIZE = "contact.element_size"
-# Main measures of a run, which an accuracy warning names first.
-MAIN_MEASURES = (
-    "relative_displacement_amplitude",
-    "absolute_acceleration_peak",
-    "loop_area",
-    "friction_ratio_peak",
-    "pressure_peak",
-    "contact_fraction",
-)
 
 
 class AccuracyContext(NamedTuple):
@@ -72,6 +64,8 @@ class AccuracyContext(NamedTuple):
     unworn : tuple
         The patch before wear on its nested meshes, from fine to coarse; () if the patch is not
         worn.
+    next_seconds : float
+        CPU time [s] of all passes that would meet the tolerance, if it exceeds accuracy.max_seconds; else 0.
     """
 
     model: object
@@ -79,6 +73,7 @@ class AccuracyContext(NamedTuple):
     patch: object = None
     extra: Mapping = MappingProxyType({})
     unworn: tuple = ()
+    next_seconds: float = 0.0
 
 
 def tolerance_warnings(context: AccuracyContext, coarse=(), static_patches=()) -> list[str]:
@@ -151,7 +146,7 @@ def _select_interface_measures(context: AccuracyContext, face) -> AccuracyContex
         numbered = rows.add_interface_number(name, face.number)
         if context.measures.get(numbered) is not None:
             measures[name] = context.measures[numbered]
-    return AccuracyContext(face.model, measures, face.patch)
+    return AccuracyContext(face.model, measures, face.patch, next_seconds=context.next_seconds)
 
 
 def _select_named_measures(context: AccuracyContext, excess: dict) -> list[str]:
@@ -161,7 +156,7 @@ def _select_named_measures(context: AccuracyContext, excess: dict) -> list[str]:
     measure with the largest ratio of error to allowed error.
     """
     known = context.measures
-    main = [name for name in MAIN_MEASURES if name in excess]
+    main = [name for name in refine.MAIN_MEASURES if name in excess]
     main = [name for name in main if known[name].error < abs(known[name].value)]
     others = [name for name in excess if not name.startswith(RINGING_PREFIX)] or excess
     return main or [max(others, key=excess.get)]
@@ -254,6 +249,10 @@ def _advise_mesh(
         return faces.replace_contact_keys(model, f"{cause}; split the elements of contact.mesh")
     if not all(patch.mesh.is_automatic for patch in patch_models):
         return faces.replace_contact_keys(model, f"{cause}; leave out {ELEMENT_SIZE}")
+    next_seconds = max(context.next_seconds for context, _ in solutions)
+    if next_seconds:
+        limit = format_number(_round_up(next_seconds), 2)
+        return f"{cause}; set accuracy.max_seconds = {limit} for finer meshes"
     tolerances = [] if is_at_limit else [_tolerance_for_finer_mesh(*place) for place in solutions]
     tolerances = [tolerance for tolerance in tolerances if tolerance is not None]
     if tolerances:
@@ -261,12 +260,18 @@ def _advise_mesh(
     patches = [context.patch for context, _ in solutions if isinstance(context.patch, press.Patch)]
     seconds = max(map(mesh_levels.predict_next_mesh_seconds, patches), default=0.0)
     limit = mesh_levels.max_condensing_seconds(patch_models[0])
-    if seconds > limit:
+    if seconds > limit and not patch_models[0].mesh.n_finer:
         cause += (
             f"; the next mesh would take about {format_number(seconds, 2)} CPU s, and at most {limit:g} CPU s are spent "
             "on a mesh of this scene"
         )
     return f"{cause}; no accuracy.tolerance leads to a finer mesh; {USE_ERROR_ADVICE}"
+
+
+def _round_up(value: float) -> float:
+    """Return a value rounded up to two significant digits."""
+    unit = 10.0 ** (floor(log10(value)) - 1)
+    return unit * ceil(value / unit)
 
 
 def _tolerance_for_finer_mesh(context: AccuracyContext, coarse) -> float | None:

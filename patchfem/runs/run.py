@@ -7,7 +7,7 @@ import hashlib
 from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
-from time import perf_counter
+from time import perf_counter, process_time
 from typing import NamedTuple
 
 import numpy as np
@@ -16,7 +16,7 @@ from ..core import Measure, NotConverged, Outcome
 from ..model.model import Model
 from ..model.source import locate_errors
 from ..points import checkpoint
-from . import joint, memory
+from . import joint, memory, refine
 from .accuracy_warnings import AccuracyContext, tolerance_warnings
 from .balances import mark_unbalanced
 from .bench import result as bench_result
@@ -100,13 +100,44 @@ def run(
     runnable = runnable if isinstance(runnable, Plan) else plan(runnable)
     with locate_errors(runnable.model.source):
         memory.refuse_insufficient_memory(runnable.sizes.parts)
-        return _run_plan(runnable, say, progress, state_file, estimate=estimate, fresh=fresh)
+        if fresh:
+            store.clear_cache()
+        begin = process_time()
+        passed = None
+        next_plan = runnable
+        while True:
+            begin_pass = process_time()
+            done = _run_pass(next_plan, say, progress, state_file, estimate=estimate)
+            end = process_time()
+            if not estimate:
+                return _complete_result(done, None)
+            passed = refine.judge_pass(
+                runnable.model, done.result, end - begin_pass, end - begin, passed
+            )
+            if passed.model is None:
+                return _complete_result(done, passed)
+            next_plan = replace(runnable, model=passed.model)
 
 
-def _run_plan(
-    run_plan: Plan, say, progress, state_file: StateFile | None, *, estimate: bool, fresh: bool
-) -> Result:
-    """Run a plan that needs no more memory than is free.
+class FinishedPass(NamedTuple):
+    """Result of a pass of a run without its accuracy warnings.
+
+    - result: Result.
+    - notes: sentences on the scene and the patch.
+    - start: start time of the pass [s].
+    - meshes: patch of [contact] on its meshes.
+    """
+
+    result: Result
+    notes: list
+    start: float
+    meshes: PatchMeshes
+
+
+def _run_pass(
+    run_plan: Plan, say, progress, state_file: StateFile | None, *, estimate: bool
+) -> FinishedPass:
+    """Run a plan once.
 
     The order is: patch of [contact] on its meshes, patches of the interfaces, wear, then the motion or
     the static result, and finally static measures, balances and warnings. A patch without contact
@@ -119,8 +150,6 @@ def _run_plan(
     notes = list(model.source.notes)
     meshes = PatchMeshes()
     stiffer = None
-    if fresh:
-        store.clear_cache()
     if model.rig is not None:
         warnings += engines.describe_unused_settings(model, run_plan.engine)
     if model.patch is not None:
@@ -168,7 +197,9 @@ def _run_plan(
                 )
                 at_rest = replace(at_rest, outcome=Outcome.NOT_CONVERGED)
                 unworn = PatchMeshes(meshes.patch, meshes.coarse)
-                error.partial_result = _complete_result(at_rest, notes, start, unworn)
+                error.partial_result = _complete_result(
+                    FinishedPass(at_rest, notes, start, unworn), None
+                )
             raise
         if model.kind != "patch":
             result = _add_static_measures(result, model, meshes)
@@ -176,7 +207,7 @@ def _run_plan(
             result = measures.add_wear_measures(
                 replace(result, plan=run_plan), worn_patch, estimate
             )
-    return _complete_result(mark_unbalanced(result), notes, start, meshes)
+    return FinishedPass(mark_unbalanced(result), notes, start, meshes)
 
 
 def _solve_contact_patch(model: Model, *, estimate: bool) -> PatchMeshes:
@@ -280,21 +311,22 @@ def _add_static_measures(result: Result, model: Model, meshes: PatchMeshes) -> R
     return result
 
 
-def _complete_result(result: Result, notes: list, start: float, meshes: PatchMeshes) -> Result:
+def _complete_result(done: FinishedPass, passed: refine.Pass | None) -> Result:
     """Add CPU time, notes, accuracy warnings and definitions of the measures to a Result.
 
     Parameters
     ----------
-    result : Result
-    notes : list
-        Notes on the scene and the patch.
-    start : float
-        Start time of the run [s].
-    meshes : PatchMeshes
+    done : FinishedPass
+    passed : refine.Pass or None
+        Why no further pass follows; None for a run without errors.
     """
+    result, notes, start, meshes = done
     model = result.plan.model
     result.seconds["total"] = perf_counter() - start
-    context = AccuracyContext(model, result.measures, result.patch, result.extra, meshes.unworn)
+    next_seconds = 0.0 if passed is None else passed.seconds
+    context = AccuracyContext(
+        model, result.measures, result.patch, result.extra, meshes.unworn, next_seconds
+    )
     warnings = [*result.warnings, *tolerance_warnings(context, meshes.coarse, meshes.static)]
     notes = [*notes, *result.extra.get("notes", [])]
     yielding_faces = _note_on_yielding_faces(result)

@@ -140,7 +140,8 @@ def solve_on_refined_meshes(patch_model, tolerance: float, estimate: bool = True
     mesh halves the cells of the previous one. The refinement ends if the next mesh would exceed the CPU
     time that is allowed for a patch. If the next mesh of a patch with a profile is expensive, the
     measures are computed on points as dense as the profile, and the mesh only serves fields and motion.
-    Under a prescribed displacement, the meshes must resolve the friction work as well.
+    Under a prescribed displacement, the meshes must resolve the friction work as well. `PatchMesh.n_finer` more meshes
+    follow.
 
     Parameters
     ----------
@@ -159,6 +160,7 @@ def solve_on_refined_meshes(patch_model, tolerance: float, estimate: bool = True
     patches = ()
     points = None
     has_failed_on_points = False
+    n_finer = patch_model.mesh.n_finer
     while True:
         patch = None
         if estimate or len(patches) == MIN_LEVELS - 1:
@@ -195,10 +197,11 @@ def solve_on_refined_meshes(patch_model, tolerance: float, estimate: bool = True
             patches = with_static_measures(patches, tolerance, points)
         # The points do not determine a peak that may be at a free corner, but a finer mesh does.
         is_done = is_within or (points is not None and "pressure_peak" in points.measures)
-        if is_done and _resolves_slip_work(patch_model, patches, tolerance):
-            return patches
-        if seconds > max_condensing_seconds(patch_model, tolerance):
-            return patches
+        is_done = is_done and _resolves_slip_work(patch_model, patches, tolerance)
+        if is_done or seconds > max_condensing_seconds(patch_model, tolerance):
+            if n_finer == 0:
+                return patches
+            n_finer -= 1
 
 
 def _meets_tolerance(patches: tuple, tolerance: float, points) -> bool:

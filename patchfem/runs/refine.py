@@ -1,0 +1,156 @@
+"""Refinement of a run until its main measures meet the tolerance.
+
+In: the result of a pass of a run. Out: the model of the next pass, or the time that it would need. A pass is repeated
+with twice the resolution along the axis with the largest share of the error of the worst main measure: the meshes of
+the patches, or the steps of a bench. The steps of a rig are refined within a pass (`rig.run_refined`). A run that would
+not meet its tolerance within accuracy.max_seconds is not repeated.
+"""
+
+from dataclasses import replace
+from math import ceil, log
+from typing import NamedTuple
+
+from ..core import Outcome
+from ..model.model import Model
+from .results.patch_rows import TABLE as PATCH_TABLE
+
+# Main measures of a run, which have to meet the tolerance.
+MAIN_MEASURES = (
+    "relative_displacement_amplitude",
+    "absolute_acceleration_peak",
+    "loop_area",
+    "friction_ratio_peak",
+    "pressure_peak",
+    "contact_fraction",
+)
+COST_RATIO = 4.0  # Expected ratio of the CPU times of two successive passes.
+ERROR_RATIO = 4.0  # Expected ratio of the errors of two successive passes.
+# Smallest ratio of the errors of two successive passes after which a third one follows.
+MIN_GAIN = 1.5
+MAX_EXCESS = 1e9  # Upper bound of the ratio of error to allowed error, for values of zero.
+MAX_BENCH_STEPS = 6400  # Largest number of automatically chosen steps per cycle of a bench.
+# Outcomes of runs without measures that finer passes could improve.
+FAILED_OUTCOMES = (Outcome.NOT_CONVERGED, Outcome.NO_CONTACT, Outcome.GROWS)
+
+
+class Pass(NamedTuple):
+    """Pass of a run, and what the next one would be.
+
+    - excess: largest ratio of error to allowed error of the main measures.
+    - model: model of the next pass, or None.
+    - seconds: CPU time [s] of all passes that would meet the tolerance, if it exceeds accuracy.max_seconds; else 0.
+    """
+
+    excess: float
+    model: Model | None = None
+    seconds: float = 0.0
+
+
+def judge_pass(
+    given: Model, result, seconds: float, total_seconds: float, before: Pass | None
+) -> Pass:
+    """Decide whether a run needs another pass.
+
+    Parameters
+    ----------
+    given : Model
+        Model of the first pass, with the settings that the scene fixes.
+    result : Result
+    seconds, total_seconds : float
+        CPU times [s] of this pass and of all passes.
+    before : Pass or None
+        Pass before this one.
+    """
+    model = given if before is None else before.model
+    name, excess = find_worst_measure(result.measures, model.accuracy.tolerance)
+    if excess <= 1 or result.outcome in FAILED_OUTCOMES or not _can_repeat(model, result, name):
+        return Pass(excess)
+    if before is not None and excess * MIN_GAIN > before.excess:
+        return Pass(excess)
+    axis = find_axis(result.measures[name], name)
+    if axis == "mesh":
+        finer = refine_meshes(model)
+    elif axis == "steps" and model.kind == "bench" and given.accuracy.steps_per_cycle is None:
+        finer = _refine_steps(model, result.extra["steps"])
+    else:
+        finer = None
+    n_passes = ceil(log(excess) / log(ERROR_RATIO))
+    expected = total_seconds + seconds * sum(COST_RATIO**k for k in range(1, n_passes + 1))
+    if finer is None or expected <= model.accuracy.max_seconds:
+        return Pass(excess, finer)
+    return Pass(excess, None, expected)
+
+
+def _can_repeat(model: Model, result, name: str) -> bool:
+    """Return whether finer passes can reduce the error of a measure.
+
+    Static patches are refined when they are pressed, and wear has its own passes. Measures on the points of a profile do
+    not depend on the mesh.
+    """
+    if model.kind == "patch" or model.wear is not None:
+        return False
+    return not (
+        name in PATCH_TABLE and result.patch is not None and result.patch.points is not None
+    )
+
+
+def find_worst_measure(measures: dict, tolerance: float) -> tuple[str, float]:
+    """Return the main measure with the largest ratio of error to allowed error, and this ratio; ("", 0) without one."""
+    found = [name for name in MAIN_MEASURES if name in measures]
+    ratios = {name: min(measures[name].error_ratio(tolerance), MAX_EXCESS) for name in found}
+    worst = max(ratios, key=ratios.get, default="")
+    return worst, ratios.get(worst, 0.0)
+
+
+def find_axis(measure, name: str) -> str:
+    """Return the axis with the largest share of the error of a measure, such as "mesh"; "own" if none is known."""
+    if name in PATCH_TABLE:
+        return "mesh"
+    if measure.causes is None:
+        return "own"
+    axis = max(measure.causes.parts, key=measure.causes.parts.get, default="own")
+    return axis if measure.causes.parts.get(axis, 0.0) > 0 else "own"
+
+
+def _refine_steps(model: Model, steps: int) -> Model | None:
+    """Return the model of a bench with twice the steps per cycle; None if there are too many."""
+    if 2 * steps > MAX_BENCH_STEPS:
+        return None
+    accuracy = model.accuracy.model_copy(update={"steps_per_cycle": 2 * steps})
+    return replace(model, accuracy=accuracy)
+
+
+def refine_meshes(model: Model) -> Model | None:
+    """Return a model whose patches have meshes with half the element size; None if no mesh is automatic."""
+    patch = model.patch
+    if patch is not None:
+        return replace(model, patch=_refine_mesh(patch)) if _can_refine(patch) else None
+    if model.rig is None:
+        return None
+    friction = model.rig.friction
+    interfaces = tuple(map(_refine_interface, friction.interfaces))
+    if interfaces == friction.interfaces:
+        return None
+    friction = replace(friction, interfaces=interfaces)
+    return replace(model, rig=replace(model.rig, friction=friction))
+
+
+def _refine_interface(interface):
+    """Return an interface with a finer mesh of its patch; unchanged if it has no patch with an automatic mesh."""
+    if not _can_refine(interface.patch):
+        return interface
+    return replace(interface, patch=_refine_mesh(interface.patch))
+
+
+def _refine_mesh(patch_model):
+    """Return a patch whose mesh is halved once more."""
+    return patch_model.with_mesh(n_finer=patch_model.mesh.n_finer + 1)
+
+
+def _can_refine(patch_model) -> bool:
+    """Return whether the mesh of a patch follows from the tolerance and belongs to this run alone."""
+    return (
+        patch_model is not None
+        and patch_model.mesh.is_automatic
+        and patch_model.mesh.shared is None
+    )

@@ -1,0 +1,76 @@
+"""A run is repeated with a finer resolution until its main measures meet the tolerance."""
+
+import re
+
+import patchfem as pf
+
+MAIN_MEASURES = (
+    "relative_displacement_amplitude",
+    "loop_area",
+    "friction_ratio_peak",
+    "pressure_peak",
+)
+
+# Bonds that weaken over .2 um of slip, which 400 steps of a slide of 40 um do not resolve.
+WEAKENING = """
+[normal]
+load = "1.8 kN"
+[friction]
+law = "nonlocal"
+static = 0.3
+kinetic = 0.14
+bond_length = ".76 um"
+rest_growth = "0.29 mm/s^2"
+slip_growth = ".2 um"
+rest_speed = "75 um/s"
+[slide]
+kind = "sine"
+amplitude = "40 um"
+frequency = "30 Hz"
+cycles = 4
+"""
+
+
+def find_excess(result) -> float:
+    """Return the largest ratio of error to allowed error of the main measures."""
+    tolerance = result.plan.model.accuracy.tolerance
+    measures = [result.measures[name] for name in MAIN_MEASURES if name in result.measures]
+    return max(measure.error_ratio(tolerance) for measure in measures)
+
+
+def test_exact_beam_is_refined_until_its_loop_meets_the_tolerance():
+    """The template `beam` misses its tolerance on the first mesh. With more time it meets it, and agrees with the coarse
+    run within both errors; the warning of the coarse run names the time that the next pass needs."""
+    once = pf.run(pf.new("beam"), **{"accuracy.max_seconds": 1e-3})
+    done = pf.run(pf.new("beam"))
+    assert find_excess(once) > 5
+    assert find_excess(done) <= 1
+    assert done.patch.x.size >= 4 * once.patch.x.size - 3
+    coarse, fine = (run.measures["loop_area"] for run in (once, done))
+    assert abs(coarse.value - fine.value) <= coarse.error + fine.error
+    assert fine.error < coarse.error / 10
+    (named,) = set(re.findall(r"set accuracy\.max_seconds = ([\d.]+)", " ".join(once.warnings)))
+    assert float(named) > 1e-3
+
+
+def test_always_mesh_that_the_scene_gives_is_kept():
+    """A run does not change an element size that the scene gives."""
+    result = pf.run(pf.new("beam"), **{"contact.element_size": "0.5 mm"})
+    assert find_excess(result) > 1
+    assert result.patch.x.size < 150
+    assert not any("max_seconds" in warning for warning in result.warnings)
+
+
+def test_exact_bench_has_more_steps_until_its_peak_meets_the_tolerance():
+    """The peak of the friction of weakening bonds follows with more steps; fixed steps are kept, and their error holds."""
+    fixed = pf.run(WEAKENING, **{"accuracy.steps_per_cycle": 400})
+    done = pf.run(WEAKENING)
+    exact = pf.run(WEAKENING, **{"accuracy.steps_per_cycle": 20000})
+    truth = exact.measures["friction_ratio_peak"].value
+    assert fixed.extra["steps"] == 400
+    assert done.extra["steps"] > 400
+    assert find_excess(fixed) > 1
+    assert find_excess(done) <= 1
+    for result in (fixed, done):
+        peak = result.measures["friction_ratio_peak"]
+        assert abs(peak.value - truth) <= peak.error
