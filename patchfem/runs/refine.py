@@ -10,6 +10,8 @@ from dataclasses import replace
 from math import ceil, log
 from typing import NamedTuple
 
+import numpy as np
+
 from ..core import Outcome
 from ..model.model import Model
 from .results.patch_rows import TABLE as PATCH_TABLE
@@ -79,6 +81,28 @@ def judge_pass(
     if finer is None or expected <= model.accuracy.max_seconds:
         return Pass(excess, finer)
     return Pass(excess, None, expected)
+
+
+def bound_errors(measures: dict, before: dict) -> dict:
+    """Return measures whose errors are not smaller than those of a method of second order.
+
+    The error of a pass follows from the difference of two resolutions, which may vanish by chance; the loop would stop
+    just there. The error of the pass before, divided by its largest expected gain, is a lower bound.
+
+    Parameters
+    ----------
+    measures, before : dict of str to Measure
+        Measures of a pass, and of the pass before, by name.
+    """
+    bounded = dict(measures)
+    for name, measure in measures.items():
+        earlier = before.get(name)
+        if measure.error is None or earlier is None or earlier.error is None:
+            continue
+        error = max(measure.error, earlier.error / ERROR_RATIO)
+        if error > measure.error and np.isfinite(error):
+            bounded[name] = replace(measure, error=error)
+    return bounded
 
 
 def _can_repeat(model: Model, result, name: str) -> bool:

@@ -104,10 +104,15 @@ def run(
             store.clear_cache()
         begin = process_time()
         passed = None
+        done = None
         next_plan = runnable
         while True:
             begin_pass = process_time()
+            before = None if done is None else done.result.measures
             done = _run_pass(next_plan, say, progress, state_file, estimate=estimate)
+            if before is not None:
+                bounded = refine.bound_errors(done.result.measures, before)
+                done = done._replace(result=replace(done.result, measures=bounded))
             end = process_time()
             if not estimate:
                 return _complete_result(done, None)
