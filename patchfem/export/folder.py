@@ -40,7 +40,7 @@ LOCK = ".writer"
 # files with the state from which an interrupted run or fit continues
 STATE = "wear.npz"
 STARTS = "starts.json"
-STATES = re.compile(r"wear\.npz|starts\.json|march_\d+\.npz")
+STATES = re.compile(r"wear\.npz|starts\.json|march(_\d+)+\.npz")
 
 
 class Folder:

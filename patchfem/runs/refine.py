@@ -13,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..core import Outcome
+from ..formatting import format_number
 from ..model.model import Model
 from .results.patch_rows import TABLE as PATCH_TABLE
 
@@ -41,11 +42,13 @@ class Pass(NamedTuple):
     - excess: largest ratio of error to allowed error of the main measures.
     - model: model of the next pass, or None.
     - seconds: CPU time [s] of all passes that would meet the tolerance, if it exceeds accuracy.max_seconds; else 0.
+    - reason: why another pass follows, and its resolution; "" without one.
     """
 
     excess: float
     model: Model | None = None
     seconds: float = 0.0
+    reason: str = ""
 
 
 def judge_pass(
@@ -78,9 +81,16 @@ def judge_pass(
         finer = None
     n_passes = ceil(log(excess) / log(ERROR_RATIO))
     expected = total_seconds + seconds * sum(COST_RATIO**k for k in range(1, n_passes + 1))
-    if finer is None or expected <= model.accuracy.max_seconds:
-        return Pass(excess, finer)
-    return Pass(excess, None, expected)
+    if finer is None:
+        return Pass(excess)
+    if expected > model.accuracy.max_seconds:
+        return Pass(excess, None, expected)
+    resolution = "half the element size" if axis == "mesh" else "twice the steps"
+    reason = (
+        f"{name} has {format_number(excess, 2)} times the error that the tolerance allows; the run is repeated with "
+        f"{resolution}"
+    )
+    return Pass(excess, finer, reason=reason)
 
 
 def bound_errors(measures: dict, before: dict) -> dict:

@@ -6,13 +6,14 @@ In: a `Plan`, or a Scene or Model that is planned first. Out: a `Result`.
 import hashlib
 from contextlib import nullcontext
 from dataclasses import replace
+from itertools import count
 from pathlib import Path
 from time import perf_counter, process_time
 from typing import NamedTuple
 
 import numpy as np
 
-from ..core import Measure, NotConverged, Outcome
+from ..core import Measure, Missing, NotConverged, Outcome
 from ..model.model import Model
 from ..model.source import locate_errors
 from ..points import checkpoint
@@ -103,24 +104,32 @@ def run(
         if fresh:
             store.clear_cache()
         begin = process_time()
-        passed = None
-        done = None
+        earlier = passed = None
         next_plan = runnable
-        while True:
+        for n_before in count():
             begin_pass = process_time()
-            before = None if done is None else done.result.measures
-            done = _run_pass(next_plan, say, progress, state_file, estimate=estimate)
-            if before is not None:
-                bounded = refine.bound_errors(done.result.measures, before)
-                done = done._replace(result=replace(done.result, measures=bounded))
-            end = process_time()
+            try:
+                done = _run_pass(next_plan, say, progress, state_file, n_before, estimate=estimate)
+            except (NotConverged, Missing):
+                if earlier is None:
+                    raise
+                return _complete_result(earlier, passed)
             if not estimate:
                 return _complete_result(done, None)
+            if earlier is not None:
+                if done.result.outcome is Outcome.NOT_CONVERGED:
+                    return _complete_result(earlier, passed)
+                bounded = refine.bound_errors(done.result.measures, earlier.result.measures)
+                done = done._replace(result=replace(done.result, measures=bounded))
+            end = process_time()
             passed = refine.judge_pass(
                 runnable.model, done.result, end - begin_pass, end - begin, passed
             )
             if passed.model is None:
                 return _complete_result(done, passed)
+            if say is not None:
+                say(passed.reason)
+            earlier = done
             next_plan = replace(runnable, model=passed.model)
 
 
@@ -140,9 +149,9 @@ class FinishedPass(NamedTuple):
 
 
 def _run_pass(
-    run_plan: Plan, say, progress, state_file: StateFile | None, *, estimate: bool
+    run_plan: Plan, say, progress, state_file: StateFile | None, n_before: int, *, estimate: bool
 ) -> FinishedPass:
-    """Run a plan once.
+    """Run a plan once, after a number of coarser passes.
 
     The order is: patch of [contact] on its meshes, patches of the interfaces, wear, then the motion or
     the static result, and finally static measures, balances and warnings. A patch without contact
@@ -188,7 +197,7 @@ def _run_pass(
             meshes = PatchMeshes(worn_patch.patch, tuple(worn_patch.coarse), meshes.static, unworn)
             inputs = _make_worn_inputs(inputs, worn_patch)
         try:
-            with _saving_context(state_file, run_plan, meshes.patch):
+            with _saving_context(state_file, run_plan, meshes.patch, n_before):
                 if run_plan.kind == "patch":
                     result = patch_result.make_static_result(inputs)
                 elif run_plan.kind == "bench":
@@ -367,8 +376,10 @@ def _note_on_yielding_faces(result: Result) -> dict:
     return strength.note_on_yielding_faces(patch_model, peak.value - (peak.error or 0.0))
 
 
-def _saving_context(state_file: StateFile | None, run_plan: Plan, patch):
+def _saving_context(state_file: StateFile | None, run_plan: Plan, patch, n_before: int):
     """Return a context in which marches save their states; one that does nothing without them.
+
+    `n_before` is the number of earlier passes, whose states remain.
 
     Raises
     ------
@@ -381,9 +392,11 @@ def _saving_context(state_file: StateFile | None, run_plan: Plan, patch):
 
     def march_state_path(number: int) -> Path:
         """Return the path of the state file of one march."""
-        return state_file.path.parent / f"march_{number}.npz"
+        name = f"march_{number}.npz" if n_before == 0 else f"march_{n_before + 1}_{number}.npz"
+        return state_file.path.parent / name
 
-    if state_file.resume and model.wear is None and not march_state_path(1).is_file():
+    is_missing = n_before == 0 and model.wear is None and not march_state_path(1).is_file()
+    if state_file.resume and is_missing:
         raise evolve.make_missing_state_error(state_file.path)
     return checkpoint.store_checkpoints(
         checkpoint.CheckpointFiles(

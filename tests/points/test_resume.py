@@ -26,8 +26,10 @@ from scene_texts import (
     SECOND,
 )
 
+from patchfem import new
 from patchfem.export.folder import is_state
 from patchfem.points import checkpoint, time_march
+from patchfem.runs import refine
 
 MARCH = '[accuracy]\nmethod = "march"\nsteps_per_cycle = 60\n'
 SHORT_DRIVE = DRIVE.replace("cycles = 30", "cycles = 16.3")
@@ -129,6 +131,26 @@ def test_exact_resumed_run_equals_uninterrupted_run(tmp_path, save_counter, kind
     assert_same_results(out, tmp_path / "whole")
     assert sorted(path.name for path in tmp_path.iterdir()) == ["out", "scene.toml", "whole"]
     assert not any(is_state(path.name) for path in out.iterdir())
+
+
+def test_exact_run_is_resumed_in_its_second_pass(tmp_path, save_counter, monkeypatch):
+    """A run that is repeated with finer meshes goes on in the pass that was interrupted."""
+    monkeypatch.setattr(refine, "MAIN_MEASURES", ("energy_dissipated",))
+    scene = tmp_path / "beam.toml"
+    scene.write_text(new("beam"), "utf-8")
+    changes = ("accuracy.method=march", "drive.cycles=5", "accuracy.steps_per_cycle=100")
+    settings = [part for key in (*changes, "accuracy.tolerance=0.15") for part in ("--set", key)]
+    command = ("run", scene, *settings, "--no-page", "-o")
+    answer = run_cli(*command, tmp_path / "whole")
+    assert answer.code == 0 and answer.err.count("repeated with half the element size") == 1
+    assert "march_1" in save_counter.saved and "march_2_1" in save_counter.saved
+    save_counter.stop = "march_2_1"
+    assert run_cli(*command, tmp_path / "out").code == 130
+    states = [path.name for path in (tmp_path / "out.partial").iterdir()]
+    assert "march_2_1.npz" in states and all(is_state(name) for name in states)
+    save_counter.stop = 0
+    assert run_cli(*command, tmp_path / "out", "--resume").code == 0
+    assert_same_results(tmp_path / "out", tmp_path / "whole")
 
 
 def test_refuses_to_resume_from_other_or_damaged_state(tmp_path, save_counter):
