@@ -11,7 +11,7 @@ base; what changes with frequency is how much the block moves then. Sweeps of 15
 cycles; distorted is a third harmonic above 3 % of the first. What such a sweep would also have shown, and the report
 says nothing of: below 135 Hz yaw, at 129 Hz, turns the block that its friction still holds, and a gauge off the contact
 reads 0.67 mil at 3 g where it reads 0.19 at most above 140 Hz; there slip begins at 4.0 g. At 4.75 g a rigid block
-shows less than the input, 0.91 to 0.96 of it, one in grooves 1.32 to 1.59 times: Table 1 has 1.2 to 1.7 times at 5 g.
+shows less than the input, 0.92 to 0.96 of it, one in grooves 1.32 to 1.60 times: Table 1 has 1.2 to 1.7 times at 5 g.
 
 Run: python studies/report/sweeps.py
 """
