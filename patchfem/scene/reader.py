@@ -6,7 +6,6 @@ import re
 import tomllib
 from typing import Any
 
-from ..effects import MAX_COORDINATES
 from .keys.lookup import (
     LIMITS_BY_ERROR_TYPE,
     describe_error,
@@ -66,12 +65,6 @@ def _read_inner(draft: SceneDraft, key: Key, value: Any, path: str) -> Any:
         if isinstance(value, dict):
             return _read_table(draft, key.inner, value, path)
         draft.add_mistake(path, f"a table [{path}] is needed, not {format_for_message(value)}")
-    elif isinstance(value, list) and len(value) > MAX_COORDINATES:
-        draft.add_mistake(
-            path,
-            f"{len(value)} tables are too many; at most {MAX_COORDINATES} are possible; many modes or masses belong "
-            "into a file of arrays that structure.file names",
-        )
     elif isinstance(value, list) and value and all(isinstance(item, dict) for item in value):
         return tuple(
             _read_table(draft, key.inner, item, f"{path}.{k}") for k, item in enumerate(value)

@@ -12,7 +12,7 @@ from pydantic import ValidationError
 from ..lines import split_key
 from . import quantities
 from .contact import MATERIAL_REQUIREMENT, Material
-from .tables import Tables
+from .tables import Structure, Tables
 from .types import Key, Table, advise_on_name, list_keys
 
 MAX_SHOWN_CHARACTERS = 60  # largest number of characters of a wrong value in a message
@@ -137,8 +137,12 @@ def _describe_array_requirement(types: tuple) -> str:
     """Return what an array of numbers without unit requires."""
     if float in types:
         return "plain numbers are needed, such as [1, 1.5]"
-    is_open = any(... in get_args(part) for part in types)
-    return f"{'' if is_open else 'two '}whole numbers are needed, such as [1, 2]"
+    return f"{'' if _is_open_array(types) else 'two '}whole numbers are needed, such as [1, 2]"
+
+
+def _is_open_array(types: tuple) -> bool:
+    """Return whether an array may have any number of values, and not a fixed one."""
+    return any(... in get_args(part) for part in types)
 
 
 def describe_error(key: Key, error: Any, value: Any) -> str:
@@ -164,7 +168,10 @@ def describe_error(key: Key, error: Any, value: Any) -> str:
         return f"at least {error['ctx']['min_length']} values are needed, not {len(value)}"
     if error["type"] == "too_long":
         most = error["ctx"]["max_length"]
-        return f"{len(value)} values are too many; at most {most} are possible"
+        if not _is_open_array(key.types):
+            return f"{needed}, not {len(value)} values"
+        remedy = "; give larger rigs in structure.file" if key.table is Structure else ""
+        return f"{len(value)} values are too many; at most {most} are possible{remedy}"
     if error["type"] == "value_error":
         return str(error["ctx"]["error"])
     if key.allowed and isinstance(value, str):

@@ -380,7 +380,7 @@ class Structure(Table):
         Length,
         "displacement at which the flexure meets its stop; a larger displacement ends the run; default: no stop",
     )
-    mode: tuple[Mode, ...] = ()
+    mode: Annotated[tuple[Mode, ...], Field(max_length=MAX_COORDINATES)] = ()
     measured: key(
         Literal["free", "stuck"],
         "'free': the modes are those of the rig without the joint; 'stuck': frequencies and damping were measured "
