@@ -95,7 +95,7 @@ def test_exact_axis_texts_are_valid_in_scene():
         ("angle=1 mrad", "did you mean 'contact.tilt.angle'?"),
         ("structure.mode.frequency=100 Hz", "structure.mode.NAME.frequency"),
         ("friction.static.x=1", "friction.static is a value"),
-        ("friction.breakaway=1", "was removed in patchfem 2.0"),
+        ("friction.breakaway=1", "was removed in patchfem 1.4"),
     ],
 )
 def test_refuses_invalid_axis(text, says):
