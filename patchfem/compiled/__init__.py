@@ -53,7 +53,6 @@ PUBLIC = {
         "NJIT_KERNEL",
     ),
     "jit": (
-        "NJIT_INTERNAL",
         "NJIT_NO_REFCOUNT",
         "njit",
     ),

@@ -1,6 +1,6 @@
 """Flags of compiled code: fast-math is limited to options under which NaN and infinity keep their meaning."""
 
-from .jit import NJIT_INTERNAL, NJIT_NO_REFCOUNT
+from .jit import NJIT_NO_REFCOUNT
 
 FASTMATH_FLAGS = {"reassoc", "contract", "arcp"}
 
@@ -15,7 +15,6 @@ __all__ = [
     "FASTMATH_FLAGS",
     "NJIT_CALL",
     "NJIT_INLINE",
-    "NJIT_INTERNAL",
     "NJIT_KERNEL",
     "NJIT_NO_REFCOUNT",
 ]

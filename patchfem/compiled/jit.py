@@ -31,9 +31,6 @@ NO_PYTHON_WRAPPER = (
 # Options for functions that allocate nothing and need no reference counting, which took
 # 1.3 of the 1.6 us of a time step.
 NJIT_NO_REFCOUNT = {"_nrt": False} if hasattr(DefaultOptions, "_nrt") else {}
-# Options for functions that only compiled code calls; without wrappers, most
-# of their compile time is saved.
-NJIT_INTERNAL = NJIT_NO_REFCOUNT | NO_C_WRAPPER | NO_PYTHON_WRAPPER
 # Compiler passes of numba that the kernels need. The omitted ones handle closures, generators,
 # `with`, lists, raise and array expressions, which no kernel contains; they took a seventh of the
 # compile time of a loop.

@@ -20,7 +20,7 @@ def _return_unchanged(function=None, **options):
 
 
 # Replacement of the module `jit` in kernel modules that are not compiled.
-JIT_REPLACEMENT = SimpleNamespace(njit=_return_unchanged, NJIT_NO_REFCOUNT={}, NJIT_INTERNAL={})
+JIT_REPLACEMENT = SimpleNamespace(njit=_return_unchanged, NJIT_NO_REFCOUNT={})
 
 
 UNCOMPILED_MODULES = {}  # uncompiled kernel modules by full name
