@@ -9,6 +9,7 @@ from typing import Any
 from .keys.lookup import (
     LIMITS_BY_ERROR_TYPE,
     describe_error,
+    describe_requirement,
     find_key,
     format_for_message,
     validate_values,
@@ -61,18 +62,15 @@ def _read_table(draft: SceneDraft, model: type[Table], raw: dict[str, Any], tabl
 
 def _read_inner(draft: SceneDraft, key: Key, value: Any, path: str) -> Any:
     """Read a table or an array of tables inside a table."""
-    if not key.is_array:
-        if isinstance(value, dict):
-            return _read_table(draft, key.inner, value, path)
-        draft.add_mistake(path, f"a table [{path}] is needed, not {format_for_message(value)}")
-    elif isinstance(value, list) and value and all(isinstance(item, dict) for item in value):
+    if not key.is_array and isinstance(value, dict):
+        return _read_table(draft, key.inner, value, path)
+    is_list = key.is_array and isinstance(value, list) and len(value) > 0
+    if is_list and all(isinstance(item, dict) for item in value):
         return tuple(
             _read_table(draft, key.inner, item, f"{path}.{k}") for k, item in enumerate(value)
         )
-    else:
-        draft.add_mistake(
-            path, f"an array of tables [[{path}]] is needed, not {format_for_message(value)}"
-        )
+    needed = describe_requirement(key, path)
+    draft.add_mistake(path, f"{needed}, not {format_for_message(value)}")
     return None
 
 
@@ -95,7 +93,7 @@ def _validate_values(
         if index is not None and isinstance(value, list) and index < len(value):
             path = f"{path}.{index}"
             value = value[index]
-        draft.add_mistake(path, describe_error(list_keys(model)[key], error, value))
+        draft.add_mistake(path, describe_error(list_keys(model)[key], error, value, path))
     return valid
 
 

@@ -29,11 +29,11 @@ BAD_VALUES = [
         "contact.load",
         "a bare number without a unit; a force with its unit is needed, such as '26 lbf'",
     ),
-    ('load = "-1 N"', "contact.load", "must be >= 0, not '-1 N'; a force"),
+    ('load = "-1 N"', "contact.load", "must be >= 0, not '-1 N'"),
     (
         'length = "-12.7 mm"',
         "contact.length",
-        "must be > 0, not '-12.7 mm'; a length with its unit is needed",
+        "must be > 0, not '-12.7 mm'",
     ),
     (
         'substrate = "Ti-8Al"',
@@ -71,6 +71,11 @@ BAD_SETS = [
     ("accuracy.tolerance=1", "accuracy.tolerance", "must be < 1, not 1"),
     ("friction.reading=reprot", "friction.reading", "did you mean 'report'? use one of stretch, report"),
     ("friction.temperature=5", "friction.temperature", "a table [friction.temperature] is needed, not 5"),
+    ("contact.tilt=5", "contact.tilt", "a table [contact.tilt] is needed, not 5"),
+    ("structure.mode=5", "structure.mode", "an array of tables [[structure.mode]] is needed, not 5"),
+    ("contact.upper.coating=thick", "contact.upper.coating", "unknown value 'thick'; use one of none, or give a table "
+     "[contact.upper.coating]"),
+    ("contact.upper.coating=5", "contact.upper.coating", "one of none, or a table [contact.upper.coating], is needed, not"),
     ("contact.pairs=0", "contact.pairs", "must be >= 1, not 0; a whole number"),
     ("contact.pairs=1.5", "contact.pairs", "a whole number is needed, not 1.5"),
     ("contact.element_size=13 mm", "contact.element_size", "longer than contact.length"),
@@ -80,7 +85,8 @@ BAD_SETS = [
     ("contact.upper.chamfer=1 nm", "contact.upper.chamfer", "less than 1e-5 of the length"),
     ("contact.load_line.offset=1 mm", "contact.load_line", "unless [contact.holder]"),
     ("contact.load=1e40 N", "contact.load", "a mean pressure above Young's modulus"),
-    ("contact.tilt.angle=100 deg", "contact.tilt.angle", "must be <= 0.1 rad, not '100 deg'"),
+    ("contact.tilt.angle=100 deg", "contact.tilt.angle", "must be <= 0.1 rad, not '100 deg'; the gap is "
+     "computed as this angle times the distance"),
     ('contact.strips={count = 2, roll = "-9 deg"}', "contact.strips.roll", "must be >= -0.1 rad, not '-9 deg'"),
     ("contact.crown.radius=-1 m", "contact.crown.radius", "for a hollow surface leave out [contact.crown]"),
     ("structure.mode.axal.frequency=1 Hz", "structure.mode.axal", "did you mean 'axial'?"),
@@ -303,7 +309,10 @@ def test_refuses_odd_keys_and_huge_numbers():
         RIG, "structure.mode.axial.frequency=1e300 Hz"
     )
     assert get_only_mistake(RIG, "structure.moving_mass=1e-300 kg").endswith(
-        "must be 0 or have a magnitude from 1e-50 to 1e+50"
+        "the value must have a magnitude from 1e-50 to 1e+50"
+    )
+    assert get_only_mistake(RIG, "structure.stiffening.cubic=1e-300 N/m^3").endswith(
+        "the value must be 0 or have a magnitude from 1e-50 to 1e+50"
     )
     # a load has only an upper limit of its magnitude
     assert get_only_mistake(RIG, "contact.load=1e60 N").endswith(
