@@ -71,7 +71,7 @@ class LimitReason(str):
 FILE_MARK = object()
 
 
-def _require_magnitude(value: float, smallest: float, accepts_zero: bool) -> float:
+def _require_magnitude(value: float, *, smallest: float, accepts_zero: bool) -> float:
     """Return a value; raise ValueError if its magnitude is above MAX_MAGNITUDE or in (0, `smallest`)."""
     if value and not smallest <= abs(value) <= MAX_MAGNITUDE:
         allowed = f"must not exceed {MAX_MAGNITUDE:g} in magnitude"
