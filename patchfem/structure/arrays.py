@@ -165,9 +165,10 @@ def _build_basis_from_matrices(
     if faces is not None:
         faces = to_real(faces, "slide")
         faces = faces.reshape(-1, n) if faces.size % n == 0 else faces
+        faces = faces if faces.size else None
     output = data.get("output")
     if output is None:
-        if faces is None or not len(faces):
+        if faces is None:
             _refuse_missing(
                 data,
                 "output (n,), what the accelerometer measures; slide (n,) serves as output if output "
@@ -220,7 +221,12 @@ def _build_basis_from_modes(
         if name not in data:
             _refuse_missing(data, f"{name} of the modes")
     if mass is None and "moving_mass" in data:
-        mass = float(read_numbers(data["moving_mass"], "moving_mass")[0])
+        masses_of_modes = read_numbers(data["moving_mass"], "moving_mass")
+        if masses_of_modes.size > 1:
+            raise PatchfemError(
+                f"moving_mass has {masses_of_modes.size} values; one mass [kg] of all modes is needed"
+            )
+        mass = float(masses_of_modes[0])
     if mass is None or not mass > 0:
         raise PatchfemError(
             "lacks moving_mass > 0, the modal mass [kg]; give moving_mass in the file or in "
@@ -279,8 +285,8 @@ def _read_names(data: dict, n: int) -> tuple | None:
     if "names" not in data:
         return None
     # A cell of a .mat file is an array with one string.
-    texts = [name if isinstance(name, str) else np.ravel(name)[0] for name in data["names"]]
-    names = tuple(str(text).strip() for text in texts)
+    texts = [np.ravel(name)[:1] for name in np.atleast_1d(data["names"])]
+    names = tuple(str(text[0]).strip() for text in texts if text.size)
     if len(names) != n or len(set(names)) != n:
         raise PatchfemError(f"names must be {n} different texts")
     return names

@@ -309,14 +309,14 @@ def test_refuses_odd_keys_and_huge_numbers():
         RIG, "structure.mode.axial.frequency=1e300 Hz"
     )
     assert get_only_mistake(RIG, "structure.moving_mass=1e-300 kg").endswith(
-        "the value must have a magnitude from 1e-50 to 1e+50"
+        "1e-300 kg is outside the computable range; a magnitude from 1e-50 to 1e+50 kg is needed"
     )
     assert get_only_mistake(RIG, "structure.stiffening.cubic=1e-300 N/m^3").endswith(
-        "the value must be 0 or have a magnitude from 1e-50 to 1e+50"
+        "; 0 or a magnitude from 1e-50 to 1e+50 N/m^3 is needed"
     )
     # a load has only an upper limit of its magnitude
     assert get_only_mistake(RIG, "contact.load=1e60 N").endswith(
-        "the value must not exceed 1e+50 in magnitude"
+        "1e+60 N is outside the computable range; a magnitude of at most 1e+50 N is needed"
     )
     assert "unknown key" in get_only_mistake(
         RIG.replace("[structure]\n", '[structure]\n"mode.².x" = 1\n')

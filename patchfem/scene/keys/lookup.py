@@ -184,8 +184,8 @@ def describe_error(key: Key, error: Any, value: Any, path: str) -> str:
         text = str(bound) if isinstance(bound, int) else f"{bound:g}"
         if bound and key.kind:
             text = quantities.format_si(bound, key.kind)
-        # A limit is compared only after the unit was read, so that the unit is right.
-        reason = key.limit_reason if key.kind else needed
+        # A limit is compared only after the number and its unit were read, so that these are right.
+        reason = key.limit_reason if float in key.types else needed
         refusal = f"must be {limit.sign} {text}, not {format_for_message(value)}"
         return f"{refusal}; {reason}" if reason else refusal
     if error["type"] == "too_short" and value and error["ctx"]["min_length"] > 1:

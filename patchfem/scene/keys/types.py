@@ -14,7 +14,7 @@ from pydantic import BaseModel, ConfigDict, Field, Strict, WithJsonSchema, field
 from pydantic.types import AllowInfNan
 from pydantic_core import core_schema
 
-from .quantities import EXAMPLE_QUANTITIES, parse_quantity, read_percentage
+from .quantities import EXAMPLE_QUANTITIES, find_si_unit, parse_quantity, read_percentage
 
 # Largest magnitude of a value in SI; its fourth power, and products with
 # that, stay within double precision.
@@ -71,14 +71,17 @@ class LimitReason(str):
 FILE_MARK = object()
 
 
-def _require_magnitude(value: float, *, smallest: float, accepts_zero: bool) -> float:
-    """Return a value; raise ValueError if its magnitude is above MAX_MAGNITUDE or in (0, `smallest`)."""
+def _require_magnitude(
+    value: float, *, smallest: float = 0.0, accepts_zero: bool = True, unit: str = ""
+) -> float:
+    """Return a value in SI; raise ValueError if its magnitude is above MAX_MAGNITUDE or in (0, `smallest`)."""
     if value and not smallest <= abs(value) <= MAX_MAGNITUDE:
-        allowed = f"must not exceed {MAX_MAGNITUDE:g} in magnitude"
+        needed = f"a magnitude of at most {MAX_MAGNITUDE:g} {unit}".strip()
         if smallest:
-            zero = "be 0 or " if accepts_zero else ""
-            allowed = f"must {zero}have a magnitude from {smallest:g} to {MAX_MAGNITUDE:g}"
-        raise ValueError(f"{value:g} in SI is outside the computable range; the value {allowed}")
+            zero = "0 or " if accepts_zero else ""
+            needed = f"{zero}a magnitude from {smallest:g} to {MAX_MAGNITUDE:g} {unit}"
+        shown = f"{value:g} {unit}".strip()
+        raise ValueError(f"{shown} is outside the computable range; {needed} is needed")
     return value
 
 
@@ -94,7 +97,12 @@ def quantity(kind: str, **limits: float) -> Any:
     """
     schema = {"type": "string", "examples": [EXAMPLE_QUANTITIES[kind]]}
     smallest = 1 / MAX_MAGNITUDE if kind in DIVISOR_KINDS else 0.0
-    check = partial(_require_magnitude, smallest=smallest, accepts_zero="gt" not in limits)
+    check = partial(
+        _require_magnitude,
+        smallest=smallest,
+        accepts_zero="gt" not in limits,
+        unit=find_si_unit(kind),
+    )
     return Annotated[
         float,
         Kind(kind),
@@ -112,7 +120,7 @@ def number(**limits: float) -> Any:
         Strict(),
         AllowInfNan(False),
         Field(**limits),
-        CheckAfter(partial(_require_magnitude, smallest=0.0, accepts_zero=True)),
+        CheckAfter(_require_magnitude),
         CheckBefore(read_percentage),
     ]
 
