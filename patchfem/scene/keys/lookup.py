@@ -194,7 +194,9 @@ def describe_error(key: Key, error: Any, value: Any, path: str) -> str:
         most = error["ctx"]["max_length"]
         if not _is_open_array(key.types):
             return f"{needed}, not {len(value)} values"
-        remedy = "; give larger rigs in structure.file" if key.table is Structure else ""
+        remedy = (
+            "; give the modes of a larger rig in structure.file" if key.table is Structure else ""
+        )
         return f"{len(value)} values are too many; at most {most} are possible{remedy}"
     if error["type"] == "value_error":
         return str(error["ctx"]["error"])

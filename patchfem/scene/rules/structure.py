@@ -13,8 +13,8 @@ from .scene_draft import SceneDraft
 
 ARRAY_EXTENSIONS = (".npz", ".mat")
 UNIVERSAL_EXTENSIONS = (".uff", ".unv")
-# File extensions of matrices from finite-element programs, for [structure.reduced].
 MATRIX_KEYS = ("stiffness", "mass", "damping")  # keys of the files of [structure.reduced]
+# Extensions of these files, and those of Nastran, which are no longer read.
 MATRIX_EXTENSIONS = (".mtx", ".mat", ".npz")
 NASTRAN_EXTENSIONS = (".op4", ".pch", ".bdf", ".dat")
 # Largest plausible damping ratio, at which a free oscillation decays to a few per cent within one
