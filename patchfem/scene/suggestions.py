@@ -75,6 +75,8 @@ def describe_unknown_key(
     pieces = [piece for piece in table_key.split(".") if not piece.isdecimal()]
     if removed := describe_removed(".".join([*pieces, key]).lstrip(".")):
         return UnknownKey(removed, "")
+    if "." in key and find_key(".".join(filter(None, (table_key, key)))):
+        return UnknownKey(f"unknown key; leave out its quotes: {key}", "")
     is_table = _is_table(raw[key])
     subject = "unknown table" if is_table else "unknown key"
     names = _list_tables_with_key(key) if table_key else []

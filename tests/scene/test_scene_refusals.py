@@ -101,6 +101,10 @@ BAD_SETS = [
     ("accuracy.steps_per_cycle=3", "accuracy.steps_per_cycle", "must be >= 4"),
     ("contact.load.x=1", "contact.load.x", "contact.load is a value, not a table"),
     ("contact.load", "contact.load", "table.key=value is needed"),
+    ("contact.load=['1 N']", "contact.load", "an array is not a quantity; a force with its unit is needed"),
+    ("structure.mode.axial=3", "structure.mode[1]", "a table is needed, not 3"),
+    ("structure.mode[0].slide=1", "structure.mode[0].slide", "mode[0] names no item; items are numbered from 1"),
+    ("structure.mode.second.name=", "structure.mode[2].name", "must not be an empty text"),
     ('contact.substrate={young = "1 GPa", poisson = 0.5, density = "1 kg/m^3"}', "contact.substrate.poisson",
      "must be < 0.5"),
     ('contact.substrate={young = "1 GPa", poisson = 0.3}', "contact.substrate.density", "missing; a density"),
@@ -353,6 +357,25 @@ def test_refuses_unreadable_file(tmp_path):
             "[structure.mode]\n",
             "structure.mode: an array of tables [[structure.mode]] is needed, not a table",
         ),
+        (
+            "[[structure.spring]]\nbetween = [1]\n",
+            "structure.spring[1].between: two whole numbers are needed, such as [1, 2], not 1 value",
+        ),
+        (
+            "[structure.reduced]\ndamping = true\n",
+            "structure.reduced.damping: a plain number, or the name of a file, is needed, not true",
+        ),
+        (
+            "[structure.reduced]\nboundary = [1, true]\n",
+            "structure.reduced.boundary[2]: whole numbers or texts are needed, such as [1, '12:x'], not true",
+        ),
+        (
+            '[structure.reduced]\nmass = "m"\n',
+            "structure.reduced.mass: the name has no extension; use one of .mtx, .mat, .npz",
+        ),
+        ("[wear.friction]\ndepth = [0]\n", "wear.friction.depth[1]: a bare number without a unit"),
+        ("[sweep]\ncontact.load = []\n", "sweep.contact.load: at least one value is needed"),
+        ('"contact.load" = "1 N"\n', "contact.load: unknown key; leave out its quotes"),
     ],
 )
 def test_refuses_wrong_structure_of_table(text, says):

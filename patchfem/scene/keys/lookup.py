@@ -129,7 +129,8 @@ def describe_requirement(key: Key | None, path: str) -> str:
     if holds_array:
         return _describe_array_requirement(types)
     if float in types:
-        return "a plain number is needed"
+        other = ", or the name of a file," if key.names_file else ""
+        return f"a plain number{other} is needed"
     if int in types:
         return "a whole number is needed"
     return "a text in quotes is needed"
@@ -156,6 +157,8 @@ def _describe_array_requirement(types: tuple) -> str:
     """Return what an array of numbers without unit requires."""
     if float in types:
         return "plain numbers are needed, such as [1, 1.5]"
+    if str in types:
+        return "whole numbers or texts are needed, such as [1, '12:x']"
     return f"{'' if _is_open_array(types) else 'two '}whole numbers are needed, such as [1, 2]"
 
 
@@ -198,6 +201,10 @@ def describe_error(key: Key, error: Any, value: Any, path: str) -> str:
             "; give the modes of a larger rig in structure.file" if key.table is Structure else ""
         )
         return f"{len(value)} values are too many; at most {most} are possible{remedy}"
+    if error["type"] == "missing" and isinstance(value, list) and value:
+        return f"{needed}, not {len(value)} value{'s' if len(value) > 1 else ''}"
+    if error["type"] == "string_too_short":
+        return "must not be an empty text"
     if error["type"] == "value_error":
         return str(error["ctx"]["error"])
     if key.allowed and isinstance(value, str):

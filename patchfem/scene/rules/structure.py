@@ -88,10 +88,11 @@ def _check_file(structure: TableFacts) -> None:
         advice = advise_on_name(extension, (*ARRAY_EXTENSIONS, ".uff"))
         structure.add_mistake(
             "file",
-            f"the name ends in '{extension}'; {advice}: matrices or modes as arrays, or universal files",
+            f"{_describe_extension(extension)}; {advice}: matrices or modes as arrays, or universal files",
         )
     if extension not in UNIVERSAL_EXTENSIONS:
-        for key in filter(structure.has, LOCATION_KEYS):
+        keys = LOCATION_KEYS if extension in ARRAY_EXTENSIONS else ()
+        for key in filter(structure.has, keys):
             array = key.removesuffix("_at")
             structure.add_mistake(
                 key,
@@ -147,7 +148,7 @@ def _check_reduced(structure: TableFacts) -> None:
         if extension in NASTRAN_EXTENSIONS:
             removed = describe_removed("files of Nastran", "reading files of Nastran")
             advice = f"{removed}; {advice}"
-        structure.add_mistake(f"reduced.{key}", f"the name ends in '{extension}'; {advice}")
+        structure.add_mistake(f"reduced.{key}", f"{_describe_extension(extension)}; {advice}")
 
     # Coordinates of the boundary, of the base and of the joint.
     boundary = tuple(reduced.boundary)
@@ -177,8 +178,13 @@ def _check_reduced(structure: TableFacts) -> None:
 
 
 def find_file_extension(name: str) -> str:
-    """Return the extension of a file name in lower case, with its dot."""
-    return "." + name.rpartition(".")[2].lower()
+    """Return the extension of a file name in lower case, with its dot; "" for a name without a dot."""
+    return f".{name.rpartition('.')[2].lower()}" if "." in name else ""
+
+
+def _describe_extension(extension: str) -> str:
+    """Return the clause of a message about a file whose extension is wrong."""
+    return f"the name ends in '{extension}'" if extension else "the name has no extension"
 
 
 def _check_modes(structure: TableFacts) -> None:
