@@ -11,6 +11,7 @@ Other arrays of the file are ignored.
 
 from math import prod
 from pathlib import Path
+from zipfile import is_zipfile
 
 import numpy as np
 from numpy.lib import format as npy
@@ -53,6 +54,8 @@ def read_arrays(path: Path) -> dict:
     """
     try:
         if str(path).lower().endswith(".npz"):
+            if path.is_file() and not is_zipfile(path):
+                raise PatchfemError("it is not an archive of NumPy arrays")
             with np.load(path, allow_pickle=False) as file:
                 return {name: _read_member(file, name) for name in ARRAY_NAMES if name in file}
         variables = read_variables(path)
@@ -63,6 +66,8 @@ def read_arrays(path: Path) -> dict:
     except PatchfemError as error:
         reason = str(error).removeprefix(f"{path}: ")
         raise PatchfemError(f"{path} cannot be read ({reason})") from None
+    except OSError as error:
+        raise PatchfemError(f"{path} cannot be read ({error.strerror or error})") from None
     except Exception as error:
         # NumPy and zipfile raise errors of many types for a damaged file.
         raise PatchfemError(
