@@ -4,6 +4,7 @@ import numpy as np
 from scipy import sparse
 
 from ..core import PatchfemError
+from .cells import MAX_VALUE
 
 MAX_SKEW = 1e-8  # largest skew part |A - A^T| / |A| of a matrix that counts as symmetric
 SKEW_REFUSAL = "gyroscopic and follower terms are not supported"
@@ -48,7 +49,7 @@ def to_real(values, subject: str):
 
 
 def read_numbers(values, subject: str, *shapes: tuple) -> np.ndarray:
-    """Return an array as finite real numbers.
+    """Return an array as finite real numbers of a magnitude with which the program can compute.
 
     Parameters
     ----------
@@ -67,7 +68,7 @@ def read_numbers(values, subject: str, *shapes: tuple) -> np.ndarray:
     Raises
     ------
     PatchfemError
-        If the array is empty, has none of the shapes, or holds anything but finite real numbers.
+        If the array is empty, has none of the shapes, or holds anything but such numbers.
     """
     values = np.asarray(to_real(values, subject))
     if values.dtype.kind not in "iufb":
@@ -76,6 +77,10 @@ def read_numbers(values, subject: str, *shapes: tuple) -> np.ndarray:
     if not np.isfinite(values).all():
         raise PatchfemError(
             f"{subject} contains values that are not finite; finite ones are needed"
+        )
+    if np.abs(values).max(initial=0.0) > MAX_VALUE:
+        raise PatchfemError(
+            f"{subject} contains values outside the computable range; magnitudes of at most {MAX_VALUE:g} are needed"
         )
     if not values.size:
         raise PatchfemError(f"{subject} is empty; at least one number is needed")

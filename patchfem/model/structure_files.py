@@ -102,4 +102,8 @@ def _build_modes_from_arrays(
             "lacks `slide`, the motion at the patch; add `slide` to the file, or write "
             "[[structure.interface]]"
         )
+    if needs_interface and not modes.interfaces.any(axis=1).all():
+        raise PatchfemError(
+            "`slide` of an interface is 0 in every mode, so nothing slides there; give the motion at the patch"
+        )
     return FileModes(modes, [])

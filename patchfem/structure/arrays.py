@@ -41,6 +41,7 @@ ARRAY_NAMES = (  # names of the arrays that are read from a file
 )
 # Largest size of a number [bytes], that of a complex number of double precision
 MAX_NUMBER_BYTES = 16
+MIN_MASS = 1e-50  # smallest modal mass [kg], which is that of structure.moving_mass
 MAX_MASS_FRACTION = 1 + 1e-9  # largest sum of base^2: 1, plus round-off of the shapes
 
 
@@ -232,9 +233,9 @@ def _build_basis_from_modes(
                 f"moving_mass has {masses_of_modes.size} values; one mass [kg] of all modes is needed"
             )
         mass = float(masses_of_modes[0])
-    if mass is None or not mass > 0:
+    if mass is None or mass < MIN_MASS:
         raise PatchfemError(
-            "lacks moving_mass > 0, the modal mass [kg]; give moving_mass in the file or in "
+            f"lacks moving_mass >= {MIN_MASS:g}, the modal mass [kg]; give moving_mass in the file or in "
             "[structure]"
         )
     if (omega < 0).any():

@@ -109,13 +109,16 @@ def test_refuses_incomplete_or_invalid_matrices(change, message):
 
 @pytest.mark.parametrize("change, message", [
     ({"damping": None}, "lacks damping of the modes; the file contains"),
-    ({"moving_mass": None}, "lacks moving_mass > 0"), ({"frequency": np.array([-1.0, 2.0])}, "frequencies must be >= 0"),
+    ({"moving_mass": None}, "lacks moving_mass >= 1e-50"),
+    ({"frequency": np.array([-1.0, 2.0])}, "frequencies must be >= 0"),
     ({"base": np.ones(2)}, "the sum of `base`^2"),
     ({"damping": np.array([-0.1, 0.1])}, "damping must be >= 0"), ({"output": np.array([np.nan, 0])}, "not finite"),
     ({"damping": -np.eye(2)}, "damping matrix adds energy"),
     ({"frequency": np.zeros(0)}, "frequency is empty; at least one number is needed"),
     ({"slide": np.zeros((0, 2))}, "slide is empty; at least one number is needed"),
     ({"slide": np.array(["a", "b"])}, "slide contains no numbers; real numbers are needed"),
+    ({"slide": np.array([1e200, 1.0])}, "slide contains values outside the computable range"),
+    ({"moving_mass": 1e-300}, "lacks moving_mass >= 1e-50"),
     ({"moving_mass": np.zeros(0)}, "moving_mass is empty"), ({"moving_mass": np.ones(2)}, "moving_mass has 2 values"),
 ])  # fmt: skip
 def test_refuses_incomplete_or_invalid_modes(change, message):
