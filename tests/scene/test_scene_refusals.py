@@ -374,6 +374,14 @@ def test_refuses_unreadable_file(tmp_path):
             "structure.reduced.mass: the name has no extension; use one of .mtx, .mat, .npz",
         ),
         ("[wear.friction]\ndepth = [0]\n", "wear.friction.depth[1]: a bare number without a unit"),
+        (
+            '[structure]\nfile = "a.uff"\n',
+            "(node and direction, as named in the file (such as 12:+x), whose motion",
+        ),
+        (
+            '[drive]\nkind = "force"\nlevels = ["1e60 N"]\n',
+            "drive.levels: 1e+60 N is outside the computable range; 0 or a magnitude from 1e-50 to 1e+50 N",
+        ),
         ("[sweep]\ncontact.load = []\n", "sweep.contact.load: at least one value is needed"),
         ('"contact.load" = "1 N"\n', "contact.load: unknown key; leave out its quotes"),
     ],

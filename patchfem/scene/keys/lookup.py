@@ -150,7 +150,7 @@ def describe_missing_key(key: Key | None, path: str) -> str:
     needed = describe_requirement(key, path)
     if not (needed.startswith(_UNSPECIFIC_REQUIREMENTS) and key.record.meaning):
         return needed
-    return f"{needed} ({re.split('[;:]', key.record.meaning)[0]})"
+    return f"{needed} ({re.split('[;:] ', key.record.meaning)[0]})"
 
 
 def _describe_array_requirement(types: tuple) -> str:

@@ -71,10 +71,27 @@ class LimitReason(str):
 FILE_MARK = object()
 
 
-def _require_magnitude(
+def require_magnitude(
     value: float, *, smallest: float = 0.0, accepts_zero: bool = True, unit: str = ""
 ) -> float:
-    """Return a value in SI; raise ValueError if its magnitude is above MAX_MAGNITUDE or in (0, `smallest`)."""
+    """Return a value if its magnitude is one with which the program can compute.
+
+    Parameters
+    ----------
+    value : float
+        Value in SI.
+    smallest : float
+        Smallest magnitude other than 0.
+    accepts_zero : bool
+        Whether the message names 0 as a value that is accepted.
+    unit : str
+        Unit in SI, for the message; "" for a plain number.
+
+    Raises
+    ------
+    ValueError
+        If the magnitude is above MAX_MAGNITUDE or in (0, `smallest`).
+    """
     if value and not smallest <= abs(value) <= MAX_MAGNITUDE:
         needed = f"a magnitude of at most {MAX_MAGNITUDE:g} {unit}".strip()
         if smallest:
@@ -98,7 +115,7 @@ def quantity(kind: str, **limits: float) -> Any:
     schema = {"type": "string", "examples": [EXAMPLE_QUANTITIES[kind]]}
     smallest = 1 / MAX_MAGNITUDE if kind in DIVISOR_KINDS else 0.0
     check = partial(
-        _require_magnitude,
+        require_magnitude,
         smallest=smallest,
         accepts_zero="gt" not in limits,
         unit=find_si_unit(kind),
@@ -120,7 +137,7 @@ def number(**limits: float) -> Any:
         Strict(),
         AllowInfNan(False),
         Field(**limits),
-        CheckAfter(_require_magnitude),
+        CheckAfter(require_magnitude),
         CheckBefore(read_percentage),
     ]
 

@@ -169,7 +169,7 @@ def _check_reduced(structure: TableFacts) -> None:
                 "applies only to [friction]; a [[structure.interface]] names its two sides with the key `between`: "
                 "leave structure.reduced.slide out",
             )
-    elif structure.draft.has("friction") and not reduced.slide:
+    elif structure.draft.has("friction") and not structure.has("reduced.slide"):
         structure.add_missing(
             "reduced.slide",
             "which two boundary coordinates rub against each other, such as slide = [1, 0] for coordinate 1 against "
