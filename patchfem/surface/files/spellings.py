@@ -17,7 +17,7 @@ UNITS = {
 UNIT_LIST = ", ".join(UNITS)
 # Longer words for units of length, in lower case.
 UNIT_WORDS = {
-    **dict.fromkeys(("å", "angstrom", "ångström"), 1e-10),
+    **dict.fromkeys(("a", "å", "angstrom", "ångström"), 1e-10),
     **dict.fromkeys(("inch", "inches"), 0.0254),
     **dict.fromkeys(("micron", "microns", "mikron"), 1e-6),
     "mils": 25.4e-6,

@@ -14,6 +14,7 @@ from .spellings import (
     HEADER_EXAMPLE,
     SIZE_LINES,
     UNIT_LIST,
+    UNITS,
     parse_length_unit,
     parse_pixel_size,
     shorten,
@@ -100,9 +101,9 @@ def make_surface(table: Table, units: tuple[str, str] | None = None) -> Profile 
         given = units[role == "z"] if units else None
         table = _convert_column(table, role, "m" if pixel and role != "z" else given)
         _check_numbers(table, role)
-    _require_heights(table)
-    if table.columns["z"].ndim == 1 and "y" in table.columns:
+    if size and table.columns["z"].ndim == 1 and "y" in table.columns:
         table = _fill_raster(table)
+    _require_heights(table)
     return _make_surface(table, has_stated_units=table.are_units_fixed or units is not None)
 
 
@@ -118,6 +119,10 @@ def _set_axes(table: Table, pixel: float | None) -> Table:
             )
         return table
     if pixel is not None:
+        if "x" in columns or "y" in columns:
+            table = table.add_notes(
+                "the size of the scan in the header is not used, because --units gives the pixel size"
+            )
         columns |= {role: pixel * np.arange(n) for role, n in zip("yx", z.shape)}
         table = table._replace(units=table.units | dict.fromkeys("xy", "m"))
     if z.shape[0] == 1:
@@ -172,10 +177,12 @@ def _check_numbers(table: Table, role: str) -> None:
 
 
 def _require_heights(table: Table) -> None:
-    """Raise PatchfemError for fewer than two heights."""
-    count = np.isfinite(table.columns["z"]).sum()
-    if count < 2:
-        raise PatchfemError(f"{table.path}: {count} heights; a trace needs at least two")
+    """Raise PatchfemError for fewer than two heights of a trace, or three of a scan."""
+    z = table.columns["z"]
+    count = np.isfinite(z).sum()
+    if count <= z.ndim:
+        kind = ("a trace needs at least two", "a scan needs at least three")[z.ndim - 1]
+        raise PatchfemError(f"{table.path}: {count} heights; {kind}")
 
 
 def _fill_raster(table: Table) -> Table:
@@ -241,7 +248,7 @@ def _make_surface(table: Table, *, has_stated_units: bool) -> Profile | Areal:
 
 
 def _require_increase(table: Table, role: str, places) -> None:
-    """Raise PatchfemError if positions [m] do not increase, or there are fewer than two of them."""
+    """Raise PatchfemError if positions [m] are equal or do not increase, or there are fewer than two of them."""
     if not np.ptp(places) > 0:
         raise PatchfemError(
             f"{table.path}: every sample lies at {role} = {format_length(places[0])}; a surface needs at least two "
@@ -253,6 +260,11 @@ def _require_increase(table: Table, role: str, places) -> None:
     first = int(np.argmin(is_rising))
     second = first + 1
     lines = table.lines
+    if places[first] == places[second]:
+        raise PatchfemError(
+            f"{table.locate(second)}: two samples have {role} = {format_length(places[first])}; delete one of them, or "
+            "write the mean of their heights"
+        )
     if lines is not None and lines[first] > lines[second]:
         first, second = second, first
     raise PatchfemError(
@@ -264,8 +276,8 @@ def _require_increase(table: Table, role: str, places) -> None:
 def _undo_rounding(table: Table, role: str, x) -> tuple[np.ndarray, tuple[str, ...]]:
     """Return equally spaced positions (n,) [m] if these differ from them only by rounding, with a note.
 
-    A step of 0.15625 um printed to 0.1 um makes the slopes 14 % too large. If the header gives the length of the scan, it
-    gives the step.
+    A step of 0.15625 um printed to 0.1 um makes the slopes 14 % too large. If the header gives a length that fits, it
+    gives the step, else the regression on the positions.
     """
     if x.size < MIN_ROUNDED or not x[-1] > x[0]:
         return x, ()
@@ -274,11 +286,14 @@ def _undo_rounding(table: Table, role: str, x) -> tuple[np.ndarray, tuple[str, .
     step = float(count @ x / (count @ count))
     evens = [float(x.mean()) + step * count]
     if table.length is not None:
-        evens = [x[0] + table.length / n * np.arange(x.size) for n in (x.size, x.size - 1)]
+        of_length = [x[0] + table.length / n * np.arange(x.size) for n in (x.size, x.size - 1)]
+        evens = [*of_length, *evens]
     for even in evens:
         distance = float(np.abs(x - even).max())
         step = float(even[1] - even[0])
-        if step > 0 and 1e-6 * step < distance <= MAX_ROUNDING * max(digit, MIN_PRINTED_DIGIT):
+        if step > 0 and distance <= MAX_ROUNDING * max(digit, MIN_PRINTED_DIGIT):
+            if distance <= 1e-6 * step:
+                return x, ()
             note = (
                 f"{role} is rounded to {format_length(digit)} in the file; the samples are taken as evenly spaced by "
                 f"{format_length(step)}"
@@ -294,12 +309,15 @@ def _undo_rounding(table: Table, role: str, x) -> tuple[np.ndarray, tuple[str, .
 
 
 def find_printed_digit(x) -> float:
-    """Return the largest power of ten [m] that divides all positions (n,), or 0 if there is none."""
-    largest = int(np.floor(np.log10((x[-1] - x[0]) / 5)))
-    for digit in 10.0 ** np.arange(largest, largest - 8, -1):
-        if np.abs(x / digit - np.rint(x / digit)).max() < DIGIT_TOL:
-            return float(digit)
-    return 0.0
+    """Return the largest power of ten of a metre or of an inch [m] that divides all positions (n,), or 0."""
+    digits = [0.0]
+    for unit in (1.0, UNITS["in"]):
+        largest = int(np.floor(np.log10((x[-1] - x[0]) / unit / 5)))
+        for digit in unit * 10.0 ** np.arange(largest, largest - 8, -1):
+            if np.abs(x / digit - np.rint(x / digit)).max() < DIGIT_TOL:
+                digits.append(float(digit))
+                break
+    return max(digits)
 
 
 def _check_span(path, length: float, span: float, *, has_stated_units: bool) -> None:
