@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 
 import numpy as np
-from scipy import ndimage, signal, special
+from scipy import ndimage, special
 
 from ..profile import find_runs
 from ..quantity import SIDE, Quantity
@@ -55,7 +55,7 @@ def compare_waves(
     if kept.sum() * step < MIN_WAVES * BAND[1]:
         kept = np.ones(count, bool)
     # The shape of a track has no part in its waves: the second filter removes what the first one leaves of a bend.
-    lines = [signal.detrend(line[:n_lines, :count], axis=1) for line in lines]
+    lines = [_level(line[:n_lines, :count]) for line in lines]
     lines = [z - _filter(z, BAND[1] / step) for z in lines]
     passed = [(_filter(z, BAND[0] / step) - _filter(z, BAND[1] / step))[:, kept] for z in lines]
     slopes = [(np.diff(z, axis=1) / step)[:, kept[1:]] for z in lines]
@@ -79,6 +79,12 @@ def compare_waves(
             continue
         values[name] = _divide_means(*blocks, 0.5, DEFINITIONS[name][1])._replace(name=name)
     return values
+
+
+def _level(z) -> np.ndarray:
+    """Subtract the straight line of least squares from each line of heights (k, n)."""
+    basis = np.linalg.qr(np.vander(np.linspace(-1, 1, z.shape[1]), 2))[0]
+    return z - z @ basis @ basis.T
 
 
 def _average_squares(values, n_blocks: int, axis: int) -> np.ndarray:
