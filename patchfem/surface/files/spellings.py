@@ -41,6 +41,7 @@ MISSING = re.compile(r"(?:[+-]?nan|\*+|bad)?", re.IGNORECASE)  # height that was
 GIVE_UNITS = 'state the units of x and z by --units "mm,um" (in Python, by units=("mm", "um"))'
 GIVE_PIXEL_SIZE = 'give the pixel size in place of the unit of x, as in --units "0.8 um,um"'
 HEADER_EXAMPLE = "write the header as `x [um],z [um]`"
+SCAN_HEADER_EXAMPLE = "write the header as `x [um],y [um],z [um]`"
 SIZE_LINES = "`# Width: 1.2 mm` and `# Height: 0.8 mm`"
 
 

@@ -12,6 +12,7 @@ from .spellings import (
     GIVE_PIXEL_SIZE,
     GIVE_UNITS,
     HEADER_EXAMPLE,
+    SCAN_HEADER_EXAMPLE,
     SIZE_LINES,
     UNIT_LIST,
     UNITS,
@@ -23,6 +24,9 @@ from .spellings import (
 MAX_POINTS = 50_000_000  # largest number of heights
 MAX_LENGTH = 10.0  # length or coordinate [m] above which a number has a wrong unit
 MIN_LENGTH = 1e-9  # length [m] below which a trace has a wrong unit
+ATOM_WIDTH = 1e-10  # span of heights [m] below which they have a wrong unit
+# Largest fraction of the highest, and of the lowest, heights that may be faults, such as 999 um for no signal.
+FAULT_FRACTION = 0.01
 MIN_ROUNDED = (
     10  # smallest number of positions that shows whether they are even apart from rounding
 )
@@ -142,9 +146,11 @@ def _convert_column(table: Table, role: str, given: str | None) -> Table:
     stated = table.units.get(role)
     unit = stated if given is None else given
     if unit is None:
+        remedy = table.remedy
+        if "y" in table.columns:
+            remedy = remedy.replace(HEADER_EXAMPLE, SCAN_HEADER_EXAMPLE)
         raise PatchfemError(
-            f"{table.place}: the unit of {role} is not given, and units are never guessed; {table.remedy}, or "
-            f"{GIVE_UNITS}"
+            f"{table.place}: the unit of {role} is not given, and units are never guessed; {remedy}, or {GIVE_UNITS}"
         )
     factor = parse_length_unit(unit)
     if factor is None:
@@ -237,12 +243,9 @@ def _make_surface(table: Table, *, has_stated_units: bool) -> Profile | Areal:
         table = table.add_notes(*notes)
         _require_increase(table, role, places)
         axes.append(frozen_array(places))
-    _check_span(
-        table.path,
-        max(float(np.ptp(axis)) for axis in axes),
-        float(np.nanmax(z) - np.nanmin(z)),
-        has_stated_units=has_stated_units,
-    )
+    length = max(float(np.ptp(axis)) for axis in axes)
+    notes = _check_span(table.path, length, z, has_stated_units=has_stated_units)
+    table = table._replace(notes=table.notes + notes)
     surface = Profile if z.ndim == 1 else Areal
     return surface(*reversed(axes), frozen_array(z), str(table.path), table.notes)
 
@@ -320,14 +323,34 @@ def find_printed_digit(x) -> float:
     return max(digits)
 
 
-def _check_span(path, length: float, span: float, *, has_stated_units: bool) -> None:
-    """Raise PatchfemError for a tiny length [m], and for heights that span more [m] in units from a header."""
+def _check_span(path, length: float, z, *, has_stated_units: bool) -> tuple[str, ...]:
+    """Return a note on heights [m] that span less than an atom, or more than the length [m] due to a few of them.
+
+    Raises PatchfemError for a tiny length, and if most heights span more than the length in units from a header.
+    """
     if length < MIN_LENGTH:
         raise PatchfemError(
             f"{path}: the profile is {format_length(length, 3)} long; is the unit of x right?"
         )
-    if span > length and not has_stated_units:
-        raise PatchfemError(
-            f"{path}: heights span {format_length(span)} over a length of {format_length(length)}; is the unit of z "
-            "right? If not, correct the header or give --units to profile and compare; write a missing height as nan"
+    span = float(np.nanmax(z) - np.nanmin(z))
+    if 0 < span < ATOM_WIDTH:
+        note = f"{path}: heights span {format_length(span)}, less than the width of an atom; is the unit of z right?"
+        return (note,)
+    if span <= length:
+        return ()
+    text = f"{path}: heights span {format_length(span)} over a length of {format_length(length)}"
+    heights = np.sort(z[np.isfinite(z)])
+    count = int(np.ceil(FAULT_FRACTION * heights.size)) if heights.size >= MIN_ROUNDED else 0
+    inner_span = float(heights[-1 - count] - heights[count])
+    if inner_span <= length:
+        note = (
+            f"{text}, but only {format_length(inner_span)} without the {count} highest and the {count} lowest of "
+            f"{heights.size}; write nan for each of these heights that is a fault of the measurement"
         )
+        return (note,)
+    if has_stated_units:
+        return ()
+    raise PatchfemError(
+        f"{text}; is the unit of z right? If not, correct the header or give --units to profile and compare; write a "
+        "missing height as nan"
+    )

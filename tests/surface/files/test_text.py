@@ -156,9 +156,11 @@ REFUSED = {
     "\ufeff \n\n": EMPTY,
     "# only words\n% more\n": WORDS.replace("1 lines", "2 lines"),
     **dict.fromkeys(
-        ("0,1\n1,2\n", "0,0,1\n0,1,2\n", "x,z\n0,1\n"),
+        ("0,1\n1,2\n", "x,z\n0,1\n"),
         "{path}:1: the unit of x is not given, and units are never guessed; write the header as `x [um],z [um]`, "
         f"{GIVE}"),
+    "0,0,1\n0,1,2\n": "{path}:1: the unit of x is not given, and units are never guessed; write the header as "
+                      f"`x [um],y [um],z [um]`, {GIVE}",
     "\nx [um],z []\n0,1\n": "{path}:2: unknown unit '' of z; use one of m, km, cm, mm, um, nm, in, ft, mil",
     "x [um],z [furlong]\n0,1\n": "{path}:1: unknown unit 'furlong' of z; use one of m, km, cm, mm, um, nm, in, ft, mil",
     "x [um]\n0\n": "{path}:2: only one column, but x and z are needed; write the header as `x [um],z [um]`",
@@ -221,6 +223,23 @@ def test_refuses_malformed_text_with_message(tmp_path, content):
         read_content(tmp_path, content)
     message = REFUSED[content].replace("{path}", str(tmp_path / "before.csv"))
     assert str(caught.value) == message
+
+
+@pytest.mark.parametrize(
+    "heights, note",
+    [
+        ({40: "999"}, "heights span 999 um over a length of 99 um, but only 1 um without the 1 highest and the 1 "
+         "lowest of 100; write nan for each of these heights that is a fault of the measurement"),
+        (dict.fromkeys(range(100), "0") | {3: "1e-5"}, "heights span 0.01 nm, less than the width of an atom; is the unit "
+         "of z right?"),
+    ],
+)  # fmt: skip
+def test_exact_heights_with_a_fault_or_without_size_have_a_note(tmp_path, heights, note):
+    """A single height far from all others does not make a file unreadable; heights of no size are named."""
+    rows = "".join(f"{k},{heights.get(k, k % 2)}\n" for k in range(100))
+    found = read_content(tmp_path, "x [um],z [um]\n" + rows)
+    assert found.notes == (f"{found.source}: {note}",)
+    assert found.z.size == 100
 
 
 @pytest.mark.usefixtures("small_text_limit")
