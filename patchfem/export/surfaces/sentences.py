@@ -77,6 +77,8 @@ WARNINGS = {
     "contain this error.",
 }
 NOTES = {
+    "left_out": "{before} heights before wear and {after} after it are spikes, dropouts or dust and are left out; "
+    "--keep-spikes keeps them.",
     "other_tracks": "Further tracks: {count}, which compare.json lists.",
     "sure_place": "The place is sure: there the surfaces agree by {significance} standard deviations more than at "
     "other places, and more than {sure} make a place sure.",

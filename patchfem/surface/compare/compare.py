@@ -161,7 +161,10 @@ def compare_surfaces(
         ratios = _compare_waves((first, second), result, options.direction)
         result = replace(result, values=result.values | ratios)
     evidence = replace(result.evidence, removed=removed)
-    return replace(result, evidence=evidence, direction=options.direction)
+    findings = result.findings
+    if any(removed):
+        findings += (Finding("left_out", dict(zip(("before", "after"), removed))),)
+    return replace(result, findings=findings, evidence=evidence, direction=options.direction)
 
 
 def _check_options(surfaces: tuple[Profile | Areal, Profile | Areal], options: Options) -> None:

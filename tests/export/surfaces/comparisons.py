@@ -88,6 +88,7 @@ FINDINGS = {
     "drift": {"height": 2e-8, "noise": 1.5e-8},
     "other_tracks": {"count": 2},
     "track_cut": {},
+    "left_out": {"before": 3, "after": 41},
     "worn_tops": {},
 }
 
