@@ -108,7 +108,8 @@ def make_surface(table: Table, units: tuple[str, str] | None = None) -> Profile 
     if size and table.columns["z"].ndim == 1 and "y" in table.columns:
         table = _fill_raster(table)
     _require_heights(table)
-    return _make_surface(table, has_stated_units=table.are_units_fixed or units is not None)
+    unit_source = "the file format" if table.are_units_fixed else ""
+    return _make_surface(table, "--units" if units else unit_source)
 
 
 def _set_axes(table: Table, pixel: float | None) -> Table:
@@ -229,7 +230,7 @@ def _find_positions(values) -> tuple[np.ndarray, np.ndarray]:
     return values[order][np.concatenate([[True], is_new])], index
 
 
-def _make_surface(table: Table, *, has_stated_units: bool) -> Profile | Areal:
+def _make_surface(table: Table, unit_source: str) -> Profile | Areal:
     """Make the surface of a trace (n,) or of a matrix (m, n) in metres, whose positions increase."""
     z = table.columns["z"]
     axes = []
@@ -244,7 +245,7 @@ def _make_surface(table: Table, *, has_stated_units: bool) -> Profile | Areal:
         _require_increase(table, role, places)
         axes.append(frozen_array(places))
     length = max(float(np.ptp(axis)) for axis in axes)
-    notes = _check_span(table.path, length, z, has_stated_units=has_stated_units)
+    notes = _check_span(table.path, length, z, unit_source)
     table = table._replace(notes=table.notes + notes)
     surface = Profile if z.ndim == 1 else Areal
     return surface(*reversed(axes), frozen_array(z), str(table.path), table.notes)
@@ -323,10 +324,11 @@ def find_printed_digit(x) -> float:
     return max(digits)
 
 
-def _check_span(path, length: float, z, *, has_stated_units: bool) -> tuple[str, ...]:
-    """Return a note on heights [m] that span less than an atom, or more than the length [m] due to a few of them.
+def _check_span(path, length: float, z, unit_source: str) -> tuple[str, ...]:
+    """Return a note on heights [m] that span less than an atom, or more than the length [m].
 
-    Raises PatchfemError for a tiny length, and if most heights span more than the length in units from a header.
+    Raises PatchfemError for a tiny length, and if most heights span more than the length in units from a header, which
+    have no other source.
     """
     if length < MIN_LENGTH:
         raise PatchfemError(
@@ -348,8 +350,8 @@ def _check_span(path, length: float, z, *, has_stated_units: bool) -> tuple[str,
             f"{heights.size}; write nan for each of these heights that is a fault of the measurement"
         )
         return (note,)
-    if has_stated_units:
-        return ()
+    if unit_source:
+        return (f"{text} in the units of {unit_source}; are they right?",)
     raise PatchfemError(
         f"{text}; is the unit of z right? If not, correct the header or give --units to profile and compare; write a "
         "missing height as nan"
