@@ -144,7 +144,7 @@ def _state_main(values: dict[str, Quantity], members: list[RoughnessReport]) -> 
     parts = []
     names = next(names for names in MAIN if names[0] in values)
     for name in names:
-        if name not in values:
+        if not sentences.is_known(values.get(name)):
             continue
         text = f"{name} {sentences.format_value(name, values[name])}"
         if values[name].reason == "few_files":

@@ -11,7 +11,6 @@ from traces import UM, draw_uneven_trace, format_trace
 from patchfem.core import Missing, PatchfemError
 from patchfem.formatting import format_length
 from patchfem.surface import read_profile
-from patchfem.surface.files.read import read_surface
 
 
 def read_content(tmp_path, content, name="before.csv"):
@@ -247,7 +246,7 @@ def test_exact_steep_heights_in_given_units_have_a_note(tmp_path):
     """Heights that span more than the length are read in the units of --units, with a note."""
     path = tmp_path / "a.csv"
     path.write_text("x [um],z [um]\n0,1\n1,900\n2,1\n", "utf-8")
-    found = read_surface(path, ("um", "um"))
+    found = read_profile(path, ("um", "um"))
     assert found.notes == (
         f"{path}: heights span 899 um over a length of 2 um in the units of --units; are they right?",
     )
