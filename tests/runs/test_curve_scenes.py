@@ -69,3 +69,14 @@ def test_exact_linear_curve_agrees_with_modal_sum():
     )
     peak = result.measures["peak_frequency"]
     assert abs(peak.value - 143 * np.sqrt(1 - 2 * ZETA**2)) < peak.error < 0.2
+
+
+def test_always_undamped_resonance_is_missing_in_curve():
+    """The point at the frequency of an undamped mode has no amplitude and is marked as unbounded; the others are finite."""
+    curve = pf.run(
+        RIG.replace("0.003", "0"), **{"drive.from": "142 Hz", "drive.to": "144 Hz"}
+    ).extra["curve"]
+    at_resonance = curve["frequency"] == 143.0
+    assert np.isnan(curve["amplitude"][at_resonance]).all() and at_resonance.any()
+    assert (curve["regime"][at_resonance] == "unbounded").all()
+    assert np.isfinite(curve["amplitude"][~at_resonance]).all()
