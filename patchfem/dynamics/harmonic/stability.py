@@ -13,8 +13,8 @@ in the width of the cells. Successive cells of equal coefficients become one.
 from dataclasses import replace
 
 import numpy as np
-from scipy.linalg import expm
 
+from ..exponentials import find_exponentials
 from .laws import FlowStates, LawForce
 from .motion import SteadyMotion
 
@@ -117,7 +117,15 @@ def find_monodromy(motion: SteadyMotion, modes, cells: int = 0) -> np.ndarray:
         rates[:, k, n : 2 * n] = np.outer(gain[first], group.rows[i])
         rates[:, k, k] = -loss[first]
 
-    steps = expm(rates * np.add.reduceat(widths, first)[:, None, None])
+    # Velocities are divided by a scale, which balances the entries of stiff modes and contacts.
+    scale = max(float(np.sqrt(np.abs(rates[:, n : 2 * n, :n]).max())), 1.0)
+    sizes = np.ones(size)
+    sizes[n : 2 * n] = scale
+    balanced = rates * (sizes / sizes[:, None])
+    steps = find_exponentials(balanced * np.add.reduceat(widths, first)[:, None, None])
+    steps *= sizes[:, None] / sizes
+
+    # A reversal ends a cell; its memory is the slide there.
     for k, (i, node, _) in enumerate(turns, 2 * n):
         last = np.searchsorted(first, node) - 1
         steps[last, k] = group.rows[i] @ steps[last, :n]
