@@ -42,7 +42,9 @@ class Cluster(FutureExecutor):
         If the certificates for TLS are missing.
     """
 
-    chunks_per_worker = 2  # A worker has its next chunk before it returns the results of the last one.
+    chunks_per_worker = (
+        2  # A worker has its next chunk before it returns the results of the last one.
+    )
 
     def __init__(self, address: str = "", workers: int = 0):
         try:
