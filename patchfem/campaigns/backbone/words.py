@@ -194,7 +194,10 @@ def _describe_band_width(backbone: Backbone) -> str:
     frequency, damping = deviations
     k = int(np.argmax(damping))
     content = "the numerical error"
-    if len(backbone.curves) > 1:
+    if any(
+        other is not curve and match_amplitudes(curve, other)[0].size
+        for other in backbone.curves.values()
+    ):
         content += " and the difference of the two methods"
     return (
         f"Its band is {content}; it is widest at {format_length(curve.amplitude[k], 3)}, where the damping ratio is "
@@ -204,10 +207,15 @@ def _describe_band_width(backbone: Backbone) -> str:
 
 
 def _describe_static_curve(curves: dict[str, Curve]) -> list[str]:
-    """Describe up to which amplitude frequency and damping of the quasi-static curve agree with harmonic balance."""
+    """Describe up to which amplitude frequency and damping of the quasi-static curve agree with harmonic balance.
+
+    Nothing is said without an amplitude at which both curves have a value.
+    """
     if len(curves) < 2:
         return []
     here, there = match_amplitudes(curves["balance"], curves["quasi-static"])
+    if not here.size:
+        return []
     balance = curves["balance"].at(here)
     static = curves["quasi-static"].at(there)
     agrees = np.ones(balance.amplitude.size, bool)
@@ -220,7 +228,9 @@ def _describe_static_curve(curves: dict[str, Curve]) -> list[str]:
     # the range ends at the first amplitude at which they differ
     tolerance = f"{100 * AGREEMENT:g} %"
     if agrees.all():
-        return [f"The quasi-static curve holds within {tolerance} at all its amplitudes."]
+        return [
+            f"The quasi-static curve holds within {tolerance} at all amplitudes of both curves."
+        ]
     first = int(np.argmin(agrees))
     if not first:
         return [

@@ -97,7 +97,10 @@ class FutureExecutor:
 
     def make_connection_error(self) -> Missing:
         """Return the error for a lost connection to the workers."""
-        return Missing(f"{self.name}: the connection to the scheduler is lost")
+        return Missing(
+            f"{self.name}: the connection to the scheduler is lost; start the scheduler again, and repeat the command with "
+            "--resume, which keeps the finished cases"
+        )
 
 
 class _OwnProcesses(SpawnContext):
