@@ -18,10 +18,8 @@ PUBLIC = {
     ),
     "cost": (
         "Cost",
-        "MEETS",
-        "MISSES",
+        "Judgement",
         "TOLERANCE",
-        "UNKNOWN",
         "describe_fastest_setting",
         "find_best_run",
         "find_fastest_settings",

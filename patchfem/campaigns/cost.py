@@ -11,12 +11,13 @@ import os
 import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from enum import StrEnum
 from math import inf
 from time import perf_counter, process_time
 from typing import NamedTuple
 
 from .. import compiled
-from ..core import NotConverged, PatchfemError, compute_allowed_error
+from ..core import Measure, NotConverged, PatchfemError, compute_allowed_error
 from ..formatting import format_number
 from ..model.model import Model
 from ..model.source import locate_errors
@@ -39,12 +40,16 @@ MIN_SECONDS_TIMED_ONCE = 0.3
 _REMEDY_TEXT = re.compile(r"; the tolerance is [^;]*; (.*)", re.DOTALL)
 # Smallest ratio of elapsed to CPU time at which both times are reported.
 MIN_ELAPSED_TO_CPU_RATIO = 1.5
-# Judgements of the errors of a run.
-MEETS = "meets its tolerance"
-MISSES = "misses its tolerance"
-UNKNOWN = "has unknown errors"
 EQUAL_COST_RATIO = 1.1  # Largest ratio of the CPU times of equally expensive runs.
 TIMING_SCATTER = 2e-3  # Scatter of the CPU time of repeated short runs [s].
+
+
+class Judgement(StrEnum):
+    """Judgement of the errors of a run: within its tolerance, one beyond it, or none known beyond it."""
+
+    MEETS = "meets its tolerance"
+    MISSES = "misses its tolerance"
+    UNKNOWN = "has unknown errors"
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -101,9 +106,11 @@ class Cost:
         Parameters
         ----------
         name : str
+            Name of the measure.
         error : float
             In the unit of the measure.
         tolerance : float
+            Largest error, relative to the value.
         """
         return error <= compute_allowed_error(tolerance, self.values[name], self.floors[name])
 
@@ -116,6 +123,7 @@ def compute_setting_costs(
     Parameters
     ----------
     model : Model
+        Model of the scene with its own settings.
     setting_name : str
         One of NUMERICAL_SETTINGS, or TOLERANCE for several tolerances, which include that of the scene.
     say : callable, optional
@@ -195,7 +203,7 @@ class _FinishedRun(NamedTuple):
     The number of steps is None if the method takes no time steps, and that of nodes without a patch.
     """
 
-    measures: dict
+    measures: dict[str, Measure]
     warnings: Sequence[str]
     steps: int | None = None
     nodes: int | None = None
@@ -240,6 +248,7 @@ def _run_setting(setting: Setting, label: str, say: Callable | None) -> _Finishe
     Parameters
     ----------
     setting : Setting
+        Setting with its model.
     label : str
         Name of the run in a message.
     say : callable or None
@@ -275,7 +284,9 @@ def find_fastest_run(runs: list[Cost], tolerance: float, names: Sequence[str] = 
     Parameters
     ----------
     runs : list of Cost
+        Runs from coarse to fine.
     tolerance : float
+        Largest error, relative to the value.
     names : sequence of str
         Measures that count; by default those with an error estimate in any run.
     """
@@ -283,7 +294,7 @@ def find_fastest_run(runs: list[Cost], tolerance: float, names: Sequence[str] = 
     confirmed = []
     is_confirmed = True
     for run in reversed(runs):
-        is_accurate = judge_run(run, counted, tolerance) == MEETS
+        is_accurate = judge_run(run, counted, tolerance) is Judgement.MEETS
         if run.value is not None:
             is_confirmed = is_confirmed and is_accurate
         if is_accurate and (is_confirmed or run.value is None):
@@ -308,12 +319,27 @@ def find_best_run(runs: list[Cost], tolerance: float) -> Cost:
     return min(known, key=lambda run: find_worst_error(run, names, tolerance))
 
 
-def judge_run(run: Cost, names: Sequence[str], tolerance: float) -> str:
-    """Return MEETS if the errors of measures are within a tolerance, MISSES if one is not, else UNKNOWN."""
+def judge_run(run: Cost, names: Sequence[str], tolerance: float) -> Judgement:
+    """Judge whether the errors of some measures of a run are within a tolerance.
+
+    Parameters
+    ----------
+    run : Cost
+        Run whose errors are judged.
+    names : sequence of str
+        Measures that count.
+    tolerance : float
+        Largest error, relative to the value.
+
+    Returns
+    -------
+    Judgement
+        UNKNOWN if the run has no error estimate of one of the measures, and no other error is too large.
+    """
     known = [name for name in names if name in run.errors]
     if not all(run.is_allowed(name, run.errors[name], tolerance) for name in known):
-        return MISSES
-    return MEETS if len(known) == len(names) else UNKNOWN
+        return Judgement.MISSES
+    return Judgement.MEETS if len(known) == len(names) else Judgement.UNKNOWN
 
 
 def describe_fastest_setting(runs: list[Cost], tolerance: float) -> str:
@@ -334,7 +360,7 @@ def describe_fastest_setting(runs: list[Cost], tolerance: float) -> str:
         )
 
     # A run with unknown errors may meet the tolerance.
-    is_unknown = any(judge_run(run, names, tolerance) == UNKNOWN for run in runs)
+    is_unknown = any(judge_run(run, names, tolerance) is Judgement.UNKNOWN for run in runs)
     text = (
         f"no setting {'is known to meet' if is_unknown else 'meets'} the tolerance {tolerance:g}: "
     )
@@ -358,15 +384,17 @@ class WorstError(NamedTuple):
     name: str
 
 
-def find_worst_error(run: Cost, names: Sequence, tolerance: float) -> WorstError:
+def find_worst_error(run: Cost, names: Sequence[str], tolerance: float) -> WorstError:
     """Find the measure with the largest error relative to a tolerance.
 
     Parameters
     ----------
     run : Cost
+        Run whose errors are compared.
     names : sequence of str
         Names of the measures to compare.
     tolerance : float
+        Largest error, relative to the value, beside which a floor counts.
 
     Returns
     -------

@@ -4,11 +4,9 @@ from dataclasses import asdict
 from typing import NamedTuple
 
 from ..campaigns.cost import (
-    MEETS,
-    MISSES,
     TOLERANCE,
-    UNKNOWN,
     Cost,
+    Judgement,
     WorstError,
     describe_fastest_setting,
     find_best_run,
@@ -32,9 +30,9 @@ RUN_COLUMNS = {
 }
 # Words for the judgement of the scene as it is.
 SCENE_JUDGEMENTS = {
-    MEETS: "meets the tolerance",
-    MISSES: "misses the tolerance",
-    UNKNOWN: "does not have an error estimate of every measure",
+    Judgement.MEETS: "meets the tolerance",
+    Judgement.MISSES: "misses the tolerance",
+    Judgement.UNKNOWN: "does not have an error estimate of every measure",
 }
 
 
@@ -42,13 +40,13 @@ class Row(NamedTuple):
     """A run of a curve, and its least accurate measure.
 
     knob: TOLERANCE, or the setting that varies; worst: of the measures with an error estimate in any run of the curve;
-    judgement: whether their errors are within the tolerance of the run, MEETS, MISSES or UNKNOWN.
+    judgement: of their errors.
     """
 
     knob: str
     run: Cost
     worst: WorstError
-    judgement: str
+    judgement: Judgement
 
 
 def make_answer(curves: dict[str, list[Cost]], model: Model) -> Answer:
@@ -65,15 +63,9 @@ def make_answer(curves: dict[str, list[Cost]], model: Model) -> Answer:
     rows = []
     for one, curve in curves.items():
         names = find_measures_with_error(curve)
-        rows += [
-            Row(
-                one,
-                run,
-                find_worst_error(run, names, run.tolerance),
-                judge_run(run, names, run.tolerance),
-            )
-            for run in curve
-        ]
+        for run in curve:
+            worst = find_worst_error(run, names, run.tolerance)
+            rows.append(Row(one, run, worst, judge_run(run, names, run.tolerance)))
     main = _find_main_measure(runs)
 
     # the scene as it is, or the run that the sentence names
@@ -119,7 +111,7 @@ def describe_runs(knob: str, runs: list[Cost], tolerance: float) -> dict:
         worst = find_worst_error(run, list(run.values), run.tolerance)
         entry = {
             "worst": {"measure": worst.name, "error": worst.fraction},
-            "meets_tolerance": judge_run(run, names, run.tolerance) == MEETS,
+            "meets_tolerance": judge_run(run, names, run.tolerance) is Judgement.MEETS,
             "remedies": list(run.remedies),
         }
         entries.append(asdict(run) | entry)
@@ -143,21 +135,23 @@ def _describe_scene(row: Row, rows: list[Row]) -> list[str]:
         f"{SCENE_JUDGEMENTS[row.judgement]}{error}."
     ]
 
-    met = [one.run for one in rows if one.judgement == MEETS]
+    met = [one.run for one in rows if one.judgement is Judgement.MEETS]
     if met:
         best = min(met, key=lambda one: one.tolerance)
         seconds = format_number(best.seconds, 2)
         sentences.append(f"The smallest tolerance that is met is {best.label}, in {seconds} CPU s.")
-    elif any(one.judgement == UNKNOWN for one in rows):
+    elif any(one.judgement is Judgement.UNKNOWN for one in rows):
         sentences.append("No run is known to meet its tolerance.")
     else:
         sentences.append("No run meets its tolerance.")
-    advice = [
-        f"For the tolerance {one.run.tolerance:g}: {text}."
-        for one in rows
-        if one.judgement == MISSES
-        for text in one.run.remedies
-    ]
+
+    # the last advice belongs to the smallest tolerance that is missed
+    advice = []
+    for one in rows:
+        if one.judgement is Judgement.MISSES:
+            advice += [
+                f"For the tolerance {one.run.tolerance:g}: {text}." for text in one.run.remedies
+            ]
     return sentences + advice[-1:]
 
 

@@ -193,11 +193,11 @@ def _describe_band_width(backbone: Backbone) -> str:
         deviations.append(np.maximum(above, below) / np.maximum(np.abs(value), 1e-300))
     frequency, damping = deviations
     k = int(np.argmax(damping))
+
+    # a second curve widens the band only where it has a value
+    others = [other for other in backbone.curves.values() if other is not curve]
     content = "the numerical error"
-    if any(
-        other is not curve and match_amplitudes(curve, other)[0].size
-        for other in backbone.curves.values()
-    ):
+    if any(match_amplitudes(curve, other)[0].size for other in others):
         content += " and the difference of the two methods"
     return (
         f"Its band is {content}; it is widest at {format_length(curve.amplitude[k], 3)}, where the damping ratio is "

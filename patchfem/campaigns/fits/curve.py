@@ -250,6 +250,8 @@ class CurveModel:
             self.methods = max(self.methods, successful, key=len)
             if len(self.methods) == len(METHODS):
                 return ""
+
+        # one method has no value within the ranges, or none has
         if not self.methods:
             listed = "; ".join(f"{method}: {reasons[method]}" for method in METHODS)
             raise PatchfemError(

@@ -221,12 +221,17 @@ class ChunkQueue:
 
     def record_death(self, numbers: Sequence[int]) -> list[int]:
         """Record the failure of a chunk: return the cases to abandon, and queue the others to be repeated alone."""
+        abandoned: list[int] = []
         self.deaths.update(numbers)
-        self.suspects += [number for number in numbers if self.deaths[number] < MAX_DEATHS - 1]
-        self.last_suspects += [
-            number for number in numbers if self.deaths[number] == MAX_DEATHS - 1
-        ]
-        return [number for number in numbers if self.deaths[number] >= MAX_DEATHS]
+        for number in numbers:
+            n_left = MAX_DEATHS - self.deaths[number]
+            if n_left > 1:
+                self.suspects.append(number)
+            elif n_left == 1:
+                self.last_suspects.append(number)
+            else:
+                abandoned.append(number)
+        return abandoned
 
 
 def iterate_chunks(
