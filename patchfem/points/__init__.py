@@ -12,7 +12,7 @@ nodes in partial slip, laws that are much faster than the drive; and, with one p
 7. `slide_kernels`, `slides`  points along a prescribed slide
 8. `orbits`               periodic motions by marching, and their multipliers
 
-A law is a number in `return_maps_kernels.Law` with a branch in each of five functions. Read `return_maps_kernels` first.
+A law is a number in `law_rows.Law` with a branch in each of five functions. Read `return_maps_kernels` first.
 """
 
 # Names that other folders use, by module.

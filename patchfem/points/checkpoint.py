@@ -89,9 +89,9 @@ def open_checkpoint(run, record, request: tuple) -> MarchCheckpoint:
 
     Parameters
     ----------
-    run : march.March
+    run : time_march.March
         March at its start.
-    record : march.Record
+    record : time_march.Record
     request : tuple
         Numbers that identify what is marched; the first one is the number of steps.
 
@@ -156,8 +156,8 @@ def save_checkpoint(path: Path, key: str, run, record) -> None:
     path : Path
     key : str
         Identifies the march.
-    run : march.March
-    record : march.Record
+    run : time_march.March
+    record : time_march.Record
 
     Raises
     ------
@@ -173,6 +173,8 @@ def save_checkpoint(path: Path, key: str, run, record) -> None:
     for number, (_, samples, sums) in enumerate(record.recent):
         arrays |= {f"samples.{number}": samples, f"energies.{number}": sums}
     arrays |= {"totals": record.totals, "works": run.work_sums, "lists": run.first_sums}
+    if record.before is not None:
+        arrays["before"] = record.before
     firsts = [first for first, _, _ in record.recent]
     numbers = {"done": run.done, "firsts": firsts, "energy": run.first_energy}
     n_bytes = sum(array.nbytes for array in arrays.values())
@@ -222,6 +224,7 @@ def load_checkpoint(path: Path, key: str, run, record) -> None:
             for number, first in enumerate(numbers["firsts"])
         ]
         record.last = record.recent[-1]
+        record.before = arrays.get("before")
         run.first_sums = arrays["lists"]
     except PatchfemError:
         raise

@@ -1037,13 +1037,12 @@ def commit(system, h):
         relax_pieces(system)
     for i in range(system.state.shape[1]):
         system.state[0, i] = system.state[2, i]
-    heave = int(ports.contact[0])
-    if heave >= 0:
-        n = system.state.shape[1] // 2
-        up = project(ports.rows[heave], system.state[0, :n])
-        turn = project(ports.rows[int(ports.contact[1])], system.state[0, :n])
-        slot = normal.find_set(system.sets, int(system.totals[Total.SLOT]), -up, turn)
-        system.totals[Total.SLOT] = slot
+    # Held ports come back to rest, which may also move the holder.
+    energy = find_motion_energy(system)
+    system.totals[Total.REST] = 0.0
+    if options.is_rigid and system.totals[Total.SLOT] >= 0:
+        rest_ports(system)
+        system.totals[Total.REST] = find_motion_energy(system) - energy
     if flank.size:
         rise = 2 * flank[Flank.SLOPE] * ports.values[Port.INCREMENT, 0] / h
         flank[Flank.RISE_SPEED] = rise - flank[Flank.RISE_SPEED]
@@ -1053,11 +1052,6 @@ def commit(system, h):
         flank[Flank.FORCE] = 0.0
         for j in range(count):
             flank[Flank.FORCE] += read_point(system, j).force
-    system.totals[Total.REST] = 0.0
-    if options.is_rigid:
-        before = find_modal_energy(system)
-        rest_ports(system)
-        system.totals[Total.REST] = find_modal_energy(system) - before
 
 
 @njit(**NJIT_CALL)
@@ -1173,14 +1167,24 @@ def read_points(system, forces, stretch):
 
 
 @njit(**NJIT_CALL)
-def find_modal_energy(system):
-    """Return the energy of the modes [J]."""
+def find_motion_energy(system):
+    """Return the energy of the modes and of the normal contact [J], and find the present contact set."""
     state = system.state[0]
+    ports = system.ports
     n = state.size // 2
     energy = 0.0
     for i in range(n):
         energy += state[n + i] ** 2 + system.structure.modes[0, i] * state[i] ** 2
-    return 0.5 * system.options.mass * energy
+    energy *= 0.5 * system.options.mass
+    heave = int(ports.contact[0])
+    if heave >= 0:
+        up = project(ports.rows[heave], state[:n])
+        turn = project(ports.rows[int(ports.contact[1])], state[:n])
+        slot = normal.find_set(system.sets, int(system.totals[Total.SLOT]), -up, turn)
+        system.totals[Total.SLOT] = slot
+        if slot >= 0:
+            energy += normal.compute_energy(system.sets, slot, up, turn)[0]
+    return energy
 
 
 @njit(**NJIT_CALL)

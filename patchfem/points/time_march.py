@@ -12,7 +12,6 @@ from numpy.polynomial.legendre import leggauss
 from .. import compiled
 from ..contact.set_arrays import hash_set, make_set_arrays
 from ..core import Missing, ModalBasis, Outcome, Response, SineDrive
-from ..formatting import format_length
 from ..friction.bonds import list_numbers
 from ..friction.bonds.list_rows_kernels import N_ROWS, STATUS, BondLists
 from ..friction.bonds.parameters import growth_numbers
@@ -64,9 +63,6 @@ TAYLOR_DEGREE = 18  # degree whose remainder is below round-off for matrices of 
 SAME_PLACE = 1e-12  # change of a slide relative to the largest displacement that counts as rest
 MAX_EARLY_SAMPLES_PER_CYCLE = 128  # samples per cycle of the histories before the window
 EDGE = 1e-9  # distance of the samples of a drive from the ends of a step, in steps
-RUNAWAY = (
-    10.0  # output relative to the travel of a softening spring beyond which a step has diverged
-)
 # Sums that a repeated cycle continues
 REPEATED = [Total.WORK_IN, Total.POWER, Total.VISCOUS, Total.FRICTION]
 PRESS_COLUMNS = ("normal_load", "normal_moment", "normal_energy", "heave", "turn")
@@ -342,7 +338,8 @@ def _make_points(contact: Contact, n_nodes: int) -> Points:
     resultant = contact.preload
     if contact.grooves is not None:
         resultant *= float(np.hypot(1.0, contact.grooves.slope(0.0)))
-    share = np.array([law.load / resultant for law in laws], float)
+    # A single point carries a prescribed load that is 0 at the start.
+    share = np.array([law.load / resultant if resultant > 0 else 1.0 for law in laws], float)
     nodes = np.full(len(laws), RESULTANT, np.int64)
     place = np.zeros(len(laws))
     shapes = np.zeros((0, len(laws)))
@@ -638,9 +635,7 @@ class March:
             If the lists become too long.
         """
         self._set_drive(count)
-        springs = any(one.is_spring for one in self.contact.point_sets)
-        may_repeat = self.system.options.has_lists or springs
-        saved = copy_system(self.system) if may_repeat else None
+        saved = copy_system(self.system) if self.system.options.has_lists else None
         while True:
             samples = np.zeros((count + 1, self.width))
             n_done, status = self.kernels.march(self.system, count, samples)
@@ -649,25 +644,10 @@ class March:
             saved = enlarge_lists(saved, f"at step {self.done + n_done}")
             self.system = copy_system(saved)
         samples = samples[: n_done + 1]
-        if springs and status == EXCEEDS_TRAVEL and n_done and self._has_run_away(samples[-1]):
-            self.system = saved
-            self.kernels.march(self.system, n_done - 1, samples[:-1])
-            n_done = n_done - 1
-            samples = samples[:-1]
-            last = abs(float(self.modes.output @ samples[-1, : self.modes.omega.size]))
-            self.message = (
-                f"beyond a displacement of {format_length(last, 3)} the motion grows without limit, because the "
-                "force of the softening spring no longer pulls the block back; the run ended there"
-            )
         self.done += n_done
         self._judge(status)
         self._add_works(samples)
         return samples
-
-    def _has_run_away(self, sample) -> bool:
-        """Return whether the output of a sample is far beyond the travel."""
-        output = abs(float(self.modes.output @ sample[: self.modes.omega.size]))
-        return output > RUNAWAY * self.system.options.travel
 
     def _judge(self, status: int) -> None:
         """Set outcome and message from the status of the compiled march."""
@@ -900,7 +880,6 @@ def march(
         and contact.load is None
         and not run.system.options.has_lists
     )
-    before = None
     while run.done < n_steps and run.outcome is None:
         n_left = n_steps - run.done
         n_early = n_left - record.n_window
@@ -918,15 +897,21 @@ def march(
             [run.system.points.memory.ravel(), run.system.points.shear[Shear.VALUE]]
         )
         now = np.concatenate([state, memory])
-        if can_repeat and count > 0 and before is not None and before.size == now.size:
+        if (
+            can_repeat
+            and count > 0
+            and record.before is not None
+            and record.before.size == now.size
+        ):
             scale = np.concatenate([record.find_largest_state(), np.abs(memory)])
-            if (np.abs(now - before) <= SAME_CYCLE * scale).all():
+            if (np.abs(now - record.before) <= SAME_CYCLE * scale).all():
                 record.repeat(count)
                 run.done += count * size
                 run.system.totals[REPEATED] += count * (run.system.totals - totals)[REPEATED]
                 run.work_sums += count * (run.work_sums - works)
-        before = now if size % steps_per_cycle == 0 else None
-        saved.write_if_due(run, record)
+        record.before = now if size % steps_per_cycle == 0 else None
+        if run.done < n_steps:
+            saved.write_if_due(run, record)
         if progress is not None:
             progress(run.done / n_steps)
     run.check_steps()
@@ -973,6 +958,7 @@ class Record:
     - last, recent: number of the first step, samples and energies of the last part, and of the last parts, which contain
       the window
     - stride: distance of the samples of earlier cycles
+    - before: state and memory at the end of the part before the last, if both have whole cycles; else None
     """
 
     def __init__(self, run: March, n_steps: int, n_window: int, keeps_samples: bool):
@@ -988,6 +974,7 @@ class Record:
         self.totals = np.zeros(3)
         self.snapshots = []
         self.last = None
+        self.before = None
         self.recent = []
         # The distance of early samples divides a cycle, so that each one begins with a sample.
         longest = max(1, run.steps // MAX_EARLY_SAMPLES_PER_CYCLE)

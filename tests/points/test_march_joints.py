@@ -123,7 +123,7 @@ def march_random_chain(seed):
     makers = {
         "coulomb": lambda p: Coulomb(kinetic[p], limit[p]).element(1.0),
         "ep": lambda p: ElasticPlastic(limit[p], length[p]).element(1.0),
-        "bonds": lambda p: points_element(Bonds(0.5, length[p]), [1.0], [2 * limit[p]]),
+        "bonds": lambda p: points_element(Bonds(0.5, length[p]), 2 * limit[p]),
         "tanh": lambda p: TanhLaw(limit[p], length[p]).element(1.0),
     }
     elements = [makers[kind](p) for p, kind in enumerate(kinds)]

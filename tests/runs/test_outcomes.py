@@ -92,6 +92,20 @@ RUNS = [
         "softening spring",
         "",
     ),
+    (
+        COULOMB_RIG,
+        "accuracy.method=march; structure.stiffening.cubic=-1e14 N/m^3; drive.acceleration=60 g",
+        "grows",
+        r"beyond a displacement of .* um the motion grows without limit.*softening spring",
+        "",
+    ),
+    (
+        PLASTIC_RIG,
+        "accuracy.method=march; structure.stiffening.cubic=-1e14 N/m^3; drive.acceleration=60 g",
+        "grows",
+        r"beyond a displacement of .* um the motion grows without limit",
+        "",
+    ),
     (COATED_RIG, "drive.acceleration=60 g", "leaves_contact", "", ""),
     (COATED_RIG, HARMONIC + "drive.acceleration=60 g", "leaves_contact", "", ""),
     (

@@ -29,6 +29,21 @@ CASES = {  # Scene and changes.
 }  # fmt: skip
 
 
+@pytest.mark.parametrize("method", ["march", "exact"])
+def test_exact_energies_continue_over_drive_levels(method):
+    """Dissipated energy and work never start anew at a level: the balance holds at every sample of all levels."""
+    text, changes = CASES["levels"]
+    result = run_scene(text, changes.replace("march", method), estimate=False)
+    time = result.response.time
+    work, stored, dissipated, created = result.response.extra["ledger"]
+    scale = dissipated[-1]
+    gap = work - (stored - stored[0]) - dissipated + created
+    assert np.abs(gap).max() <= (1e-9 if method == "march" else 1e-6) * scale
+    assert np.diff(dissipated).min() >= -1e-9 * scale
+    first_level = dissipated[time <= time[-1] / 2][-1]
+    assert 0 < first_level < 0.5 * scale
+
+
 @pytest.mark.parametrize("name", CASES)
 def test_always_last_two_cycles_have_hundred_samples_each(name, tmp_path):
     """A history has its start, its end, and at least 100 samples per cycle of the last two cycles; the motion between

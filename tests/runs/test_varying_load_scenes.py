@@ -3,8 +3,9 @@ load."""
 
 import numpy as np
 import pytest
-from scene_texts import RIG
+from scene_texts import COATED, DRIVE, MODE, RIG, make_friction_table
 
+from patchfem.core import Outcome
 from patchfem.export.run_data import collect_data
 from patchfem.runs.run import run
 from patchfem.scene import loads
@@ -49,3 +50,39 @@ def test_exact_pitching_mode_balances_energy_and_fields(law):
     assert (fields["gap"] >= 0).all() and not (fields["gap"] * fields["normal_stress"]).any()
     assert (np.abs(fields["shear_stress"]) <= 0.3 * fields["normal_stress"] + 1e-6).all()
     assert collect_data(result)["normal_load"].values is load and np.ptp(load) > 1e-3 * load[0]
+
+
+@pytest.mark.parametrize("steps", [100, 400])
+def test_always_coulomb_friction_with_heave_and_pitch_converges(steps):
+    """Rigid friction that brings the slide back to rest also moves the load; its energy is part of the balance."""
+    text = (
+        COATED.replace("0.5 mm", "1.5 mm")
+        + '[contact.crown]\nradius = "100 m"\n'
+        + make_friction_table("coulomb")
+        + MODE
+        + 'normal = 0.3\npitch = "1 rad/m"\n'
+        + DRIVE
+    )
+    result = run_text(
+        text, "accuracy.method=march", "drive.cycles=12", f"accuracy.steps_per_cycle={steps}"
+    )
+    assert result.outcome is not Outcome.NOT_CONVERGED, result.message
+    assert result.measures["energy_balance"].value <= 1e-10
+
+
+@pytest.mark.parametrize("law", ["coulomb", "elastic-plastic", "tanh"])
+def test_exact_load_that_is_zero_at_the_start(law):
+    """The march and the engine from event to event agree for a load 20 N (1 - cos 2 pi f t)."""
+    load = '[normal]\nload = "20 N"\namplitude = "20 N"\nfrequency = "50 Hz"\nphase = "180 deg"\n'
+    text = load + make_friction_table(law) + MODE + DRIVE
+    marched, exact = (
+        run_text(text, f"accuracy.method={method}", "drive.cycles=10", *steps, estimate=True)
+        for method, steps in (
+            ("march", ["accuracy.steps_per_cycle=200", "accuracy.tolerance=0.05"]),
+            ("exact", []),
+        )
+    )
+    for name in ("relative_displacement_amplitude", "friction_work"):
+        first, second = marched.measures[name], exact.measures[name]
+        assert abs(first.value - second.value) <= 1.5 * (first.error + second.error), name
+        assert first.error <= 0.05 * second.value

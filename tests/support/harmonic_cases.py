@@ -16,7 +16,7 @@ def make_speed_law(limit, speed):
 
 def make_bond_law(limit, length):
     """Return the law of bonds, F = limit u with du/dq = sgn(v) - u per unit of length."""
-    return FlowLaw(points_element(Bonds(limit, length), np.ones(1), np.ones(1)))
+    return FlowLaw(points_element(Bonds(limit, length), 1.0))
 
 
 def make_lugre_law():

@@ -6,25 +6,12 @@ from ..bonds.parameters import Bonds, growth_numbers
 from ..protocol import Element
 
 
-def points_element(law: Bonds, area, sigma) -> Element:
-    """Return the Element that combines points which all have the same relative displacement.
-
-    Parameters
-    ----------
-    law : Bonds
-    area, sigma : (m,) array
-        Areas [m2] and pressures [Pa] of the points.
-
-    Returns
-    -------
-    Element
-    """
-    sigma = np.asarray(sigma, float)
-    load = float(np.asarray(area, float) @ sigma)
+def points_element(law: Bonds, load: float) -> Element:
+    """Return the Element that combines points under a load [N] which all have the same relative displacement."""
     head = [0.0, law.static * load / law.length, law.length]
     return Element(
         kernels="friction.laws.stretch_kernels",
-        numbers=np.concatenate([head, growth_numbers(law), sigma]),
+        numbers=np.concatenate([head, growth_numbers(law)]),
         memory=np.array([law.length, law.initial, 0.0, 0.0, 0.0]),
         limit=law.static * load,
         length=law.length,

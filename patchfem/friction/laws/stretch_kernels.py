@@ -1,10 +1,10 @@
 """Bonds of eq. 2.17 with reading="stretch" and p = 1 for points that move alike, compiled.
 
-Every point moves in proportion to its pressure, so one point under 1 Pa stands for all of them. Equations:
+The forces of the points are proportional to their pressures, so one point carries the whole load. Equations:
 `friction.bonds.point_kernels`.
 
-numbers: sum of mu_s area pressure/eps_0 over the points [N/m], eps_0 [m], the growth (5,) of eq. 2.10, the pressures
-[Pa]. At a constant bond length the bonds are exponentials of the path between two reversals.
+numbers: 0, mu_s load/eps_0 [N/m], eps_0 [m], the growth (5,) of eq. 2.10. At a constant bond length the bonds are
+exponentials of the path between two reversals.
 """
 
 from math import exp, expm1

@@ -20,7 +20,6 @@ from ...core import (
 )
 from ...dynamics.event_list import DRIVE_CHANGE, RELEASE, REVERSAL, STOP, EventLog
 from ...dynamics.integrated import find_accelerations
-from ...formatting import format_length
 from ...hybrid import cases, periodic
 from ...hybrid import runs as engine
 from ...hybrid.laws import is_rigid
@@ -41,15 +40,13 @@ from . import strips
 from .evaluation import RunEvaluator
 from .hybrid_laws import Joints, make_joints
 from .levels import remove_incomplete_cycle, run_levels
-from .solution import Solution, first_mode_stiffness
+from .solution import Solution, describe_escape, find_travel, first_mode_stiffness
 
 SAMPLES_PER_CYCLE = 400  # samples of each of the last cycles
 MIN_SAMPLES = 101  # samples of the last cycles of a run shorter than a cycle
 MAX_EARLY_SAMPLES = 8_000  # samples of equal distances before the last cycles
 EARLY_SAMPLES_PER_CYCLE = 40
 SAME_TIME_TOL = 1e-9  # distance of samples that are one, in cycles
-# Displacement at which a motion has left the range of a softening spring, relative to that without restoring force.
-ESCAPE_RATIO = 2.0
 MAX_CHANGE_RATIO = 1e-2  # largest ratio of the change of a steady motion to the tolerance
 N_CHANGE_WINDOWS = (
     3  # windows at the end of a run from which the change of the motion is determined
@@ -190,7 +187,7 @@ class LumpedEvaluator(RunEvaluator):
         frames : int
             Number of snapshots of the elements in the last cycle.
         """
-        travel = min(self.model.rig.springs.travel, self._find_escape())
+        travel = find_travel(self.model.rig)
         times = self._choose_times(drive, cycles, frames)
         motion = self._run(drive, cycles, np.concatenate(times[:2]), travel, state)
         outcome = EARLY_ENDS.get(motion.status)
@@ -205,25 +202,11 @@ class LumpedEvaluator(RunEvaluator):
         run = self._make_run(motion, drive, cycles, times, state)
         return replace(run, outcome=outcome, message=message)
 
-    def _find_escape(self) -> float:
-        """Return the displacement [m] beyond which a softening spring no longer pulls the output back; inf without one."""
-        cubic = self.model.rig.springs.cubic
-        if cubic is None or cubic >= 0:
-            return np.inf
-        modes = self.model.rig.modes
-        stiffness = modes.mass * modes.omega[0] ** 2 / max(modes.output[0] ** 2, 1e-300)
-        return ESCAPE_RATIO * np.sqrt(stiffness / -cubic)
-
     def _explain_end(self, motion, travel: float) -> str:
         """Return why a motion ended early, "" if it reached the travel of the scene."""
         if motion.status == Status.LEAVES_GROOVES:
             return self.model.grooves.describe_lift(motion.time)
-        if travel >= self.model.rig.springs.travel:
-            return ""
-        return (
-            f"beyond a displacement of {format_length(travel, 3)} the motion grows without limit, because the force of the "
-            "softening spring no longer pulls the block back; the run ended there"
-        )
+        return describe_escape(self.model.rig, travel)
 
     def _run(self, drive, cycles: float, times, travel: float, state: State | None):
         """Return the `hybrid.runs.Motion` of a drive."""

@@ -140,7 +140,7 @@ def make_element(interface: InterfaceLaw, load: float, speed: float) -> Element:
     """
     f = interface.numbers
     if law_has_trait(f.law, "bonds"):
-        return points_element(make_bond_parameters(f, speed, 1e-12), [1.0], [load])
+        return points_element(make_bond_parameters(f, speed, 1e-12), load)
     return make_law(f, load).element(load)
 
 
@@ -165,7 +165,7 @@ def make_single_law(model: Model, numerics: Numerics, patch) -> SingleLaw:
     if law_has_trait(f.law, "bonds"):
         is_single = not (model.partial_slip or numerics.per_point)
         if is_single and choose_bond_summation(model, numerics).engine == "recursion":
-            return SingleLaw(points_element(model.bonds, [1.0], [load]))
+            return SingleLaw(points_element(model.bonds, load))
         return SingleLaw(None)
     if law_has_trait(f.law, "averaged"):
         limit = f.static * load * averaged_law.slip_force_ratio(model, patch)

@@ -290,10 +290,21 @@ def _join_histories(histories: list, shifts: list):
     for name in last.extra:
         arrays = [part.extra[name] for part in histories]
         if name == "ledger":
-            extra[name] = join([array.T for array in arrays]).T
+            extra[name] = join([array.T for array in _continue_energies(arrays)]).T
         else:
             extra[name] = join(arrays)
     return replace(last, extra=extra, **columns)
+
+
+def _continue_energies(ledgers: list) -> list:
+    """Return the energies (4, k) [J] of successive runs with work, dissipated and created energy since the first start."""
+    continued = []
+    before = np.zeros((4, 1))
+    for ledger in ledgers:
+        continued.append(ledger + before)
+        before = continued[-1][:, -1:].copy()
+        before[1] = 0.0  # the stored energy does not add up
+    return continued
 
 
 def _shift_times(time, shift: float):

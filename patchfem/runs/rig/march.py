@@ -4,13 +4,14 @@ In: a Model, its Numerics and its Patch. Out: a Solution. The measures come from
 work of the energy balance and the harmonics of the loop.
 """
 
+from dataclasses import replace
 from functools import partial
 from operator import attrgetter
 from time import perf_counter
 
 import numpy as np
 
-from ...core import IntegratedMeasures
+from ...core import IntegratedMeasures, Outcome
 from ...effects import law_has_trait
 from ...friction.record import make_law
 from ...points import time_march as engine
@@ -29,7 +30,14 @@ from . import strips
 from .bond_lists import BondListGuard, choose_bond_summation, has_bond_list
 from .evaluation import RunEvaluator, compute_work_check
 from .interface import make_contact
-from .solution import CycleLoop, Solution, compute_sampled_loop, first_interface_load
+from .solution import (
+    CycleLoop,
+    Solution,
+    compute_sampled_loop,
+    describe_escape,
+    find_travel,
+    first_interface_load,
+)
 
 # Safety factor on the first-order error due to a run that does not end exactly at the requested
 # time.
@@ -64,6 +72,7 @@ def march_in_time(model, numerics, patch, frames: int = 0, say=None, progress=No
     # Strips that slide independently have no common shear stress, so no output frames are stored.
     slide_apart = rig.friction.strips_slide_apart
     progress = BondListGuard(progress) if has_bond_list(model, numerics) else progress
+    travel = find_travel(rig)
     # The histories of a patch that is reduced to a few points are not used.
     is_gathered = model.patch is not None and model.patch.mesh.can_gather_points
 
@@ -76,12 +85,14 @@ def march_in_time(model, numerics, patch, frames: int = 0, say=None, progress=No
             cycles,
             numerics.steps,
             window=numerics.window,
-            travel=rig.springs.travel,
+            travel=travel,
             start=rig.start if before is None else before,
             frames=0 if slide_apart or not is_last else frames,
             keeps_samples=numerics.whole and not is_gathered,
             progress=watch,
         )
+        if run.outcome is Outcome.EXCEEDS_TRAVEL:
+            run = replace(run, message=describe_escape(rig, travel))
         return strips.average_march_over_strips(run, patch) if slide_apart else run
 
     evaluator = MarchEvaluator(model, numerics, patch, contact)

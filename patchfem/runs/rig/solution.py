@@ -9,11 +9,14 @@ from typing import NamedTuple
 import numpy as np
 
 from ...core import Measure, Outcome, Response
+from ...formatting import format_length
 from ...response.decay_curve import measure_last_cycle_amplitude
 from ...response.measures import compute_harmonic, measure_half_range
 from ...response.reasons import MAX_OTHER_MODES_FRACTION
 from ...structure.drive_sizes import find_drive_omega, has_full_cycle
 
+# Displacement at which a motion has left the range of a softening spring, relative to that without restoring force.
+ESCAPE_RATIO = 2.0
 NO_PEAK_REASON = "the output does not move at any of the swept frequencies, so there is no peak"
 # Safety factor on the change of a peak frequency in a coarse run.
 PEAK_SHIFT_FACTOR = 3.0
@@ -73,6 +76,25 @@ class Solution:
     extremes: np.ndarray | None = None
     bounded: bool = False
     extra: dict = field(default_factory=dict)
+
+
+def find_travel(rig) -> float:
+    """Return the output [m] at which a run ends: the travel of the scene, or the range of a softening spring."""
+    cubic = rig.springs.cubic
+    if cubic is None or cubic >= 0:
+        return rig.springs.travel
+    stiffness = rig.modes.mass * rig.modes.omega[0] ** 2 / max(rig.modes.output[0] ** 2, 1e-300)
+    return min(rig.springs.travel, ESCAPE_RATIO * float(np.sqrt(stiffness / -cubic)))
+
+
+def describe_escape(rig, travel: float) -> str:
+    """Return why a run ended at a travel [m] of `find_travel`; "" if it is the travel of the scene."""
+    if travel >= rig.springs.travel:
+        return ""
+    return (
+        f"beyond a displacement of {format_length(travel, 3)} the motion grows without limit, because the force of the "
+        "softening spring no longer pulls the block back; the run ended there"
+    )
 
 
 class CycleLoop(NamedTuple):

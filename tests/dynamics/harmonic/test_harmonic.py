@@ -345,7 +345,7 @@ def test_refuses_laws_that_cannot_be_balanced():
     with pytest.raises(PatchfemError, match="rigid friction"):
         find_steady_motion(modes, DRIVE, Coulomb(1.0, 1.0).element(1.0))
     with pytest.raises(PatchfemError, match="a constant bond length"):
-        find_steady_motion(modes, DRIVE, points_element(GROWING, [1.0], [1.0]))
+        find_steady_motion(modes, DRIVE, points_element(GROWING, 1.0))
     with pytest.raises(PatchfemError, match="interface 2"):
         LawGroup(modes, (2, Spring(1.0)))
     with pytest.raises(PatchfemError, match="on at least one interface"):
