@@ -165,12 +165,12 @@ def test_exact_curves_without_common_amplitude_are_not_compared():
         "quasi-static": make_curve(np.array([3e-6, 4e-6]), values, 1e-3 * values),
     }
     apart = Backbone("a", None, curves, {}, None, None, (), make_band(curves))
-    assert words._describe_static_curve(curves) == []
-    assert words._describe_band_width(apart).startswith("Its band is the numerical error; it is")
+    assert words.describe_static_curve(curves) == []
+    assert words.describe_band_width(apart).startswith("Its band is the numerical error; it is")
 
     curves["quasi-static"] = curves["quasi-static"]._replace(amplitude=np.array([2e-6, 4e-6]))
     near = apart._replace(curves=curves, band=make_band(curves))
-    assert words._describe_static_curve(curves) == [
+    assert words.describe_static_curve(curves) == [
         "The quasi-static curve holds within 2 % at all amplitudes of both curves."
     ]
-    assert "and the difference of the two methods" in words._describe_band_width(near)
+    assert "and the difference of the two methods" in words.describe_band_width(near)

@@ -136,8 +136,8 @@ def write_advice(joint: JointMode, backbone: Backbone) -> tuple[str, ...]:
     sentences = [
         f"Use the curve of method {band.method}: {PURPOSES[band.method]}.",
         *_describe_slip(joint, curve),
-        _describe_band_width(backbone),
-        *_describe_static_curve(curves),
+        describe_band_width(backbone),
+        *describe_static_curve(curves),
         *_describe_coupling(joint, curve),
     ]
 
@@ -181,7 +181,7 @@ def _describe_slip(joint: JointMode, curve: Curve) -> list[str]:
     return sentences
 
 
-def _describe_band_width(backbone: Backbone) -> str:
+def describe_band_width(backbone: Backbone) -> str:
     """Describe where the band of the damping ratio is widest, and the largest deviation of the frequency."""
     band = backbone.band
     curve = backbone.best
@@ -206,7 +206,7 @@ def _describe_band_width(backbone: Backbone) -> str:
     )
 
 
-def _describe_static_curve(curves: dict[str, Curve]) -> list[str]:
+def describe_static_curve(curves: dict[str, Curve]) -> list[str]:
     """Describe up to which amplitude frequency and damping of the quasi-static curve agree with harmonic balance.
 
     Nothing is said without an amplitude at which both curves have a value.
