@@ -1121,7 +1121,9 @@ def find_extremes(q, v, step: float) -> list[tuple[float, float]]:
     square = 3 * (first + last) - 6 * mean
     linear = 6 * mean - 4 * first - 2 * last
     root = np.sqrt(np.maximum(linear**2 - 4 * square * first, 0.0))
-    x = np.clip(2 * first / (-linear + np.copysign(root, first - last)), 0.0, 1.0)
+    # A displacement that jumps, as at a stop within round-off, has its extreme at a sample: the quotient is infinite.
+    with np.errstate(divide="ignore"):
+        x = np.clip(2 * first / (-linear + np.copysign(root, first - last)), 0.0, 1.0)
     peaks = q[row, turn] + step * x * (first + x * (linear / 2 + x * square / 3))
     np.minimum.at(low, row, peaks)
     np.maximum.at(high, row, peaks)

@@ -1,6 +1,7 @@
 """The curve of accuracy against computing time of a run by time integration agrees with the exact
 solution."""
 
+from dataclasses import replace
 from itertools import pairwise
 
 import pytest
@@ -66,3 +67,17 @@ def test_refuses_curve_if_steps_do_not_limit_accuracy(scene):
     assert compute_accuracy_curve(result) is None
     with pytest.raises(pf.PatchfemError, match=r"plot\.accuracy: nothing to draw"):
         result.plot.accuracy()
+
+
+def test_exact_error_at_tolerance_is_the_tolerance_on_the_curve(marched_result):
+    """A measure whose error is the tolerance times its value plus its floor has the tolerance as its error on the curve."""
+    tolerance = marched_result.plan.model.accuracy.tolerance
+    measures = {}
+    for name, measure in marched_result.measures.items():
+        if measure.value is not None and measure.error is not None:
+            floor = 3 * tolerance * abs(measure.value)
+            error = tolerance * abs(measure.value) + floor
+            measure = replace(measure, floor=floor, error=error)
+        measures[name] = measure
+    curve = compute_accuracy_curve(replace(marched_result, measures=measures))
+    assert curve.present.error == pytest.approx(tolerance, rel=1e-12)

@@ -91,3 +91,14 @@ def test_curve_that_ends_early_has_a_note(max_points, monkeypatch):
     assert note.endswith(
         ": it has too many points; the largest motion is that of this part, so change drive.from or drive.to"
     )
+
+
+def test_always_undamped_resonance_is_missing_in_curve():
+    """The point at the frequency of an undamped mode has no amplitude and is marked as unbounded; the others are finite."""
+    curve = pf.run(
+        RIG.replace("0.003", "0"), **{"drive.from": "142 Hz", "drive.to": "144 Hz"}
+    ).extra["curve"]
+    at_resonance = curve["frequency"] == 143.0
+    assert np.isnan(curve["amplitude"][at_resonance]).all() and at_resonance.any()
+    assert (curve["regime"][at_resonance] == "unbounded").all()
+    assert np.isfinite(curve["amplitude"][~at_resonance]).all()

@@ -118,3 +118,32 @@ def test_exact_flutter_amplitude_of_weakening_law(ratio, grows):
 
 
 SECOND = '[[structure.mode]]\nname = "second"\nfrequency = "{} Hz"\ndamping = 0.02\nslide = 0.3\n[structure.start]\n'
+
+
+@pytest.mark.parametrize(
+    "frequency, law, reason",
+    [
+        (400, "coulomb", None),
+        (0, "coulomb", "a mode of 0 Hz"),
+        (None, "nonlocal", "limit cycles can be computed only for"),
+    ],
+)
+def test_exact_flutter_amplitude_of_two_modes_or_its_reason(frequency, law, reason):
+    """A second mode hardly changes the flutter amplitude, but the note predicts no rest; a rigid mode, or a law without
+    stiffness, gives a reason."""
+    more = 'bond_length = "20 um"\nreading = "report"' if law == "nonlocal" else ""
+    text = format_scene(
+        start=0.9 * FLUTTER_AMPLITUDE, law=law, more=more, cycles=60 if law == "coulomb" else 3
+    )
+    if frequency is not None:
+        text = text.replace("[structure.start]\n", SECOND.format(frequency)).replace(
+            ' mm"]', ' mm", "0 mm"]'
+        )
+    result = pf.run(text)
+    amplitude = result.measures["flutter_amplitude"]
+    if reason is None:
+        assert amplitude.value == pytest.approx(1e-3 * FLUTTER_AMPLITUDE, rel=1e-4)
+        assert 0 < amplitude.error < 1e-6 * amplitude.value
+        assert "decays to rest" not in result.notes[-1]
+    else:
+        assert amplitude.value is None and reason in amplitude.reason

@@ -286,3 +286,23 @@ def test_always_files_contain_fields_of_every_interface(tmp_path, monkeypatch, c
     assert pf.load("out/scene.resolved.toml").structure.interface[1].contact.load == 60
     assert run_cli("export", "chain.toml", "-o", "elements.mat").code == 0
     assert loadmat("elements.mat")["M"].shape == (2, 2)
+
+
+def test_always_interfaces_that_lose_contact_or_have_few_elements_say_so():
+    """A displacement beyond a piece ends the run, patches without load are no contact, a coarse mesh gives no errors of
+    the motion and a warning that names the key to leave out."""
+    far = pf.run(CHAIN, **{"drive.acceleration": "3000 g", "drive.cycles": 5.0})
+    assert str(far.outcome) == "leaves_contact"
+    unloaded = pf.run(CHAIN, **{f"structure.interface.{k}.contact.load": "0 N" for k in (0, 1)})
+    assert str(unloaded.outcome) == "no_contact" and set(unloaded.measures) == {"normal_load"}
+    coarse = pf.run(
+        CHAIN, **{"structure.interface.0.contact.element_size": "5 mm", "drive.cycles": 5.0}
+    )
+    assert (
+        coarse.measures["loop_area_2"].error is None
+        and coarse.measures["pressure_peak_2"].error > 0
+    )
+    (warning,) = find_sentences(
+        coarse.warnings, "interface 1-0: the interface has too few elements"
+    )
+    assert "leave out structure.interface.contact.element_size" in warning

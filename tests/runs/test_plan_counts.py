@@ -3,10 +3,15 @@
 import json
 from time import perf_counter
 
+import numpy as np
 import pytest
 from command_line import run_cli
+from scene_runs import load_scene, run_scene
+from scene_texts import COATED, COULOMB, KILOGRAM, NONLOCAL, POINT, SHEAR, STRUCTURE
 
-from patchfem import load, plan
+from patchfem import build, load, plan
+from patchfem.runs import choose_numerics
+from patchfem.runs.rig import bond_lists
 from patchfem.runs.run import run
 
 BARELY_STUCK = """[normal]
@@ -82,3 +87,50 @@ def test_exact_probe_measures_what_the_plan_does_not_predict(tmp_path, monkeypat
     assert probed["probe"]["normal_stiffness"] == pytest.approx(found, rel=1e-9)
     text = " ".join(probed["probe"]["sentences"])
     assert "slide.cycles" in text and "contact.element_size" in text and "drive.cycles" not in text
+
+
+FORCED = (
+    POINT.replace("26 lbf", "100 N")
+    + COULOMB.replace("0.3", "0.9")
+    + KILOGRAM
+    + '[drive]\nkind = "force"\nfrequency = "50 Hz"\nforce = "100 N"\ncycles = 200\n'
+)
+
+
+@pytest.mark.parametrize("kinetic, sticks", [(0.2, False), (0.85, True)])
+def test_exact_kinetic_coefficient_decides_about_sticking(kinetic, sticks):
+    """Whether a sliding block sticks again depends on the kinetic coefficient, in the run and in the verdict of the plan."""
+    changes = f"friction.kinetic={kinetic}; structure.mode.axial.frequency=50 Hz; structure.mode.axial.damping=0.02"
+    scene = load_scene(FORCED, changes)
+    run_plan = plan(scene)
+    (sentence,) = [line for line in run_plan.verdict if line.startswith("D = 0.9 is below 1")]
+    assert ("alternates between stick and slip" in sentence) == sticks
+    assert ("does not limit the amplitude" in sentence) != sticks
+    assert (run_scene(FORCED, changes).measures["stick_fraction"].value > 0) == sticks
+    assert run_plan.groups["knee_force"] == pytest.approx(4 / np.pi * kinetic * 100)
+
+
+def test_exact_cost_of_a_bond_list_counts_steps_patches_and_strips():
+    """The computing time of a sum over bonds grows in proportion to the cycles, and by the lists of an elastic patch; a
+    run with fewer steps than strips has a shorter list."""
+
+    def estimate(changes: str, table: str = ""):
+        model = build(
+            load_scene(COATED + table + NONLOCAL + STRUCTURE, "friction.order=2; " + changes)
+        )
+        numerics = choose_numerics(model)
+        cost = bond_lists.estimate_bond_list_cost(model, numerics)
+        return cost, numerics, bond_lists.choose_bond_summation(model, numerics)
+
+    cost, numerics, choice = estimate("drive.cycles=30")
+    assert cost.seconds == pytest.approx(choice.seconds * 30 * numerics.steps)
+    assert estimate("drive.cycles=90")[0].seconds == pytest.approx(3 * cost.seconds)
+    sheared = estimate("drive.cycles=30", SHEAR)[0]
+    assert sheared.seconds == pytest.approx(bond_lists.SHEAR_COST_FACTOR * cost.seconds)
+    short, numerics, choice = estimate(
+        "drive.cycles=1; accuracy.steps_per_cycle=20; accuracy.tail=0; accuracy.quadrature=direct"
+    )
+    assert short.strips < choice.strips
+    assert short.seconds == pytest.approx(
+        choice.seconds * numerics.steps * short.strips / choice.strips
+    )

@@ -75,3 +75,23 @@ def test_refuses_worn_depth_of_other_pieces(earlier_run_folder, sets, message):
         *(word for assignment in sets for word in ("--set", assignment)),
     )
     assert answer.code == 2 and message in answer.err and "Traceback" not in answer.err
+
+
+def test_refuses_wear_of_other_profile_or_worn_through_coating(earlier_run_folder):
+    """The unworn surfaces are compared, not their file names, and a coating that was worn through cannot wear further."""
+    rows = (f"{x},{(x / 6400 - 1) ** 2}" for x in range(0, 12801, 100))
+    (earlier_run_folder / "bulge.csv").write_text("\n".join(("x_um,z_um", *rows)))
+    sets = ["wear.start=one/result.nc", "contact.profile.file=bulge.csv"]
+    with pytest.raises(
+        pf.PatchfemError, match="unworn surfaces of that run differ from those of this scene"
+    ):
+        pf.run(loads(SCENE, earlier_run_folder / "a.toml", sets))
+    coat = (
+        'substrate = "Ti-8Al-1Mo-1V"\n[contact.coating]\nmaterial = "WC-Co"\nthickness = "0.5 um"\n'
+    )
+    coated = SCENE.replace('substrate = "Ti-8Al-1Mo-1V"\n', coat)
+    pf.run(loads(coated, earlier_run_folder / "a.toml", [HALF_CYCLES])).save(
+        earlier_run_folder / "gone"
+    )
+    with pytest.raises(pf.PatchfemError, match="the coating of the upper piece was worn through;"):
+        pf.run(loads(coated, earlier_run_folder / "a.toml", ["wear.start=gone/result.nc"]))

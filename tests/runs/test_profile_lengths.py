@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from scene_texts import COATING, PIECE
+from scene_texts import COATED, COATING, PIECE
 
 import patchfem as pf
 from patchfem import build
@@ -80,3 +80,32 @@ def test_exact_profile_on_points_agrees_with_independent_program(tmp_path):
         value, error, _ = measures[name]
         assert abs(value - reference) <= error + 5e-6 * reference, name
         assert error <= 1e-3 * reference, name
+
+
+def test_refuses_profile_without_heights(tmp_path):
+    """A profile without heights is refused with its file name and what a trace needs."""
+    x = np.linspace(0, 12.7e-3, 50)
+    with pytest.raises(
+        pf.PatchfemError, match=r"trace\.csv: 0 heights; a trace needs at least two"
+    ):
+        run_profile(tmp_path, x, np.full(50, np.nan), COATED)
+
+
+def test_exact_surface_trace_agrees_with_inverted_gap(tmp_path):
+    """Peaks of a trace are material: a trace z gives the result of the gap -z to the last bit."""
+    x = np.linspace(-6.35e-3, 6.35e-3, 2001)
+    z = 1e-6 * np.cos(500 * np.pi * x) - x**2 / 6
+    surface, gap, other_gap = (
+        run_profile(
+            tmp_path,
+            x,
+            sign * z,
+            COATED,
+            f"contact.profile.heights={kind}",
+            "contact.profile.on=lower",
+        )
+        .measures["approach"]
+        .value
+        for sign, kind in ((1, "surface"), (-1, "gap"), (1, "gap"))
+    )
+    assert surface == gap and other_gap > 1.1 * gap

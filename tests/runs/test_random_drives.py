@@ -96,3 +96,20 @@ def test_exact_random_vibration_energies_balance():
     assert stuck.outcome == "stuck" and stuck.measures["response_damping"].reason.startswith(
         "the frequency response (H1) has no peak"
     )
+
+
+@pytest.mark.parametrize(
+    "rows, message",
+    [
+        ("[g^2/Hz]\n10,0.01\n5,0.01\n", r"csv:3: frequencies must be above"),
+        ("[g]\n10,0.01\n50,0.01\n", "unknown unit"),
+        ("[g^2/Hz]\n50,0.01\n100,0.01\n", "reach beyond the spectrum"),
+    ],
+)
+def test_refuses_faulty_table_of_a_spectrum(tmp_path, rows, message):
+    """The table of a spectrum has increasing frequencies, a unit of a spectrum, and the whole band."""
+    path = tmp_path / "spectrum.csv"
+    path.write_text("frequency [Hz],level " + rows)
+    drive = {key: value for key, value in RIG["drive"].items() if key != "spectrum"}
+    with pytest.raises(pf.PatchfemError, match=message):
+        pf.run(RIG | {"drive": drive | {"file": str(path)}})

@@ -56,3 +56,27 @@ def test_refuses_large_run_before_allocation_with_key(text, sets, key, monkeypat
     assert reason.startswith("about ") and f"{key}" in reason and "1 GB are free" in reason
     # The plan of a bench generates its samples to count them.
     assert peak < (7e8 if run_plan.kind == "bench" else 3e7)
+
+
+def test_exact_free_memory_of_control_group(tmp_path):
+    """The free memory of a control group is its limit minus the used memory plus the inactive cached files, for versions
+    1 and 2."""
+    groups, root = tmp_path / "cgroup", tmp_path / "fs"
+    for place, limit, used, inactive in (("a", 9000, 5000, 600), ("a/b", "max", 4000, 0)):
+        (root / place).mkdir(parents=True)
+        (root / place / "memory.max").write_text(f"{limit}\n")
+        (root / place / "memory.current").write_text(f"{used}\n")
+        (root / place / "memory.stat").write_text(f"anon 1\ninactive_file {inactive}\n")
+    groups.write_text("0::/a/b\n")
+    assert memory.free_in_control_group(50.0, groups, root) == 9000 - 5000 + 600 + 50
+    groups.write_text("5:cpu:/a\n4:memory:/c\n0::/\n")
+    place = root / "memory" / "c"
+    place.mkdir(parents=True)
+    for name, text in (
+        ("limit_in_bytes", "700"),
+        ("usage_in_bytes", "300"),
+        ("stat", "total_inactive_file 20"),
+    ):
+        (place / f"memory.{name}").write_text(text + "\n")
+    assert memory.free_in_control_group(50.0, groups, root) == 700 - 300 + 20 + 50
+    assert memory.free_in_control_group(50.0, tmp_path / "none", root) == float("inf")

@@ -2,8 +2,11 @@
 
 import numpy as np
 import pytest
+from scene_runs import find_sentences
+from scene_texts import COULOMB, SLIDE
 
 import patchfem as pf
+from patchfem.scene import loads
 
 LENGTH = 1.0  # mm
 WAVELENGTHS = (5, 10, 20, 50, 100, 200)  # um
@@ -21,8 +24,8 @@ heights = "surface"
 
 
 @pytest.fixture(scope="module")
-def result(tmp_path_factory):
-    """Return the run of a patch under a sum of sines of 5 to 200 um and noise."""
+def folder(tmp_path_factory):
+    """Return a folder with a trace, a sum of sines of 5 to 200 um and noise."""
     folder = tmp_path_factory.mktemp("rough")
     random = np.random.default_rng(1)
     x = np.arange(0, 1000 * LENGTH + 0.25, 0.5)
@@ -32,8 +35,13 @@ def result(tmp_path_factory):
     np.savetxt(
         folder / "trace.csv", np.c_[x, z], delimiter=",", header="x [um],z [um]", comments=""
     )
-    (folder / "scene.toml").write_text(SCENE)
-    return pf.run(pf.load(folder / "scene.toml"))
+    return folder
+
+
+@pytest.fixture(scope="module")
+def result(folder):
+    """Return the run of a patch under the trace."""
+    return pf.run(loads(SCENE, folder / "scene.toml"))
 
 
 def test_exact_peak_pressure_of_rough_trace_is_that_of_its_pressure_field(result):
@@ -58,3 +66,17 @@ def test_exact_loaded_fraction_is_mean_over_peak_pressure(result):
     data = result.to_xarray()
     assert float((data.weight * data.normal_stress[-1]).sum()) == pytest.approx(7, rel=1e-10)
     assert float(np.ptp(data.x.values)) == pytest.approx(1e-3, rel=1e-3)
+
+
+def test_exact_note_says_what_is_given_on_the_points(result, folder):
+    """Of a patch, pressure and gap are given on the points; of a motion, fields are those of the mesh."""
+    motion = pf.run(loads(SCENE + COULOMB + SLIDE, folder / "scene.toml"))
+    for notes, clause in (
+        (
+            result.notes,
+            "pressure and gap of the interface are given on these points, but the stress",
+        ),
+        (motion.notes, "fields and motion are computed on the mesh of"),
+    ):
+        (note,) = find_sentences(notes, "each static measure is computed on the mesh and on points")
+        assert clause in note

@@ -2,7 +2,10 @@
 of its files."""
 
 import json
+import resource
 import socket
+import subprocess
+import sys
 from itertools import pairwise
 from pathlib import Path
 from types import SimpleNamespace
@@ -12,7 +15,18 @@ import pytest
 import xarray as xr
 from command_line import run_cli
 from scene_runs import assert_agree, find_sentences, run_scene
-from scene_texts import BENCH, COULOMB, NONLOCAL, POINT, SHEAR, SLIDE, SMALL_PATCH, STRUCTURE
+from scene_texts import (
+    BENCH,
+    COULOMB,
+    MODE,
+    NONLOCAL,
+    POINT,
+    SHEAR,
+    SLIDE,
+    SMALL_PATCH,
+    STRUCTURE,
+    SWEEP,
+)
 from vtkmodules.util.numpy_support import vtk_to_numpy
 from vtkmodules.vtkCommonDataModel import vtkCompositeDataSet
 from vtkmodules.vtkIOHDF import vtkHDFReader
@@ -237,3 +251,35 @@ def test_always_shipped_scenes_load_and_plan(path):
 
 
 # Exit codes.
+
+
+def test_refuses_run_beyond_memory_limit_in_one_line(tmp_path):
+    """A run beyond the memory limit of its process ends with exit code 4 and a message of one line."""
+    (tmp_path / "a.toml").write_text(POINT + COULOMB + STRUCTURE)
+    limit = 150 << 20
+    process = subprocess.run(
+        [sys.executable, "-m", "patchfem", "run", tmp_path / "a.toml", "-o", tmp_path / "out"],
+        timeout=120,
+        capture_output=True,
+        text=True,
+        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_AS, (limit, limit)),
+    )
+    assert process.returncode == 4 and process.stderr.count("\n") == 1, process.stderr
+    assert "GB are free; free some memory" in process.stderr or "out of memory" in process.stderr
+
+
+# Progress.
+
+
+def test_always_long_run_reports_progress():
+    """A long sweep reports its progress on the way, in increasing fractions up to 1."""
+    fractions = []
+    changes = "accuracy.method=march; accuracy.steps_per_cycle=400"
+    run_scene(
+        POINT + NONLOCAL + MODE + SWEEP.replace('"120 Hz"', '"160 Hz"'),
+        changes,
+        progress=fractions.append,
+        estimate=False,
+    )
+    assert sum(0.2 < fraction < 0.9 for fraction in fractions) >= 1
+    assert fractions == sorted(fractions) and fractions[-1] <= 1.0

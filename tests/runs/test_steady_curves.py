@@ -3,6 +3,7 @@ point."""
 
 import numpy as np
 import pytest
+from scene_runs import find_sentences
 from scene_texts import COULOMB, MODE, PLASTIC, POINT, SECOND, SWEEP
 
 import patchfem as pf
@@ -125,3 +126,11 @@ def test_always_unstable_steady_state_is_not_converged():
     assert levels.outcome == "stuck" and any(
         "1 of 2 drive levels" in warning for warning in levels.warnings
     )
+
+
+def test_exact_number_of_steady_motions_is_stated():
+    """With an interlock of 80 um three steady motions exist at 180 Hz; a warning says how many are stable."""
+    steady = pf.run(INTERLOCK + SINE.format(180, 10), **STEADY)
+    assert steady.outcome == "steady" and np.abs(steady.extra["multipliers"]).max() < 1
+    (sentence,) = find_sentences([*steady.warnings, *steady.notes], "3 steady motions exist")
+    assert "1 of them stable" in sentence

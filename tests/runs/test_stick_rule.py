@@ -4,6 +4,8 @@ samples."""
 from math import pi
 
 import pytest
+from scene_runs import run_scene
+from scene_texts import COULOMB, POINT, STRUCTURE
 
 from patchfem.runs.run import run
 from patchfem.scene import loads
@@ -79,3 +81,14 @@ def test_order_of_stick_fraction_from_samples(law, omega, second_mode):
             assert phase is None and start is None
             continue
         assert abs((phase - start + pi / 2) % pi - pi / 2) < 4 * pi / steps
+
+
+@pytest.mark.parametrize(
+    "level, reason", [("40 g", "never sticks"), ("0.1 g", "sticks throughout")]
+)
+def test_exact_slip_phase_needs_stick_and_slip(level, reason):
+    """A motion that never sticks, or never slips, has no phase of the first slip."""
+    phase = run_scene(POINT + COULOMB + STRUCTURE, f"drive.acceleration={level}").measures[
+        "slip_start_phase"
+    ]
+    assert phase.value is None and reason in phase.reason, phase

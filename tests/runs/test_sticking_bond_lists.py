@@ -4,6 +4,8 @@ import numpy as np
 import pytest
 
 from patchfem import load, plan
+from patchfem.core import Missing
+from patchfem.runs.rig import bond_lists
 from patchfem.runs.run import run
 
 GROWTH_SENTENCE = "each reversal makes the list of bonds longer"
@@ -141,3 +143,12 @@ def test_exact_report_law_sticks_up_to_half_friction_limit(text, is_stuck):
     """Only with the law of the report, the plan predicts that a block sticks on a growing list of
     bonds, up to half of the friction limit."""
     assert any(GROWTH_SENTENCE in sentence for sentence in plan(text).verdict) is is_stuck
+
+
+def test_refuses_stuck_block_with_too_long_bond_list(monkeypatch):
+    """A run whose list of bonds would take too long is stopped early, with an estimate of its time and the key to lower."""
+    scene = load(RIG.format(reading="report", push=5.739).replace("cycles = 6", "cycles = 200"))
+    monkeypatch.setattr(bond_lists, "MAX_LIST_SECONDS", 1.0)
+    pattern = r"computing time of about (\d+) s, more than the limit of 1 s; lower drive\.cycles"
+    with pytest.raises(Missing, match=pattern):
+        run(scene, estimate=False)

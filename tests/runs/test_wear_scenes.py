@@ -1,7 +1,9 @@
 """Scenes with [wear]: volumes in closed form, the worn patch, shakedown, refusals and files."""
 
+import io
 import json
 
+import numpy as np
 import pytest
 import wear_scenes
 from command_line import run_cli
@@ -213,3 +215,35 @@ def test_exact_wear_at_step_agrees_with_independent_program():
         measure = measures[name]
         assert abs(measure.value - reference) <= measure.error + uncertainty, name
         assert measure.error < 1e-3 * measure.value, name
+
+
+@pytest.mark.parametrize("state", ["wear.npz", ""])
+def test_exact_new_run_reports_discarded_state_once(tmp_path, state):
+    """A new run reports once that it discards the saved state of an interrupted run."""
+    scene, partial = tmp_path / "plain.toml", tmp_path / "out.partial"
+    scene.write_text(POINT + COULOMB + SINE)
+    partial.mkdir()
+    if state:
+        (partial / state).write_bytes(b"kept")
+    answer = run_cli("run", scene, "-o", tmp_path / "out", "--no-page")
+    assert answer.code == 0, answer.err
+    message = "out.partial held the state of an interrupted run, which is now discarded"
+    assert answer.err.count(message) == bool(state)
+    assert not partial.exists() and not (tmp_path / "out" / "wear.npz").exists()
+
+
+def test_refuses_to_resume_wear_without_valid_state(tmp_path):
+    """Resuming is refused without a saved state, with a damaged one, and for a scene without wear."""
+    scene, partial = tmp_path / "worn.toml", tmp_path / "out.partial"
+    scene.write_text(TILTED + COULOMB + SINE + WEAR)
+    answer = run_cli("run", scene, "-o", tmp_path / "out", "--resume")
+    assert answer.code == 2 and "no interrupted run" in answer.err
+    partial.mkdir(exist_ok=True)
+    archive = io.BytesIO()
+    np.savez(archive, key=np.zeros(1000))
+    for damaged in (archive.getvalue()[:-200], b"", b"PK nothing"):
+        (partial / "wear.npz").write_bytes(damaged)
+        answer = run_cli("run", scene, "-o", tmp_path / "out", "--resume")
+        assert answer.code == 2 and "cannot be read" in answer.err, answer.err
+    scene.write_text(TILTED + COULOMB + SINE)
+    assert run_cli("run", scene, "-o", tmp_path / "out", "--resume").code == 2

@@ -60,6 +60,16 @@ def test_figure_8_study_gives_its_stated_figures(tmp_path, capsys):
     assert "load cell" in (tmp_path / "x.svg").read_text()
 
 
+@pytest.mark.parametrize("model", ["rigid block", "grooves"])
+def test_sweeps_are_distorted_only_above_the_stated_levels(model):
+    """The acceleration is distorted at 4.5 g at every frequency above 136 Hz, and at 4.1 g at none."""
+    sweeps = load_study("report/sweeps.py")
+    for level, is_distorted in ((4.1, False), (4.5, True)):
+        sweep = sweeps.sweep_level(model, level)
+        distortion = sweep.distortion[sweep.frequency > 136]
+        assert ((distortion > sweeps.DISTORTION_LIMIT) == is_distorted).all()
+
+
 @pytest.mark.slow
 def test_sweeps_give_stated_critical_levels(tmp_path, capsys):
     """The critical levels and accelerations of the three models are those stated in the study."""

@@ -1,7 +1,15 @@
 """Runs of scenes with changed keys, and comparisons of their measures with references and with other runs."""
 
+import re
+
 from patchfem.runs.run import run
 from patchfem.scene import loads
+
+REMEDY = (
+    r"\b(add|belongs|built|choose|give|keep|leave|lower|name|need|needed|needs|put|raise|set|use)\b"
+)
+# Reasons that say themselves what to do.
+OWN_REMEDY = "is not above|nothing moves|there is no such file"
 
 
 def load_scene(text: str, changes: str = "", path="a.toml"):
@@ -40,3 +48,10 @@ def assert_agree(first, second, names=None, rel: float | None = None) -> None:
 def find_sentences(sentences, part: str) -> list[str]:
     """Return the sentences that contain a text."""
     return [sentence for sentence in sentences if part in sentence]
+
+
+def assert_names_key_and_remedy(message: str) -> None:
+    """Assert that a refusal names a key or a table of the scene, and says what to do."""
+    text = re.sub(r"^(--set|a\.toml(:\d+)?): ", "", message)
+    assert re.search(r"[a-z]+(\.[\w[\]-]+)+|\[[a-z.]+\]|^[a-z]+:", text), message
+    assert re.search(f"{REMEDY}|{OWN_REMEDY}", text.split(": ", 1)[-1], re.S), message
