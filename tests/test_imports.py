@@ -135,6 +135,8 @@ def rig_without_files() -> str:
 HEAVY = "numpy scipy skfem numba matplotlib xarray h5py pyvista meshio"
 OUT = ("-o", "OUT", "-q", "--no-page")
 NO_PATCH = "contact mesh skfem export.page export.charts.panels"
+SLOW_SCIPY = "scipy.signal scipy.stats scipy.interpolate matplotlib"
+TRACE = "x [um],z [um]\n" + "".join(f"{k},{k % 7}\n" for k in range(600))
 COMMANDS = {  # command -> scene, arguments, modules of patchfem and packages that are not loaded
     **{
         f"run of a {name}": (
@@ -174,10 +176,17 @@ COMMANDS = {  # command -> scene, arguments, modules of patchfem and packages th
         "runs.bench.bench runs.wear",
         "numpy.random cyclopts.completion numba email socket",
     ),
+    "profile": (
+        TRACE,
+        ("profile", "SCENE", "--cutoff", "80 um"),
+        "",
+        SLOW_SCIPY + " scipy.optimize",
+    ),
+    "compare": (TRACE, ("compare", "SCENE", "SCENE"), "", SLOW_SCIPY),
 }
 
 
-@pytest.mark.share(0, 3, 6, 10, 11)
+@pytest.mark.share(0, 3, 6, 10, 11, 12, 13)
 @pytest.mark.parametrize("name", COMMANDS)
 def test_exact_command_loads_only_needed_packages(write_scene, tmp_path, name):
     """A command does not load the modules and packages listed as unnecessary for it."""

@@ -1,8 +1,9 @@
-"""Each feature removed in patchfem 2.0 is refused with one sentence that names its replacement."""
+"""Each feature that a release removed is refused with one sentence that names its replacement."""
 
 import re
 from functools import partial
 from importlib.util import find_spec
+from pathlib import Path
 
 import pytest
 import surfaces
@@ -84,6 +85,10 @@ TRIED = {  # removed feature -> (function that uses it, replacement that the mes
         partial(load, RIG, {"structure.mode.axial.lateral": 0.2}),
         "the patch slides along x alone",
     ),
+    "accuracy.convergence": (
+        partial(load, RIG, {"accuracy.convergence": 1e-6}),
+        "use accuracy.method = 'march' without it",
+    ),
     "friction.breakaway": (
         partial(load, RIG, {"friction.breakaway": 0.2}),
         "law 'iwan' or 'elastic-plastic' does not creep",
@@ -145,13 +150,20 @@ def test_refuses_removed_feature(tmp_path, name):
     with pytest.raises(pf.PatchfemError) as refused:
         attempt(tmp_path)
     sentence = str(refused.value)
-    assert re.search(r"removed in patchfem (1\.0|2\.0)\b", sentence) and instead in sentence
+    assert re.search(r"removed in patchfem \d\.\d\b", sentence) and instead in sentence
     assert len(sentence.strip().splitlines()) == 1
 
 
 def test_always_all_removed_features_are_tested():
     """Every removed option and key is among the tested features."""
     assert set(removed.REMOVED_NAMES) - {"files of Nastran"} <= set(TRIED)
+
+
+def test_always_removing_versions_are_releases():
+    """Each version that removed a key, files or an option is a release that the list of changes contains."""
+    changes = (Path(pf.__file__).parent / "CHANGES.md").read_text("utf-8")
+    releases = set(re.findall(r"^## (\d+\.\d+)\.0 \(", changes, re.MULTILINE))
+    assert {version for version, _ in removed.REMOVED_NAMES.values()} <= releases
 
 
 @pytest.mark.skipif(

@@ -11,12 +11,13 @@ import os
 import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from enum import StrEnum
 from math import inf
 from time import perf_counter, process_time
 from typing import NamedTuple
 
 from .. import compiled
-from ..core import NotConverged, PatchfemError, compute_allowed_error
+from ..core import Measure, NotConverged, PatchfemError, compute_allowed_error
 from ..formatting import format_number
 from ..model.model import Model
 from ..model.source import locate_errors
@@ -41,6 +42,14 @@ _REMEDY_TEXT = re.compile(r"; the tolerance is [^;]*; (.*)", re.DOTALL)
 MIN_ELAPSED_TO_CPU_RATIO = 1.5
 EQUAL_COST_RATIO = 1.1  # Largest ratio of the CPU times of equally expensive runs.
 TIMING_SCATTER = 2e-3  # Scatter of the CPU time of repeated short runs [s].
+
+
+class Judgement(StrEnum):
+    """Judgement of the errors of a run: within its tolerance, one beyond it, or none known beyond it."""
+
+    MEETS = "meets its tolerance"
+    MISSES = "misses its tolerance"
+    UNKNOWN = "has unknown errors"
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -91,19 +100,17 @@ class Cost:
     steps: int | None = None
     nodes: int | None = None
 
-    def meets_tolerance(self) -> bool:
-        """Return whether every error estimate is within the tolerance of the run."""
-        return all(self.is_allowed(name, self.errors[name], self.tolerance) for name in self.errors)
-
     def is_allowed(self, name: str, error: float, tolerance: float) -> bool:
         """Return whether an error of a measure is at most tolerance x |value| + floor.
 
         Parameters
         ----------
         name : str
+            Name of the measure.
         error : float
             In the unit of the measure.
         tolerance : float
+            Largest error, relative to the value.
         """
         return error <= compute_allowed_error(tolerance, self.values[name], self.floors[name])
 
@@ -116,6 +123,7 @@ def compute_setting_costs(
     Parameters
     ----------
     model : Model
+        Model of the scene with its own settings.
     setting_name : str
         One of NUMERICAL_SETTINGS, or TOLERANCE for several tolerances, which include that of the scene.
     say : callable, optional
@@ -195,7 +203,7 @@ class _FinishedRun(NamedTuple):
     The number of steps is None if the method takes no time steps, and that of nodes without a patch.
     """
 
-    measures: dict
+    measures: dict[str, Measure]
     warnings: Sequence[str]
     steps: int | None = None
     nodes: int | None = None
@@ -240,6 +248,7 @@ def _run_setting(setting: Setting, label: str, say: Callable | None) -> _Finishe
     Parameters
     ----------
     setting : Setting
+        Setting with its model.
     label : str
         Name of the run in a message.
     say : callable or None
@@ -268,29 +277,69 @@ def find_fastest_settings(runs: list[Cost], tolerance: float) -> dict[str, str |
 def find_fastest_run(runs: list[Cost], tolerance: float, names: Sequence[str] = ()) -> Cost | None:
     """Return the run with the shortest CPU time whose errors are within a tolerance; None if there is none.
 
-    A coarse run that is accurate by chance is excluded: those of all finer values must be within the tolerance as well.
-    The automatic setting is judged independently of the others. Among equally expensive runs, the one with the coarsest
-    setting is returned.
+    An error that is unknown is not within the tolerance. A coarse run that is accurate by chance is excluded: those of all
+    finer values must be within the tolerance as well. The automatic setting is judged independently of the others. Among
+    equally expensive runs, the one with the coarsest setting is returned.
 
     Parameters
     ----------
     runs : list of Cost
+        Runs from coarse to fine.
     tolerance : float
+        Largest error, relative to the value.
     names : sequence of str
-        Measures that count; all by default.
+        Measures that count; by default those with an error estimate in any run.
     """
+    counted = names or find_measures_with_error(runs)
     confirmed = []
     is_confirmed = True
     for run in reversed(runs):
-        counted = [name for name in run.errors if name in names or not names]
-        is_accurate = all(run.is_allowed(name, run.errors[name], tolerance) for name in counted)
+        is_accurate = judge_run(run, counted, tolerance) is Judgement.MEETS
         if run.value is not None:
             is_confirmed = is_confirmed and is_accurate
         if is_accurate and (is_confirmed or run.value is None):
             confirmed.append(run)
+
+    # The times of repeated runs scatter.
     shortest = min((run.seconds for run in confirmed), default=inf)
     limit = EQUAL_COST_RATIO * shortest + TIMING_SCATTER
     return next((run for run in reversed(confirmed) if run.seconds <= limit), None)
+
+
+def find_best_run(runs: list[Cost], tolerance: float) -> Cost:
+    """Return the fastest run within a tolerance, else that with the smallest errors, else the last one.
+
+    Only a run without unknown errors can have the smallest ones.
+    """
+    names = find_measures_with_error(runs)
+    fastest = find_fastest_run(runs, tolerance)
+    known = [run for run in runs if all(name in run.errors for name in names)]
+    if fastest is not None or not known:
+        return fastest or runs[-1]
+    return min(known, key=lambda run: find_worst_error(run, names, tolerance))
+
+
+def judge_run(run: Cost, names: Sequence[str], tolerance: float) -> Judgement:
+    """Judge whether the errors of some measures of a run are within a tolerance.
+
+    Parameters
+    ----------
+    run : Cost
+        Run whose errors are judged.
+    names : sequence of str
+        Measures that count.
+    tolerance : float
+        Largest error, relative to the value.
+
+    Returns
+    -------
+    Judgement
+        UNKNOWN if the run has no error estimate of one of the measures, and no other error is too large.
+    """
+    known = [name for name in names if name in run.errors]
+    if not all(run.is_allowed(name, run.errors[name], tolerance) for name in known):
+        return Judgement.MISSES
+    return Judgement.MEETS if len(known) == len(names) else Judgement.UNKNOWN
 
 
 def describe_fastest_setting(runs: list[Cost], tolerance: float) -> str:
@@ -298,19 +347,29 @@ def describe_fastest_setting(runs: list[Cost], tolerance: float) -> str:
 
     If no setting meets the tolerance, the description contains the worst measure of the best run.
     """
-    fastest = find_fastest_run(runs, tolerance)
-    if fastest is not None:
-        seconds = format_number(fastest.seconds, 2)
+    names = find_measures_with_error(runs)
+    best = find_best_run(runs, tolerance)
+    seconds = format_number(best.seconds, 2)
+    if find_fastest_run(runs, tolerance) is not None:
+        measures = "every measure"
+        if any(name not in names for name in best.values):
+            measures += " that has an error estimate"
         return (
-            f"{fastest.words}: {seconds} CPU s per run, with every measure within the tolerance "
+            f"{best.words}: {seconds} CPU s per run, with {measures} within the tolerance "
             f"{tolerance:g}"
         )
-    names = find_measures_with_error(runs)
-    best = min(runs, key=lambda run: find_worst_error(run, names, tolerance))
+
+    # A run with unknown errors may meet the tolerance.
+    is_unknown = any(judge_run(run, names, tolerance) is Judgement.UNKNOWN for run in runs)
+    text = (
+        f"no setting {'is known to meet' if is_unknown else 'meets'} the tolerance {tolerance:g}: "
+    )
     worst = find_worst_error(best, names, tolerance)
+    if not all(name in best.errors for name in names):
+        return f"{text}no run has an error estimate of every measure"
     return (
-        f"no setting meets the tolerance {tolerance:g}: the best run, with {best.words}, has an error of "
-        f"{format_number(worst.fraction, 2)} in {worst.name} and takes {format_number(best.seconds, 2)} CPU s"
+        f"{text}the best run, with {best.words}, has an error of {format_number(worst.fraction, 2)} in "
+        f"{worst.name} and takes {seconds} CPU s"
     )
 
 
@@ -325,15 +384,17 @@ class WorstError(NamedTuple):
     name: str
 
 
-def find_worst_error(run: Cost, names: Sequence, tolerance: float) -> WorstError:
+def find_worst_error(run: Cost, names: Sequence[str], tolerance: float) -> WorstError:
     """Find the measure with the largest error relative to a tolerance.
 
     Parameters
     ----------
     run : Cost
+        Run whose errors are compared.
     names : sequence of str
         Names of the measures to compare.
     tolerance : float
+        Largest error, relative to the value, beside which a floor counts.
 
     Returns
     -------
@@ -348,12 +409,7 @@ def find_worst_error(run: Cost, names: Sequence, tolerance: float) -> WorstError
     return worst
 
 
-def find_worst_run_error(run: Cost) -> WorstError:
-    """Find the measure of a run with the largest error relative to the tolerance of the run."""
-    return find_worst_error(run, list(run.values), run.tolerance)
-
-
-def find_measures_with_error(runs: list) -> list:
+def find_measures_with_error(runs: list[Cost]) -> list[str]:
     """Return the measures with an error estimate in any run; all measures if there is none."""
     names = list(runs[-1].values)
     return [name for name in names if any(name in run.errors for run in runs)] or names

@@ -3,11 +3,12 @@
 In: `core.ModalBasis`, a drive, a contact. Out: histories, events, energies. A module imports its own
 entry of this list and the entries before it:
 
-1. `integrated`       accelerations and phases of slip of a run
-2. `curve_points`     adaptive points of a curve, denser where its curvature is larger
-3. `event_list`       log of the events of a run
-4. `harmonic`         steady motions by harmonic balance, branches and stability
-5. `limit_cycles`     limit cycles of modes with negative damping and friction
+1. `exponentials`     exponentials of many small matrices
+2. `integrated`       accelerations and phases of slip of a run
+3. `curve_points`     adaptive points of a curve, denser where its curvature is larger
+4. `event_list`       log of the events of a run
+5. `harmonic`         steady motions by harmonic balance, branches and stability
+6. `limit_cycles`     limit cycles of modes with negative damping and friction
 
 Motion in time is computed by `hybrid` and `points`.
 """

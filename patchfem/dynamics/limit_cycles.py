@@ -16,10 +16,10 @@ from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
-from scipy.linalg import expm
 from scipy.optimize import brentq
 
 from ..core import ModalBasis, NotConverged
+from .exponentials import find_exponentials
 from .harmonic.backbone import FreeBalance, find_free_motions
 from .harmonic.equations import HarmonicBalance
 from .harmonic.forces import LawGroup
@@ -237,7 +237,7 @@ def _free_motion_matrices(modes: ModalBasis, t) -> np.ndarray:
     stiffness = -np.diag(modes.omega**2) / scale
     rates = np.block([[np.zeros((n, n)), scale * np.eye(n)], [stiffness, -modes.damping_matrix]])
     size = np.repeat([1.0, scale], n)
-    return expm(rates * times[:, None, None]) * (size[:, None] / size)
+    return find_exponentials(rates * times[:, None, None]) * (size[:, None] / size)
 
 
 def _reversal_speed_ratios(modes: ModalBasis, row, force: float, half_periods) -> np.ndarray:

@@ -6,13 +6,14 @@ from typing import NamedTuple
 from ..campaigns.cost import (
     TOLERANCE,
     Cost,
+    Judgement,
     WorstError,
     describe_fastest_setting,
-    find_fastest_run,
+    find_best_run,
     find_fastest_settings,
     find_measures_with_error,
     find_worst_error,
-    find_worst_run_error,
+    judge_run,
 )
 from ..formatting import format_number
 from ..model.model import Model
@@ -27,17 +28,25 @@ RUN_COLUMNS = {
     "wall_seconds": ("wall_seconds", "s"),
     "timings": ("timings", ""),
 }
+# Words for the judgement of the scene as it is.
+SCENE_JUDGEMENTS = {
+    Judgement.MEETS: "meets the tolerance",
+    Judgement.MISSES: "misses the tolerance",
+    Judgement.UNKNOWN: "does not have an error estimate of every measure",
+}
 
 
 class Row(NamedTuple):
     """A run of a curve, and its least accurate measure.
 
-    knob: TOLERANCE, or the setting that varies; worst: of the measures that are compared along the curve.
+    knob: TOLERANCE, or the setting that varies; worst: of the measures with an error estimate in any run of the curve;
+    judgement: of their errors.
     """
 
     knob: str
     run: Cost
     worst: WorstError
+    judgement: Judgement
 
 
 def make_answer(curves: dict[str, list[Cost]], model: Model) -> Answer:
@@ -53,20 +62,19 @@ def make_answer(curves: dict[str, list[Cost]], model: Model) -> Answer:
     knob, runs = next(iter(curves.items()))
     rows = []
     for one, curve in curves.items():
-        shared = None if one == TOLERANCE else find_measures_with_error(curve)
-        rows += [
-            Row(one, run, find_worst_error(run, shared or list(run.values), run.tolerance))
-            for run in curve
-        ]
+        names = find_measures_with_error(curve)
+        for run in curve:
+            worst = find_worst_error(run, names, run.tolerance)
+            rows.append(Row(one, run, worst, judge_run(run, names, run.tolerance)))
     main = _find_main_measure(runs)
 
-    # the scene as it is, or the fastest run that meets its tolerance
+    # the scene as it is, or the run that the sentence names
     if knob == TOLERANCE:
         chosen = next((run for run in runs if run.tolerance == tolerance), runs[-1])
     else:
-        chosen = find_fastest_run(runs, tolerance) or runs[-1]
+        chosen = find_best_run(runs, tolerance)
     row = next(row for row in rows if row.run is chosen)
-    sentences = _describe_scene(row, runs) if knob == TOLERANCE else []
+    sentences = _describe_scene(row, rows[: len(runs)]) if knob == TOLERANCE else []
     details = {one: describe_runs(one, curve, tolerance) for one, curve in curves.items()}
     texts = [part["sentence"] for part in details.values() if part["sentence"]]
     sentences += [f"{text[0].upper()}{text[1:]}." for text in texts]
@@ -76,7 +84,7 @@ def make_answer(curves: dict[str, list[Cost]], model: Model) -> Answer:
         verdict=tuple(sentences[:4]),
         quantities=_make_quantities(row, main, tolerance),
         data=_make_data(rows, main, tolerance),
-        remarks=Remarks(notes=tuple(f"{chosen.label}: {text}" for text in chosen.remedies)),
+        remarks=Remarks(notes=tuple(f"With {chosen.words}: {text}." for text in chosen.remedies)),
         details=details,
         origin=make_origin(model.source, "cost"),
     )
@@ -97,12 +105,13 @@ def describe_runs(knob: str, runs: list[Cost], tolerance: float) -> dict:
     tolerance : float
         That of the scene.
     """
+    names = find_measures_with_error(runs)
     entries = []
     for run in runs:
-        worst = find_worst_run_error(run)
+        worst = find_worst_error(run, list(run.values), run.tolerance)
         entry = {
             "worst": {"measure": worst.name, "error": worst.fraction},
-            "meets_tolerance": run.meets_tolerance(),
+            "meets_tolerance": judge_run(run, names, run.tolerance) is Judgement.MEETS,
             "remedies": list(run.remedies),
         }
         entries.append(asdict(run) | entry)
@@ -114,7 +123,7 @@ def describe_runs(knob: str, runs: list[Cost], tolerance: float) -> dict:
     }
 
 
-def _describe_scene(row: Row, runs: list[Cost]) -> list[str]:
+def _describe_scene(row: Row, rows: list[Row]) -> list[str]:
     """Return sentences on the scene as it is, the smallest tolerance that is met, and the advice of a run that misses."""
     run = row.run
     error = ""
@@ -123,21 +132,26 @@ def _describe_scene(row: Row, runs: list[Cost]) -> list[str]:
         error = f", with a largest error of {format_number(row.worst.fraction, 2)} in {name}"
     sentences = [
         f"At its tolerance {run.tolerance:g} the scene takes {format_number(run.seconds, 2)} CPU s and "
-        f"{'meets' if run.meets_tolerance() else 'misses'} the tolerance{error}."
+        f"{SCENE_JUDGEMENTS[row.judgement]}{error}."
     ]
-    met = [one for one in runs if one.meets_tolerance()]
+
+    met = [one.run for one in rows if one.judgement is Judgement.MEETS]
     if met:
         best = min(met, key=lambda one: one.tolerance)
         seconds = format_number(best.seconds, 2)
         sentences.append(f"The smallest tolerance that is met is {best.label}, in {seconds} CPU s.")
+    elif any(one.judgement is Judgement.UNKNOWN for one in rows):
+        sentences.append("No run is known to meet its tolerance.")
     else:
         sentences.append("No run meets its tolerance.")
-    advice = [
-        f"For the tolerance {one.tolerance:g}: {text}."
-        for one in runs
-        if one not in met
-        for text in one.remedies
-    ]
+
+    # the last advice belongs to the smallest tolerance that is missed
+    advice = []
+    for one in rows:
+        if one.judgement is Judgement.MISSES:
+            advice += [
+                f"For the tolerance {one.run.tolerance:g}: {text}." for text in one.run.remedies
+            ]
     return sentences + advice[-1:]
 
 
@@ -194,11 +208,7 @@ def _make_data(rows: list[Row], main: str, tolerance: float) -> dict[str, Variab
     has_several = rows[0].knob != rows[-1].knob
     data["result"] = encode(
         "run",
-        [
-            f"{row.knob.replace('_', ' ')}: " * has_several
-            + f"{'meets' if row.worst.fraction <= row.run.tolerance else 'misses'} its tolerance"
-            for row in rows
-        ],
+        [f"{row.knob.replace('_', ' ')}: " * has_several + row.judgement for row in rows],
     )
     seconds = data["seconds"].values
     ends = {

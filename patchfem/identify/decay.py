@@ -15,6 +15,7 @@ MIN_DECREASE = (
 # Smallest distance of two sinusoids in spectral lines (1/T for a record of length T).
 MIN_SPECTRAL_LINE_SPACING = 3
 MIN_AMPLITUDE_RATIO = 0.01  # smallest amplitude of a sinusoid, relative to the largest one
+DAMPING_ROUND_OFF = 1e-10  # error of a damping ratio of a record without noise
 # Initial decay rates of a further sinusoid, times the record length.
 START_DECAY_RATES = (0.3, 3.0, 30.0)
 
@@ -75,19 +76,36 @@ def fit_decay(time, value) -> Decay:
     # sinusoids that decay, and whose energy counts
     motions = np.einsum("nkc,nc->nk", problem.tabulate(fit.poles)[:, 0], fit.coefficients)
     energy = np.sum(motions**2, axis=1)
-    is_kept = (fit.damping > 0) & (energy > MIN_AMPLITUDE_RATIO**2 * energy.max())
+    is_kept = fit.damping > DAMPING_ROUND_OFF
+    is_kept &= energy > MIN_AMPLITUDE_RATIO**2 * energy.max()
+    errors = problem.estimate_damping_errors(fit)
     if not is_kept.any():
-        raise PatchfemError(
-            "the oscillation in the record grows instead of decaying; begin the record after the drive "
-            "has ended"
-        )
+        raise PatchfemError(_describe_growth(fit.damping, errors, energy))
     order = np.flatnonzero(is_kept)[np.argsort(fit.omega[is_kept])]
     return Decay(
         frequency=fit.omega[order] / (2 * np.pi),
         damping=fit.damping[order],
         amplitude=np.hypot(*fit.coefficients.T)[order],
-        damping_error=problem.estimate_damping_errors(fit)[order],
+        damping_error=errors[order],
         misfit=float(np.sqrt(fit.mean_square)) / problem.scale,
+    )
+
+
+def _describe_growth(damping, errors, energy) -> str:
+    """Describe why a record without a decaying sinusoid has no damping: it grows, or it does neither within its error.
+
+    damping, errors, energy: of each sinusoid (n,).
+    """
+    largest = int(np.argmax(energy))
+    error = max(float(errors[largest]), DAMPING_ROUND_OFF)
+    if damping[largest] < -error:
+        return (
+            "the oscillation in the record grows instead of decaying; begin the record after the drive "
+            "has ended"
+        )
+    return (
+        f"the damping ratio of the oscillation in the record is zero within its error of {error:.1g}: it neither decays nor "
+        "grows; give a longer record"
     )
 
 

@@ -8,7 +8,7 @@ the parameter lies on a bound, the interval follows from the profile of the sum 
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import NamedTuple
 
@@ -17,7 +17,13 @@ from scipy.optimize import least_squares
 
 from ..core import NotConverged, Outcome, frozen_array
 from .intervals import FitIntervals, compute_intervals, make_unknown_intervals
-from .space import SearchSpace, UnitCubeResidual, make_search_space, make_space_filling_points
+from .space import (
+    SearchCounts,
+    SearchSpace,
+    UnitCubeResidual,
+    make_search_space,
+    make_space_filling_points,
+)
 
 COST_TOL = 1e-10  # relative change of the sum of squares per step at convergence
 QUICK_COST_TOL = 1e-4  # COST_TOL of a residual that is expensive to evaluate
@@ -45,14 +51,6 @@ class IntervalKind(StrEnum):
     ROWS = "rows"
     SERIES = "series"
     NONE = ""
-
-
-class SearchCounts(NamedTuple):
-    """Number of residual evaluations of a search and of failures, and the reason of the first failure or ""."""
-
-    evaluations: int
-    failures: int
-    reason: str
 
 
 class Descent(NamedTuple):
@@ -110,6 +108,10 @@ class Fit:
     counts: SearchCounts
     outcome: Outcome
     descents: Descents
+
+    def count_earlier_search(self, earlier: "Fit") -> "Fit":
+        """Return this fit with evaluations and agreed descents of an earlier search, which gave its only start."""
+        return replace(self, counts=earlier.counts.add(self.counts), agreed=earlier.agreed)
 
 
 @dataclass(frozen=True, slots=True)
@@ -207,13 +209,15 @@ class Problem:
         best = min(ends, key=lambda end: end.cost)
         if not np.isfinite(best.cost):
             raise NotConverged(
-                f"fit: all {search.starts} searches failed; the first failed for this reason: {model.reason}"
+                f"fit: all {search.starts} searches failed; the first failed for this reason: {model.counts.reason}"
             )
         search.before_descent()
-        best = descend(UnitCubeResidual(self.residual, model.space), best.u, range(n))
+        central = UnitCubeResidual(self.residual, model.space)
+        best = descend(central, best.u, range(n))
         # all descents may be stored ones
         model.sum_of_squares(best.u)
-        return _assemble_fit(model, best, starts, ends, interval_kind)
+        fit = _assemble_fit(model, best, starts, ends, interval_kind)
+        return replace(fit, counts=fit.counts.add(central.counts))
 
     def _choose_starts(self, model: UnitCubeResidual, max_points: int) -> list[np.ndarray]:
         """Return the starting points (n,) in the unit cube: that of the problem, then the best of some trial points."""
@@ -231,7 +235,7 @@ class Problem:
         points = given + sorted(trials, key=lambda point: costs[tuple(point)])
         if not points:
             raise NotConverged(
-                f"the model failed at all {model.evaluations} starting points of the search: {model.reason}"
+                f"the model failed at all {model.counts.evaluations} starting points of the search: {model.counts.reason}"
             )
         return points[: max(1, max_points)]
 
@@ -271,7 +275,7 @@ def _assemble_fit(
         intervals=intervals,
         rms=float(np.sqrt(cost / model.rows)),
         agreed=int(np.sum(np.abs(costs - best.cost) <= max_difference)),
-        counts=SearchCounts(model.evaluations, model.failures, model.reason),
+        counts=model.counts,
         outcome=Outcome.DONE if is_converged else Outcome.NOT_CONVERGED,
         descents=descents,
     )

@@ -85,11 +85,27 @@ def make_search_space(low, high) -> SearchSpace:
     return SearchSpace(low, high, (low > 0) & (high > MIN_BOUND_RATIO_FOR_LOG * low))
 
 
+class SearchCounts(NamedTuple):
+    """Number of residual evaluations of a search and of failures, and the reason of the first failure or ""."""
+
+    evaluations: int
+    failures: int
+    reason: str
+
+    def add(self, later: "SearchCounts") -> "SearchCounts":
+        """Return the counts of this search and a later one together."""
+        return SearchCounts(
+            self.evaluations + later.evaluations,
+            self.failures + later.failures,
+            self.reason or later.reason,
+        )
+
+
 class UnitCubeResidual:
     """Residual as a function of a point u of the unit cube, with a count of evaluations.
 
-    An evaluation fails if it raises a PatchfemError or an arithmetic error, or if the residual is not finite.
-    `reason` describes the first failure. An error of type Missing is not caught.
+    An evaluation fails if it raises a PatchfemError or an arithmetic error, or if the residual is not finite. An error of
+    type Missing is not caught.
 
     Parameters
     ----------
@@ -104,9 +120,7 @@ class UnitCubeResidual:
         self.residual = residual
         self.space = space
         self.is_expensive = is_expensive
-        self.evaluations = 0
-        self.failures = 0
-        self.reason = ""
+        self.counts = SearchCounts(0, 0, "")
         self.largest = 0.0
         self.rows = 0
         self._evaluate_once = lru_cache(N_KNOWN_RESIDUALS)(self._evaluate)
@@ -129,20 +143,19 @@ class UnitCubeResidual:
 
     def _evaluate(self, u: tuple[float, ...]) -> np.ndarray | None:
         """Evaluate the residual at u (n,), and count evaluations and failures."""
-        self.evaluations += 1
         reason = "the residual is not finite"
         try:
             residual = np.asarray(self.residual(self.space.to_values(u)), float)
             if np.isfinite(residual).all():
                 self.rows = residual.size
                 self.largest = max(self.largest, float(np.abs(residual).max(initial=0.0)))
+                self.counts = self.counts.add(SearchCounts(1, 0, ""))
                 return residual
         except Missing:
             raise
         except (PatchfemError, ArithmeticError, np.linalg.LinAlgError) as error:
             reason = str(error)
-        self.failures += 1
-        self.reason = self.reason or reason
+        self.counts = self.counts.add(SearchCounts(1, 1, reason))
         return None
 
     def jacobian(self, u, free) -> np.ndarray:

@@ -60,7 +60,7 @@ def read_lines(path: Path, contents: str, remedy: str = "") -> list[str]:
             )
         return path.read_text("utf-8-sig").split("\n")
     except FileNotFoundError:
-        raise Missing(f"{path}: no such {contents.split()[-1]}{remedy}") from None
+        raise Missing(f"{path}: there is no such file{remedy}") from None
     except (OSError, UnicodeDecodeError, ValueError) as error:
         raise PatchfemError(f"{path}: {contents} cannot be read ({error})") from None
 
@@ -180,6 +180,6 @@ def parse_number(location: str, cell: str, factor: float) -> float:
     value = float(cell) * factor
     if abs(value) > MAX_VALUE:
         raise PatchfemError(
-            f"{location}: {value:g} in SI is outside the computable range, {MAX_VALUE:g}"
+            f"{location}: {value:g} in SI is outside the computable range; at most {MAX_VALUE:g} is possible"
         )
     return value

@@ -252,7 +252,10 @@ def _read_abaqus(path: Path) -> Matrix:
     with open(path, encoding="latin-1") as file:
         lines = (line for line in file if line.strip() and line.lstrip()[0] not in "*%#")
         first = next(lines, "")
-        table = np.loadtxt(chain([first], lines), delimiter="," if "," in first else None, ndmin=2)
+        table = np.zeros((0, 0))
+        if first:
+            separator = "," if "," in first else None
+            table = np.loadtxt(chain([first], lines), delimiter=separator, ndmin=2)
     if table.shape[1] not in (3, 5) or not table.size:
         raise PatchfemError(
             f"{path}: is not a matrix: write a Matrix Market file, or lines of row, column, number, or "

@@ -47,7 +47,7 @@ def read_slide(path) -> tuple:
     columns = read_columns(path, table)
     if "lateral" in columns.values:
         raise PatchfemError(
-            f"{path}:1: a slide in two directions was removed in patchfem 2.0; leave out the column lateral"
+            f"{path}:1: a slide in two directions was removed in patchfem 1.3; leave out the column lateral"
         )
     columns = {name: columns.values[name] for name in COLUMN_NAMES}
     for name, column in columns.items():

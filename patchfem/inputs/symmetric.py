@@ -4,6 +4,7 @@ import numpy as np
 from scipy import sparse
 
 from ..core import PatchfemError
+from .cells import MAX_VALUE
 
 MAX_SKEW = 1e-8  # largest skew part |A - A^T| / |A| of a matrix that counts as symmetric
 SKEW_REFUSAL = "gyroscopic and follower terms are not supported"
@@ -48,7 +49,7 @@ def to_real(values, subject: str):
 
 
 def read_numbers(values, subject: str, *shapes: tuple) -> np.ndarray:
-    """Return an array as finite real numbers; raise PatchfemError if it holds anything else.
+    """Return an array as finite real numbers of a magnitude with which the program can compute.
 
     Parameters
     ----------
@@ -58,22 +59,48 @@ def read_numbers(values, subject: str, *shapes: tuple) -> np.ndarray:
     *shapes : tuple of int or None
         Shapes that are allowed; None stands for any length. The last length of the first one is the number of
         coordinates. Without a shape the array is flattened.
+
+    Returns
+    -------
+    ndarray of float
+        An array with at least one number.
+
+    Raises
+    ------
+    PatchfemError
+        If the array is empty, has none of the shapes, or holds anything but such numbers.
     """
     values = np.asarray(to_real(values, subject))
     if values.dtype.kind not in "iufb":
-        raise PatchfemError(f"{subject} does not contain real numbers")
+        raise PatchfemError(f"{subject} contains no numbers; real numbers are needed")
     values = values.astype(float)
     if not np.isfinite(values).all():
-        raise PatchfemError(f"{subject} contains values that are not finite")
+        raise PatchfemError(
+            f"{subject} contains values that are not finite; finite ones are needed"
+        )
+    if np.abs(values).max(initial=0.0) > MAX_VALUE:
+        raise PatchfemError(
+            f"{subject} contains values outside the computable range; magnitudes of at most {MAX_VALUE:g} are needed"
+        )
+    if not values.size:
+        raise PatchfemError(f"{subject} is empty; at least one number is needed")
     if not shapes:
         return values.ravel()
     for shape in shapes:
         lengths = zip(shape, values.shape)
         if len(shape) == values.ndim and all(length in (None, size) for length, size in lengths):
             return values
+    needed = " or ".join(_format_shape(shape) for shape in shapes)
     raise PatchfemError(
-        f"{subject} has shape {values.shape}, but there are {shapes[0][-1]} coordinates or modes"
+        f"{subject} has shape {_format_shape(values.shape)}, but there are {shapes[0][-1]} coordinates or modes; "
+        f"shape {needed} is needed"
     )
+
+
+def _format_shape(shape: tuple) -> str:
+    """Return a shape as text, such as (k, 2), where k stands for any length."""
+    lengths = ["k" if length is None else str(length) for length in shape]
+    return f"({', '.join(lengths)}{',' if len(shape) == 1 else ''})"
 
 
 def symmetrize(values, subject: str):
@@ -99,9 +126,13 @@ def symmetrize(values, subject: str):
     except (TypeError, ValueError):
         raise PatchfemError(f"{subject} is not a matrix of real numbers") from None
     if values.ndim != 2 or values.shape[0] != values.shape[1] or not values.shape[0]:
-        raise PatchfemError(f"{subject} must be square, not of shape {values.shape}")
+        raise PatchfemError(
+            f"{subject} must be square with at least one row, not of shape {_format_shape(values.shape)}"
+        )
     if not np.isfinite(values.data if sparse.issparse(values) else values).all():
-        raise PatchfemError(f"{subject} contains values that are not finite")
+        raise PatchfemError(
+            f"{subject} contains values that are not finite; finite ones are needed"
+        )
     skew = abs(values - values.T).max()
     largest = abs(values).max()
     if skew > MAX_SKEW * largest:

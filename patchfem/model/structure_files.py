@@ -73,7 +73,10 @@ def _build_modes(
     content = _read_file(path)
     is_forced = drive_kind == "force"
     if not is_universal_file(path):
-        return _build_modes_from_arrays(content, structure, is_forced, mass, needs_interface)
+        try:
+            return _build_modes_from_arrays(content, structure, is_forced, mass, needs_interface)
+        except PatchfemError as error:
+            raise PatchfemError(f"{path}: {error}", error.key) from None
     if mass is not None:
         raise PatchfemError(
             "a universal file has no numbered masses; use structure.force_at or output_at",
@@ -98,5 +101,9 @@ def _build_modes_from_arrays(
         raise PatchfemError(
             "lacks `slide`, the motion at the patch; add `slide` to the file, or write "
             "[[structure.interface]]"
+        )
+    if needs_interface and not modes.interfaces.any(axis=1).all():
+        raise PatchfemError(
+            "`slide` of an interface is 0 in every mode, so nothing slides there; give the motion at the patch"
         )
     return FileModes(modes, [])

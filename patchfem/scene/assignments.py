@@ -280,6 +280,8 @@ def read_values(key: str, text: str, form: Form = LISTS) -> Axis | Range:
     """
     pieces = _split_at_commas(text)
     reader = _ValueReader(key, pieces)
+    if not text.strip():
+        raise ValueError("at least one value is needed")
     if not (form.has_lists or reader.is_number):
         raise ValueError(
             "is not a number that can vary; only quantities and plain numbers can be free"

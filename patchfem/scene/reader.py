@@ -6,10 +6,10 @@ import re
 import tomllib
 from typing import Any
 
-from ..effects import MAX_COORDINATES
 from .keys.lookup import (
     LIMITS_BY_ERROR_TYPE,
     describe_error,
+    describe_requirement,
     find_key,
     format_for_message,
     validate_values,
@@ -62,25 +62,20 @@ def _read_table(draft: SceneDraft, model: type[Table], raw: dict[str, Any], tabl
 
 def _read_inner(draft: SceneDraft, key: Key, value: Any, path: str) -> Any:
     """Read a table or an array of tables inside a table."""
-    if not key.is_array:
-        if isinstance(value, dict):
-            return _read_table(draft, key.inner, value, path)
-        draft.add_mistake(path, f"a table [{path}] is needed, not {format_for_message(value)}")
-    elif isinstance(value, list) and len(value) > MAX_COORDINATES:
-        draft.add_mistake(
-            path,
-            f"{len(value)} tables are too many; at most {MAX_COORDINATES} are possible; many modes or masses belong "
-            "into a file of arrays that structure.file names",
-        )
-    elif isinstance(value, list) and value and all(isinstance(item, dict) for item in value):
-        return tuple(
-            _read_table(draft, key.inner, item, f"{path}.{k}") for k, item in enumerate(value)
-        )
-    else:
-        draft.add_mistake(
-            path, f"an array of tables [[{path}]] is needed, not {format_for_message(value)}"
-        )
-    return None
+    if not key.is_array and isinstance(value, dict):
+        return _read_table(draft, key.inner, value, path)
+    if not (key.is_array and isinstance(value, list) and value):
+        needed = describe_requirement(key, path)
+        draft.add_mistake(path, f"{needed}, not {format_for_message(value)}")
+        return None
+    items = []
+    for index, item in enumerate(value):
+        item_path = f"{path}.{index}"
+        if not isinstance(item, dict):
+            draft.add_mistake(item_path, f"a table is needed, not {format_for_message(item)}")
+            return None
+        items.append(_read_table(draft, key.inner, item, item_path))
+    return tuple(items)
 
 
 def _validate_values(
@@ -102,7 +97,7 @@ def _validate_values(
         if index is not None and isinstance(value, list) and index < len(value):
             path = f"{path}.{index}"
             value = value[index]
-        draft.add_mistake(path, describe_error(list_keys(model)[key], error, value))
+        draft.add_mistake(path, describe_error(list_keys(model)[key], error, value, path))
     return valid
 
 
@@ -124,7 +119,7 @@ def apply_set(draft: SceneDraft, assignment: str) -> None:
     except UnicodeEncodeError:
         displayed_text = assignment.encode(errors="backslashreplace").decode()
         draft.add_set_mistake(
-            f"{displayed_text}: contains bytes that are not UTF-8 text; save the file as UTF-8"
+            f"{displayed_text}: contains bytes that are not UTF-8 text; write it in UTF-8"
         )
         return
     key, text = split_assignment(assignment)
@@ -144,6 +139,11 @@ def apply_set(draft: SceneDraft, assignment: str) -> None:
             if piece is None:
                 return
             pieces[depth] = str(piece)
+        elif "[" in piece:
+            draft.add_set_mistake(
+                f"{key}: {piece} names no item; items are numbered from 1, as in structure.mode[1]"
+            )
+            return
         if depth == len(pieces) - 1:
             break
         inner = holder[piece] if isinstance(holder, list) else holder.get(piece)

@@ -75,9 +75,12 @@ def describe_unknown_key(
     pieces = [piece for piece in table_key.split(".") if not piece.isdecimal()]
     if removed := describe_removed(".".join([*pieces, key]).lstrip(".")):
         return UnknownKey(removed, "")
+    if "." in key and find_key(".".join(filter(None, (table_key, key)))):
+        return UnknownKey(f"unknown key; leave out its quotes: {key}", "")
     is_table = _is_table(raw[key])
     subject = "unknown table" if is_table else "unknown key"
-    owners = [f"[{name}]" for name in _list_tables_with_key(key) if table_key and name]
+    names = _list_tables_with_key(key) if table_key else []
+    owners = [_write_header(name) for name in names if name]
     wrong_table = ""
     if owners:
         verb = "has" if len(owners) == 1 else "have"
@@ -137,6 +140,11 @@ def _suggest_name(
     if lacking and (len(lacking) == 1 or not is_set):
         ratings[lacking[0]] = max(ratings[lacking[0]], 1.5)
     return _find_best({name: rating for name, rating in ratings.items() if rating != 1})
+
+
+def _write_header(table_key: str) -> str:
+    """Return the header of a table in a scene: [[structure.mode]] for one of an array, else [contact.tilt]."""
+    return f"[[{table_key}]]" if find_key(table_key).is_array else f"[{table_key}]"
 
 
 def _name_item(table_key: str) -> str:

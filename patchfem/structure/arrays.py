@@ -11,6 +11,7 @@ Other arrays of the file are ignored.
 
 from math import prod
 from pathlib import Path
+from zipfile import is_zipfile
 
 import numpy as np
 from numpy.lib import format as npy
@@ -40,6 +41,7 @@ ARRAY_NAMES = (  # names of the arrays that are read from a file
 )
 # Largest size of a number [bytes], that of a complex number of double precision
 MAX_NUMBER_BYTES = 16
+MIN_MASS = 1e-50  # smallest modal mass [kg], which is that of structure.moving_mass
 MAX_MASS_FRACTION = 1 + 1e-9  # largest sum of base^2: 1, plus round-off of the shapes
 
 
@@ -53,6 +55,8 @@ def read_arrays(path: Path) -> dict:
     """
     try:
         if str(path).lower().endswith(".npz"):
+            if path.is_file() and not is_zipfile(path):
+                raise PatchfemError("it is not an archive of NumPy arrays")
             with np.load(path, allow_pickle=False) as file:
                 return {name: _read_member(file, name) for name in ARRAY_NAMES if name in file}
         variables = read_variables(path)
@@ -63,6 +67,8 @@ def read_arrays(path: Path) -> dict:
     except PatchfemError as error:
         reason = str(error).removeprefix(f"{path}: ")
         raise PatchfemError(f"{path} cannot be read ({reason})") from None
+    except OSError as error:
+        raise PatchfemError(f"{path} cannot be read ({error.strerror or error})") from None
     except Exception as error:
         # NumPy and zipfile raise errors of many types for a damaged file.
         raise PatchfemError(
@@ -165,9 +171,10 @@ def _build_basis_from_matrices(
     if faces is not None:
         faces = to_real(faces, "slide")
         faces = faces.reshape(-1, n) if faces.size % n == 0 else faces
+        faces = faces if faces.size else None
     output = data.get("output")
     if output is None:
-        if faces is None or not len(faces):
+        if faces is None:
             _refuse_missing(
                 data,
                 "output (n,), what the accelerometer measures; slide (n,) serves as output if output "
@@ -220,10 +227,15 @@ def _build_basis_from_modes(
         if name not in data:
             _refuse_missing(data, f"{name} of the modes")
     if mass is None and "moving_mass" in data:
-        mass = float(read_numbers(data["moving_mass"], "moving_mass")[0])
-    if mass is None or not mass > 0:
+        masses_of_modes = read_numbers(data["moving_mass"], "moving_mass")
+        if masses_of_modes.size > 1:
+            raise PatchfemError(
+                f"moving_mass has {masses_of_modes.size} values; one mass [kg] of all modes is needed"
+            )
+        mass = float(masses_of_modes[0])
+    if mass is None or mass < MIN_MASS:
         raise PatchfemError(
-            "lacks moving_mass > 0, the modal mass [kg]; give moving_mass in the file or in "
+            f"lacks moving_mass >= {MIN_MASS:g}, the modal mass [kg]; give moving_mass in the file or in "
             "[structure]"
         )
     if (omega < 0).any():
@@ -279,8 +291,8 @@ def _read_names(data: dict, n: int) -> tuple | None:
     if "names" not in data:
         return None
     # A cell of a .mat file is an array with one string.
-    texts = [name if isinstance(name, str) else np.ravel(name)[0] for name in data["names"]]
-    names = tuple(str(text).strip() for text in texts)
+    texts = [np.ravel(name)[:1] for name in np.atleast_1d(data["names"])]
+    names = tuple(str(text[0]).strip() for text in texts if text.size)
     if len(names) != n or len(set(names)) != n:
         raise PatchfemError(f"names must be {n} different texts")
     return names

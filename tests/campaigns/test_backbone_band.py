@@ -7,6 +7,8 @@ import pytest
 
 import patchfem as pf
 from patchfem.__main__ import main
+from patchfem.campaigns.backbone import words
+from patchfem.campaigns.backbone.records import Backbone, make_band, make_curve
 
 LAW = '[normal]\nload = "100 N"\n[friction]\nlaw = "elastic-plastic"\nstatic = 0.3\nbond_length = "60 um"\n'
 SLIDE = '[slide]\nkind = "sine"\namplitude = "10 um"\nfrequency = "1 Hz"\n'
@@ -150,3 +152,25 @@ def test_refuses_invalid_modes(scene, modes, message):
     """Modes with invalid text, units, slide or beside a structure of masses are refused."""
     with pytest.raises(pf.PatchfemError, match=f"(?s){message}"):
         pf.backbone(scene, modes=modes)
+
+
+def test_exact_curves_without_common_amplitude_are_not_compared():
+    """Two curves without a common amplitude give no sentence on their agreement, and the band is the numerical error.
+
+    Once the quasi-static curve was said to hold "at all its amplitudes" where the other method had no value.
+    """
+    values = np.ones((4, 2))
+    curves = {
+        "balance": make_curve(np.array([1e-6, 2e-6]), values, 1e-3 * values),
+        "quasi-static": make_curve(np.array([3e-6, 4e-6]), values, 1e-3 * values),
+    }
+    apart = Backbone("a", None, curves, {}, None, None, (), make_band(curves))
+    assert words.describe_static_curve(curves) == []
+    assert words.describe_band_width(apart).startswith("Its band is the numerical error; it is")
+
+    curves["quasi-static"] = curves["quasi-static"]._replace(amplitude=np.array([2e-6, 4e-6]))
+    near = apart._replace(curves=curves, band=make_band(curves))
+    assert words.describe_static_curve(curves) == [
+        "The quasi-static curve holds within 2 % at all amplitudes of both curves."
+    ]
+    assert "and the difference of the two methods" in words.describe_band_width(near)

@@ -2,6 +2,7 @@
 
 import csv
 import json
+from dataclasses import replace
 
 import pytest
 from command_line import run_cli
@@ -15,8 +16,9 @@ from patchfem.campaigns import (
     describe_fastest_setting,
     numerical_settings,
 )
-from patchfem.campaigns.cost import find_fastest_run
+from patchfem.campaigns.cost import find_fastest_run, find_fastest_settings
 from patchfem.core import NotConverged, PatchfemError
+from patchfem.export.costs import make_answer
 from patchfem.runs.run import run
 
 LENGTH = 12.7e-3
@@ -142,6 +144,76 @@ def test_exact_smallest_of_equally_fast_settings_is_proposed():
     slow = [make_cost("2", 1.0, 8e-3), make_cost("4", 0.96, 2e-3), make_cost("8", 1.2, 1e-3)]
     assert find_fastest_run(slow, 1e-2).label == "2" and find_fastest_run(slow, 5e-3).label == "4"
     assert describe_fastest_setting(slow, 5e-3).endswith("within the tolerance 0.005")
+
+
+def test_exact_unknown_error_is_not_within_tolerance():
+    """A run with an unknown error is not the fastest within the tolerance, and unknown errors are stated.
+
+    Once a run with 4 modes whose work had no error estimate was called the fastest "with every measure within the
+    tolerance".
+    """
+    runs = [make_cost("4", 0.1, 1e-4), make_cost("8", 1, 1e-5), make_cost("16", 2, 1e-5)]
+    del runs[0].errors["b"]
+    assert find_fastest_run(runs, 1e-2).label == "8"
+    assert find_fastest_settings(runs, 1e-2) == {"a": "4", "b": "8"}
+    assert describe_fastest_setting(runs, 1e-6).startswith(
+        "no setting meets the tolerance 1e-06: the best run, with a knob at 8"
+    )
+    for run_cost in runs:
+        run_cost.errors.clear()
+    assert find_fastest_run(runs, 1e-2) is None
+    assert find_fastest_settings(runs, 1e-2) == {"a": None, "b": None}
+    assert describe_fastest_setting(runs, 1e-2) == (
+        "no setting is known to meet the tolerance 0.01: no run has an error estimate of every measure"
+    )
+
+
+def test_exact_notes_are_those_of_the_named_run():
+    """The advice of a note belongs to the setting that it names, which is the best run of the sentence.
+
+    Once the advice of the finest run was printed, though another run had the smallest errors.
+    """
+    model = build_model(tolerance=1e-3)
+    errors = {"2": 4e-2, "4": 2e-3, "8": 8e-3}
+    runs = [
+        replace(make_cost(label, 1, error), tolerance=1e-3, remedies=(f"advice {label}",))
+        for label, error in errors.items()
+    ]
+    answer = make_answer({"shear_modes": runs}, model)
+    assert answer.remarks.notes == ("With a knob at 4: advice 4.",)
+    assert answer.verdict[0].startswith(
+        "No setting meets the tolerance 0.001: the best run, with a knob at 4,"
+    )
+    assert answer.quantities["largest_error"].value == pytest.approx(2e-3)
+
+    # The note of a curve over tolerances is that of the scene as it is.
+    runs = [replace(run, tolerance=10.0**-k) for k, run in enumerate(runs, 2)]
+    answer = make_answer({"tolerance": runs}, model)
+    assert answer.remarks.notes == ("With a knob at 4: advice 4.",)
+    assert answer.verdict == (
+        "At its tolerance 0.001 the scene takes 1 CPU s and misses the tolerance, with a largest error of 0.002 in a.",
+        "No run meets its tolerance.",
+        "For the tolerance 0.0001: advice 8.",
+    )
+
+
+def test_exact_runs_with_unknown_errors_are_told_from_runs_that_miss():
+    """A run without an error estimate neither meets nor misses its tolerance in sentences, table and page."""
+    runs = [replace(make_cost(str(k), 1, 1e-4), tolerance=10.0**-k) for k in (2, 3, 4, 5)]
+    del runs[1].errors["b"]
+    answer = make_answer({"tolerance": runs}, build_model(tolerance=1e-3))
+    assert answer.verdict[:2] == (
+        "At its tolerance 0.001 the scene takes 1 CPU s and does not have an error estimate of every measure, with a "
+        "largest error of 0.0001 in a.",
+        "The smallest tolerance that is met is 4, in 1 CPU s.",
+    )
+    entries = answer.details["tolerance"]["runs"]
+    assert [entry["meets_tolerance"] for entry in entries] == [True, False, True, False]
+    for known in runs[:1] + runs[2:]:
+        del known.errors["b"]
+    runs[-1].errors["b"] = 1e-3
+    answer = make_answer({"tolerance": runs}, build_model(tolerance=1e-3))
+    assert answer.verdict[1] == "No run is known to meet its tolerance."
 
 
 @pytest.mark.parametrize(

@@ -13,6 +13,7 @@ from scene_texts import DRIVE, KILOGRAM, POINT, make_friction_table, make_shaken
 import patchfem as pf
 from patchfem.campaigns.fits import curve as curves
 from patchfem.campaigns.fits.curve import read_damping_curve
+from patchfem.campaigns.fits.problem import parse_ranges
 from patchfem.core import PatchfemError
 
 IWAN = (
@@ -115,6 +116,38 @@ def test_exact_overdamped_trials_are_skipped(tmp_path):
         r"leave out the rows with the largest damping",
     ):
         pf.fit(FLUID, to=path, free={"friction.static": (10.0, 20.0)}, out=tmp_path / "none")
+
+
+@pytest.mark.parametrize("gaps", [("quasi-static",), ("balance",), ("balance", "quasi-static")])
+def test_exact_method_with_gaps_is_not_used(gaps, monkeypatch):
+    """A method that has no value at one of the rows is left out of the fit with a note; the fit is refused without any.
+
+    Once a method with gaps counted as usable, so that all searches failed though the other one had every row.
+    """
+
+    def compute_with_gaps(model, amplitudes, method):
+        """Return frequency and damping with a gap at the largest amplitude for some methods."""
+        values = np.ones((2, amplitudes.size))
+        if method in gaps:
+            values[:, -1] = np.nan
+        return values
+
+    monkeypatch.setattr(curves, "compute_points", compute_with_gaps)
+    scene = pf.load(IWAN)
+    ranges = parse_ranges(["friction.chi=-0.9..-0.05"])
+    model = curves.CurveModel(scene, ranges, AMPLITUDES)
+    trials = [[-0.5], [-0.4]]
+    reason = (
+        "the mode of the model does not oscillate at the amplitudes 20 um; leave out these rows"
+    )
+    if len(gaps) == 2:
+        with pytest.raises(PatchfemError, match=f"balance: {reason}.*quasi-static: {reason}"):
+            model.choose_methods(trials)
+        return
+    note = model.choose_methods(trials)
+    (used,) = {"balance", "quasi-static"} - set(gaps)
+    assert model.methods == [used]
+    assert note.startswith(f"the fit is by {used} alone: {gaps[0]}: {reason}")
 
 
 def test_fit_command_reads_curve_and_refuses_invalid_curves(tmp_path, monkeypatch):

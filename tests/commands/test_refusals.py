@@ -139,7 +139,7 @@ REFUSED = {  # command -> [(arguments, texts of the lines of the message)]; exit
 }
 NOT_THERE = [  # arguments, message on a missing file; exit code 4
     (("compare", "trace.csv", "none.csv"), "none.csv: there is no such file"),
-    (("compare", "--pairs", "none.csv"), "none.csv: no such table"),
+    (("compare", "--pairs", "none.csv"), "none.csv: there is no such file"),
     (("profile", "none.csv"), "none.csv: there is no such file"),
     (("export", "none", "-o", "a.vtu"), "none: no such results folder"),
     (("view", "none"), "none: no such results folder"),

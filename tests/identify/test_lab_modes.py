@@ -177,3 +177,20 @@ def test_refuses_invalid_records_with_reason():
         fit_decay(TIME[:500], np.exp(3 * TIME[:500]) * np.cos(OMEGA[0] * TIME[:500]))
     with pytest.raises(PatchfemError, match="no decaying oscillation"):
         fit_decay(TIME[:500], np.ones(500))
+
+
+@pytest.mark.parametrize("rate, noise", [(0.0, 0.0), (0.005, 0.05)])
+def test_refuses_undamped_decay_without_calling_it_growing(rate, noise):
+    """A record whose damping ratio is zero within its error neither decays nor grows.
+
+    Once an undamped oscillation was said to grow, because its damping ratio was -1e-17.
+    """
+    rng = np.random.default_rng(1)
+    time = TIME[:500]
+    record = np.exp(rate * time) * np.cos(OMEGA[0] * time) + noise * rng.normal(size=500)
+    with pytest.raises(PatchfemError, match=r"is zero within its error of [\de.-]+: it neither"):
+        fit_decay(time, record)
+    growing = np.exp(60 * rate * time) * record
+    if rate:
+        with pytest.raises(PatchfemError, match="grows instead of decaying"):
+            fit_decay(time, growing)

@@ -1,5 +1,7 @@
 """Bounded least squares compared with linear algebra, closed-form profiles and known solutions."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -8,6 +10,7 @@ from scipy.stats import t as student
 
 from patchfem.core import Missing, NotConverged, Outcome, PatchfemError
 from patchfem.identify import Problem, describe_fit
+from patchfem.identify.least_squares import Search
 from patchfem.identify.space import make_search_space
 
 RNG = np.random.default_rng(7)
@@ -247,3 +250,28 @@ def test_exact_decay_intervals_cover_values_in_95_percent():
         ).solve()
         inside += sum(a <= x <= b for (a, b), x in zip(fit.intervals.ends, (1.0, 3.0)))
     assert 0.935 < inside / 2000 < 0.965
+
+
+def test_exact_counts_contain_every_evaluation():
+    """The counts of a search contain its last descent and its failures, and those of an earlier search if asked.
+
+    Once the evaluations of the last descent, and those of the search by the quasi-static curve, were lost.
+    """
+    calls = []
+
+    def residual(values):
+        calls.append(values)
+        if values[0] > 4:
+            raise PatchfemError("too large")
+        return DESIGN @ values - NOISY
+
+    problem = Problem(residual, [-5, -5, -5], [5, 5, 5])
+    fit = problem.search(Search(3, seed=1))
+    assert fit.counts.evaluations == len(calls)
+    first = problem.solve(4, "")
+    second = replace(problem, start=first.values).solve(1).count_earlier_search(first)
+    assert fit.counts.evaluations + second.counts.evaluations == len(calls)
+    assert second.agreed == first.agreed == 4
+    failures = fit.counts.failures + second.counts.failures
+    assert failures == sum(values[0] > 4 for values in calls) > 0
+    assert second.counts.reason == "too large"

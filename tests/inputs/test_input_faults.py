@@ -15,7 +15,7 @@ def test_exact_path_file_is_read_in_seconds_and_metres(tmp_path):
     assert time == pytest.approx([0, 0.5, 1.5], rel=1e-15)
     assert displacement == pytest.approx([0, 2.5e-4, -5e-4], rel=1e-15)
     path.write_text("lateral [um],time [ms],displacement [mm]\n0,0,0\n4,500,0.25\n")
-    with pytest.raises(PatchfemError, match=r"two directions was removed in patchfem 2\.0"):
+    with pytest.raises(PatchfemError, match=r"two directions was removed in patchfem 1\.3"):
         read_slide(path)
 
 

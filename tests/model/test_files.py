@@ -1,6 +1,7 @@
 """The command `check` reads every file named by a scene and reports each fault at its line of the
 scene."""
 
+import io
 import json
 
 import meshio
@@ -42,6 +43,19 @@ def mesh_text(name="{}") -> str:
     return f'{head}mesh = "{name}"\n{table}{remainder}'
 
 
+def make_modes(**changes) -> bytes:
+    """Return a .npz file of two modes with changed arrays."""
+    content = io.BytesIO()
+    modes = {
+        "omega": [300.0, 600.0],
+        "damping": [0.01, 0.01],
+        "slide": [1.0, 0.5],
+        "base": [0.5, 0.5],
+    }
+    np.savez(content, **({"moving_mass": 2.0} | modes | changes))
+    return content.getvalue()
+
+
 FAULTS = {
     "profile": (PROFILE, "a.csv", "0,1\n1,2\n", "contact.profile.file", "a.csv:1: the unit of x is not given"),
     "profile, short": (PROFILE, "a.csv", "x [mm],z [um]\n0,1\n2,2\n4,1\n", "contact.profile.file",
@@ -53,6 +67,10 @@ FAULTS = {
     "drive": (DRIVE, "d.csv", "time [s],acceleration [g]\n0,0\n0,1\n", "drive.file",
               "d.csv:3: time 0 s is not later than"),
     "structure": (ARRAYS, "a.npz", b"PK\x03\x04 no archive", "structure.file", "a.npz cannot be read"),
+    "structure, no modes": (ARRAYS, "a.npz", make_modes(omega=[]), "structure.file",
+                            "a.npz: omega is empty; at least one number is needed"),
+    "structure, no slide": (POINT + COULOMB + ARRAYS, "a.npz", make_modes(slide=[0.0, 0.0]), "structure.file",
+                            "a.npz: `slide` of an interface is 0 in every mode"),
     "measured": (MEASURED, "m.csv", "frequency [Hz],output [g]\n1,1\n", "measured.file",
                  "not 'frequency [Hz],output [g]' (columns with a unit: frequency, input"),
     "mesh": (mesh_text(), "a.msh", "$MeshFormat\nnonsense\n", "contact.mesh", "a.msh: not a readable .msh file"),

@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 import patchfem as pf
+from patchfem.dynamics.harmonic import branch
 
 RIG = """
 [structure]
@@ -69,6 +70,27 @@ def test_exact_linear_curve_agrees_with_modal_sum():
     )
     peak = result.measures["peak_frequency"]
     assert abs(peak.value - 143 * np.sqrt(1 - 2 * ZETA**2)) < peak.error < 0.2
+
+
+@pytest.mark.parametrize("max_points", [15, 2000])
+def test_curve_that_ends_early_has_a_note(max_points, monkeypatch):
+    """A curve that does not reach the end of the sweep says where it ends, why, and which keys to change.
+
+    Once the largest motion of such a part was stated without a word.
+    """
+    monkeypatch.setattr(branch, "PATH", branch.PATH._replace(max_points=max_points))
+    result = pf.run(RIG + '[structure.stiffening]\ncubic = "1e6 N/m^3"\n')
+    notes = [text for text in result.warnings if "and not the end of the sweep" in text]
+    reached = result.extra["curve"]["frequency"].max()
+    if max_points > 15:
+        assert not notes and reached == pytest.approx(210)
+        return
+    (note,) = notes
+    assert reached < 200
+    assert f"reaches {reached:.4g} Hz and not the end of the sweep at 210 Hz" in note
+    assert note.endswith(
+        ": it has too many points; the largest motion is that of this part, so change drive.from or drive.to"
+    )
 
 
 def test_always_undamped_resonance_is_missing_in_curve():

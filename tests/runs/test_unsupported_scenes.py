@@ -212,7 +212,7 @@ REFUSALS = [
     (
         COATED.replace('load = "26 lbf"\n', "") + '[contact.approach]\ndistance = "1 um"\n',
         "contact.load_line.offset=2 mm",
-        r"removed in patchfem 2\.0; give contact\.load",
+        r"removed in patchfem 1\.4; give contact\.load",
     ),
     (
         POINT + COULOMB + STRUCTURE,

@@ -94,8 +94,10 @@ def test_exact_axis_texts_are_valid_in_scene():
         ("mode.frequency=100 Hz", "did you mean 'structure.mode'?"),
         ("angle=1 mrad", "did you mean 'contact.tilt.angle'?"),
         ("structure.mode.frequency=100 Hz", "structure.mode.NAME.frequency"),
+        ("wear.jumps=ten", "use one of auto, or give a whole number"),
+        ("wear.jumps=1.5", "one of auto, or a whole number, is needed, not 1.5"),
         ("friction.static.x=1", "friction.static is a value"),
-        ("friction.breakaway=1", "was removed in patchfem 2.0"),
+        ("friction.breakaway=1", "was removed in patchfem 1.4"),
     ],
 )
 def test_refuses_invalid_axis(text, says):

@@ -3,9 +3,19 @@
 import time
 
 import pytest
-from scene_texts import BENCH, COULOMB, PATCH, POINT, RIG, STRUCTURE, list_mistakes
+from scene_texts import (
+    BENCH,
+    COULOMB,
+    FORCED,
+    PAIR,
+    PATCH,
+    POINT,
+    RIG,
+    STRUCTURE,
+    list_mistakes,
+)
 
-from patchfem.scene import Tables
+from patchfem.scene import Tables, loads
 from patchfem.scene.keys.types import list_keys
 
 
@@ -63,6 +73,39 @@ def test_refuses_huge_whole_numbers(text, key, size):
 def test_refuses_numbers_that_overflow(text, sets, says):
     """Numbers from which an overflowing quantity is computed are refused."""
     assert says in list_mistakes(text, sets)[0]
+
+
+TOO_MANY = "2001 values are too many; at most 2000 are possible; give the modes of a larger rig in structure.file"
+MASSES = "[" + ", ".join(['"1 kg"'] * 2001) + "]"
+SPRING = """{between = [1, 0], stiffness = '1 N/m'}"""
+
+
+@pytest.mark.parametrize(
+    "sets, says",
+    [
+        (
+            f"structure.masses={MASSES}",
+            f"structure.masses: {TOO_MANY}",
+        ),
+        (
+            f"structure.mode=[{', '.join(['{}'] * 2001)}]",
+            f"structure.mode: {TOO_MANY}",
+        ),
+        (
+            "structure.spring.0.between=[1, 2, 3, 4]",
+            "structure.spring[1].between: two whole numbers are needed, such as [1, 2], not 4 values",
+        ),
+    ],
+)
+def test_refuses_too_many_values_with_their_remedy(sets, says):
+    """Too many masses or modes are referred to a file of arrays, and too many ends of a spring to the right number."""
+    assert f"--set: {says}" in list_mistakes(PAIR + FORCED, sets)
+
+
+def test_exact_rig_may_have_more_springs_than_coordinates():
+    """The largest number of masses and modes is no limit of the number of springs."""
+    scene = loads(PAIR + FORCED, sets=[f"structure.spring=[{', '.join([SPRING] * 2001)}]"])
+    assert len(scene.structure.spring) == 2001
 
 
 def test_refuses_control_characters():

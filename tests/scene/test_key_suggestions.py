@@ -54,6 +54,11 @@ def test_exact_setting_suggests_key_of_file(wrong, meant):
     "wrong, says",
     [
         ("friction.amplitude=2 um", "[normal] and [slide] have a key of this name"),
+        (
+            "normal.between=[1, 2]",
+            "[[structure.spring]], [[structure.damper]] and [[structure.interface]] have a key of",
+        ),
+        ("drive.yaw=1 rad/m", "[[structure.mode]] has a key of this name"),
         ("structure.law=coulomb", "[friction] has a key of this name"),
         ("structure.interface.0.load=1 N", "the scene has no [[structure.interface]]"),
     ],

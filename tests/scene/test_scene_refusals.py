@@ -29,11 +29,11 @@ BAD_VALUES = [
         "contact.load",
         "a bare number without a unit; a force with its unit is needed, such as '26 lbf'",
     ),
-    ('load = "-1 N"', "contact.load", "must be >= 0, not '-1 N'; a force"),
+    ('load = "-1 N"', "contact.load", "must be >= 0, not '-1 N'"),
     (
         'length = "-12.7 mm"',
         "contact.length",
-        "must be > 0, not '-12.7 mm'; a length with its unit is needed",
+        "must be > 0, not '-12.7 mm'",
     ),
     (
         'substrate = "Ti-8Al"',
@@ -71,6 +71,11 @@ BAD_SETS = [
     ("accuracy.tolerance=1", "accuracy.tolerance", "must be < 1, not 1"),
     ("friction.reading=reprot", "friction.reading", "did you mean 'report'? use one of stretch, report"),
     ("friction.temperature=5", "friction.temperature", "a table [friction.temperature] is needed, not 5"),
+    ("contact.tilt=5", "contact.tilt", "a table [contact.tilt] is needed, not 5"),
+    ("structure.mode=5", "structure.mode", "an array of tables [[structure.mode]] is needed, not 5"),
+    ("contact.upper.coating=thick", "contact.upper.coating", "unknown value 'thick'; use one of none, or give a table "
+     "[contact.upper.coating]"),
+    ("contact.upper.coating=5", "contact.upper.coating", "one of none, or a table [contact.upper.coating], is needed, not"),
     ("contact.pairs=0", "contact.pairs", "must be >= 1, not 0; a whole number"),
     ("contact.pairs=1.5", "contact.pairs", "a whole number is needed, not 1.5"),
     ("contact.element_size=13 mm", "contact.element_size", "longer than contact.length"),
@@ -80,7 +85,8 @@ BAD_SETS = [
     ("contact.upper.chamfer=1 nm", "contact.upper.chamfer", "less than 1e-5 of the length"),
     ("contact.load_line.offset=1 mm", "contact.load_line", "unless [contact.holder]"),
     ("contact.load=1e40 N", "contact.load", "a mean pressure above Young's modulus"),
-    ("contact.tilt.angle=100 deg", "contact.tilt.angle", "must be <= 0.1 rad, not '100 deg'"),
+    ("contact.tilt.angle=100 deg", "contact.tilt.angle", "must be <= 0.1 rad, not '100 deg'; the gap is "
+     "computed as this angle times the distance"),
     ('contact.strips={count = 2, roll = "-9 deg"}', "contact.strips.roll", "must be >= -0.1 rad, not '-9 deg'"),
     ("contact.crown.radius=-1 m", "contact.crown.radius", "for a hollow surface leave out [contact.crown]"),
     ("structure.mode.axal.frequency=1 Hz", "structure.mode.axal", "did you mean 'axial'?"),
@@ -95,6 +101,10 @@ BAD_SETS = [
     ("accuracy.steps_per_cycle=3", "accuracy.steps_per_cycle", "must be >= 4"),
     ("contact.load.x=1", "contact.load.x", "contact.load is a value, not a table"),
     ("contact.load", "contact.load", "table.key=value is needed"),
+    ("contact.load=['1 N']", "contact.load", "an array is not a quantity; a force with its unit is needed"),
+    ("structure.mode.axial=3", "structure.mode[1]", "a table is needed, not 3"),
+    ("structure.mode[0].slide=1", "structure.mode[0].slide", "mode[0] names no item; items are numbered from 1"),
+    ("structure.mode.second.name=", "structure.mode[2].name", "must not be an empty text"),
     ('contact.substrate={young = "1 GPa", poisson = 0.5, density = "1 kg/m^3"}', "contact.substrate.poisson",
      "must be < 0.5"),
     ('contact.substrate={young = "1 GPa", poisson = 0.3}', "contact.substrate.density", "missing; a density"),
@@ -303,11 +313,14 @@ def test_refuses_odd_keys_and_huge_numbers():
         RIG, "structure.mode.axial.frequency=1e300 Hz"
     )
     assert get_only_mistake(RIG, "structure.moving_mass=1e-300 kg").endswith(
-        "must be 0 or have a magnitude from 1e-50 to 1e+50"
+        "1e-300 kg is outside the computable range; a magnitude from 1e-50 to 1e+50 kg is needed"
+    )
+    assert get_only_mistake(RIG, "structure.stiffening.cubic=1e-300 N/m^3").endswith(
+        "; 0 or a magnitude from 1e-50 to 1e+50 N/m^3 is needed"
     )
     # a load has only an upper limit of its magnitude
     assert get_only_mistake(RIG, "contact.load=1e60 N").endswith(
-        "the value must not exceed 1e+50 in magnitude"
+        "1e+60 N is outside the computable range; a magnitude of at most 1e+50 N is needed"
     )
     assert "unknown key" in get_only_mistake(
         RIG.replace("[structure]\n", '[structure]\n"mode.².x" = 1\n')
@@ -344,6 +357,33 @@ def test_refuses_unreadable_file(tmp_path):
             "[structure.mode]\n",
             "structure.mode: an array of tables [[structure.mode]] is needed, not a table",
         ),
+        (
+            "[[structure.spring]]\nbetween = [1]\n",
+            "structure.spring[1].between: two whole numbers are needed, such as [1, 2], not 1 value",
+        ),
+        (
+            "[structure.reduced]\ndamping = true\n",
+            "structure.reduced.damping: a plain number, or the name of a file, is needed, not true",
+        ),
+        (
+            "[structure.reduced]\nboundary = [1, true]\n",
+            "structure.reduced.boundary[2]: whole numbers or texts are needed, such as [1, '12:x'], not true",
+        ),
+        (
+            '[structure.reduced]\nmass = "m"\n',
+            "structure.reduced.mass: the name has no extension; use one of .mtx, .mat, .npz",
+        ),
+        ("[wear.friction]\ndepth = [0]\n", "wear.friction.depth[1]: a bare number without a unit"),
+        (
+            '[structure]\nfile = "a.uff"\n',
+            "(node and direction, as named in the file (such as 12:+x), whose motion",
+        ),
+        (
+            '[drive]\nkind = "force"\nlevels = ["1e60 N"]\n',
+            "drive.levels: 1e+60 N is outside the computable range; 0 or a magnitude from 1e-50 to 1e+50 N",
+        ),
+        ("[sweep]\ncontact.load = []\n", "sweep.contact.load: at least one value is needed"),
+        ('"contact.load" = "1 N"\n', "contact.load: unknown key; leave out its quotes"),
     ],
 )
 def test_refuses_wrong_structure_of_table(text, says):

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import re
+
 import pytest
 from scene_texts import BENCH, FORCED, LINEAR, PAIR, PATCH, RIG
 
 from patchfem.effects import describe_unsupported
 from patchfem.scene import loads
-from patchfem.scene.rules.support import SUPPORT
+from patchfem.scene.rules import support
 from patchfem.scene.scene import SceneError
 
 POINT_RIG = BENCH[: BENCH.index("[slide]")] + LINEAR
@@ -77,6 +79,16 @@ SETS = {
     "wear": WEAR,
     "wear.start": "wear.start=result.nc",
 }  # fmt: skip
+SINGLE = PAIR[: PAIR.rindex("[[structure.interface]]")]
+# Property of a joint in a message, after re.escape
+PROPERTY = re.compile(r"\\\{.*?\}")
+# More assignments for rows whose scene has, with the assignments of its features alone, those of another row, too.
+MORE_SETS = {
+    "grooves, patch.strips, partial slip": "{law}.law=coulomb",
+    "wear, patch.strips, partial slip": "{law}.law=coulomb",
+    "shape on the lower piece, interface": BONDS,
+    "mode with yaw, patch.strips, rig, law for one interface": f"{BONDS} {{law}}.order=2",
+}
 REDUCED = POINT_RIG[: POINT_RIG.index("[structure]")] + (
     '[structure.reduced]\nstiffness = "k.mtx"\nmass = "m.mtx"\nboundary = [1, 2]\nslide = [1, 0]\n'
     + LINEAR[LINEAR.index("[drive]") :]
@@ -105,6 +117,11 @@ def choose_base(features: set[str]) -> tuple[str, dict[str, str]]:
     """Return a scene for some features, and the keys of its law, its load, its patch and a changing load."""
     words = {"law": "friction", "load": "contact", "patch": "contact"}
     words["change"] = SETS["mode with heave or pitch"]
+    if features == {"shape on the lower piece", "law without bonds", "partial slip"}:
+        return PATCH_BENCH, words
+    if features == {"law for one interface", "patch of an interface"}:
+        law = "structure.interface.0"
+        return SINGLE + FORCED, words | {"law": law, "patch": f"{law}.contact"}
     if "patches of interfaces" in features:
         return FILE + FORCED, words | {"patch": "structure.interface.0.contact"}
     if features & (MASS_FEATURES | {"patch of an interface", "law without elements"}):
@@ -120,15 +137,47 @@ def choose_base(features: set[str]) -> tuple[str, dict[str, str]]:
     return (PATCH_BENCH if "bench" in features else RIG), words
 
 
-@pytest.mark.parametrize("names, instead", SUPPORT, ids=[names for names, _ in SUPPORT])
-def test_refuses_each_row_of_support(names, instead):
-    """A scene with the features of a row is refused, with the advice of the row."""
+def list_refusals(names: str) -> list[str]:
+    """Return the messages about combinations that no run supports, for a scene with the features of a row."""
     features = names.split(", ")
     text, words = choose_base(set(features))
-
-    sets = " ".join(SETS.get(name, "") for name in features).format_map(words).split()
-    with pytest.raises(SceneError) as refused:
+    assignments = [*(SETS.get(name, "") for name in features), MORE_SETS.get(names, "")]
+    sets = " ".join(assignments).format_map(words).split()
+    try:
         loads(text, "a.toml", [write_blanks(assignment) for assignment in sets])
-    found = [message for message in refused.value.mistakes if "not supported yet" in message]
-    advice = describe_unsupported("", instead).partition("; ")[2]
-    assert found and ("{" in advice or any(message.endswith(advice) for message in found)), found
+    except SceneError as refused:
+        return [message for message in refused.mistakes if "not supported yet" in message]
+    return []
+
+
+def make_pattern(names: str, instead: str) -> str:
+    """Return a pattern that only the message of a row matches; properties of the scene are free in it."""
+    first, *others = names.split(", ")
+    feature = support.find_feature(first)
+    beside = " and ".join(filter(None, map(support.name_feature, others)))
+    message = describe_unsupported(f"{feature.words} with {beside}".strip(), instead)
+    return PROPERTY.sub("((?! and ).)+", re.escape(message))
+
+
+@pytest.mark.parametrize("names, instead", support.SUPPORT, ids=[row[0] for row in support.SUPPORT])
+def test_refuses_each_row_of_support(names, instead):
+    """A scene with the features of a row is refused for this row alone, with its advice."""
+    (found,) = list_refusals(names)
+    assert re.fullmatch(make_pattern(names, instead), found.split(": ", 2)[2]), found
+
+
+# Two rows that apply to a scene at the same key: (features of both, the key, end of the only message at it).
+OVERLAPS = [
+    ("patch.strips, law of an averaged pressure, partial slip", "contact.strips", "leave out this entry"),
+    ("normal.amplitude, bench, law for flat faces, normal.grooves", "normal.amplitude", "leave one of the two out"),
+    ("law for one interface, several interfaces, partial slip", "structure.interface[1].law",
+     "leave out [structure.interface.contact.shear], or use law 'coulomb' or 'elastic-plastic'"),
+    ("wear, patch.strips, shape on the lower piece, wear.start", "wear", "leave out [wear] or leave out wear.start"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("names, key, advice", OVERLAPS)
+def test_prints_the_row_whose_advice_suffices(names, key, advice):
+    """Of two rows at the same key, that one is printed whose advice also removes the cause of the other."""
+    (message,) = [text for text in list_refusals(names) if f": {key}: " in text]
+    assert message.endswith(advice)

@@ -93,8 +93,10 @@ def test_exact_basis_from_modal_file(tmp_path):
 
 @pytest.mark.parametrize("change, message", [
     ({"K": None}, "lacks the matrix K; the file contains M, C"), ({"slide": None}, "lacks output"),
-    ({"slide": np.ones(3)}, "slide has shape (3,), but there are 2"),
-    ({"K": np.ones((2, 3))}, "K must be square"),
+    ({"slide": np.ones(3)}, "slide has shape (3,), but there are 2 coordinates or modes; shape (2,) or (k, 2) is needed"),
+    ({"slide": np.zeros((0, 2))}, "lacks output"),
+    ({"K": np.ones((2, 3))}, "K must be square"), ({"K": np.zeros((0, 0))}, "K must be square with at least one row"),
+    ({"names": np.zeros((2, 0))}, "names must be 2 different texts"), ({"names": np.array("a")}, "names must be 2"),
     ({"names": np.array(["a", "a"])}, "names must be 2 different texts"), ({"C": -C}, "C adds energy"),
 ])  # fmt: skip
 def test_refuses_incomplete_or_invalid_matrices(change, message):
@@ -107,10 +109,17 @@ def test_refuses_incomplete_or_invalid_matrices(change, message):
 
 @pytest.mark.parametrize("change, message", [
     ({"damping": None}, "lacks damping of the modes; the file contains"),
-    ({"moving_mass": None}, "lacks moving_mass > 0"), ({"frequency": np.array([-1.0, 2.0])}, "frequencies must be >= 0"),
+    ({"moving_mass": None}, "lacks moving_mass >= 1e-50"),
+    ({"frequency": np.array([-1.0, 2.0])}, "frequencies must be >= 0"),
     ({"base": np.ones(2)}, "the sum of `base`^2"),
     ({"damping": np.array([-0.1, 0.1])}, "damping must be >= 0"), ({"output": np.array([np.nan, 0])}, "not finite"),
     ({"damping": -np.eye(2)}, "damping matrix adds energy"),
+    ({"frequency": np.zeros(0)}, "frequency is empty; at least one number is needed"),
+    ({"slide": np.zeros((0, 2))}, "slide is empty; at least one number is needed"),
+    ({"slide": np.array(["a", "b"])}, "slide contains no numbers; real numbers are needed"),
+    ({"slide": np.array([1e200, 1.0])}, "slide contains values outside the computable range"),
+    ({"moving_mass": 1e-300}, "lacks moving_mass >= 1e-50"),
+    ({"moving_mass": np.zeros(0)}, "moving_mass is empty"), ({"moving_mass": np.ones(2)}, "moving_mass has 2 values"),
 ])  # fmt: skip
 def test_refuses_incomplete_or_invalid_modes(change, message):
     """Missing, misshapen or unphysical modal data of a file are refused with the name of the array."""

@@ -136,8 +136,8 @@ def write_advice(joint: JointMode, backbone: Backbone) -> tuple[str, ...]:
     sentences = [
         f"Use the curve of method {band.method}: {PURPOSES[band.method]}.",
         *_describe_slip(joint, curve),
-        _describe_band_width(backbone),
-        *_describe_static_curve(curves),
+        describe_band_width(backbone),
+        *describe_static_curve(curves),
         *_describe_coupling(joint, curve),
     ]
 
@@ -181,7 +181,7 @@ def _describe_slip(joint: JointMode, curve: Curve) -> list[str]:
     return sentences
 
 
-def _describe_band_width(backbone: Backbone) -> str:
+def describe_band_width(backbone: Backbone) -> str:
     """Describe where the band of the damping ratio is widest, and the largest deviation of the frequency."""
     band = backbone.band
     curve = backbone.best
@@ -193,8 +193,11 @@ def _describe_band_width(backbone: Backbone) -> str:
         deviations.append(np.maximum(above, below) / np.maximum(np.abs(value), 1e-300))
     frequency, damping = deviations
     k = int(np.argmax(damping))
+
+    # a second curve widens the band only where it has a value
+    others = [other for other in backbone.curves.values() if other is not curve]
     content = "the numerical error"
-    if len(backbone.curves) > 1:
+    if any(match_amplitudes(curve, other)[0].size for other in others):
         content += " and the difference of the two methods"
     return (
         f"Its band is {content}; it is widest at {format_length(curve.amplitude[k], 3)}, where the damping ratio is "
@@ -203,11 +206,16 @@ def _describe_band_width(backbone: Backbone) -> str:
     )
 
 
-def _describe_static_curve(curves: dict[str, Curve]) -> list[str]:
-    """Describe up to which amplitude frequency and damping of the quasi-static curve agree with harmonic balance."""
+def describe_static_curve(curves: dict[str, Curve]) -> list[str]:
+    """Describe up to which amplitude frequency and damping of the quasi-static curve agree with harmonic balance.
+
+    Nothing is said without an amplitude at which both curves have a value.
+    """
     if len(curves) < 2:
         return []
     here, there = match_amplitudes(curves["balance"], curves["quasi-static"])
+    if not here.size:
+        return []
     balance = curves["balance"].at(here)
     static = curves["quasi-static"].at(there)
     agrees = np.ones(balance.amplitude.size, bool)
@@ -220,7 +228,9 @@ def _describe_static_curve(curves: dict[str, Curve]) -> list[str]:
     # the range ends at the first amplitude at which they differ
     tolerance = f"{100 * AGREEMENT:g} %"
     if agrees.all():
-        return [f"The quasi-static curve holds within {tolerance} at all its amplitudes."]
+        return [
+            f"The quasi-static curve holds within {tolerance} at all amplitudes of both curves."
+        ]
     first = int(np.argmin(agrees))
     if not first:
         return [

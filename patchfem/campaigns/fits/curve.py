@@ -227,30 +227,39 @@ class CurveModel:
             )
         return curve
 
-    def choose_methods(self, trials: Iterable) -> None:
-        """Select the backbone methods that succeed for trial values of the free parameters.
+    def choose_methods(self, trials: Iterable) -> str:
+        """Select the backbone methods that have a value at every amplitude, for trial values of the free parameters.
 
         The selection is that of the first trial for which the largest number of METHODS succeeds.
+
+        Returns
+        -------
+        str
+            Note on the method that is left out, with the reason of its first failure; "" if both succeed.
         """
-        reasons: list[str] = []
+        reasons: dict[str, str] = {}
         self.methods = []
         for values in trials:
             successful = []
             for method in METHODS:
                 try:
-                    self._compute_once(tuple(map(float, values)), method)
+                    self.compute(values, method)
                     successful.append(method)
                 except PatchfemError as reason:
-                    reasons.append(f"{method}: {reason}")
+                    reasons.setdefault(method, str(reason))
             self.methods = max(self.methods, successful, key=len)
             if len(self.methods) == len(METHODS):
-                return
+                return ""
+
+        # one method has no value within the ranges, or none has
         if not self.methods:
+            listed = "; ".join(f"{method}: {reasons[method]}" for method in METHODS)
             raise PatchfemError(
-                "no curve of frequency and damping could be computed within the ranges of --free; "
-                f"{'; '.join(reasons[: len(METHODS)])}; leave out the rows with the largest "
-                "damping, or change the ranges of --free"
+                f"no curve of frequency and damping could be computed within the ranges of --free; {listed}; leave out "
+                "the rows with the largest damping, or change the ranges of --free"
             )
+        (omitted,) = set(METHODS) - set(self.methods)
+        return f"the fit is by {self.methods[0]} alone: {omitted}: {reasons[omitted]}"
 
 
 def compute_points(model: Model, amplitudes: np.ndarray, method: str) -> np.ndarray:
@@ -340,22 +349,23 @@ def fit_curve(
 
     problem = make_problem(METHODS[0], None)
     points = make_space_filling_points(MAX_TRIALS, len(ranges))
-    curves.choose_methods([problem.start, *map(problem.search_space.to_values, points)])
+    choice = curves.choose_methods([problem.start, *map(problem.search_space.to_values, points)])
     if say:
         say(f"{n_amplitudes} amplitudes computed by {' and '.join(curves.methods)}")
 
     # the fast method gives the start of the search by the reference method
     reference = curves.methods[0]
-    start = None
     if len(curves.methods) > 1:
-        start = make_problem(curves.methods[-1], None).solve(starts, "").values
-        starts = 1
-    problem = make_problem(reference, start)
-    fit = problem.solve(starts, "series")
+        first = make_problem(curves.methods[-1], None).solve(starts, "")
+        problem = make_problem(reference, first.values)
+        fit = problem.solve(1, "series").count_earlier_search(first)
+    else:
+        problem = make_problem(reference, None)
+        fit = problem.solve(starts, "series")
     fitted = curves.compute(fit.values, reference)
     widened, mode_notes = _widen_by_missing_modes(problem, fit, curves, measured)
     beyond, advice = extrapolate_curve(curves, measured, widened)
-    notes = [measured.assumed, _note_different_methods(reference, measured)]
+    notes = [choice, measured.assumed, _note_different_methods(reference, measured)]
     return FittedCurve(
         keys=keys.make_fitted_keys(widened, begin),
         path=Path(curve_file),

@@ -144,7 +144,7 @@ def fit_hysteresis_loop(
             first = problem.solve(interval_kind="")
             bench.refine_steps(first.values)
             fit = replace(problem, start=first.values).solve(1, "series")
-            fit = replace(fit, agreed=first.agreed)
+            fit = fit.count_earlier_search(first)
     except NotConverged as error:
         if bench.n_computed == 0:
             raise bench.first_error or error from None

@@ -15,7 +15,6 @@ MIN_DISPLACEMENT = 0.01 * 25.4e-6
 # Largest absolute log ratio, which is also assigned to unbounded and to vanishing motions.
 MAX_LOG_RATIO = log(1e3)
 EQUAL_TOL = 1e-9  # Largest relative difference at which two inputs count as equal.
-INPUT_DIGITS = 8  # digits of the logarithm of an input at which two inputs count as equal
 CONDITION_COLUMNS = {"frequency": "frequency", "input": "acceleration"}
 
 
@@ -152,6 +151,13 @@ def _format_cell(name: str, value) -> str:
     return f"{value:.6g}{unit}" if unit else str(value) or "(none)"
 
 
+def _number_values(values) -> np.ndarray:
+    """Return the number (n,) of each value in rising order; values within EQUAL_TOL have the same number."""
+    distinct, place = np.unique(values, return_inverse=True)
+    is_new = np.diff(distinct, prepend=-np.inf) > EQUAL_TOL * distinct
+    return np.cumsum(is_new)[place]
+
+
 def read_response_table(path: Path) -> Readings:
     """Read the readings from a CSV table of measured responses (`inputs.measured.read_table`).
 
@@ -184,8 +190,8 @@ def read_response_table(path: Path) -> Readings:
 
     # inputs that differ only by the round-off of a unit conversion are one condition
     inputs = np.array([(rows[k].frequency, rows[k].input) for k in row_numbers])
-    rounded = np.round(np.log(inputs), INPUT_DIGITS)
-    _, first, condition = np.unique(rounded, axis=0, return_index=True, return_inverse=True)
+    numbers = np.transpose([_number_values(column) for column in inputs.T])
+    _, first, condition = np.unique(numbers, axis=0, return_index=True, return_inverse=True)
     return Readings(
         path=Path(path),
         rows=rows,

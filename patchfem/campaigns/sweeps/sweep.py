@@ -189,6 +189,7 @@ class ChunkQueue:
         self.min_size = min_size
         self.remaining = deque(numbers)
         self.suspects: deque[int] = deque()
+        self.last_suspects: deque[int] = deque()
         self.deaths: Counter[int] = Counter()
         self.workers = max(workers, 1)
         # Elapsed time per case of the last chunk, with a guess before the first chunk.
@@ -197,12 +198,14 @@ class ChunkQueue:
     def take_chunk(self, *, is_idle: bool = True) -> list | None:
         """Return the case numbers of the next chunk; None if none is available at present.
 
-        Cases of failed chunks are returned last and one by one, and only if `is_idle`, that is, if no other chunk
-        is being computed. This identifies the case that kills a worker.
+        Cases of failed chunks are returned last and one by one. The last attempt is only made if `is_idle`, that is, if no
+        other chunk is being computed, so that the case itself has killed the worker.
         """
         n_remaining = len(self.remaining)
         if not n_remaining:
-            return [self.suspects.popleft()] if self.suspects and is_idle else None
+            if self.suspects:
+                return [self.suspects.popleft()]
+            return [self.last_suspects.popleft()] if self.last_suspects and is_idle else None
         max_size = n_remaining
         if self.workers > 1:
             # A chunk has at most half of the remaining cases per worker, so that all workers finish
@@ -218,9 +221,17 @@ class ChunkQueue:
 
     def record_death(self, numbers: Sequence[int]) -> list[int]:
         """Record the failure of a chunk: return the cases to abandon, and queue the others to be repeated alone."""
+        abandoned: list[int] = []
         self.deaths.update(numbers)
-        self.suspects += [number for number in numbers if self.deaths[number] < MAX_DEATHS]
-        return [number for number in numbers if self.deaths[number] >= MAX_DEATHS]
+        for number in numbers:
+            n_left = MAX_DEATHS - self.deaths[number]
+            if n_left > 1:
+                self.suspects.append(number)
+            elif n_left == 1:
+                self.last_suspects.append(number)
+            else:
+                abandoned.append(number)
+        return abandoned
 
 
 def iterate_chunks(

@@ -26,7 +26,8 @@ class CurvePath:
 
     - x, p: (k, N), (k,) solutions and parameters
     - folds: parameters at the folds, from a cubic between neighbouring points
-    - ended: "end"; "start" if the curve returned to the other bound; "points"; "step" if no step was short enough
+    - ended: "end" at the bound in the first direction; "start" if the curve returned to the other bound; "points" after the
+      largest number of points; "step" if no step was short enough
     """
 
     x: np.ndarray

@@ -13,8 +13,8 @@ in the width of the cells. Successive cells of equal coefficients become one.
 from dataclasses import replace
 
 import numpy as np
-from scipy.linalg import expm
 
+from ..exponentials import find_exponentials
 from .laws import FlowStates, LawForce
 from .motion import SteadyMotion
 
@@ -117,11 +117,25 @@ def find_monodromy(motion: SteadyMotion, modes, cells: int = 0) -> np.ndarray:
         rates[:, k, n : 2 * n] = np.outer(gain[first], group.rows[i])
         rates[:, k, k] = -loss[first]
 
-    steps = expm(rates * np.add.reduceat(widths, first)[:, None, None])
+    steps = _find_cell_steps(rates, np.add.reduceat(widths, first), n)
+
+    # A reversal ends a cell; its memory is the slide there.
     for k, (i, node, _) in enumerate(turns, 2 * n):
         last = np.searchsorted(first, node) - 1
         steps[last, k] = group.rows[i] @ steps[last, :n]
     return _multiply(steps)
+
+
+def _find_cell_steps(rates, widths, n: int) -> np.ndarray:
+    """Return the transition matrices (c, s, s) of cells from the rates of the state by theta and the widths (c,) [rad].
+
+    Velocities, the coordinates n to 2 n, are divided by a scale, which balances the entries of stiff modes and contacts.
+    """
+    scale = max(float(np.sqrt(np.abs(rates[:, n : 2 * n, :n]).max())), 1.0)
+    sizes = np.ones(rates.shape[1])
+    sizes[n : 2 * n] = scale
+    balanced = rates * (sizes / sizes[:, None])
+    return find_exponentials(balanced * widths[:, None, None]) * (sizes[:, None] / sizes)
 
 
 def _average(values, weight=0.5):

@@ -230,8 +230,17 @@ def _compare_roughness(comparison: Comparison) -> dict:
             row = {side: entries[name] for side, entries in content[region].items()}
             rows[f"{name} {region}"] = row | {"cutoff": {"value": evidence.cutoff, "unit": "m"}}
     if not rows:
-        content["reason"] = sentences.REASONS["no_track"]
+        content["reason"] = sentences.REASONS[_explain_no_roughness(comparison)]
     return {"roughness": content, "track_roughness": rows}
+
+
+def _explain_no_roughness(comparison: Comparison) -> str:
+    """Return the code of the reason why there is no roughness inside and outside of a track."""
+    if comparison.is_areal:
+        return "scans"
+    if comparison.track is None:
+        return "no_track"
+    return "elsewhere" if comparison.evidence.placement.basis == "flanks" else "short_track"
 
 
 def _make_data(comparison: Comparison) -> dict[str, Variable]:

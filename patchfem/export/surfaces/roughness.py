@@ -28,8 +28,8 @@ MAX_FACTOR = (
 # parameters in the headline: those of a scan, of a trace with a cut-off, and of one without
 MAIN = (("Sa", "Sq", "Sz"), ("Ra", "Rq", "Rz"), ("Pa", "Pq", "Pt"))
 INTERVAL_NOTE = (
-    "Intervals of a single trace are 90 % intervals (5 to 95 %) of the mean over its sections of one cut-off, by Student's "
-    "t from the scatter of their logarithms."
+    "Intervals of a single trace are 90 % intervals (5 to 95 %) by Student's t of the logarithm, from the changes of each "
+    "parameter if one section of a cut-off is left out."
 )
 MEANS_NOTE = (
     "Means have equal weights, and 95 % intervals by Student's t from the scatter of the files, where these determine the "
@@ -144,7 +144,7 @@ def _state_main(values: dict[str, Quantity], members: list[RoughnessReport]) -> 
     parts = []
     names = next(names for names in MAIN if names[0] in values)
     for name in names:
-        if name not in values:
+        if not sentences.is_known(values.get(name)):
             continue
         text = f"{name} {sentences.format_value(name, values[name])}"
         if values[name].reason == "few_files":

@@ -26,7 +26,7 @@ VERDICTS = {
     "scar_or_bow": "Either a scar over all of the surface, up to {scar_depth} deep on average, or a bent datum of the "
     "instrument: both are possible.",
     "scar_or_drift": "Either wear of {scar_depth}, the mean over {region}, or drift of the instrument: both are possible.",
-    "elsewhere": "Not comparable: the two surfaces have no part in common, and no unworn flanks of a track show a depth.",
+    "elsewhere": "Not comparable: no common part of both surfaces is found, and no unworn flanks of a track show a depth.",
     "no_datum": "No worn depth: the place is the same, but too few heights agree ({unworn} of all) to measure depths from.",
     "mirror_finish": "Not comparable: the short waves of the surface (rms height {rq}) hardly exceed the noise ({noise}).",
     "identical": "No wear: both files hold the same heights; was the same file given twice?",
@@ -39,7 +39,8 @@ ADVICE = {
     "no_datum": "Measure a longer part, so that more of the unworn surface is on both traces.",
     "mirror_finish": "Measure with less noise; for traces, the start may be marked on the part and its shift given.",
     "growth_at_ends": "Measurements that end on unworn surface on both sides would decide.",
-    "scar_or_drift": "Unworn parts drift nearly as much as the deepest place is worn; repeated measurements would decide.",
+    "scar_or_drift": "The unworn parts drift so much that one of many places may look as deep; comparing two measurements "
+    "of the worn surface would show the drift alone.",
     "scar_or_bow": "Longer traces with unworn surface on both sides, or a datum that is known to be straight, would decide.",
 }
 
@@ -48,7 +49,11 @@ SCANS = {
     "elsewhere": (
         "Not comparable: no part of the first scan is found in the second one.",
         "Measure the same place again, with more of the unworn surface beside the track.",
-    )
+    ),
+    "no_wear": (
+        VERDICTS["no_wear"],
+        "A worn square of {side} x {side} points is not seen below a mean depth of {detection_limit}.",
+    ),
 }
 
 # Sentences on findings: further sentences of the verdict, warnings, and notes.
@@ -67,14 +72,16 @@ WARNINGS = {
     "other_step": "The traces have different steps, {before} before and {after} after; slopes and the largest depth depend "
     "on them.",
     "likely_place": "The place is likely, not sure: there the surfaces agree by {significance} standard deviations more "
-    "than at other places ({sure} are sure); compare their curves.",
-    "drift": "The datum drifts by {height}, more than the noise; the intervals contain this error.",
-    "either_plane": "Another plane fits the unworn heights as well, and would give other depths.",
+    "than at other places, and more than {sure} make a place sure; compare their curves.",
+    "drift": "The datum drifts by {height} (rms), more than the noise of neighbouring depths ({noise}); the intervals "
+    "contain this error.",
 }
 NOTES = {
-    "other_tracks": "{count} more tracks were found; compare.json lists them.",
+    "left_out": "{before} heights before wear and {after} after it are spikes, dropouts or dust and are left out; "
+    "--keep-spikes keeps them.",
+    "other_tracks": "Further tracks: {count}, which compare.json lists.",
     "sure_place": "The place is sure: there the surfaces agree by {significance} standard deviations more than at "
-    "other places ({sure} are sure).",
+    "other places, and more than {sure} make a place sure.",
     "track_cut": "The track leaves the common part, so that it may be wider than stated.",
     "deposits": "{amount} of material lie above the first surface: deposits or pile-up.",
     "mirrored": "The second surface was measured in the opposite direction; it was mirrored, so that its x counts from "
@@ -86,25 +93,27 @@ NO_LIMIT = "any amount"  # stands for a missing number
 
 # Why a quantity has no value.
 REASONS = {
-    "elsewhere": "the two surfaces have no part in common",
+    "elsewhere": "no common part of both surfaces is found",
     "no_wear": "no wear is shown",
     "no_track": "no track is shown",
     "cut_off": "the track leaves the part that both surfaces show",
-    "no_flanks": "the flanks of the track are not known",
     "noise": "the noise is as large as the roughness",
-    "too_short": "the surface is too short",
+    "short_track": "the track, or the surface beside it, is too short for a standard cut-off",
+    "scans": "only that of traces is compared",
+    "other_step": "the steps differ",
+    "unresolved": "it is shorter than two steps, which do not resolve it",
+    "not_falling": "the autocorrelation does not fall to 0.2 within half of each side",
     "no_limit": "even or wedge-shaped wear of any size looks like an offset or tilt of the datum",
     "not_hidden": "unworn parts show where the datum is, so that no wear can hide",
     "identical": "both files hold the same heights",
     "no_datum": "too few heights agree to measure depths from",
+    "mirror_finish": "the short waves of the surface hardly exceed the noise",
     "growth_at_ends": "a scar and growth at the ends are both possible",
     "scar_or_bow": "a scar and a bent datum are both possible",
     "scar_or_drift": "wear and drift of the instrument are both possible",
     "flat": "the surface is flat",
     "undetermined": "the heights do not determine it",
-    "holes": "missing heights prevent it",
     "band": "the surface is too short, or its step too long, for the waves of the band",
-    "strips": "the patch is in strips",
     "sections": "no interval from fewer than five sections",
     "few_files": "no interval from so few files",
 }
@@ -196,7 +205,9 @@ def describe(comparison: Comparison) -> Words:
             notes.append(NOTES[code].format_map(fields))
         else:
             verdict.append(IN_VERDICT[code].format_map(fields))
-    notes = [*verdict[MAX_SENTENCES:], *notes, INTERVALS]
+    notes = [*verdict[MAX_SENTENCES:], *notes]
+    if any(is_known(quantity) and quantity.low is not None for quantity in values.values()):
+        notes.append(INTERVALS)
     return Words(tuple(verdict[:MAX_SENTENCES]), tuple(warnings), tuple(notes))
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Sequence
-from functools import cache, lru_cache
+from functools import lru_cache
 from typing import Any, NamedTuple, get_args, get_origin
 
 from pydantic import ValidationError
@@ -12,7 +12,7 @@ from pydantic import ValidationError
 from ..lines import split_key
 from . import quantities
 from .contact import MATERIAL_REQUIREMENT, Material
-from .tables import Tables
+from .tables import Structure, Tables
 from .types import Key, Table, advise_on_name, list_keys
 
 MAX_SHOWN_CHARACTERS = 60  # largest number of characters of a wrong value in a message
@@ -79,7 +79,7 @@ def validate_value(key: str, value: Any, ignored: Iterable[str] = ()) -> dict[st
     valid, errors = validate_values(known.table, {known.name: value})
     for error in errors:
         if error["loc"][0] == known.name and error["type"] not in ("missing", *ignored):
-            raise ValueError(describe_error(known, error, value))
+            raise ValueError(describe_error(known, error, value, key))
     return valid
 
 
@@ -95,9 +95,16 @@ def validate_values(
     return valid, ()
 
 
-@cache
-def describe_requirement(key: Key | None) -> str:
-    """Describe what a key requires, as a clause of a message, or return "" for a table and an unknown key."""
+@lru_cache(1024)
+def describe_requirement(key: Key | None, path: str) -> str:
+    """Describe what a key requires, as a clause of a message, or return "" for an unknown key.
+
+    Parameters
+    ----------
+    key : Key or None
+    path : str
+        Dotted key, which a clause about a table names.
+    """
     if key is None:
         return ""
     types = key.types
@@ -114,34 +121,53 @@ def describe_requirement(key: Key | None) -> str:
     if Material in types:
         return MATERIAL_REQUIREMENT
     if key.allowed:
-        number = " (or a whole number)" if int in types else ""
-        return f"one of {', '.join(key.allowed)} is needed{number}"
+        other = _describe_other_type(key, path)
+        return f"one of {', '.join(key.allowed)}{other and f', or {other},'} is needed"
+    if key.inner is not None:
+        table = f"an array of tables [[{path}]]" if holds_array else f"a table [{path}]"
+        return f"{table} is needed"
     if holds_array:
-        return "" if key.inner else _describe_array_requirement(types)
+        return _describe_array_requirement(types)
     if float in types:
-        return "a plain number is needed"
+        other = ", or the name of a file," if key.names_file else ""
+        return f"a plain number{other} is needed"
     if int in types:
         return "a whole number is needed"
     return "a text in quotes is needed"
 
 
-def describe_missing_key(key: Key | None) -> str:
+def _describe_other_type(key: Key, path: str) -> str:
+    """Return what a key accepts in place of one of its words: a table, a whole number, or "" for nothing else."""
+    if key.inner is not None:
+        return f"a table [{path}]"
+    return "a whole number" if int in key.types else ""
+
+
+def describe_missing_key(key: Key | None, path: str) -> str:
     """Describe the value that a missing key needs; the meaning of the key follows where its type says too little."""
-    needed = describe_requirement(key)
+    if key is not None and key.is_array and key.inner is not None:
+        return ""
+    needed = describe_requirement(key, path)
     if not (needed.startswith(_UNSPECIFIC_REQUIREMENTS) and key.record.meaning):
         return needed
-    return f"{needed} ({re.split('[;:]', key.record.meaning)[0]})"
+    return f"{needed} ({re.split('[;:] ', key.record.meaning)[0]})"
 
 
 def _describe_array_requirement(types: tuple) -> str:
     """Return what an array of numbers without unit requires."""
     if float in types:
         return "plain numbers are needed, such as [1, 1.5]"
-    is_open = any(... in get_args(part) for part in types)
-    return f"{'' if is_open else 'two '}whole numbers are needed, such as [1, 2]"
+    if str in types:
+        return "whole numbers or texts are needed, such as [1, '12:x']"
+    return f"{'' if _is_open_array(types) else 'two '}whole numbers are needed, such as [1, 2]"
 
 
-def describe_error(key: Key, error: Any, value: Any) -> str:
+def _is_open_array(types: tuple) -> bool:
+    """Return whether an array may have any number of values, and not a fixed one."""
+    return any(... in get_args(part) for part in types)
+
+
+def describe_error(key: Key, error: Any, value: Any, path: str) -> str:
     """Return the message for a validation error of pydantic.
 
     Parameters
@@ -151,24 +177,40 @@ def describe_error(key: Key, error: Any, value: Any) -> str:
         One of `ValidationError.errors()`.
     value
         The wrong value as it is written.
+    path : str
+        Dotted key, which a message about a table names.
     """
-    needed = describe_requirement(key)
+    needed = describe_requirement(key, path)
     if error["type"] in LIMITS_BY_ERROR_TYPE:
         limit = LIMITS_BY_ERROR_TYPE[error["type"]]
         bound = error["ctx"][limit.name]
         text = str(bound) if isinstance(bound, int) else f"{bound:g}"
         if bound and key.kind:
             text = quantities.format_si(bound, key.kind)
-        return f"must be {limit.sign} {text}, not {format_for_message(value)}; {needed}"
+        # A limit is compared only after the number and its unit were read, so that these are right.
+        reason = key.limit_reason if float in key.types else needed
+        refusal = f"must be {limit.sign} {text}, not {format_for_message(value)}"
+        return f"{refusal}; {reason}" if reason else refusal
     if error["type"] == "too_short" and value and error["ctx"]["min_length"] > 1:
         return f"at least {error['ctx']['min_length']} values are needed, not {len(value)}"
     if error["type"] == "too_long":
         most = error["ctx"]["max_length"]
-        return f"{len(value)} values are too many; at most {most} are possible"
+        if not _is_open_array(key.types):
+            return f"{needed}, not {len(value)} values"
+        remedy = (
+            "; give the modes of a larger rig in structure.file" if key.table is Structure else ""
+        )
+        return f"{len(value)} values are too many; at most {most} are possible{remedy}"
+    if error["type"] == "missing" and isinstance(value, list) and value:
+        return f"{needed}, not {len(value)} value{'s' if len(value) > 1 else ''}"
+    if error["type"] == "string_too_short":
+        return "must not be an empty text"
     if error["type"] == "value_error":
         return str(error["ctx"]["error"])
     if key.allowed and isinstance(value, str):
-        return f"unknown value {format_for_message(value)}; {advise_on_name(value, key.allowed)}"
+        other = _describe_other_type(key, path)
+        advice = advise_on_name(value, key.allowed) + (other and f", or give {other}")
+        return f"unknown value {format_for_message(value)}; {advice}"
     return f"{needed or 'another value is needed'}, not {format_for_message(value)}"
 
 

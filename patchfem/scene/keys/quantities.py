@@ -117,6 +117,8 @@ def _describe_non_text(value: object, kind: str) -> str:
     reason = "not a quantity"
     if isinstance(value, bool):
         reason = f"{str(value).lower()} is not a quantity"
+    elif isinstance(value, list | dict):
+        reason = f"{'an array' if isinstance(value, list) else 'a table'} is not a quantity"
     elif isinstance(value, int | float):
         reason = "a bare number without a unit"
     return f"{reason}; {describe_requirement(kind)}"

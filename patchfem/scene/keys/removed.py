@@ -1,33 +1,34 @@
 """Keys, files and options that patchfem no longer takes: one table, with what to use instead."""
 
-# Version that removed a key, files or an option of a verb, and what to use instead. Rows of 1.x are gone: their names are
-# as unknown as any other.
+# Version that removed a key, files or an option of a verb, and what to use instead. Most names that 1.0.0 removed have no
+# row: they are as unknown as any other.
 REMOVED_NAMES = {
-    "structure.interface.lateral": ("2.0", "leave it out: an interface slides along x alone"),
-    "structure.mode.lateral": ("2.0", "leave it out: the patch slides along x alone"),
+    "accuracy.convergence": ("1.0", "use accuracy.method = 'march' without it"),
+    "structure.interface.lateral": ("1.3", "leave it out: an interface slides along x alone"),
+    "structure.mode.lateral": ("1.1", "leave it out: the patch slides along x alone"),
     "friction.breakaway": (
-        "2.0",
+        "1.4",
         "leave it out; law 'iwan' or 'elastic-plastic' does not creep under an oscillating force",
     ),
     "structure.interface.breakaway": (
-        "2.0",
+        "1.4",
         "leave it out; law 'iwan' or 'elastic-plastic' does not creep",
     ),
     "approach of a piece that can rotate": (
-        "2.0",
+        "1.4",
         "give contact.load, or leave out [contact.load_line] and contact.holder.rotational_stiffness",
     ),
-    "files of Nastran": ("2.0", "convert the matrix, with pyNastran for example"),
+    "files of Nastran": ("1.3", "convert the matrix, with pyNastran for example"),
     "fit --placebo": (
-        "2.0",
+        "1.2",
         "set another value of the key with --set and compare the scores of the fits",
     ),
     "fit --from-patch": (
-        "2.0",
+        "1.2",
         "run the scene with its patch, or fit the law of a point to a loop that `run` and `export` wrote",
     ),
-    "fit --amplitudes": ("2.0", "leave it out: it belonged to --from-patch"),
-    "export --of": ("2.0", "leave it out: choose the field in ParaView"),
+    "fit --amplitudes": ("1.2", "leave it out: it belonged to --from-patch"),
+    "export --of": ("1.2", "leave it out: choose the field in ParaView"),
 }
 
 

@@ -15,6 +15,7 @@ from .accuracy import Accuracy
 from .contact import Contact, Grooves
 from .quantities import format_si, parse_quantity
 from .types import (
+    MAX_MAGNITUDE,
     AbsoluteTemperature,
     Acceleration,
     Duration,
@@ -36,6 +37,7 @@ from .types import (
     number,
     optional,
     quantity,
+    require_magnitude,
     whole_number,
 )
 
@@ -380,7 +382,7 @@ class Structure(Table):
         Length,
         "displacement at which the flexure meets its stop; a larger displacement ends the run; default: no stop",
     )
-    mode: tuple[Mode, ...] = ()
+    mode: Annotated[tuple[Mode, ...], Field(max_length=MAX_COORDINATES)] = ()
     measured: key(
         Literal["free", "stuck"],
         "'free': the modes are those of the rig without the joint; 'stuck': frequencies and damping were measured "
@@ -524,7 +526,10 @@ class Drive(Table):
         """Read the levels of a force drive: write each force in SI as if it were an acceleration."""
         if info.data.get("kind") != "force" or not isinstance(value, list | tuple):
             return value
-        return [format_si(parse_quantity(level, "force"), "acceleration") for level in value]
+        forces = [parse_quantity(level, "force") for level in value]
+        for force in forces:
+            require_magnitude(force, smallest=1 / MAX_MAGNITUDE, unit="N")
+        return [format_si(force, "acceleration") for force in forces]
 
 
 class WornFriction(Table):

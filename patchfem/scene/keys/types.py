@@ -14,7 +14,7 @@ from pydantic import BaseModel, ConfigDict, Field, Strict, WithJsonSchema, field
 from pydantic.types import AllowInfNan
 from pydantic_core import core_schema
 
-from .quantities import EXAMPLE_QUANTITIES, parse_quantity, read_percentage
+from .quantities import EXAMPLE_QUANTITIES, find_si_unit, parse_quantity, read_percentage
 
 # Largest magnitude of a value in SI; its fourth power, and products with
 # that, stay within double precision.
@@ -63,17 +63,42 @@ class Kind(str):
     """Annotation of a key whose value is a quantity of this kind (see `quantities.UNIT_FACTORS`)."""
 
 
+class LimitReason(str):
+    """Annotation of a key with limits: why a value beyond them is refused, as a clause of a message."""
+
+
 # Annotation of a key that names a file.
 FILE_MARK = object()
 
 
-def _require_magnitude(value: float, smallest: float) -> float:
-    """Return a value; raise ValueError if its magnitude is above MAX_MAGNITUDE or in (0, `smallest`)."""
+def require_magnitude(
+    value: float, *, smallest: float = 0.0, accepts_zero: bool = True, unit: str = ""
+) -> float:
+    """Return a value if its magnitude is one with which the program can compute.
+
+    Parameters
+    ----------
+    value : float
+        Value in SI.
+    smallest : float
+        Smallest magnitude other than 0.
+    accepts_zero : bool
+        Whether the message names 0 as a value that is accepted.
+    unit : str
+        Unit in SI, for the message; "" for a plain number.
+
+    Raises
+    ------
+    ValueError
+        If the magnitude is above MAX_MAGNITUDE or in (0, `smallest`).
+    """
     if value and not smallest <= abs(value) <= MAX_MAGNITUDE:
-        allowed = f"must not exceed {MAX_MAGNITUDE:g} in magnitude"
+        needed = f"a magnitude of at most {MAX_MAGNITUDE:g} {unit}".strip()
         if smallest:
-            allowed = f"must be 0 or have a magnitude from {smallest:g} to {MAX_MAGNITUDE:g}"
-        raise ValueError(f"{value:g} in SI is outside the computable range; the value {allowed}")
+            zero = "0 or " if accepts_zero else ""
+            needed = f"{zero}a magnitude from {smallest:g} to {MAX_MAGNITUDE:g} {unit}"
+        shown = f"{value:g} {unit}".strip()
+        raise ValueError(f"{shown} is outside the computable range; {needed} is needed")
     return value
 
 
@@ -89,13 +114,19 @@ def quantity(kind: str, **limits: float) -> Any:
     """
     schema = {"type": "string", "examples": [EXAMPLE_QUANTITIES[kind]]}
     smallest = 1 / MAX_MAGNITUDE if kind in DIVISOR_KINDS else 0.0
+    check = partial(
+        require_magnitude,
+        smallest=smallest,
+        accepts_zero="gt" not in limits,
+        unit=find_si_unit(kind),
+    )
     return Annotated[
         float,
         Kind(kind),
         CheckBefore(partial(parse_quantity, kind=kind)),
         WithJsonSchema(schema),
         Field(**limits),
-        CheckAfter(partial(_require_magnitude, smallest=smallest)),
+        CheckAfter(check),
     ]
 
 
@@ -106,7 +137,7 @@ def number(**limits: float) -> Any:
         Strict(),
         AllowInfNan(False),
         Field(**limits),
-        CheckAfter(partial(_require_magnitude, smallest=0.0)),
+        CheckAfter(require_magnitude),
         CheckBefore(read_percentage),
     ]
 
@@ -277,6 +308,7 @@ class Key:
     - allowed: the words of a key that accepts one of a few.
     - accepts_value: whether the key accepts a value, as a material or a coating does in place of its table.
     - kind: kind of quantity of the value or of its items; None without unit.
+    - limit_reason: why a value beyond the limits is refused; "" where this needs no words.
     - names_file: whether a text of this key is the name of a file.
     - record: documentation; that of a table is empty.
     """
@@ -298,6 +330,8 @@ class Key:
         self.allowed: tuple[str, ...] = get_args(literals[0]) if literals else ()
         self.accepts_value = self.inner is None or self.inner.has_name or bool(literals)
         self.kind = next((str(mark) for mark in marks if isinstance(mark, Kind)), None)
+        reasons = (str(mark) for mark in marks if isinstance(mark, LimitReason))
+        self.limit_reason = next(reasons, "")
         self.names_file = FILE_MARK in marks
         self.record = next(filter(_is_record, field.metadata), KeyRecord(""))
 

@@ -98,7 +98,7 @@ def _check_stiffness(law: TableFacts, contact: TableView) -> None:
 
 
 def find_unused_law_keys(law: Friction) -> list[str]:
-    """Return the keys that have no effect on the bonds of a law, whose length is constant or does not grow at rest."""
+    """Return the keys of a law of bonds that have no effect because their length is constant or does not grow at rest."""
     if not law_has_trait(law.law, "bonds"):
         return []
     bond = TableView(law)

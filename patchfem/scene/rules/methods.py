@@ -289,7 +289,7 @@ def _find_obstacle(method: str, motion: MotionFeatures) -> str:
     if motion.compliance or not motion.has_grooves or not law_has_trait(law, "memoryless"):
         return ""
     return (
-        f"the motion over grooves under law '{law}' is computed from event to event since 2.0; use 'exact' or leave "
+        f"the motion over grooves under law '{law}' is computed from event to event; use 'exact' or leave "
         "`method` out"
     )
 

@@ -104,7 +104,7 @@ class SceneDraft:
 
     def add_missing(self, key: str, reason: str) -> None:
         """Add a missing key as a mistake at the line of its table."""
-        needed = describe_missing_key(find_key(key))
+        needed = describe_missing_key(find_key(key), key)
         clauses = dict.fromkeys(filter(None, ("missing", needed, reason)))
         self.add_mistake(key, "; ".join(clauses))
 

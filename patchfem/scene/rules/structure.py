@@ -13,8 +13,8 @@ from .scene_draft import SceneDraft
 
 ARRAY_EXTENSIONS = (".npz", ".mat")
 UNIVERSAL_EXTENSIONS = (".uff", ".unv")
-# File extensions of matrices from finite-element programs, for [structure.reduced].
 MATRIX_KEYS = ("stiffness", "mass", "damping")  # keys of the files of [structure.reduced]
+# Extensions of these files, and those of Nastran, which are no longer read.
 MATRIX_EXTENSIONS = (".mtx", ".mat", ".npz")
 NASTRAN_EXTENSIONS = (".op4", ".pch", ".bdf", ".dat")
 # Largest plausible damping ratio, at which a free oscillation decays to a few per cent within one
@@ -88,10 +88,11 @@ def _check_file(structure: TableFacts) -> None:
         advice = advise_on_name(extension, (*ARRAY_EXTENSIONS, ".uff"))
         structure.add_mistake(
             "file",
-            f"the name ends in '{extension}'; {advice}: matrices or modes as arrays, or universal files",
+            f"{_describe_extension(extension)}; {advice}: matrices or modes as arrays, or universal files",
         )
     if extension not in UNIVERSAL_EXTENSIONS:
-        for key in filter(structure.has, LOCATION_KEYS):
+        keys = LOCATION_KEYS if extension in ARRAY_EXTENSIONS else ()
+        for key in filter(structure.has, keys):
             array = key.removesuffix("_at")
             structure.add_mistake(
                 key,
@@ -147,7 +148,7 @@ def _check_reduced(structure: TableFacts) -> None:
         if extension in NASTRAN_EXTENSIONS:
             removed = describe_removed("files of Nastran", "reading files of Nastran")
             advice = f"{removed}; {advice}"
-        structure.add_mistake(f"reduced.{key}", f"the name ends in '{extension}'; {advice}")
+        structure.add_mistake(f"reduced.{key}", f"{_describe_extension(extension)}; {advice}")
 
     # Coordinates of the boundary, of the base and of the joint.
     boundary = tuple(reduced.boundary)
@@ -168,7 +169,7 @@ def _check_reduced(structure: TableFacts) -> None:
                 "applies only to [friction]; a [[structure.interface]] names its two sides with the key `between`: "
                 "leave structure.reduced.slide out",
             )
-    elif structure.draft.has("friction") and not reduced.slide:
+    elif structure.draft.has("friction") and not structure.has("reduced.slide"):
         structure.add_missing(
             "reduced.slide",
             "which two boundary coordinates rub against each other, such as slide = [1, 0] for coordinate 1 against "
@@ -177,8 +178,13 @@ def _check_reduced(structure: TableFacts) -> None:
 
 
 def find_file_extension(name: str) -> str:
-    """Return the extension of a file name in lower case, with its dot."""
-    return "." + name.rpartition(".")[2].lower()
+    """Return the extension of a file name in lower case, with its dot; "" for a name without a dot."""
+    return f".{name.rpartition('.')[2].lower()}" if "." in name else ""
+
+
+def _describe_extension(extension: str) -> str:
+    """Return the clause of a message about a file whose extension is wrong."""
+    return f"the name ends in '{extension}'" if extension else "the name has no extension"
 
 
 def _check_modes(structure: TableFacts) -> None:

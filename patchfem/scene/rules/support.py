@@ -1,8 +1,9 @@
 """Combinations of effects that a scene may contain but no run can compute: the table SUPPORT.
 
-Each row names two or three features and says what to do instead; LIMITS.md lists the rows. A feature is a key
-(`structure.stiffening`), a key with a value (`drive.kind=free`) or a row of FEATURES; keys of the patch of a joint begin
-with `patch`. To support a combination, delete its row. What single engines of a rig can compute stands in `methods`.
+Each row names two or more features and says what to do instead; LIMITS.md lists the rows and defines the features. A
+feature is a key (`structure.stiffening`), a key with a value (`drive.kind=free`) or a row of FEATURES; keys of the patch
+of a joint begin with `patch`. To support a combination, delete its row. What single engines of a rig can compute stands
+in `methods`.
 """
 
 from __future__ import annotations
@@ -268,17 +269,15 @@ WITHOUT_JOINT = (
 )
 STEADY_ADVICE = "wear is computed from the last cycle of a steady motion: use"
 # Features that no run supports together, by what to do instead: a key of `effects.REMEDIES`, or the advice itself. A
-# mistake is reported at the key of the first feature, and only the first row of a key counts.
+# mistake is reported at the key of the first feature. Only the first row that applies is reported at a key: of two rows
+# with the same key, that one comes first whose advice also removes the cause of the other.
 COMBINATIONS = {
-    suggest_laws("varying-load"): (
-        "law for a constant load, changing load",
-        "normal.amplitude, bench, law with memory for a constant pressure",
+    "out": (
+        "patch.strips, law of an averaged pressure",
+        "patch.holder.tangential_stiffness, grooves",
+        "spread of the bonds, interface",
+        "patch.grooves, interface",
     ),
-    "recursion": (
-        "sum over all stretched bonds, changing load",
-        "sum over all bonds, grooves",
-    ),
-    "stiff": ("law that sticks rigidly, partial slip, changing load",),
     "either": (
         "structure.stiffening, changing load",
         "structure.bonded.wavelength, changing load",
@@ -291,6 +290,15 @@ COMBINATIONS = {
         "structure.stiffening, grooves",
         "structure.bonded.wavelength, grooves",
     ),
+    suggest_laws("varying-load"): (
+        "law for a constant load, changing load",
+        "normal.amplitude, bench, law with memory for a constant pressure",
+    ),
+    "recursion": (
+        "sum over all stretched bonds, changing load",
+        "sum over all bonds, grooves",
+    ),
+    "stiff": ("law that sticks rigidly, partial slip, changing load",),
     "linear": (
         "patch.asperities.law=exponential, changing load",
         "patch.asperities.law=hertz, changing load",
@@ -311,16 +319,13 @@ COMBINATIONS = {
         "accuracy.quadrature=merged, bench, patch that slips as a whole, shape on the lower piece",
         "accuracy.quadrature=merged, bench, patch that slips as a whole, normal.amplitude",
     ),
+    f"leave out {{compliance}}, or {suggest_laws('pieces', 'shear')}": (
+        "law without elements, partial slip",
+    ),
     "{joints_advice}": (
         "mode with yaw, patch.strips, rig, law for one interface",
         "law for one interface, several interfaces",
         "law for one interface, patch of an interface",
-    ),
-    "out": (
-        "patch.strips, law of an averaged pressure",
-        "patch.holder.tangential_stiffness, grooves",
-        "spread of the bonds, interface",
-        "patch.grooves, interface",
     ),
     f"leave out {{compliance}}, or {suggest_laws('shear')}": (
         "law for rigid pieces, partial slip",
@@ -333,21 +338,19 @@ COMBINATIONS = {
     "leave `harmonics` out: the steady motion of all interfaces is found without it": (
         "accuracy.harmonics, accuracy.method=harmonic, several interfaces",
     ),
-    f"leave out {{compliance}}, or {suggest_laws('pieces', 'shear')}": (
-        "law without elements, partial slip",
-    ),
     "give contact.load instead": ("patch.approach, interface",),
-    "a [normal] contact has no area, so its wear has no depth: use [contact]": (
-        "wear, grooves, load on a point",
-    ),
     "leave out [wear] or {compliance}": ("wear, patch.strips, partial slip",),
-    "put all shapes on the upper piece": ("wear, patch.strips, shape on the lower piece",),
     "leave out [wear] or leave out wear.start": ("wear, patch.strips, wear.start",),
     "leave out [wear] or the amplitude": ("wear, rig, normal.amplitude",),
     "leave out [wear] or describe a single interface by [friction] and [normal]": (
         "wear, structure.interface",
     ),
-    "leave out [wear] or this key": ("wear, mode with heave or pitch",),
+    "leave out [wear] or {load_change}": ("wear, mode with heave or pitch",),
+    "leave out [wear] or use law 'coulomb'": ("wear, law of an averaged pressure",),
+    "a [normal] contact has no area, so its wear has no depth: use [contact]": (
+        "wear, grooves, load on a point",
+    ),
+    "put all shapes on the upper piece": ("wear, patch.strips, shape on the lower piece",),
     f"{STEADY_ADVICE} kind 'base' or 'force'": ("wear, rig, drive.kind=free",),
     f"{STEADY_ADVICE} waveform 'sine'": ("wear, rig, drive other than a sine",),
     "use 'auto', 'exact' or 'march'": ("wear, rig, accuracy.method=harmonic",),
@@ -370,7 +373,6 @@ COMBINATIONS = {
         "sensor apart from the output, drive.kind=free",
         "sensor apart from the output, levels or sweep in time",
     ),
-    "leave out [wear] or use law 'coulomb'": ("wear, law of an averaged pressure",),
 }
 SUPPORT = tuple(
     chain.from_iterable(zip(rows, repeat(instead)) for instead, rows in COMBINATIONS.items())

@@ -19,7 +19,7 @@ from ..profile import Profile, robust_deviation
 from ..quantity import SIDE, Quantity
 from . import waves
 from .alignment import SURE_SIGNIFICANCE, Aligned, align
-from .changes import find_detection_limit
+from .changes import find_detection_limit, find_largest_window
 from .depth_map import UNWORN_LIMIT, DepthMap
 from .depths import make_depths, measure_largest
 from .flanks import find_flanked_track
@@ -161,7 +161,10 @@ def compare_surfaces(
         ratios = _compare_waves((first, second), result, options.direction)
         result = replace(result, values=result.values | ratios)
     evidence = replace(result.evidence, removed=removed)
-    return replace(result, evidence=evidence, direction=options.direction)
+    findings = result.findings
+    if any(removed):
+        findings += (Finding("left_out", dict(zip(("before", "after"), removed))),)
+    return replace(result, findings=findings, evidence=evidence, direction=options.direction)
 
 
 def _check_options(surfaces: tuple[Profile | Areal, Profile | Areal], options: Options) -> None:
@@ -214,9 +217,9 @@ def _measure(
             numbers["unworn"] = float(aligned.fit.unworn.mean())
         if aligned.reason == "mirror_finish":
             numbers = find_mirror_finish([fill_gaps(raster.z) for raster in rasters])
-        values = _name_unknowns((*names.wear, *names.place), aligned.reason)
-        verdict = Finding(aligned.reason, numbers)
-        return Comparison(*surfaces, verdict, values | {"hidden_wear": hidden})
+        unknown = (*names.wear, *names.place, "hidden_wear")
+        values = _name_unknowns(unknown, aligned.reason)
+        return Comparison(*surfaces, Finding(aligned.reason, numbers), values)
 
     # What the same tests find above the first surface is a control for what they find below it.
     spans = find_spans(depths) if is_trace else []
@@ -268,6 +271,8 @@ def _measure(
     )
     numbers = {"lost": area, "grown": grown, "basis": placement.basis}
     numbers |= limit_wear(bounds[2] / depths.size, limit) | possible
+    if not is_trace:
+        numbers["side"] = find_largest_window(depths.depth.shape)
     verdict = Finding(code, numbers)
     evidence = Evidence(placement, datum, depths, regions, cutoff)
     findings = _collect_findings(verdict, evidence, spans, tracks, rasters)
@@ -333,7 +338,11 @@ def _collect_findings(
     known = placement.values.get("significance")
     significance = known.value if known else np.inf
     is_sure = significance > SURE_SIGNIFICANCE
-    place = {"significance": float(np.rint(significance)), "sure": SURE_SIGNIFICANCE}
+    # Rounded up, 11.7 would look as sure as 12.
+    place = {"significance": float(np.floor(significance)), "sure": SURE_SIGNIFICANCE}
+    # The noise of the depths contains the drift; that of neighbours does not.
+    drift = depths.errors.drift
+    short_noise = robust_deviation(np.diff(depths.depth)) / np.sqrt(2)
     steps = [float(raster.steps[-1]) for raster in rasters]
     is_uneven = depths.y is None and max(steps) > MAX_STEP_RATIO * min(steps)
     first, last = depths.x[depths.worn][[0, -1]] if not is_placed else (0.0, 0.0)
@@ -350,11 +359,7 @@ def _collect_findings(
             "other_length",
             {} if scale is None else scale._asdict() | {"scale": scale.value},
         ),
-        (
-            depths.errors.drift > depths.noise_level,
-            "drift",
-            {"height": depths.errors.drift},
-        ),
+        (drift > short_noise, "drift", {"height": drift, "noise": short_noise}),
         (len(tracks) > 1, "other_tracks", {"count": len(tracks) - 1}),
         (tracks and any(tracks[0].cut), "track_cut", {}),
         (has_tops, "worn_tops", {}),
@@ -496,7 +501,9 @@ def _compare_waves(
         return _name_unknowns(RATIO_NAMES, "other_step")
     else:
         lines = [np.moveaxis(fill_gaps(raster.z), axis, -1) for raster in rasters]
-    noise = 0.0 if result.evidence.datum is None else result.evidence.datum.noise
+    datum = result.evidence.datum
+    # A mirror finish has no datum, but the noise of each surface is known.
+    noise = np.sqrt(2) * result.verdict.numbers.get("noise", 0.0) if datum is None else datum.noise
     ends = []
     if depths is not None and depths.y is None:
         places = [track.values[name].value for track in result.tracks for name in ("from", "to")]

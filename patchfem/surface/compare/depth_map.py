@@ -19,7 +19,7 @@ class DepthErrors(NamedTuple):
     """Errors that the unworn heights show.
 
     - variance: function of a mask, variance [m2] of the sum of its depths.
-    - drift: standard deviation [m] of the mean depth of an unworn tile.
+    - drift: root mean square [m] of the mean depths of unworn tiles about the datum, 0 if these are too few.
     - freedom: number of independent tiles, beyond those that determine the datum, that show the variance.
     - correlation: number of neighbouring heights that share an error.
     - model: relative standard deviation of all depths due to gain, tip and interpolation.

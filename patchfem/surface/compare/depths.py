@@ -100,6 +100,7 @@ def estimate_errors(depth, noise, unworn, base) -> DepthErrors:
     # Where tiles are few, a tile may share a single error.
     variance = float(np.median(noise) ** 2 * depth.size / N_TILES[depth.ndim] ** depth.ndim)
     freedom = MIN_FREEDOM
+    drift = 0.0
     if counts.size >= MIN_TILES:
         fitted = np.linalg.lstsq(centers, means * root, rcond=None)[0]
         residual = means * root - centers @ fitted
@@ -107,15 +108,15 @@ def estimate_errors(depth, noise, unworn, base) -> DepthErrors:
         correlation = estimate_correlation(residual)
         freedom = max(counts.size / correlation - len(base), MIN_FREEDOM)
         student = special.stdtrit(freedom, 0.975) / SIDE
-        scatter = residual @ residual / (counts.size - len(base)) * correlation
-        variance = float(scatter * student**2)
+        scatter = residual @ residual / (counts.size - len(base))
+        drift = float(np.sqrt(scatter / counts.mean()))
+        variance = float(scatter * correlation * student**2)
     inverse = np.linalg.pinv(centers.T @ centers, rcond=1e-10, hermitian=True)
 
     def compute_variance(part) -> float:
         moments = base[:, part].sum(axis=1)
         return variance * float(moments @ inverse @ moments + part.sum())
 
-    drift = float(np.sqrt(variance / max(counts.mean(), 1.0)))
     return DepthErrors(compute_variance, drift, freedom)
 
 

@@ -4,7 +4,7 @@ from itertools import product
 from typing import NamedTuple
 
 import numpy as np
-from scipy import fft, ndimage, signal
+from scipy import fft, ndimage
 
 from ..profile import robust_deviation
 from .raster import Raster, fill_gaps
@@ -130,7 +130,9 @@ def _whiten(z) -> np.ndarray:
     Those of a trace fall to zero at its ends, whose jumps would be short waves that both traces share.
     """
     if z.ndim == 1:
-        z = z * signal.windows.tukey(z.size, BORDER_FRACTION)
+        # Tukey's window falls to zero as half a period of a cosine at each end.
+        from_end = np.minimum(np.arange(z.size), np.arange(z.size)[::-1]) / (z.size - 1)
+        z = z * np.sin(np.pi * np.minimum(from_end / BORDER_FRACTION, 0.5)) ** 2
     spectrum = fft.rfftn(z)
     size = np.abs(spectrum)
     return fft.irfftn(spectrum / (size + np.median(size) + TINY), z.shape)

@@ -3,15 +3,16 @@
 from collections.abc import Sequence
 
 import numpy as np
-from scipy import ndimage, signal, special
+from scipy import ndimage, special
 
 from ..profile import find_runs
-from ..quantity import SIDE, Quantity
+from ..quantity import Quantity
 from ..roughness.filter import mean_surface
 from ..roughness.report import fitting_cutoff
 from ..roughness.spectrum import BAND
 from .depth_map import DepthMap
 from .records import DEFINITIONS, name_quantity, name_unknown
+from .track import get_margin
 
 MAX_BLOCKS = 12  # largest number of blocks whose ratios show the scatter of a ratio
 MIN_BLOCKS = 4  # smallest number of blocks
@@ -24,6 +25,8 @@ MIN_WAVES = 3.0  # smallest length of a trace relative to the longest wave of th
 MIN_STEPS = 4.0  # smallest length of the shortest wave of the band in steps
 # Power of the mean over sections that gives a size of the roughness.
 POWERS = {"Ra": 1.0, "Rq": 0.5, "slope": 0.5}
+# Degree of the polynomial that is the form of a part: the bottom of a track is bent.
+FORM_DEGREE = {"inside": 4, "outside": 1}
 
 
 def compare_waves(
@@ -55,7 +58,7 @@ def compare_waves(
     if kept.sum() * step < MIN_WAVES * BAND[1]:
         kept = np.ones(count, bool)
     # The shape of a track has no part in its waves: the second filter removes what the first one leaves of a bend.
-    lines = [signal.detrend(line[:n_lines, :count], axis=1) for line in lines]
+    lines = [_subtract_polynomial(line[:n_lines, :count], 1) for line in lines]
     lines = [z - _filter(z, BAND[1] / step) for z in lines]
     passed = [(_filter(z, BAND[0] / step) - _filter(z, BAND[1] / step))[:, kept] for z in lines]
     slopes = [(np.diff(z, axis=1) / step)[:, kept[1:]] for z in lines]
@@ -81,6 +84,12 @@ def compare_waves(
     return values
 
 
+def _subtract_polynomial(z, degree: int) -> np.ndarray:
+    """Subtract the polynomial of least squares from heights (n,), or from each line of heights (k, n)."""
+    basis = np.linalg.qr(np.vander(np.linspace(-1, 1, z.shape[-1]), degree + 1))[0]
+    return z - z @ basis @ basis.T
+
+
 def _average_squares(values, n_blocks: int, axis: int) -> np.ndarray:
     """Return the mean squares (n_blocks,) of blocks of values (k, n)."""
     return np.array([np.mean(part**2) for part in np.array_split(values, n_blocks, axis)])
@@ -99,8 +108,6 @@ def _divide_means(before, after, power: float, text: str) -> Quantity:
     first = before.mean()
     second = after.mean()
     ratio = float((second / first) ** power)
-    if len(before) < 2:
-        return Quantity(ratio, None, None, "1", text)
     # Linearised ratio of two means: the scatter of its numerator and denominator together.
     influence = after / second - before / first
     scatter = power * influence.std(ddof=1) / np.sqrt(len(before))
@@ -113,8 +120,9 @@ def _divide_means(before, after, power: float, text: str) -> Quantity:
 def measure_roughness(depths: DepthMap, spans: list[tuple[int, int]]) -> tuple[dict, float | None]:
     """Measure Ra, Rq and slope inside of the longest track and outside of all tracks, before and after wear.
 
-    Half a cut-off of the roughness profile is trimmed on both sides of an end of a track. The scatter of sections of
-    a cut-off gives the intervals.
+    As in ISO 21920-2, they are those of the whole roughness profile about its mean line. The form of a part is
+    subtracted, then its mean line; half a cut-off is left out beside the ends of a track, and half a cut-off more at
+    the ends of the filter. The scatter of sections of a cut-off gives the intervals.
 
     Parameters
     ----------
@@ -133,8 +141,11 @@ def measure_roughness(depths: DepthMap, spans: list[tuple[int, int]]) -> tuple[d
     step = depths.cell
     outside = np.ones(depths.x.size, bool)
     for first, last in spans:
-        outside[first : last + 1] = False
-    parts = {"inside": spans[:1], "outside": find_runs(outside)}
+        flank = get_margin((first, last))
+        outside[max(first - flank, 0) : last + 1 + flank] = False
+    flank = get_margin(spans[0])
+    inside = [(spans[0][0] + flank, spans[0][1] - flank)]
+    parts = {"inside": inside, "outside": find_runs(outside)}
     lengths = [max((last - first for first, last in runs), default=0) for runs in parts.values()]
     cutoff = fitting_cutoff(min(lengths) * step, step)
     if cutoff is None:
@@ -143,16 +154,13 @@ def measure_roughness(depths: DepthMap, spans: list[tuple[int, int]]) -> tuple[d
     regions = {}
     edge = int(np.ceil(cutoff / 2 / step))
     for region, runs in parts.items():
-        sections = []
-        for first, last in runs:
-            kept = np.arange(first + edge, last + 1 - edge)
-            if kept.size > edge:
-                sections += np.array_split(kept, max(int(kept.size * step / cutoff), 1))
         sizes = {}
         for side in ("before", "after"):
-            z = getattr(depths, side)
-            rough = z - mean_surface(z, (cutoff / step,))
-            sizes[side] = _measure_sections(rough, sections, step)
+            sections = []
+            for first, last in runs:
+                z = getattr(depths, side)[first + edge : last + 1 - edge]
+                sections += _cut_sections(z, cutoff / step, FORM_DEGREE[region])
+            sizes[side] = _measure_sections(sections, step)
         regions[region] = {side: _average_all(table) for side, table in sizes.items()}
         regions[region]["ratio"] = {}
         for name, power in POWERS.items():
@@ -162,14 +170,33 @@ def measure_roughness(depths: DepthMap, spans: list[tuple[int, int]]) -> tuple[d
     return regions, cutoff
 
 
-def _measure_sections(z, sections: list, step: float) -> dict[str, np.ndarray]:
+def _cut_sections(z, cutoff: float, degree: int) -> list[np.ndarray]:
+    """Return the sections of the roughness profile of a part (n,) without its form; [] if it has none.
+
+    Parameters
+    ----------
+    z : (n,) array [m]
+        Heights.
+    cutoff : float
+        Cut-off and length of a section, in samples.
+    degree : int
+        Degree of the polynomial that is the form.
+    """
+    edge = int(np.ceil(cutoff / 2))
+    count = int((z.size - 2 * edge) / cutoff)
+    if count < 1:
+        return []
+    z = _subtract_polynomial(z, degree)
+    rough = z - mean_surface(z, (cutoff,))
+    return np.array_split(rough[edge : z.size - edge], count)
+
+
+def _measure_sections(sections: list[np.ndarray], step: float) -> dict[str, np.ndarray]:
     """Return the mean (k,) in each section of the absolute height [m], of its square, and of the squared slope."""
-    # The bottom of a track is bent, which shifts the mean line.
-    parts = [z[section] - z[section].mean() for section in sections]
     return {
-        "Ra": np.array([np.abs(part).mean() for part in parts]),
-        "Rq": np.array([np.mean(part**2) for part in parts]),
-        "slope": np.array([np.mean(np.diff(part) ** 2) for part in parts]) / step**2,
+        "Ra": np.array([np.abs(part).mean() for part in sections]),
+        "Rq": np.array([np.mean(part**2) for part in sections]),
+        "slope": np.array([np.mean(np.diff(part) ** 2) for part in sections]) / step**2,
     }
 
 
@@ -178,7 +205,8 @@ def _average_all(table: dict[str, np.ndarray]) -> dict[str, Quantity]:
     sizes = {}
     for name, values in table.items():
         mean = values.mean()
-        error = SIDE * values.std(ddof=1) / np.sqrt(len(values)) if len(values) > 1 else mean
+        student = float(special.stdtrit(len(values) - 1, 0.975))
+        error = student * values.std(ddof=1) / np.sqrt(len(values))
         bounds = np.array([mean, max(mean - error, 0.0), mean + error])
         sizes[name] = name_quantity(name, *bounds ** POWERS[name])
     return sizes

@@ -25,9 +25,11 @@ DECIMAL_COMMA = re.compile(r"[+-]?[0-9]*,[0-9]+(?:[eE][+-]?[0-9]+)?")
 _COLUMN = re.compile(
     r"([^\W\d][\w .-]*?)(?:\s*\[([^\[\]]*)\]|\s*\(([^()]*)\)|\s*[_/]\s*(\w+)|\s+in\s+(\w+)|\s+(\w+))"
 )
+# Two blanks or more before a remark, behind a unit in brackets or not before one.
+_REMARK = re.compile(r"(?<=[\])])\s{2,}|\s{2,}(?![\s\[(])")
 _CELL = re.compile(r"[^\s\[\](]+\s*(?:\[[^\]]*\]|\([^)]*\))|[^\W\d_]+\s+in\s+[^\W\d_]+|\S+")
 _FACT = re.compile(
-    r"(?:(width|height|lateral units|value units)\s*:|(length),(?=[0-9.]+ \w+$))\s*(.*)",
+    r"(?:(width|height|lateral units|value units)\s*:|(length),(?=\s*[0-9.]+ \w+$))\s*(.*)",
     re.IGNORECASE,
 )
 
@@ -131,14 +133,14 @@ def _join(columns: list[Column], units: list[Column] | None) -> list[Column]:
 def parse_column(cell: str) -> Column:
     """Parse the heading of a column with its unit, such as `x [um]`, `height (nm)` or `x in mm`, or a unit alone.
 
-    Words behind two blanks are a remark.
+    Words behind two blanks are a remark, unless they are a unit in brackets.
     """
-    cell = cell.partition("  ")[0]
+    cell = _REMARK.split(cell, maxsplit=1)[0]
     if cell in NO_UNIT or parse_length_unit(cell):
         return Column("", None if cell in NO_UNIT else cell, cell)
     match = _COLUMN.fullmatch(cell) if len(cell) <= MAX_NAME else None
-    if match and match[6] and not parse_length_unit(match[6]):
-        match = None  # the second word of a name
+    if match and match[6] and not (match[1].lower() in ROLES and parse_length_unit(match[6])):
+        match = None  # a second word is a unit only behind a known name; `Length 5 mm` is a setting
     parts = match.groups()[1:] if match else ()
     unit = next((part.strip() for part in parts if part is not None), None)
     name = (match[1] if match else cell).strip(" _").lower()

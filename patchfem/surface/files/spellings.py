@@ -17,7 +17,7 @@ UNITS = {
 UNIT_LIST = ", ".join(UNITS)
 # Longer words for units of length, in lower case.
 UNIT_WORDS = {
-    **dict.fromkeys(("å", "angstrom", "ångström"), 1e-10),
+    **dict.fromkeys(("a", "å", "angstrom", "ångström"), 1e-10),
     **dict.fromkeys(("inch", "inches"), 0.0254),
     **dict.fromkeys(("micron", "microns", "mikron"), 1e-6),
     "mils": 25.4e-6,
@@ -41,6 +41,7 @@ MISSING = re.compile(r"(?:[+-]?nan|\*+|bad)?", re.IGNORECASE)  # height that was
 GIVE_UNITS = 'state the units of x and z by --units "mm,um" (in Python, by units=("mm", "um"))'
 GIVE_PIXEL_SIZE = 'give the pixel size in place of the unit of x, as in --units "0.8 um,um"'
 HEADER_EXAMPLE = "write the header as `x [um],z [um]`"
+SCAN_HEADER_EXAMPLE = "write the header as `x [um],y [um],z [um]`"
 SIZE_LINES = "`# Width: 1.2 mm` and `# Height: 0.8 mm`"
 
 

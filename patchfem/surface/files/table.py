@@ -12,8 +12,10 @@ from .spellings import (
     GIVE_PIXEL_SIZE,
     GIVE_UNITS,
     HEADER_EXAMPLE,
+    SCAN_HEADER_EXAMPLE,
     SIZE_LINES,
     UNIT_LIST,
+    UNITS,
     parse_length_unit,
     parse_pixel_size,
     shorten,
@@ -22,6 +24,9 @@ from .spellings import (
 MAX_POINTS = 50_000_000  # largest number of heights
 MAX_LENGTH = 10.0  # length or coordinate [m] above which a number has a wrong unit
 MIN_LENGTH = 1e-9  # length [m] below which a trace has a wrong unit
+ATOM_WIDTH = 1e-10  # span of heights [m] below which they have a wrong unit
+# Largest fraction of the highest, and of the lowest, heights that may be faults, such as 999 um for no signal.
+FAULT_FRACTION = 0.01
 MIN_ROUNDED = (
     10  # smallest number of positions that shows whether they are even apart from rounding
 )
@@ -100,10 +105,11 @@ def make_surface(table: Table, units: tuple[str, str] | None = None) -> Profile 
         given = units[role == "z"] if units else None
         table = _convert_column(table, role, "m" if pixel and role != "z" else given)
         _check_numbers(table, role)
-    _require_heights(table)
-    if table.columns["z"].ndim == 1 and "y" in table.columns:
+    if size and table.columns["z"].ndim == 1 and "y" in table.columns:
         table = _fill_raster(table)
-    return _make_surface(table, has_stated_units=table.are_units_fixed or units is not None)
+    _require_heights(table)
+    unit_source = "the file format" if table.are_units_fixed else ""
+    return _make_surface(table, "--units" if units else unit_source)
 
 
 def _set_axes(table: Table, pixel: float | None) -> Table:
@@ -118,6 +124,10 @@ def _set_axes(table: Table, pixel: float | None) -> Table:
             )
         return table
     if pixel is not None:
+        if "x" in columns or "y" in columns:
+            table = table.add_notes(
+                "the size of the scan in the header is not used, because --units gives the pixel size"
+            )
         columns |= {role: pixel * np.arange(n) for role, n in zip("yx", z.shape)}
         table = table._replace(units=table.units | dict.fromkeys("xy", "m"))
     if z.shape[0] == 1:
@@ -137,9 +147,11 @@ def _convert_column(table: Table, role: str, given: str | None) -> Table:
     stated = table.units.get(role)
     unit = stated if given is None else given
     if unit is None:
+        remedy = table.remedy
+        if "y" in table.columns:
+            remedy = remedy.replace(HEADER_EXAMPLE, SCAN_HEADER_EXAMPLE)
         raise PatchfemError(
-            f"{table.place}: the unit of {role} is not given, and units are never guessed; {table.remedy}, or "
-            f"{GIVE_UNITS}"
+            f"{table.place}: the unit of {role} is not given, and units are never guessed; {remedy}, or {GIVE_UNITS}"
         )
     factor = parse_length_unit(unit)
     if factor is None:
@@ -172,10 +184,12 @@ def _check_numbers(table: Table, role: str) -> None:
 
 
 def _require_heights(table: Table) -> None:
-    """Raise PatchfemError for fewer than two heights."""
-    count = np.isfinite(table.columns["z"]).sum()
-    if count < 2:
-        raise PatchfemError(f"{table.path}: {count} heights; a trace needs at least two")
+    """Raise PatchfemError for fewer than two heights of a trace, or three of a scan."""
+    z = table.columns["z"]
+    count = np.isfinite(z).sum()
+    if count <= z.ndim:
+        kind = ("a trace needs at least two", "a scan needs at least three")[z.ndim - 1]
+        raise PatchfemError(f"{table.path}: {count} heights; {kind}")
 
 
 def _fill_raster(table: Table) -> Table:
@@ -216,7 +230,7 @@ def _find_positions(values) -> tuple[np.ndarray, np.ndarray]:
     return values[order][np.concatenate([[True], is_new])], index
 
 
-def _make_surface(table: Table, *, has_stated_units: bool) -> Profile | Areal:
+def _make_surface(table: Table, unit_source: str) -> Profile | Areal:
     """Make the surface of a trace (n,) or of a matrix (m, n) in metres, whose positions increase."""
     z = table.columns["z"]
     axes = []
@@ -230,18 +244,15 @@ def _make_surface(table: Table, *, has_stated_units: bool) -> Profile | Areal:
         table = table.add_notes(*notes)
         _require_increase(table, role, places)
         axes.append(frozen_array(places))
-    _check_span(
-        table.path,
-        max(float(np.ptp(axis)) for axis in axes),
-        float(np.nanmax(z) - np.nanmin(z)),
-        has_stated_units=has_stated_units,
-    )
+    length = max(float(np.ptp(axis)) for axis in axes)
+    notes = _check_span(table.path, length, z, unit_source)
+    table = table._replace(notes=table.notes + notes)
     surface = Profile if z.ndim == 1 else Areal
     return surface(*reversed(axes), frozen_array(z), str(table.path), table.notes)
 
 
 def _require_increase(table: Table, role: str, places) -> None:
-    """Raise PatchfemError if positions [m] do not increase, or there are fewer than two of them."""
+    """Raise PatchfemError if positions [m] are equal or do not increase, or there are fewer than two of them."""
     if not np.ptp(places) > 0:
         raise PatchfemError(
             f"{table.path}: every sample lies at {role} = {format_length(places[0])}; a surface needs at least two "
@@ -253,6 +264,11 @@ def _require_increase(table: Table, role: str, places) -> None:
     first = int(np.argmin(is_rising))
     second = first + 1
     lines = table.lines
+    if places[first] == places[second]:
+        raise PatchfemError(
+            f"{table.locate(second)}: two samples have {role} = {format_length(places[first])}; delete one of them, or "
+            "write the mean of their heights"
+        )
     if lines is not None and lines[first] > lines[second]:
         first, second = second, first
     raise PatchfemError(
@@ -264,8 +280,8 @@ def _require_increase(table: Table, role: str, places) -> None:
 def _undo_rounding(table: Table, role: str, x) -> tuple[np.ndarray, tuple[str, ...]]:
     """Return equally spaced positions (n,) [m] if these differ from them only by rounding, with a note.
 
-    A step of 0.15625 um printed to 0.1 um makes the slopes 14 % too large. If the header gives the length of the scan, it
-    gives the step.
+    A step of 0.15625 um printed to 0.1 um makes the slopes 14 % too large. If the header gives a length that fits, it
+    gives the step, else the regression on the positions.
     """
     if x.size < MIN_ROUNDED or not x[-1] > x[0]:
         return x, ()
@@ -274,11 +290,14 @@ def _undo_rounding(table: Table, role: str, x) -> tuple[np.ndarray, tuple[str, .
     step = float(count @ x / (count @ count))
     evens = [float(x.mean()) + step * count]
     if table.length is not None:
-        evens = [x[0] + table.length / n * np.arange(x.size) for n in (x.size, x.size - 1)]
+        of_length = [x[0] + table.length / n * np.arange(x.size) for n in (x.size, x.size - 1)]
+        evens = [*of_length, *evens]
     for even in evens:
         distance = float(np.abs(x - even).max())
         step = float(even[1] - even[0])
-        if step > 0 and 1e-6 * step < distance <= MAX_ROUNDING * max(digit, MIN_PRINTED_DIGIT):
+        if step > 0 and distance <= MAX_ROUNDING * max(digit, MIN_PRINTED_DIGIT):
+            if distance <= 1e-6 * step:
+                return x, ()
             note = (
                 f"{role} is rounded to {format_length(digit)} in the file; the samples are taken as evenly spaced by "
                 f"{format_length(step)}"
@@ -294,22 +313,46 @@ def _undo_rounding(table: Table, role: str, x) -> tuple[np.ndarray, tuple[str, .
 
 
 def find_printed_digit(x) -> float:
-    """Return the largest power of ten [m] that divides all positions (n,), or 0 if there is none."""
-    largest = int(np.floor(np.log10((x[-1] - x[0]) / 5)))
-    for digit in 10.0 ** np.arange(largest, largest - 8, -1):
-        if np.abs(x / digit - np.rint(x / digit)).max() < DIGIT_TOL:
-            return float(digit)
-    return 0.0
+    """Return the largest power of ten of a metre or of an inch [m] that divides all positions (n,), or 0."""
+    digits = [0.0]
+    for unit in (1.0, UNITS["in"]):
+        largest = int(np.floor(np.log10((x[-1] - x[0]) / unit / 5)))
+        for digit in unit * 10.0 ** np.arange(largest, largest - 8, -1):
+            if np.abs(x / digit - np.rint(x / digit)).max() < DIGIT_TOL:
+                digits.append(float(digit))
+                break
+    return max(digits)
 
 
-def _check_span(path, length: float, span: float, *, has_stated_units: bool) -> None:
-    """Raise PatchfemError for a tiny length [m], and for heights that span more [m] in units from a header."""
+def _check_span(path, length: float, z, unit_source: str) -> tuple[str, ...]:
+    """Return a note on heights [m] that span less than an atom, or more than the length [m].
+
+    Raises PatchfemError for a tiny length, and if most heights span more than the length in units from a header, which
+    have no other source.
+    """
     if length < MIN_LENGTH:
         raise PatchfemError(
             f"{path}: the profile is {format_length(length, 3)} long; is the unit of x right?"
         )
-    if span > length and not has_stated_units:
-        raise PatchfemError(
-            f"{path}: heights span {format_length(span)} over a length of {format_length(length)}; is the unit of z "
-            "right? If not, correct the header or give --units to profile and compare; write a missing height as nan"
+    span = float(np.nanmax(z) - np.nanmin(z))
+    if 0 < span < ATOM_WIDTH:
+        note = f"{path}: heights span {format_length(span)}, less than the width of an atom; is the unit of z right?"
+        return (note,)
+    if span <= length:
+        return ()
+    text = f"{path}: heights span {format_length(span)} over a length of {format_length(length)}"
+    heights = np.sort(z[np.isfinite(z)])
+    count = int(np.ceil(FAULT_FRACTION * heights.size)) if heights.size >= MIN_ROUNDED else 0
+    inner_span = float(heights[-1 - count] - heights[count])
+    if inner_span <= length:
+        note = (
+            f"{text}, but only {format_length(inner_span)} without the {count} highest and the {count} lowest of "
+            f"{heights.size}; write nan for each of these heights that is a fault of the measurement"
         )
+        return (note,)
+    if unit_source:
+        return (f"{text} in the units of {unit_source}; are they right?",)
+    raise PatchfemError(
+        f"{text}; is the unit of z right? If not, correct the header or give --units to profile and compare; write a "
+        "missing height as nan"
+    )

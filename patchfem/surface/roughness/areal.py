@@ -64,7 +64,7 @@ def compute_areal_parameters(z, steps: tuple[float, float]) -> dict[str, float |
         distances = _find_decay_lengths(autocorrelation(z), steps)
     shortest = float(distances.min())
     if shortest < MIN_LENGTH_STEPS * max(steps):
-        values |= {"Sal": "too_short", "Str": "too_short"}
+        values |= {"Sal": "unresolved", "Str": "unresolved"}
     elif np.isfinite(shortest):
         values["Sal"] = shortest
         if np.isfinite(distances).all():

@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
+from scipy import fft
 
 from ...core import PatchfemError, frozen_array
 from ...formatting import format_length
@@ -62,15 +63,12 @@ def mean_surface(z: np.ndarray, cutoffs: tuple[float, ...]) -> np.ndarray:
 
     Missing heights are NaN in both. Cut-offs in steps along each axis. A million heights take 0.2 s.
     """
-    from scipy import signal
-
     known = ~np.isnan(z)
     sums = []
     for values in (np.where(known, z, 0.0), known.astype(float)):
         for axis, cutoff in enumerate(cutoffs):
             weight = _gaussian_weights(cutoff, z.shape[axis])[1]
-            column = weight.reshape([-1 if k == axis else 1 for k in range(z.ndim)])
-            values = signal.fftconvolve(values, column, "same", axis)
+            values = _convolve(values, weight, axis)
         sums.append(values)
     return np.divide(*sums, out=np.full(z.shape, np.nan), where=known)
 
@@ -80,15 +78,23 @@ def mean_line(z: np.ndarray, cutoff: float) -> np.ndarray:
 
     The weights that an end cuts off fit a straight line, not a constant (ISO 16610-28, first moment). Cut-off in steps.
     """
-    from scipy import signal
-
     offsets, weight = _gaussian_weights(cutoff, z.size)
     # A convolution reverses the weights.
     kernels = (weight, -offsets * weight, offsets**2 * weight)
     ones = np.ones(z.size)
-    sum_w, sum_wt, sum_wtt = [signal.fftconvolve(ones, kernel, "same") for kernel in kernels]
-    sum_wz, sum_wtz = [signal.fftconvolve(z, kernel, "same") for kernel in kernels[:2]]
+    sum_w, sum_wt, sum_wtt = [_convolve(ones, kernel) for kernel in kernels]
+    sum_wz, sum_wtz = [_convolve(z, kernel) for kernel in kernels[:2]]
     return (sum_wz * sum_wtt - sum_wtz * sum_wt) / (sum_w * sum_wtt - sum_wt**2)
+
+
+def _convolve(z, weight, axis: int = 0) -> np.ndarray:
+    """Return the convolution of heights (n,) or (m, n), zero beyond their ends, with weights (2 k + 1,) along an axis."""
+    size = z.shape[axis]
+    half = weight.size // 2
+    count = fft.next_fast_len(size + 2 * half, real=True)
+    factor = fft.rfft(weight, count).reshape([-1 if k == axis else 1 for k in range(z.ndim)])
+    sums = fft.irfft(fft.rfft(z, count, axis) * factor, count, axis)
+    return sums.take(np.arange(half, half + size), axis)
 
 
 def _gaussian_weights(cutoff: float, count: int) -> tuple[np.ndarray, np.ndarray]:

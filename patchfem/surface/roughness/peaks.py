@@ -14,6 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...core import PatchfemError
+from ...formatting import format_length, format_number
 from ..profile import Profile, level, remove_spikes, resample_evenly
 from .filter import filter_surface
 from .parameters import MIN_SAMPLES, ROUND_OFF
@@ -27,6 +28,9 @@ MAX_SPIKE_FRACTION = 0.1
 # Largest skewness whose effect on the stiffness is below the uncertainty of the theory.
 MAX_SKEWNESS = 0.5
 MAX_EXCESS = 1.0  # largest kurtosis minus 3, for the same reason
+# Fraction of the heights that are the sharpest; those of a Gaussian trace have 5 % of m_4.
+SHARPEST_FRACTION = 0.005
+MAX_SHARPEST_POWER = 0.5  # largest fraction of m_4 in the sharpest heights; more may be due to dust
 MAX_DEVIATIONS = 3  # standard deviations that skewness and kurtosis of Gaussian traces reach
 
 
@@ -56,7 +60,7 @@ class TraceMoments(NamedTuple):
 
     fine: from all samples; coarse: from every second sample, None if these are too few;
     not_gaussian: a clause if the heights are not Gaussian, else ""; dust: clauses on heights that
-    were left out.
+    were left out or that look like dust.
     """
 
     fine: Moments
@@ -83,6 +87,7 @@ def trace_moments(trace: Profile, cutoff: float | None = None) -> TraceMoments:
         dust = (
             f"{removed} of {trace.z.size} heights are spikes, dropouts or dust and are left out",
         )
+    dust += _describe_sharpest(flat)
     return TraceMoments(fine, coarse, _describe_skew(flat.z, fine, flat.length), dust)
 
 
@@ -117,6 +122,23 @@ def _filter_short_waves(trace: Profile, cutoff: float | None) -> Profile:
             f"{trace.source}: the trace is flat, so it has no peaks; leave [contact.asperities] out"
         )
     return flat if cutoff is None or cutoff >= flat.length else filter_surface(flat, cutoff)[1]
+
+
+def _describe_sharpest(trace: Profile) -> tuple[str, ...]:
+    """Describe the few heights, such as those of wide dust, that make up most of m_4; () if none do."""
+    bend = np.diff(trace.z, 2) ** 2
+    order = np.argsort(bend)
+    count = max(int(SHARPEST_FRACTION * bend.size), 1)
+    fraction = float(bend[order[-count:]].sum()) / max(float(bend.sum()), 1e-300)
+    if fraction < MAX_SHARPEST_POWER:
+        return ()
+    curvature = float(np.sqrt(bend[order[:-count]].mean())) / trace.step**2
+    place = format_length(float(trace.x[order[-1] + 1]))
+    return (
+        f"{count} of {trace.z.size} heights, the sharpest at x = {place}, make up {100 * fraction:.3g} % of the mean "
+        f"square curvature, as dust does; without them rms_curvature is {format_number(curvature, 4)} 1/m; if they are "
+        "dust, write nan for them",
+    )
 
 
 def _describe_skew(z, moments: Moments, length: float) -> str:

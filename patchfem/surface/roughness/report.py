@@ -19,6 +19,7 @@ from .parameters import (
     MIN_SECTIONS,
     PROFILE,
     ROUND_OFF,
+    WITHOUT_INTERVAL,
     compute_parameters,
     estimate_errors,
 )
@@ -177,9 +178,10 @@ def _measure_trace(
         advice = (
             f"do not use these roughness parameters, as ISO 21920 needs a whole section: {advice}"
         )
+    plural = "s" * (n_sections != 1)
     note = (
-        f"{primary.source}: the {format_length(rough.length)} within half a cut-off of the ends hold {n_sections} "
-        f"sections of {format_length(cutoff)}, and intervals need {MIN_SECTIONS}: {advice}"
+        f"{primary.source}: without half a cut-off at each end, {format_length(rough.length)} are left, which hold "
+        f"{n_sections} section{plural} of {format_length(cutoff)}, and intervals need {MIN_SECTIONS}: {advice}"
     )
     return quantities, (note,)
 
@@ -235,7 +237,8 @@ def _name_value(letter: str, name: str, value: float | None) -> Quantity:
 
 def _add_interval(quantity: Quantity, error: float | None, n_sections: int) -> Quantity:
     """Add the 90 % interval of a mean over sections by Student's t of its logarithm; without errors, the reason."""
-    if error is None and n_sections < MIN_SECTIONS and not quantity.reason:
+    has_interval = quantity.name[1:] not in WITHOUT_INTERVAL
+    if error is None and n_sections < MIN_SECTIONS and has_interval and not quantity.reason:
         return quantity._replace(reason="sections")
     if not quantity.value or not error:
         return quantity

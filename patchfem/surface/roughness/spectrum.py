@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy import signal
+from scipy import fft
 
 from ...core import frozen_array
 
@@ -94,9 +94,8 @@ def _average_tapers(z, step: float, tapers: int) -> Spectrum:
     places = np.arange(1, n + 1) / (n + 1)
     total = 0.0
     for k in range(1, tapers + 1):
-        frequency, density = signal.periodogram(
-            z, 1 / step, np.sin(np.pi * k * places), 2 * (n + 1), detrend=False
-        )
-        total = total + density[1:] / tapers
-    total[-1] *= 2  # both sides of the last frequency, as of all others
-    return Spectrum(frozen_array(frequency[1:]), frozen_array(total), tapers, n * step)
+        waves = fft.rfft(z * np.sin(np.pi * k * places), 2 * (n + 1))[1:]
+        # Both sides of each frequency, and the sum (n + 1)/2 of the squares of a taper.
+        total = total + np.abs(waves) ** 2 * 4 * step / (n + 1) / tapers
+    frequency = fft.rfftfreq(2 * (n + 1), step)[1:]
+    return Spectrum(frozen_array(frequency), frozen_array(total), tapers, n * step)

@@ -34,6 +34,19 @@ def test_exact_table_1_has_readings_of_report():
     assert len(set(cells.row_names)) == 6  # four frequencies, two of which are repeated
 
 
+def test_exact_conditions_that_differ_by_round_off_are_one(tmp_path):
+    """Frequencies that differ by 1e-13 are one condition, and a selector finds both; those that differ by 1e-8 are two.
+
+    Once two such frequencies were two conditions if their logarithms lay on both sides of a limit of rounding.
+    """
+    low, high, other = np.exp(4.960000005 + np.array([-5e-14, 5e-14, 1e-8])).tolist()
+    rows = [f"{frequency!r},4,5.0,0.1," for frequency in (high, low, other)]
+    cells = read_response_table(write_table(tmp_path, *rows))
+    assert cells.conditions[:, 0].tolist() == [high, other]
+    assert cells.condition.tolist() == [0, 0, 0, 0, 1, 1]
+    assert cells.select_readings(f"frequency={low!r} Hz").tolist() == [True] * 4 + [False] * 2
+
+
 def test_exact_repeated_conditions_are_separate_readings(tmp_path):
     """Repeated rows of a condition are separate readings, with the log ratios of computed to measured values."""
     cells = read_response_table(

@@ -146,6 +146,34 @@ def test_refuses_tls_without_certificates(tmp_path):
         assert f"DASK_DISTRIBUTED__COMM__TLS__{name}" in answer.err
 
 
+@pytest.mark.parametrize("is_begun", [False, True])
+def test_lost_connection_says_how_to_go_on(is_begun):
+    """A connection that is lost before the sweep or between two chunks gives an error that says how to go on.
+
+    Once a connection that was lost before the first chunk gave the traceback of Dask.
+    """
+    import distributed
+
+    with distributed.LocalCluster(
+        1,
+        processes=False,
+        protocol="tcp",
+        host="127.0.0.1",
+        dashboard_address=None,
+        silence_logs="CRITICAL",
+    ) as one:
+        executor = Cluster(one.scheduler.address)
+        work = make_work(Path("a.toml"))
+        if is_begun:
+            executor.begin(work, is_silent=True)
+        executor.client.close()
+        with pytest.raises(Missing, match=r"is lost; start the scheduler again, and .* --resume"):
+            if is_begun:
+                executor.submit([0])
+            else:
+                list(executor.run(work, lambda **_: [0]))
+
+
 @pytest.mark.slow
 def test_always_lost_scheduler_keeps_finished_cases(tmp_path):
     """A lost scheduler ends the sweep with code 4, and the finished cases are kept."""

@@ -1,9 +1,11 @@
 """Executors of sweeps: the results are those of a single process, also if workers die."""
 
+import multiprocessing
 import os
 import signal
 import subprocess
 import sys
+import time
 from dataclasses import replace
 from pathlib import Path
 
@@ -25,7 +27,7 @@ from patchfem.campaigns.sweeps import executors
 from patchfem.campaigns.sweeps.executors import LocalExecutor
 from patchfem.campaigns.sweeps.executors.cluster import Cluster
 from patchfem.campaigns.sweeps.executors.pool import Pool
-from patchfem.campaigns.sweeps.sweep import ChunkQueue
+from patchfem.campaigns.sweeps.sweep import ChunkQueue, WorkerDeath
 from patchfem.core import Missing, PatchfemError
 from patchfem.export.sweeps.run import SweepTarget, sweep_into
 from patchfem.runs import FAILED_OUTCOME, CaseResults
@@ -75,6 +77,32 @@ def support_on_path(monkeypatch):
 def test_exact_killed_worker_loses_one_case(tmp_path, support_on_path, once):
     """If a case kills its worker, all other cases have the same results as without it."""
     assert_only_killing_case_fails(tmp_path, once, Pool(2))
+
+
+def test_exact_death_of_process_loses_its_chunk_only(tmp_path, support_on_path):
+    """A process that dies loses its own chunk, one new process takes its place, and other child processes live on.
+
+    Once all processes were started anew, all chunks were computed again case by case without the other processes, and
+    every child process that the program had started during the sweep was killed.
+    """
+    work = make_work(tell=KillingMeasure((3,), tmp_path))
+    chunks = [[0, 1], [2, 3], [4], [5], [6], [7]]
+    pool = Pool(2)
+    answers = {}
+    other = None
+    for chunk, _, answer in pool.run(work, lambda **_: chunks.pop(0) if chunks else None):
+        answers[chunk[0]] = answer
+        if other is None:
+            other = multiprocessing.get_context("spawn").Process(target=time.sleep, args=(100,))
+            other.start()
+    try:
+        deaths = [number for number, answer in answers.items() if isinstance(answer, WorkerDeath)]
+        assert sorted(answers) == [0, 2, 4, 5, 6, 7] and deaths == [2]
+        assert len(pool.processes.started) == 3
+        assert not any(process.is_alive() for process in pool.processes.started)
+        assert other.is_alive()
+    finally:
+        other.kill()
 
 
 def assert_only_killing_case_fails(tmp_path: Path, once: bool, executor) -> None:
@@ -138,11 +166,13 @@ def test_exact_cases_of_failed_chunk_are_repeated_alone():
     attempts = []
     lost = []
     assert chunks.record_death(chunks.take_chunk()) == []
-    assert chunks.take_chunk(is_idle=False) is None
-    while (chunk := chunks.take_chunk()) is not None:
+    while (chunk := chunks.take_chunk(is_idle=False)) is not None:
         attempts.append(chunk)
         lost += chunks.record_death(chunk) if 61 in chunk else []
-    assert lost == [61] and attempts == [*([number] for number in range(100)), [61]]
+    assert lost == [] and attempts == [[number] for number in range(100)]
+    # The last attempt is made while no other case is computed.
+    assert chunks.record_death(chunks.take_chunk()) == [61]
+    assert chunks.take_chunk() is None
 
 
 @pytest.mark.slow

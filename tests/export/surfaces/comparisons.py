@@ -85,10 +85,10 @@ FINDINGS = {
     "hidden_even_wear": {"limit": 3e-7},
     "deposits": {"area": 5e-11},
     "other_step": {"before": 5e-7, "after": 1e-6},
-    "drift": {"height": 2e-8},
+    "drift": {"height": 2e-8, "noise": 1.5e-8},
     "other_tracks": {"count": 2},
     "track_cut": {},
-    "either_plane": {},
+    "left_out": {"before": 3, "after": 41},
     "worn_tops": {},
 }
 

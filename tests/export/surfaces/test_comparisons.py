@@ -3,6 +3,7 @@
 import csv
 import json
 import re
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -22,7 +23,7 @@ STATED = {
     "growth_at_ends": "a scar of 2 um over nearly all of the surface, or 2.1 um of material that grew at the ends: both are",
     "scar_or_bow": "Either a scar over all of the surface, up to 2 um deep on average, or a bent datum",
     "scar_or_drift": "Either wear of 20 nm, the mean over the",
-    "elsewhere": "Not comparable: the two surfaces have no part in common",
+    "elsewhere": "Not comparable: no common part of both surfaces is found",
     "no_datum": "too few heights agree (0.12 of all)",
     "mirror_finish": "(rms height 2 nm) hardly exceed the noise (3 nm)",
     "identical": "both files hold the same heights",
@@ -56,6 +57,27 @@ def test_exact_headline_of_each_verdict(code):
     assert 1 <= len(answer.verdict) <= 4
     assert all(re.match(r"[A-Z0-9].*[.?]$", text) for text in answer.verdict)
     assert answer.details["code"] == code
+
+
+def test_exact_each_code_of_a_sentence_is_given_by_some_module():
+    """Each verdict, finding and reason with a sentence stands in the text of a module other than that of the sentences."""
+    package = Path(sentences.__file__).parents[2]
+    texts = [
+        path.read_text("utf-8")
+        for folder in ("surface", "campaigns", "export/surfaces")
+        for path in (package / folder).rglob("*.py")
+        if path != Path(sentences.__file__)
+    ]
+    tables = (
+        sentences.VERDICTS,
+        sentences.ADVICE,
+        sentences.IN_VERDICT,
+        sentences.WARNINGS,
+        sentences.NOTES,
+        sentences.REASONS,
+    )
+    codes = {code for table in tables for code in table}
+    assert not [code for code in codes if not any(f'"{code}"' in text for text in texts)]
 
 
 @pytest.mark.parametrize("code", FINDINGS)

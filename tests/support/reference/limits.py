@@ -2,14 +2,17 @@
 
 from importlib import import_module
 
-from patchfem.effects import REMEDIES
+from patchfem.effects import LAWS, REMEDIES, join_words, name_laws_with_key
 from patchfem.runs.patch.result import MAX_SMALL_STRAIN, MIN_COUPLING_RATIO
+from patchfem.scene import loads
 from patchfem.scene.keys.types import DIVISOR_KINDS, MAX_MAGNITUDE
 from patchfem.scene.rules import support
 
-from .keys import FOLDER, format_table, iterate_bounds
+from .keys import FOLDER, format_table, iterate_bounds, iterate_tables
 from .tried import (
+    BENCH,
     BENCHES,
+    FORMS,
     METHODS,
     MORE,
     POINT,
@@ -33,8 +36,7 @@ SIZES = {  # Constant -> description of the quantity that it bounds.
     "scene.toml_text.MAX_BYTES": "bytes of a scene file",
     "scene.lines.MAX_KEY_PARTS": "number of parts, separated by dots, of a key",
     "scene.rules.contact.MAX_ELEMENTS": "number of elements along an interface that has element_size",
-    "scene.keys.tables.MAX_MASS_NUMBER": "number of masses in structure.masses",
-    "effects.MAX_COORDINATES": "number of masses or modes of a rig",
+    "effects.MAX_COORDINATES": "number of masses or modes that a scene lists",
     "scene.assignments.MAX_RANGE_VALUES": "number of values in one range of a sweep",
     "campaigns.sweeps.parse_request.MAX_CASES": "number of cases of a sweep",
     "inputs.cells.MAX_BYTES": "bytes of a text file with a table",
@@ -119,9 +121,44 @@ infinite; any computed value of this peak would depend on the mesh.
 
 ADVICE = {  # Property of a joint in the advice of a row -> its meaning.
     "{compliance}": "what lets the patch slip part by part",
+    "{load_change}": "the heave and the pitch of the modes",
     "{joints_advice}": "use a law that supports several interfaces",
     "{grooves_advice}": "use a law that supports grooves",
 }
+SHAPES = [
+    f"`{header.replace('contact', 'patch')}`"
+    for header, table in iterate_tables()
+    if "on" in table.model_fields
+]
+STRIP_LAWS = [name for name, law in LAWS.items() if {"pieces", "shear"} <= {*law.supports.split()}]
+MEANINGS = {  # Feature of a combination that is neither a key nor a law -> its keys.
+    "bench": "`[slide]`",
+    "rig": "`[drive]` with `[friction]` or `[[structure.interface]]`",
+    "load on a point": "`[normal]`",
+    "drive other than a sine": "`drive.waveform` other than `sine`, unless `drive.kind` is `free`",
+    "levels or sweep in time": "`drive.waveform` is `levels` or `sweep`, and `accuracy.method` is not `harmonic`",
+    "sensor apart from the output": "`accelerometer` or `gauge` of a `[[structure.mode]]` differs from its `output`",
+    "mode with heave or pitch": "`normal` or `pitch` of a `[[structure.mode]]` is not 0",
+    "changing load": "in a rig: `normal.amplitude`, or a mode with heave or pitch",
+    "mode with yaw": "`yaw` of a `[[structure.mode]]` is not 0",
+    "kinetic below static": "law that sticks rigidly, with `kinetic` less than `static`",
+    "spread of the bonds": f"`spread` of law {name_laws_with_key('spread')}".replace(" and ", " or "),
+    "sum over all bonds": "law nonlocal with reading 'report', or with an `order` other than 1",
+    "sum over all stretched bonds": "law nonlocal with reading 'stretch' and an `order` other than 1",
+    "sum by recursion": "law nonlocal with reading 'stretch' and order 1",
+    "named method of the sum": "law nonlocal with `accuracy.quadrature` one of " + ", ".join(support.SUMS),
+    "patch that slips as a whole": "no partial slip",
+    "partial slip": "`[patch.shear]`, `patch.asperities.tangential_ratio` or `patch.holder.tangential_stiffness`",
+    "shape on the lower piece": "`on` is `lower` in " + join_words(SHAPES, "or"),
+    "strips that slip together": "`[patch.strips]` on a bench, without `[patch.shear]`, with "
+    "`patch.asperities.tangential_ratio` or `patch.holder.tangential_stiffness`, or under another law than "
+    + join_words(STRIP_LAWS, "or"),
+    "grooves": "`[contact.grooves]` or `[normal.grooves]`, with `amplitude` > 0",
+    "interface": "`[[structure.interface]]`",
+    "several interfaces": "at least two `[[structure.interface]]`",
+    "patch of an interface": "`[structure.interface.contact]`",
+    "patches of interfaces": "`[structure.interface.contact]` in any interface",
+}  # fmt: skip
 METHOD_COLUMNS = tuple(
     SceneColumn(f"`{method}`", POINT + RIG, (f"accuracy.method={method}",)) for method in METHODS
 )
@@ -142,6 +179,8 @@ def text() -> str:
         "`patchfem check` refuses a scene in which all features of a row stand together. A feature in code style is a key, "
         "a table or a value of a key; `patch` stands for `contact` or `structure.interface.contact`.",
         _format_combinations(),
+        "The features that are not keys are:",
+        _format_features(),
         "## Numbers",
         f"The magnitude of a quantity must be at most {MAX_MAGNITUDE:g} in SI units. If the quantity is of a kind by "
         "which the program divides ("
@@ -210,6 +249,39 @@ def _format_combinations() -> str:
             advice = advice.replace(word, meaning)
         rows.append((features[0], "; ".join(features[1:]), advice))
     return format_table(("feature", "together with", "instead"), rows)
+
+
+def _format_features() -> str:
+    """Return the table that defines the features of combinations that are not keys."""
+    names = {name: None for row, _ in support.SUPPORT for name in row.split(", ")}
+    rows = [(name, define_feature(name)) for name in sorted(names) if name in support.FEATURES]
+    return format_table(("feature", "keys"), rows)
+
+
+def define_feature(name: str) -> str:
+    """Return the keys, or the laws, that give a scene a feature of a combination."""
+    if name not in support.LAW_FEATURES:
+        return MEANINGS[name]
+    laws = {form: law_has_feature(form, name) for form in list_laws()}
+    for law, forms in FORMS.items():
+        # Rows of the tables of laws that differ by a key of the same law
+        if all(laws[form] for form in forms):
+            laws |= {form: form == law for form in forms}
+    names = "law " + join_words([form for form, is_there in laws.items() if is_there], "or")
+    return names.replace(", order 2", " with another order than 1").replace(
+        ", reading", " with reading"
+    )
+
+
+def law_has_feature(form: str, name: str) -> bool:
+    """Return whether a law of the tables of limits has a feature, at an interface or alone."""
+    friction = loads(f"{POINT}{BENCH}[friction]\n{list_laws()[form]}").friction
+    joint = support.Joint.__new__(support.Joint)
+    joint.table = friction
+    found = []
+    for joint.is_interface in (False, True):
+        found.append(support.LAW_FEATURES[name](joint))
+    return any(found)
 
 
 def _format_bounds() -> str:

@@ -99,7 +99,7 @@ def test_always_unworn_pairs_show_no_wear():
         found = compare_surfaces(before, Profile(after.x, after.z + bow * (seed % 2), "after"))
         assert found.verdict.code == "no_wear", seed
         assert 0 < found.verdict.numbers["detection_limit"] < 20 * NM
-        assert has_finding(found, "hidden_even_wear")
+        assert has_finding(found, "hidden_even_wear") and not has_finding(found, "drift")
         assert found.values["hidden_wear"].high is None
 
 
@@ -126,6 +126,7 @@ def test_always_drift_alone_is_hardly_ever_called_wear():
     found = [compare_surfaces(*make_pair(drift, seed)) for seed, drift in enumerate(drifts)]
     codes = [each.verdict.code for each in found]
     assert set(codes) <= {"no_wear", "scar_or_drift", "worn"} and codes.count("worn") <= 1
+    assert sum(has_finding(each, "drift") for each in found) >= 6
     unsure = next(each for each in found if each.verdict.code == "scar_or_drift")
     assert unsure.verdict.numbers["scar_depth"] > 0
     assert unsure.values["worn_depth_mean"].reason == "scar_or_drift"
@@ -319,6 +320,53 @@ def test_exact_roughness_inside_and_outside_of_a_polished_track():
     assert regions["inside"]["after"]["Ra"].value < 0.2 * regions["inside"]["before"]["Ra"].value
     ratio = regions["outside"]["after"]["Ra"].value / regions["outside"]["before"]["Ra"].value
     assert ratio == pytest.approx(1.0, abs=0.05)
+
+
+def make_cosine(depth: float, first: int, last: int, count: int = 4000) -> np.ndarray:
+    """Return the depths (count,) of a track with the shape of one wave of a cosine between two samples."""
+    depths = np.zeros(count)
+    waves = (np.arange(last - first) + 0.5) / (last - first)
+    depths[first:last] = depth * (1 - np.cos(2 * np.pi * waves)) / 2
+    return depths
+
+
+@pytest.mark.parametrize("shape", [make_parabola, make_cosine, "flank of 100 um"])
+def test_exact_roughness_in_a_bent_track_is_that_of_the_unworn_surface(shape):
+    """Ra, Rq and slope of a surface that was lowered by 20 um are unchanged, and those of ISO 21920-2 without the track.
+
+    The reference is the Gaussian filter of the unworn trace, summed over all of its neighbours; the inside starts one
+    cut-off and the flank, a tenth of the track, behind the first worn sample.
+    """
+    if callable(shape):
+        worn = shape(20 * UM, 1500, 2500)
+    else:
+        worn = gaussian_filter1d(20 * UM * (np.abs(np.arange(4000) - 1999.5) < 500), 25.0)
+    surface = draw_surface(7)
+    found = compare_surfaces(*make_pair(worn, 7, noise=0.2 * NM, surface=surface))
+    cutoff = found.evidence.cutoff / UM
+    assert cutoff == pytest.approx(80)
+    regions = found.evidence.roughness
+    for name in ("Ra", "Rq", "slope"):
+        inside, outside = regions["inside"], regions["outside"]
+        assert inside["after"][name].value == pytest.approx(inside["before"][name].value, rel=0.01)
+        ratio = inside["ratio"][name]
+        assert ratio.low < 1 < ratio.high and abs(ratio.value - 1) < 0.01
+        assert outside["after"][name].value == pytest.approx(
+            outside["before"][name].value, rel=2e-3
+        )
+
+    start = round(SHIFT / UM)
+    unworn = surface[start : start + 4000]
+    columns = np.arange(4000)
+    weights = np.exp(-(np.pi**2) / np.log(2) * ((columns[:, None] - columns) / cutoff) ** 2)
+    rough = unworn - weights @ unworn / weights.sum(axis=1)
+    indices = np.flatnonzero(found.evidence.curves.worn)
+    flank = (indices[-1] - indices[0]) // 10 + 80
+    part = rough[round(found.evidence.curves.x[0] / UM) + indices[0] :][
+        flank : np.ptp(indices) - flank
+    ]
+    assert regions["inside"]["before"]["Ra"].value == pytest.approx(np.abs(part).mean(), rel=0.01)
+    assert regions["inside"]["before"]["Rq"].value == pytest.approx(part.std(), rel=0.01)
 
 
 @pytest.mark.parametrize(

@@ -217,6 +217,8 @@ def test_exact_dektak_export_agrees(tmp_path):
         tmp_path, write.make_dektak(z).decode("latin-1").encode("utf-16"), "scan.csv"
     )
     assert np.array_equal(utf16_trace.z, found.z)
+    in_angstrom = write.make_dektak(z).replace(b"Raw Micrometer", b"Raw A")
+    assert read_bytes(tmp_path, in_angstrom, "scan.csv").z == pytest.approx(found.z * 1e-4)
 
 
 class StandIn:

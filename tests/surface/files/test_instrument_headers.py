@@ -149,6 +149,9 @@ def test_exact_matrix_with_given_pixel_size(tmp_path):
     assert_scan_equal(found, (0.8e-6, 0.8e-6), z * 1e-9)
     scan_with_size = read_text(tmp_path, f"# Width: 4 um\n# Height: 3 um\n{rows}", ("0.8 um", "nm"))
     assert_scan_equal(scan_with_size, (0.8e-6, 0.8e-6), z * 1e-9)
+    assert scan_with_size.notes == (
+        f"{tmp_path / 'scan.txt'}: the size of the scan in the header is not used, because --units gives the pixel size",
+    )
     for text, units, message in (
         (PAIRS, ("0.8 um", "nm"), "the size of a pixel is needed only for a matrix"),
         (rows, ("-1 um", "nm"), "unknown unit '-1 um'"),

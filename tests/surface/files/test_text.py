@@ -9,6 +9,7 @@ import pytest
 from traces import UM, draw_uneven_trace, format_trace
 
 from patchfem.core import Missing, PatchfemError
+from patchfem.formatting import format_length
 from patchfem.surface import read_profile
 
 
@@ -25,6 +26,10 @@ SPELLINGS = {
     "semicolon": format_trace(X, Z, "x [um]; z [um]", ";"),
     "tab": format_trace(X, Z, "x [um]\tz [um]", "\t"),
     "blanks": format_trace(X, Z, "x [um]   z [um]", "   "),
+    "blanks before units": format_trace(X, Z, "x   [um]    z   [um]", " "),
+    "two blanks before units": format_trace(X, Z, "x  [um],z  (um)  (levelled)"),
+    "settings before the header": "Length 5 mm, Cutoff 0.8 mm\n" + format_trace(X, Z),
+    "settings between semicolons": "Start 0 mm;End 5 mm\n" + format_trace(X, Z, "x [um];z [um]", ";"),
     "windows": format_trace(X, Z).replace("\n", "\r\n"),
     "mark": "\ufeff" + format_trace(X, Z),
     "micro sign": format_trace(X, Z, "x [µm],z [μm]"),
@@ -90,11 +95,33 @@ def test_exact_rounded_x_becomes_evenly_spaced(tmp_path, step):
         assert profile.notes == ()
 
 
+@pytest.mark.parametrize("unit, metres", [("mil", 25.4e-6), ("in", 0.0254), ("mm", 1e-3)])
+def test_exact_rounded_x_in_every_unit(tmp_path, unit, metres):
+    """Positions rounded to a tenth of their unit become evenly spaced, in units of the inch as well."""
+    rows = "".join(f"{0.15625 * k:.1f},{0.001 * (k % 3)}\n" for k in range(300))
+    profile = read_content(tmp_path, f"x [{unit}],z [{unit}]\n{rows}")
+    assert np.diff(profile.x) == pytest.approx(0.15625 * metres, rel=1e-3)
+    assert f"x is rounded to {format_length(0.1 * metres)} in the file" in profile.notes[0]
+
+
+@pytest.mark.parametrize("setting", ["Length,10.0 um", "Length, 46.875 um", "Length,46.71875 um"])
+def test_exact_rounded_x_below_any_length(tmp_path, setting):
+    """A length in the header gives the step if it fits, with a blank behind the comma too, else the positions do."""
+    rows = "".join(f"{0.15625 * k:.1f},{0.001 * (k % 3)}\n" for k in range(300))
+    profile = read_content(tmp_path, f"{setting}\nx [um],z [um]\n{rows}")
+    tolerance = 1e-3 if "10.0" in setting else 1e-12
+    assert np.diff(profile.x) == pytest.approx(0.15625 * UM, rel=tolerance)
+    assert len(profile.notes) == 1 and "x is rounded to 100 nm in the file" in profile.notes[0]
+    exact_rows = "".join(f"{0.15625 * k},{0.001 * (k % 3)}\n" for k in range(300))
+    assert read_content(tmp_path, f"{setting}\nx [um],z [um]\n{exact_rows}").notes == ()
+
+
 SPELLED_UNITS = {
     "mils": 25.4e-6,
     "inch": 25.4e-3,
     "Inches": 25.4e-3,
     "pm": 1e-12,
+    "A": 1e-10,
     "Å": 1e-10,
     "Angstrom": 1e-10,
     "Ångström": 1e-10,
@@ -129,9 +156,11 @@ REFUSED = {
     "\ufeff \n\n": EMPTY,
     "# only words\n% more\n": WORDS.replace("1 lines", "2 lines"),
     **dict.fromkeys(
-        ("0,1\n1,2\n", "0,0,1\n0,1,2\n", "x,z\n0,1\n"),
+        ("0,1\n1,2\n", "x,z\n0,1\n"),
         "{path}:1: the unit of x is not given, and units are never guessed; write the header as `x [um],z [um]`, "
         f"{GIVE}"),
+    "0,0,1\n0,1,2\n": "{path}:1: the unit of x is not given, and units are never guessed; write the header as "
+                      f"`x [um],y [um],z [um]`, {GIVE}",
     "\nx [um],z []\n0,1\n": "{path}:2: unknown unit '' of z; use one of m, km, cm, mm, um, nm, in, ft, mil",
     "x [um],z [furlong]\n0,1\n": "{path}:1: unknown unit 'furlong' of z; use one of m, km, cm, mm, um, nm, in, ft, mil",
     "x [um]\n0\n": "{path}:2: only one column, but x and z are needed; write the header as `x [um],z [um]`",
@@ -174,8 +203,10 @@ REFUSED = {
                                                   "only rise or only fall, so keep one trace or scan per file",
     "x [um],z [um]\n4,1\n1,2\n2,1\n0,2\n": "{path}:4: x reverses: 1 um and then 2 um; x must only rise or "
                                            "only fall, so keep one trace or scan per file",
-    "x [um],z [um]\n0,1\n1,1\n1,2\n4,3\n": "{path}:4: x reverses: 1 um and then 1 um; x must "
-                                          "only rise or only fall, so keep one trace or scan per file",
+    "x [um],z [um]\n0,1\n1,1\n1,2\n4,3\n": "{path}:4: two samples have x = 1 um; delete one of them, or write "
+                                          "the mean of their heights",
+    "x [um],y [um],z [um]\n": "{path}: 0 heights; a trace needs at least two",
+    "x [um],y [um],z [um]\n0,0,1\n1,0,nan\n0,1,nan\n1,1,1.1\n": "{path}: 2 heights; a scan needs at least three",
     "x [um],z [um]\n5,1\n5,2\n": "{path}: every sample lies at x = 5 um; a surface needs at least two different x",
     "x [um],z [um]\n" + "1" * 2000: "{path}:2: '1111111111111111111111111111111111111...': 2 numbers are needed; "
                                     "write nan for a missing height",
@@ -192,6 +223,33 @@ def test_refuses_malformed_text_with_message(tmp_path, content):
         read_content(tmp_path, content)
     message = REFUSED[content].replace("{path}", str(tmp_path / "before.csv"))
     assert str(caught.value) == message
+
+
+@pytest.mark.parametrize(
+    "heights, note",
+    [
+        ({40: "999"}, "heights span 999 um over a length of 99 um, but only 1 um without the 1 highest and the 1 "
+         "lowest of 100; write nan for each of these heights that is a fault of the measurement"),
+        (dict.fromkeys(range(100), "0") | {3: "1e-5"}, "heights span 0.01 nm, less than the width of an atom; is the unit "
+         "of z right?"),
+    ],
+)  # fmt: skip
+def test_exact_heights_with_a_fault_or_without_size_have_a_note(tmp_path, heights, note):
+    """A single height far from all others does not make a file unreadable; heights of no size are named."""
+    rows = "".join(f"{k},{heights.get(k, k % 2)}\n" for k in range(100))
+    found = read_content(tmp_path, "x [um],z [um]\n" + rows)
+    assert found.notes == (f"{found.source}: {note}",)
+    assert found.z.size == 100
+
+
+def test_exact_steep_heights_in_given_units_have_a_note(tmp_path):
+    """Heights that span more than the length are read in the units of --units, with a note."""
+    path = tmp_path / "a.csv"
+    path.write_text("x [um],z [um]\n0,1\n1,900\n2,1\n", "utf-8")
+    found = read_profile(path, ("um", "um"))
+    assert found.notes == (
+        f"{path}: heights span 899 um over a length of 2 um in the units of --units; are they right?",
+    )
 
 
 @pytest.mark.usefixtures("small_text_limit")

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from scene_texts import PIECE
 from scipy.integrate import quad
+from scipy.ndimage import gaussian_filter1d
 
 import patchfem as pf
 from patchfem import build
@@ -94,6 +95,23 @@ def test_refuses_moments_of_no_gaussian_surface():
         trace_moments(make_trace(0.1 * x, 1e-6))
     with pytest.raises(PatchfemError, match="at least 16"):
         rms_moments(make_trace(np.sin(x[:20] * 1e6), 1e-6), 2)
+
+
+@pytest.mark.parametrize("height, is_named", [(0.0, False), (2e-6, True)])
+def test_exact_wide_dust_is_named_with_curvature_without_it(height, is_named):
+    """Dust that is too wide for a spike multiplies the curvature; a note gives that without its heights within 5 %."""
+    z = gaussian_filter1d(np.random.default_rng(1).normal(size=4000), 8.0)
+    z *= 0.4e-6 / z.std()
+    clean = trace_moments(make_trace(z, 1e-6)).fine.curvature
+    z[2000:2020] += height * np.sqrt(np.sin(np.pi * (np.arange(20) + 0.5) / 20))
+    moments = trace_moments(make_trace(z, 1e-6))
+    assert len(moments.dust) == is_named
+    if is_named:
+        assert moments.fine.curvature > 2 * clean
+        words = moments.dust[0].split()
+        without = float(words[words.index("rms_curvature") + 2])
+        assert without == pytest.approx(clean, rel=0.05)
+        assert "19 of 4000 heights, the sharpest at x = 1.999 mm, " in moments.dust[0]
 
 
 def write_trace(folder, seed=1) -> str:

@@ -5,7 +5,9 @@ The cluster is started on this machine, or belongs to a scheduler at a given add
 
 import os
 import sys
+from collections.abc import Iterator
 from concurrent.futures import Future
+from contextlib import contextmanager
 from dataclasses import replace
 from functools import cache
 from hashlib import sha256
@@ -41,6 +43,10 @@ class Cluster(FutureExecutor):
     PatchfemError
         If the certificates for TLS are missing.
     """
+
+    chunks_per_worker = (
+        2  # A worker has its next chunk before it returns the results of the last one.
+    )
 
     def __init__(self, address: str = "", workers: int = 0):
         try:
@@ -99,20 +105,29 @@ class Cluster(FutureExecutor):
                 raise self._worker_error(worker_versions, environment_versions())
 
     def begin(self, work: WorkerData, *, is_silent: bool) -> None:
-        """Store the data of the sweep on the cluster."""
+        """Store the data of the sweep on the cluster; raise Missing if the connection to the scheduler is lost."""
         path = work.sweep_scene.path
         self.origin = (environment_versions(work), path)
         scene = replace(work.sweep_scene, path=Path(os.path.abspath(path)))
         # Dask repeats this task if the workers that store its result die.
-        self.shared = self.client.submit(_identity, replace(work, sweep_scene=scene), pure=False)
-        self.executor = self.client.get_executor(pure=False)
+        with self._report_lost_connection():
+            self.shared = self.client.submit(
+                _identity, replace(work, sweep_scene=scene), pure=False
+            )
+            self.executor = self.client.get_executor(pure=False)
 
     def submit(self, chunk: list) -> Future:
         """Submit a chunk; raise Missing if the connection to the scheduler is lost."""
+        with self._report_lost_connection():
+            return self.executor.submit(_compute_on_worker, self.shared, chunk, self.origin)
+
+    @contextmanager
+    def _report_lost_connection(self) -> Iterator[None]:
+        """Raise Missing in place of the error of a client whose connection is closed."""
         from distributed.client import ClosedClientError
 
         try:
-            return self.executor.submit(_compute_on_worker, self.shared, chunk, self.origin)
+            yield
         except ClosedClientError:
             raise self.make_connection_error() from None
 

@@ -8,14 +8,13 @@ from collections.abc import Callable, Iterator
 from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
+from multiprocessing.context import SpawnContext, SpawnProcess
 from threading import Thread
 from types import ModuleType
 
 from ....core import Missing
 from ..sweep import WorkerData, WorkerDeath, compute_chunk
 
-# Number of chunks that are assigned to each worker, so that it does not wait for the next one.
-CHUNKS_PER_WORKER = 2
 # Environment of a worker: one thread, and no imports from the current folder.
 WORKER_ENVIRONMENT = {
     "PYTHONSAFEPATH": "1",
@@ -31,10 +30,12 @@ DEATHS = ("BrokenProcessPool", "KilledWorker")
 class FutureExecutor:
     """Executor that computes the chunks of a sweep as futures.
 
-    A subclass has the number of `workers` and the methods `begin`, `submit` and `end`.
+    A subclass has the number of `workers` and the methods `begin`, `submit` and `end`. The number of chunks that are
+    assigned to each worker is `chunks_per_worker`.
     """
 
     workers = 1
+    chunks_per_worker = 1
     name = ""
 
     def run(
@@ -57,18 +58,23 @@ class FutureExecutor:
             (chunk, seconds, answer or WorkerDeath), in the order in which the chunks finish.
         """
         pending: dict[Future, list] = {}
+        finished: list[tuple[list, Future]] = []
         try:
             self.begin(work, is_silent=say is None)
             while True:
-                while len(pending) < CHUNKS_PER_WORKER * self.workers:
+                while len(pending) < self.chunks_per_worker * self.workers:
                     chunk = next_chunk(is_idle=not pending)
                     if chunk is None:
                         break
                     pending[self.submit(chunk)] = chunk
-                if not pending:
+                if not pending and not finished:
                     return
-                for future in wait(pending, return_when=FIRST_COMPLETED).done:
-                    yield pending.pop(future), *self.receive(future)
+
+                # The workers compute their next chunks while the caller writes the results of these.
+                for chunk, future in finished:
+                    yield chunk, *self.receive(future)
+                done = wait(pending, return_when=FIRST_COMPLETED).done if pending else ()
+                finished = [(pending.pop(future), future) for future in done]
         finally:
             self.end()
 
@@ -91,49 +97,71 @@ class FutureExecutor:
 
     def make_connection_error(self) -> Missing:
         """Return the error for a lost connection to the workers."""
-        return Missing(f"{self.name}: the connection to the scheduler is lost")
+        return Missing(
+            f"{self.name}: the connection to the scheduler is lost; start the scheduler again, and repeat the command with "
+            "--resume, which keeps the finished cases"
+        )
+
+
+class _OwnProcesses(SpawnContext):
+    """Context of new interpreters that keeps the processes which it starts."""
+
+    def __init__(self):
+        super().__init__()
+        self.started: list[SpawnProcess] = []
+
+    def Process(self, *arguments, **keywords) -> SpawnProcess:
+        """Return a new process, which an executor starts."""
+        process = SpawnProcess(*arguments, **keywords)
+        self.started.append(process)
+        return process
 
 
 class Pool(FutureExecutor):
-    """Executor that computes the chunks of a sweep in several processes on this machine."""
+    """Executor that computes the chunks of a sweep in several processes on this machine.
+
+    Each process has an executor of its own, because the death of a process ends all chunks of its executor. A new process
+    takes its place.
+    """
 
     def __init__(self, workers: int):
         self.workers = workers
-        self.executor: ProcessPoolExecutor | None = None
 
     def begin(self, work: WorkerData, *, is_silent: bool) -> None:
         """Keep the data that each new process receives."""
         self.initial_data = (work, None if is_silent else _print_to_stderr)
-        self.other_processes = multiprocessing.active_children()
+        self.processes = _OwnProcesses()
+        self.last_chunks: dict[ProcessPoolExecutor, Future] = {}
 
     def submit(self, chunk: list) -> Future:
-        """Submit a chunk, to new processes if those before have died; raise Missing if none can be started."""
+        """Submit a chunk to an idle process, or to a new one; raise Missing if none can be started."""
+        idle = [executor for executor, future in self.last_chunks.items() if future.done()]
+        for executor in idle:
+            try:
+                future = executor.submit(_compute_in_process, chunk)
+            except BrokenProcessPool:
+                del self.last_chunks[executor]
+                continue
+            self.last_chunks[executor] = future
+            return future
         try:
+            executor = ProcessPoolExecutor(1, self.processes, _begin_process, self.initial_data)
             with _worker_environment():
-                if self.executor is not None:
-                    try:
-                        return self.executor.submit(_compute_in_process, chunk)
-                    except BrokenProcessPool:
-                        pass
-                self.executor = ProcessPoolExecutor(
-                    self.workers,
-                    multiprocessing.get_context("spawn"),
-                    _begin_process,
-                    self.initial_data,
-                )
-                return self.executor.submit(_compute_in_process, chunk)
+                future = executor.submit(_compute_in_process, chunk)
         except OSError as error:
             raise Missing(
                 f"a process of the sweep cannot be started ({error.strerror}); lower -j"
             ) from None
+        self.last_chunks[executor] = future
+        return future
 
     def end(self) -> None:
-        """Kill the processes."""
-        for process in multiprocessing.active_children():
-            if process not in self.other_processes:
+        """Kill the processes of this sweep."""
+        for process in self.processes.started:
+            if process.pid is not None:
                 process.kill()
-        if self.executor is not None:
-            self.executor.shutdown(cancel_futures=True)
+        for executor in self.last_chunks:
+            executor.shutdown(cancel_futures=True)
 
 
 @contextmanager

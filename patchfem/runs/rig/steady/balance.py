@@ -20,15 +20,27 @@ from ....dynamics.harmonic.stability import add_stability
 from ....dynamics.harmonic.steady import find_steady_motion as periodic_point
 from ....dynamics.harmonic.steady import refine_steady_motion
 from ....dynamics.integrated import EngineResult
-from ....formatting import format_length
+from ....formatting import format_length, format_quantity
 from ....response.errors import finer_errors
 from ....response.measures import compute_peak
 from ....response.spectrum import harmonic_measures, odd_harmonics
 from ..evaluation import RunEvaluator, compute_sampled_work, compute_work_check
 from ..interface import make_single_law
 from ..solution import Solution, compute_sampled_loop
-from .curves import COLUMN_MEASURES, HARMONIC_ROUND_OFF, CurvePoint, describe_instability
+from .curves import (
+    COLUMN_MEASURES,
+    HARMONIC_ROUND_OFF,
+    CurvePoint,
+    ResponseCurve,
+    describe_instability,
+)
 
+# Reasons why a branch ends before the last frequency, by the value of `Branch.ended`.
+REASONS_OF_END = {
+    "start": "it turns back to its first frequency",
+    "points": "it has too many points",
+    "step": "no neighbouring motion was found there",
+}
 # Number of samples per cycle from which the measures of a steady motion are computed.
 SAMPLES_PER_CYCLE = 4096
 
@@ -290,7 +302,7 @@ class BalanceFinder:
         evaluator.turns = motion.find_reversals()
         return CycleMeasures(evaluator.evaluate_measures(run, drive), response, book)
 
-    def trace_curve(self, drive) -> tuple:
+    def trace_curve(self, drive) -> ResponseCurve:
         """Compute the response curve over frequency by continuation through its folds."""
         first = SineDrive(drive.acceleration, 2 * np.pi * drive.low, drive.moving)
         branch = branches.trace_over_frequency(
@@ -301,7 +313,8 @@ class BalanceFinder:
             self.harmonics,
             self.tolerance,
         )
-        return [self._convert_branch_point(point, first) for point in branch.points], branch.folds
+        points = [self._convert_branch_point(point, first) for point in branch.points]
+        return ResponseCurve(points, branch.folds, tuple(_note_end_of_branch(branch, drive.high)))
 
     def measure_curve_distance(self, first: CurvePoint, second: CurvePoint) -> float:
         """Return the arc length between two points of a response curve.
@@ -349,3 +362,16 @@ class BalanceFinder:
         if "acceleration_distortion" in errors:
             errors["acceleration_distortion"] += HARMONIC_ROUND_OFF
         return point._replace(errors=errors)
+
+
+def _note_end_of_branch(branch: branches.Branch, last: float) -> list[str]:
+    """Return a list of notes on a branch that does not reach the last frequency [Hz] of the sweep."""
+    if branch.ended == "end":
+        return []
+    frequencies = [point.omega / (2 * np.pi) for point in branch.points]
+    reached = min(frequencies, key=lambda frequency: abs(frequency - last))
+    return [
+        f"the curve of steady motions reaches {format_quantity(reached, 'Hz', 4)} and not the end of the sweep at "
+        f"{format_quantity(last, 'Hz', 4)}: {REASONS_OF_END[branch.ended]}; the largest motion is that of this part, so "
+        "change drive.from or drive.to"
+    ]

@@ -75,6 +75,19 @@ class CurvePoint(NamedTuple):
         )
 
 
+class ResponseCurve(NamedTuple):
+    """Response curve over the drive frequency.
+
+    - points: list of CurvePoint, in order along the curve.
+    - folds: frequencies [Hz] at which the curve turns back.
+    - notes: sentences on a part of the sweep that the curve does not reach.
+    """
+
+    points: list
+    folds: tuple = ()
+    notes: tuple = ()
+
+
 def estimate_exact_errors(values: dict, residual: float) -> dict:
     """Estimate the errors of an event-driven steady motion from its residual over a period."""
     errors = {}

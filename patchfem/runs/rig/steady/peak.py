@@ -17,7 +17,7 @@ import numpy as np
 from ....core import NotConverged
 from ....response.errors import absolute_change
 from ..solution import Solution, replace_output_by_gauge
-from .curves import COLUMN_MEASURES, find_largest_point, tabulate_curve
+from .curves import COLUMN_MEASURES, ResponseCurve, find_largest_point, tabulate_curve
 
 AMPLITUDE = COLUMN_MEASURES["amplitude"]
 MAX_ADDED_POINTS = 40  # Largest number of points that are added to refine a peak.
@@ -192,24 +192,23 @@ def bound_concave_curve(s, y) -> tuple:
     return bounds, np.where(inside, intersection, 0.5)
 
 
-def solve_peak(points: list, folds, finder) -> Solution:
+def solve_peak(curve: ResponseCurve, finder) -> Solution:
     """Compute the steady motion at the peak of a response curve, with its error estimates.
 
     The errors include those due to the position of the peak.
 
     Parameters
     ----------
-    points : list of CurvePoint
-    folds : sequence of float
-        Frequencies [Hz] at which the curve turns back.
+    curve : ResponseCurve
     finder
         See `refine_peak`.
     """
-    points, best, above = refine_peak(points, finder, finder.model.accuracy.tolerance)
+    points, best, above = refine_peak(curve.points, finder, finder.model.accuracy.tolerance)
     peak_point = points[best]
     solution = finder.compute_steady_motion(peak_point.drive, peak_point.guess)[0]
+    solution = replace(solution, notes=(*solution.notes, *curve.notes))
     errors = dict(solution.errors or {})
-    extra = {"curve": tabulate_curve(points, folds), "at": peak_point.drive}
+    extra = {"curve": tabulate_curve(points, curve.folds), "at": peak_point.drive}
     height = peak_point.values.get(AMPLITUDE, 0.0)
     y = _collect_amplitudes(points)
     if not height > 0 or AMPLITUDE not in solution.values:

@@ -21,6 +21,7 @@ from ..march import MarchEvaluator
 from ..solution import Solution
 from .curves import (
     CurvePoint,
+    ResponseCurve,
     TracedCurve,
     compute_response_curve,
     describe_instability,
@@ -242,9 +243,10 @@ class MarchFinder(TracedCurve):
                 raise
         return make_curve_point(drive, *self.compute_steady_motion(drive))
 
-    def trace_curve(self, drive) -> tuple:
+    def trace_curve(self, drive) -> ResponseCurve:
         """Compute the response curve over frequency, which has no folds.
 
         Each point starts from the motion at the previous one.
         """
-        return compute_response_curve(self.model.rig.modes, drive, self.compute_curve_point), ()
+        points = compute_response_curve(self.model.rig.modes, drive, self.compute_curve_point)
+        return ResponseCurve(points)

@@ -24,6 +24,7 @@ from ..solution import Solution
 from .curves import (
     COLUMN_MEASURES,
     CurvePoint,
+    ResponseCurve,
     TracedCurve,
     compute_response_curve,
     describe_instability,
@@ -295,12 +296,12 @@ class ShootingFinder(TracedCurve):
         )
         return float(np.linalg.eigvals(state).real.max())
 
-    def trace_curve(self, drive) -> tuple:
+    def trace_curve(self, drive) -> ResponseCurve:
         """Compute the response curve over frequency, which has no folds.
 
         Each point starts from the motion at the previous one.
         """
-        return compute_response_curve(self.modes, drive, self.compute_curve_point), ()
+        return ResponseCurve(compute_response_curve(self.modes, drive, self.compute_curve_point))
 
 
 def find_relative_error(motion: periodic.PeriodicMotion) -> float:

@@ -50,4 +50,4 @@ def _solve_drive(finder, model) -> Solution:
         return finder.compute_steady_motion(drive)[0]
     if model.rig.drive.levels.amplitudes:
         return solve_drive_levels(finder, drive)
-    return solve_peak(*finder.trace_curve(drive), finder)
+    return solve_peak(finder.trace_curve(drive), finder)

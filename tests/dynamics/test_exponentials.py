@@ -1,0 +1,48 @@
+"""Exponentials of stacks of matrices against SciPy."""
+
+from time import process_time
+
+import numpy as np
+import pytest
+from scipy.linalg import expm
+
+from patchfem.dynamics.exponentials import BLOCK_ENTRIES, find_exponentials
+
+
+def make_oscillators(size: int, norm: float, count: int) -> np.ndarray:
+    """Return rates (k, m, m) of coupled oscillators with weak damping, of a given size."""
+    rates = np.random.default_rng(3).standard_normal((count, size, size))
+    rates -= rates.transpose(0, 2, 1)
+    rates -= 0.01 * np.eye(size)
+    return norm * rates / np.abs(rates).sum(axis=2).max(axis=1)[:, None, None]
+
+
+@pytest.mark.parametrize("size", [1, 2, 5, 12])
+def test_exact_exponentials_agree_with_scipy(size):
+    """Exponentials of matrices of different norms in one stack, in several blocks, are those of SciPy."""
+    norms = [0.0, 1e-9, 1e-3, 0.0999, 0.1001, 1.0, 30.0]
+    count = BLOCK_ENTRIES // size**2 // 6 if size == 12 else 3
+    stack = np.concatenate([make_oscillators(size, norm, count) for norm in norms])
+    difference = np.abs(find_exponentials(stack) - expm(stack))
+    assert difference.max() < 3e-13
+    # Cells of a cycle have small norms: the product of thousands of them repeats the error of each.
+    assert difference[: 5 * count].max() < 5e-16
+
+
+def test_exact_exponentials_take_less_time_than_scipy():
+    """The exponentials of 8192 cells with bonds take less than a third of the CPU time of `scipy.linalg.expm`.
+
+    Once the multipliers of a curve of a patch took 34 CPU seconds.
+    """
+    cells = make_oscillators(5, 0.01, 8192)
+
+    def measure_seconds(function) -> float:
+        """Return the CPU time [s] of a function."""
+        begin = process_time()
+        function(cells)
+        return process_time() - begin
+
+    seconds, reference = (
+        min(measure_seconds(function) for _ in range(3)) for function in (find_exponentials, expm)
+    )
+    assert seconds < reference / 3
