@@ -11,15 +11,16 @@ it:
 5.  `joint`  removal of a joint from modes that were measured with it
 6.  `rig`  a driven structure with friction
 7.  `wear`  wear of a patch in a bench or a rig over many cycles
-8.  `accuracy_warnings`  measures that miss the tolerance, and the setting to change
-9.  `accuracy_curve`  accuracy of a motion against its computing time
-10. `memory`  the memory that a run may use
-11. `plan`  what would run: engine, sizes, stiffnesses
-12. `balances`  equilibrium of a patch and energy of a bench
-13. `run`  from a plan to its result
-14. `probe`  one run without error estimates, with its measured time
-15. `pieces`  displacement and stress inside both pieces, and where they yield
-16. `batch`  many models in one batch
+8.  `refine`  repetition of a run with finer meshes or more steps until it meets the tolerance
+9.  `accuracy_warnings`  measures that miss the tolerance, and the setting to change
+10. `accuracy_curve`  accuracy of a motion against its computing time
+11. `memory`  the memory that a run may use
+12. `plan`  what would run: engine, sizes, stiffnesses
+13. `balances`  equilibrium of a patch and energy of a bench
+14. `run`  from a plan to its result
+15. `probe`  one run without error estimates, with its measured time
+16. `pieces`  displacement and stress inside both pieces, and where they yield
+17. `batch`  many models in one batch
 """
 
 # names that other folders use, by module

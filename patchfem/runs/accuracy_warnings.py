@@ -48,6 +48,8 @@ STEADY_AMPLITUDE = "relative_displacement_amplitude_steady"
 USE_ERROR_ADVICE = "use the value with its stated error"
 NO_ADVICE = f"no known setting makes this value more accurate; {USE_ERROR_ADVICE}"
 ELEMENT_SIZE = "contact.element_size"
+# Ratio of the proposed accuracy.max_seconds to the expected CPU time, which varies by tens of per cent.
+MAX_SECONDS_MARGIN = 2.0
 
 
 class AccuracyContext(NamedTuple):
@@ -251,7 +253,7 @@ def _advise_mesh(
         return faces.replace_contact_keys(model, f"{cause}; leave out {ELEMENT_SIZE}")
     next_seconds = max(context.next_seconds for context, _ in solutions)
     if next_seconds:
-        limit = format_number(_round_up(next_seconds), 2)
+        limit = format_number(_round_up(MAX_SECONDS_MARGIN * next_seconds), 2)
         return f"{cause}; set accuracy.max_seconds = {limit} for finer meshes"
     tolerances = [] if is_at_limit else [_tolerance_for_finer_mesh(*place) for place in solutions]
     tolerances = [tolerance for tolerance in tolerances if tolerance is not None]

@@ -26,6 +26,7 @@ MAIN_MEASURES = (
     "pressure_peak",
     "contact_fraction",
 )
+MAX_SECONDS = 60.0  # Largest CPU time [s] of all passes without accuracy.max_seconds.
 COST_RATIO = 4.0  # Expected ratio of the CPU times of two successive passes.
 ERROR_RATIO = 4.0  # Expected ratio of the errors of two successive passes.
 # Smallest ratio of the errors of two successive passes after which a third one follows.
@@ -83,7 +84,7 @@ def judge_pass(
     expected = total_seconds + seconds * sum(COST_RATIO**k for k in range(1, n_passes + 1))
     if finer is None:
         return Pass(excess)
-    if expected > model.accuracy.max_seconds:
+    if expected > (model.accuracy.max_seconds or MAX_SECONDS):
         return Pass(excess, None, expected)
     resolution = "half the element size" if axis == "mesh" else "twice the steps"
     reason = (

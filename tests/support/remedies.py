@@ -71,6 +71,8 @@ def _draw_coarse_scene(trial: Trial, name: str) -> dict:
             "cycles": trial.log_uniform(10, 1e5),
         }
     settings = out["accuracy"] = {"tolerance": trial.draw(1e-2, 1e-3, 1e-4, 1e-5)}
+    if kind != "patch" and name != "wear":
+        settings["max_seconds"] = DEAR
     if kind != "patch" and trial.chance(0.5):
         settings["steps_per_cycle"] = int(trial.r.integers(8, 80))
     if kind in ("rig", "masses", "linear"):
@@ -164,7 +166,7 @@ def try_remedy(tables: dict, found, remedy: Remedy) -> str:
     changed_tables = set_keys(tables, sets)
     try:
         planned = plan(loads(to_toml(changed_tables)))
-        if estimate_seconds(planned) > LONG:
+        if estimate_seconds(planned) > LONG or sets.get("accuracy.max_seconds", 0) > LONG:
             return "dear"
         new_result = run(planned)
     except (NotConverged, PatchfemError, SceneError):

@@ -17,11 +17,11 @@ class Accuracy(Table):
         number(gt=0, lt=1),
         "largest relative error that is allowed in any measure; the numerical settings follow from this tolerance",
     ) = 1e-3
-    max_seconds: key(
+    max_seconds: optional(
         number(gt=0),
         "CPU time [s] in which a run may be repeated with finer meshes, or a bench with more steps, until its main measures "
-        "meet the tolerance",
-    ) = 60.0
+        "meet the tolerance; default: 60",
+    )
     method: key(
         Literal["auto", "exact", "march", "harmonic"],
         "method that computes the motion; default: the program chooses a method for the scene",

@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 from ...effects import LAWS, law_has_trait, needs_bond_list
 from ..keys.accuracy import Accuracy
 from ..keys.tables import Tables
+from .contact import iterate_patches
 from .facts import TableFacts
 from .methods import MotionFeatures, find_motion_features
 from .scene_draft import SceneDraft
@@ -89,6 +90,24 @@ def check_settings(draft: SceneDraft, kind: str) -> None:
             draft.add_remark(
                 f"accuracy.{setting}", f"is not used, because it has no effect {where}"
             )
+        where = _find_reason_without_repetition(draft, kind)
+        if draft.tables.accuracy.max_seconds is not None and where:
+            draft.add_remark(
+                "accuracy.max_seconds", f"is not used, because no run {where} is repeated"
+            )
+
+
+def _find_reason_without_repetition(draft: SceneDraft, kind: str) -> str:
+    """Return why a run is never repeated with finer meshes or more steps, "" if it may be."""
+    tables = draft.tables
+    if kind == "patch" or tables.wear:
+        return "of a pressed patch" if kind == "patch" else "with [wear]"
+    patches = [patch for _, patch in iterate_patches(draft)]
+    if any(patch.element_size is None and patch.mesh is None for patch in patches):
+        return ""
+    if kind != "bench":
+        return "with fixed meshes" if patches else "without a patch"
+    return "with accuracy.steps_per_cycle" if tables.accuracy.steps_per_cycle else ""
 
 
 def find_unused_settings(tables: Tables, kind: str) -> dict[str, str]:
