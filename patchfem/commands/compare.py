@@ -97,7 +97,7 @@ def compare(
     if len(files) != 2:
         removed = ""
         if len(files) == 4:
-            removed = "; four files were removed in patchfem 2.0, compare each direction by itself"
+            removed = "; four files were removed in patchfem 1.2, compare each direction by itself"
         raise UsageError(
             f"compare: give two files BEFORE and AFTER, or a table of pairs with --pairs{removed}"
         )

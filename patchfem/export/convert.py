@@ -59,7 +59,7 @@ def export_results(
         )
     if out.suffix == ".py":
         raise PatchfemError(
-            f"{out}: the script for ParaView was removed in patchfem 2.0; open {NAME} in ParaView 5.13 or "
+            f"{out}: the script for ParaView was removed in patchfem 1.2; open {NAME} in ParaView 5.13 or "
             "newer, or write .pvd for older versions"
         )
     if out.suffix not in FIELD_FORMATS:

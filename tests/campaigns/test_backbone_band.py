@@ -96,7 +96,7 @@ def test_band_of_one_method_is_its_error():
 @pytest.mark.parametrize("method", ["decay", "all"])
 def test_refuses_removed_method(method):
     """A method that was removed is refused with what to use instead."""
-    with pytest.raises(pf.PatchfemError, match=f"'{method}' was removed in patchfem 2.0; "):
+    with pytest.raises(pf.PatchfemError, match=f"'{method}' was removed in patchfem 1.3; "):
         pf.backbone(LAW + SLIDE, modes=MODES, method=method)
 
 

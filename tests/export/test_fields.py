@@ -175,7 +175,7 @@ def test_exact_csv_has_interface_values(tmp_path):
         (
             ["-o", "a.py"],
             2,
-            "the script for ParaView was removed in patchfem 2.0; open fields.vtkhdf",
+            "the script for ParaView was removed in patchfem 1.2; open fields.vtkhdf",
         ),
         (["-o", "a.vtu", "--frame", "-4"], 2, "frames 0 to 2"),
         (["-o", "a.pvd", "--frame", "1"], 2, "contains all frames"),

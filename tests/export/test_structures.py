@@ -156,7 +156,7 @@ def test_exact_matrices_and_elements_of_several_interfaces(tmp_path):
             "cannot be written with [normal.grooves]",
         ),
         (FRICTION_RIG, ".csv", "a structure is exported as .mat"),
-        (FRICTION_RIG, ".npz", "removed in patchfem 2.0"),
+        (FRICTION_RIG, ".npz", "removed in patchfem 1.2"),
         (
             POINT + PLASTIC + '[slide]\nkind = "triangle"\namplitude = "8 um"\nspeed = "1 mm/s"\n',
             ".mat",

@@ -36,9 +36,9 @@ CURVES = {"balance": compute_balance_curve, "quasi-static": compute_static_curve
 # begins to slip.
 MIN_GROSS_SLIP_RATIO = 3.0
 REMOVED_METHODS = {
-    "decay": 'was removed in patchfem 2.0; run a release with drive.kind = "free", whose result has frequency and damping '
+    "decay": 'was removed in patchfem 1.3; run a release with drive.kind = "free", whose result has frequency and damping '
     "over the amplitude",
-    "all": "was removed in patchfem 2.0; leave it out: both methods are the default",
+    "all": "was removed in patchfem 1.3; leave it out: both methods are the default",
 }
 # Relative error of the flutter amplitude, smaller than the digits that are printed.
 FLUTTER_TOL = 1e-8

@@ -48,7 +48,7 @@ def export_structure(model: Model, out: Path) -> str:
     out = Path(out)
     if out.suffix.lower() != ".mat":
         removed = (
-            "; .npz was removed in patchfem 2.0, scipy.io.loadmat reads .mat in Python"
+            "; .npz was removed in patchfem 1.2, scipy.io.loadmat reads .mat in Python"
             if out.suffix.lower() == ".npz"
             else ""
         )
