@@ -52,8 +52,8 @@ LEVELS = (
 N_SEARCHES = 8
 MAX_COLUMNS = 400
 MAX_COLUMNS_OF_WAVES = 1 / 50  # longest column under a trace, over half the interface
-# Distances from the end of an interval, over its length, between which its edge is extrapolated
-EDGE_WINDOW = (0.004, 0.06)
+# Largest distance from the end of an interval, over its length, from which its edge is extrapolated
+EDGE_WINDOW = 0.06
 # Pressure over the peak at which a node of a rough layer counts as loaded
 MIN_LAYER_PRESSURE = 1e-13
 
@@ -574,32 +574,37 @@ def find_intervals(scene: Scene, x, pressure, active) -> tuple:
         elif near_step:
             place = scene.step
         else:
-            place = extrapolate_edge(x, pressure * active, (node, side), 1 if law else 2) or place
+            place = extrapolate_edge(scene, x, pressure * active, (node, side)) or place
         ends.append(float(place))
     return np.reshape(ends, (-1, 2)).tolist(), cells
 
 
-def extrapolate_edge(x, pressure, end: tuple, power: int) -> float | None:
+def extrapolate_edge(scene: Scene, x, pressure, end: tuple) -> float | None:
     """Return the place [m] at which a power of the pressure vanishes beyond a contact, None if it is unknown.
 
     The square of the pressure of bare pieces vanishes linearly, and so does the pressure of a layer. A cubic polynomial is
-    fitted near the end (last node, side) of the interval, without its outermost nodes, whose pressures are least exact.
+    fitted near the end (last node, side) of the interval, without its outermost nodes, whose pressures are least exact. The
+    fit ends at a kink of the gap and is shorter than the coating is thick, because the pressure changes its form there.
     """
     node, side = end
     open_nodes = np.flatnonzero(pressure <= 0)
     before = open_nodes[(open_nodes - node) * side < 0]
     other = before.max(initial=-1) + 1 if side > 0 else before.min(initial=x.size) - 1
-    length = abs(x[node] - x[other])
-    depth = (x[node] - x) * side / length if length else np.zeros(x.size)
-    near = (depth > EDGE_WINDOW[0]) & (depth < EDGE_WINDOW[1]) & (pressure > 0)
+    depth = (x[node] - x) * side
+    kinks = [(x[node] - mark) * side for mark in scene.marks]
+    coatings = [piece.thickness for piece in scene.pieces if piece.thickness]
+    window = min([EDGE_WINDOW * depth[other], *coatings, *(kink for kink in kinks if kink > 0)])
+    near = (depth > window / 15) & (depth < window) & (pressure > 0)
     near[np.clip(node - side * np.arange(ORDER), 0, x.size - 1)] = False
     if near.sum() < 6:
         return None
-    roots = np.roots(np.polyfit(depth[near], (pressure[near] / pressure.max()) ** power, 3))
+    power = 1 if scene.layer else 2
+    curve = np.polyfit(depth[near] / window, (pressure[near] / pressure.max()) ** power, 3)
+    roots = np.roots(curve)
     roots = roots[np.abs(roots.imag) < 1e-9].real
-    if not roots.size or np.abs(roots).min() > EDGE_WINDOW[1]:
+    if not roots.size or np.abs(roots).min() > 1.0:
         return None
-    return float(x[node] - side * length * roots[np.argmin(np.abs(roots))])
+    return float(x[node] - side * window * roots[np.argmin(np.abs(roots))])
 
 
 def find_stiffnesses(scene: Scene, pressed: Pressed, strip: int, nodes) -> np.ndarray:
