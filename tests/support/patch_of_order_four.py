@@ -117,7 +117,6 @@ class Pressed(NamedTuple):
     motion: np.ndarray
     active: np.ndarray
     intervals: list
-    cells: float
 
 
 def number(text) -> float:
@@ -503,7 +502,7 @@ def condense_piece(piece: Piece, scene: Scene, x, level: Level) -> np.ndarray:
 
 def press_nodes(scene: Scene, x, weight, compliance) -> Pressed:
     """Press the nodes x of the face with the compliances (3, m, m) of both pieces."""
-    nn, tt, nt = compliance
+    nn = compliance[0]
     count, roll = scene.strips
     y = ((np.arange(count) + 0.5) / count - 0.5) * scene.width
     area = weight * scene.width / count
@@ -527,15 +526,11 @@ def press_nodes(scene: Scene, x, weight, compliance) -> Pressed:
             C = C + np.diag(1 / slope[0])
         force, motion, active = press_bare(C, gap, rigid, target, spring)
         motion[0] += gap.min()
-    intervals = []
-    cells = 0.0
-    for strip, nodes in zip(force, join_neighbours(active)):
-        found, length = find_intervals(scene, x, strip / area, nodes)
-        intervals.append(found)
-        cells += length
-    return Pressed(
-        x, area, force, nn * count, tt * count, nt * count, slope, motion, active, intervals, cells
-    )
+    intervals = [
+        find_intervals(scene, x, strip / area, nodes)
+        for strip, nodes in zip(force, join_neighbours(active))
+    ]
+    return Pressed(x, area, force, *(compliance * count), slope, motion, active, intervals)
 
 
 def join_neighbours(active) -> np.ndarray:
@@ -551,11 +546,10 @@ def join_neighbours(active) -> np.ndarray:
     return out
 
 
-def find_intervals(scene: Scene, x, pressure, active) -> tuple:
-    """Return the intervals [m] of a strip in contact, and the sum of the cells in which they end [m]."""
+def find_intervals(scene: Scene, x, pressure, active) -> list:
+    """Return the intervals (from, to) [m] of a strip in contact."""
     law = scene.layer.get("law", "")
     ends = []
-    cells = 0.0
     padded = np.concatenate([[False], active, [False]])
     for k in np.flatnonzero(padded[1:] != padded[:-1]):
         is_start = bool(padded[k + 1])
@@ -565,7 +559,6 @@ def find_intervals(scene: Scene, x, pressure, active) -> tuple:
             ends.append(float(x[node]))
             continue
         cell = x[outside] - x[node]
-        cells += abs(cell)
         near_step = scene.step is not None and min(abs(x[[node, outside]] - scene.step)) < abs(cell)
         place = x[node] + cell / 2
         if law in ("exponential", "hertz"):
@@ -576,7 +569,7 @@ def find_intervals(scene: Scene, x, pressure, active) -> tuple:
         else:
             place = extrapolate_edge(scene, x, pressure * active, (node, side)) or place
         ends.append(float(place))
-    return np.reshape(ends, (-1, 2)).tolist(), cells
+    return np.reshape(ends, (-1, 2)).tolist()
 
 
 def extrapolate_edge(scene: Scene, x, pressure, end: tuple) -> float | None:
@@ -732,10 +725,9 @@ def find_parts(scene: Scene, pressed: Pressed) -> list:
     pressure = pressed.force / pressed.weight
     parts = [part for strip in pressed.intervals for part in strip]
     if scene.layer.get("law", "") in ("exponential", "hertz"):
-        parts = []
-        for row in pressure:
-            found, _ = find_intervals(scene, x, row, row > 1e-2 * pressure.max())
-            parts += found
+        loaded = pressure > 1e-2 * pressure.max()
+        strips = (find_intervals(scene, x, *strip) for strip in zip(pressure, loaded))
+        parts = [part for strip in strips for part in strip]
     out = []
     for low, high in parts:
         k = np.clip(np.searchsorted(x, (low + high) / 2) - 1, 0, cells.size - 1)
