@@ -3,7 +3,8 @@
 The program uses nothing of the package. Each piece is an elastic layer that is bonded to a rigid base; near short contacts
 it acts as a half plane. Pressures are constant on equal cells, displacements those at their centres, by a Fourier series
 with a long period. The pieces of the scene are sixteen times as long as tall and touch near their middle, so that their
-ends do not matter. Nodes enter and leave the contact set all at once; conjugate gradients solve on the set.
+ends do not matter. Nodes enter and leave the contact set all at once; conjugate gradients solve on the set. The
+changes between three numbers of cells are the uncertainties.
 """
 
 from __future__ import annotations
@@ -13,18 +14,16 @@ from time import process_time
 from typing import NamedTuple
 
 import numpy as np
-from campaigns import measure_rows
+from campaigns import measure_rows, select_known_rows
 from scipy.interpolate import CubicSpline
 
 SEED = 20261202
 LENGTH, HEIGHT, WIDTH = 20e-3, 1.25e-3, 10e-3
 YOUNG, POISSON = 210e9, 0.3
-COUNTS = (16384, 32768)  # numbers of cells, of which the last gives the reference
+COUNTS = (65536, 131072, 262144)  # numbers of cells of the interface
 N_ALIASES = 40  # number of aliases of a wave on either side that the kernel of a cell contains
 MAX_SETS = 60
-MAX_DOUBT_RATIO = (
-    0.5  # largest uncertainty of the reference over the stated error of a row that holds
-)
+MIN_CELLS = 8  # smallest number of cells of an interval whose ends are extrapolated
 
 
 class RandomTrace(NamedTuple):
@@ -100,7 +99,7 @@ class Cells:
         return force
 
     def press(self, gap, load: float, active) -> tuple:
-        """Return the forces (n,) [N] and the approach [m] under a load."""
+        """Return the forces (n,) [N], the approach [m], and the forces [N/m] of a unit motion of the set."""
         unit, closing = np.zeros(gap.size), np.zeros(gap.size)
         for _ in range(MAX_SETS):
             unit = self.solve(active, np.ones(gap.size), unit)
@@ -110,28 +109,68 @@ class Cells:
             overlap = approach - gap - self.product(force)
             wanted = np.where(active, force > 0, overlap > 1e-10 * np.abs(approach))
             if (wanted == active).all():
-                return force, approach
+                return force, approach, unit
             active = wanted
         raise ArithmeticError("the contact set did not settle")
 
 
-def solve_trace(trace: RandomTrace, count: int) -> dict:
-    """Return peak, contact fraction, approach and stiffness of a trace on a number of cells."""
-    cells = Cells(count)
+def correct_edges(x, force, unit) -> tuple[float, float]:
+    """Return the length in contact [m] and the stiffness [N/m] for edges between the cells.
+
+    The square of the pressure vanishes linearly at an edge, extrapolated from the second and third cell of an interval.
+    Where the set ends short of its edge by a, the pressures c/sqrt(distance) of a unit motion, unbounded there, add
+    2 pi c^2 a/E' per width to the stiffness (energy release rate).
+
+    Parameters
+    ----------
+    x : (n,) ndarray
+        Centres of equal cells [m].
+    force, unit : (n,) ndarray
+        Forces [N] under the load, and [N/m] of a unit motion of the same cells.
+    """
+    h = x[1] - x[0]
+    modulus = YOUNG / (1 - POISSON**2) / 2
+    changes = np.flatnonzero(np.diff(np.concatenate([[False], force > 0, [False]])))
+    length, stiffness = 0.0, unit.sum()
+    for begin, end in changes.reshape(-1, 2):
+        length += (end - begin) * h
+        if end - begin < MIN_CELLS:
+            continue
+        for near, far in ((begin + 1, begin + 2), (end - 2, end - 3)):
+            ratio = force[far] ** 2 / force[near] ** 2
+            if ratio <= 1:
+                continue
+            # The edge lies beyond the second centre, which is a cell and a half inside the end of the set.
+            distance = min(1 / (ratio - 1), 3.0) * h
+            missing = distance - 1.5 * h
+            length += missing
+            squares = (unit[near] ** 2 * distance + unit[far] ** 2 * (distance + h)) / 2
+            stiffness += 2 * np.pi / modulus * squares / h**2 / WIDTH * missing
+    return length, stiffness
+
+
+def solve_trace(trace: RandomTrace) -> tuple[dict, dict]:
+    """Return peak, contact fraction, approach and stiffness of a trace, and their uncertainties."""
     curve = CubicSpline(trace.x, trace.z, bc_type="natural")
-    gap = curve(cells.x) - curve(np.linspace(-LENGTH / 2, LENGTH / 2, 20001)).min()
-    active = gap < gap.min() + 2e-7
-    force, approach = cells.press(gap, trace.load, active)
-    loads = trace.load * np.array([0.99, 1.01])
-    ends = [cells.press(gap, load, force > 0)[1] for load in loads]
-    if np.abs(cells.x[force > 0]).max() > LENGTH / 3:
-        raise ArithmeticError("the contact is too long")
-    return {
-        "pressure_peak": float(force.max() / (cells.h * WIDTH)),
-        "contact_fraction": float((force > 0).mean()),
-        "approach": float(approach),
-        "normal_stiffness": float((loads[1] - loads[0]) / (ends[1] - ends[0])),
-    }
+    turns = curve.derivative().roots(extrapolate=False)
+    lowest = curve(np.append(turns, trace.x[[0, -1]])).min()
+    values, force = [], None
+    for count in COUNTS:
+        cells = Cells(count)
+        gap = curve(cells.x) - lowest
+        active = gap < 2e-7 if force is None else np.repeat(force > 0, count // force.size)
+        force, approach, unit = cells.press(gap, trace.load, active)
+        length, stiffness = correct_edges(cells.x, force, unit)
+        if np.abs(cells.x[force > 0]).max() > LENGTH / 3:
+            raise ArithmeticError("the contact is too long")
+        largest = int(np.argmax(force))
+        before, peak, after = force[largest - 1 : largest + 2]
+        peak += (before - after) ** 2 / 8 / (2 * peak - before - after)
+        values.append([peak / (cells.h * WIDTH), length / LENGTH, approach, stiffness])
+    coarse, middle, fine = np.array(values)
+    doubt = np.maximum(np.abs(fine - middle), np.abs(middle - coarse) / 2)
+    names = ("pressure_peak", "contact_fraction", "approach", "normal_stiffness")
+    return dict(zip(names, fine.tolist())), dict(zip(names, doubt.tolist()))
 
 
 def compare_trace(number: int, folder: Path, earlier: dict | None = None) -> dict:
@@ -159,13 +198,5 @@ def compare_trace(number: int, folder: Path, earlier: dict | None = None) -> dic
     if earlier and "true" in earlier:
         line |= {key: earlier[key] for key in ("true", "doubt")}
     else:
-        coarse, fine = (solve_trace(trace, count) for count in COUNTS)
-        line["true"] = fine
-        line["doubt"] = {name: abs(value - coarse[name]) for name, value in fine.items()}
-        # Counted cells are in excess by a fixed part of a cell at each edge.
-        fine["contact_fraction"] = 2 * fine["contact_fraction"] - coarse["contact_fraction"]
-    found = measure_rows(run.measures, line["true"], line["doubt"])
-    line["rows"] = [
-        row for row in found if row.doubt <= MAX_DOUBT_RATIO * row.error or not row.holds
-    ]
-    return line
+        line["true"], line["doubt"] = solve_trace(trace)
+    return line | select_known_rows(measure_rows(run.measures, line["true"], line["doubt"]), 1e-3)

@@ -126,6 +126,33 @@ def measure_rows(measures, truths: dict, doubts: dict, names=None) -> list:
     ]
 
 
+def select_known_rows(rows: list, tolerance: float) -> dict:
+    """Return the rows whose reference is known well enough, and what the others show, as keys of a line.
+
+    The rule does not depend on whether a row holds: the uncertainty of the reference is at most half of the stated error,
+    or of a tenth of the error that the tolerance allows.
+
+    Returns
+    -------
+    dict
+        - rows: the rows that count
+        - unknown: number of the other rows
+        - unknown_apart: number of the other rows that do not hold
+    """
+
+    def is_known(row: Row) -> bool:
+        """Return whether the reference of a row is known well enough."""
+        allowed = tolerance * max(abs(row.truth), row.floor)
+        return row.doubt <= max(row.error, allowed / 10, row.floor * FLOOR_FRACTION) / 2
+
+    others = [row for row in rows if not is_known(row)]
+    return {
+        "rows": [row for row in rows if is_known(row)],
+        "unknown": len(others),
+        "unknown_apart": sum(not row.holds for row in others),
+    }
+
+
 def strip_number(name: str) -> str:
     """Return the name of a measure without the number of its interface."""
     head, _, number = name.rpartition("_")
@@ -176,6 +203,11 @@ def print_score(lines: list) -> None:
     for engine in [*list_engines(lines), None]:
         selected = [line for line in lines if engine in (None, line.get("engine"))]
         print(f"{engine or 'all':12s}", describe_score(compute_score(selected)))
+    unknown, apart = (
+        sum(line.get(key, 0) for line in lines) for key in ("unknown", "unknown_apart")
+    )
+    if unknown:
+        print(f"left out: {unknown} errors of uncertain references; {apart} of them do not hold")
     for line in lines:
         if not line["rows"]:
             print(f"not compared: seed {line['seed']}, {line.get('refused', line.get('outcome'))}")
@@ -254,7 +286,7 @@ def run_campaign(compare_scene, seeds, file: Path, earlier: dict) -> None:
         try:
             with tempfile.TemporaryDirectory() as folder:
                 line = compare_scene(seed, Path(folder), earlier.get(seed))
-        except (TimeoutError, RuntimeError, AssertionError, ValueError) as error:
+        except (TimeoutError, RuntimeError, AssertionError, ArithmeticError, ValueError) as error:
             line = {"rows": [], "refused": f"failed: {error!r}"}
         signal.setitimer(signal.ITIMER_PROF, 0)
         if line is not None:

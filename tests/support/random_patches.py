@@ -1,7 +1,7 @@
 """Recipe of random static patches of all families, and the campaigns "patches" and "patches-fine".
 
 Patch n is the n-th of its recipe for every state of the package: `draw_patch(n)` returns its family, the text of its
-scene and its trace. The family follows from n modulo 100. The reference is `patch_by_skfem`, which uses nothing of
+scene and its trace. The family follows from n modulo 100. The reference is `patch_of_order_four`, which uses nothing of
 the package.
 """
 
@@ -14,8 +14,8 @@ from time import process_time
 from typing import NamedTuple
 
 import numpy as np
-from campaigns import measure_rows
-from patch_by_skfem import solve_patch
+from campaigns import measure_rows, select_known_rows
+from patch_of_order_four import solve_patch
 
 SEED = 20261201
 # Numbers of patches of each family among a hundred successive numbers
@@ -31,8 +31,6 @@ FAMILIES = {
     "smooth trace": 10,
 }
 MATERIALS = ((121e9, 0.32), (210e9, 0.3), (70e9, 0.34), (250e9, 0.24), (600e9, 0.22))
-# Largest uncertainty of the reference, relative to the stated error, at which a row that holds counts
-MAX_DOUBT_RATIO = 0.5
 
 
 class RandomPatch(NamedTuple):
@@ -167,20 +165,14 @@ def compare_patch(
     scene = write_scene(patch, tolerance, folder)
     started = process_time()
     run = pf.run(pf.load(scene))
-    line = {"group": patch.family, "engine": "patch", "seconds": process_time() - started}
+    line = {"group": patch.family, "engine": patch.family, "seconds": process_time() - started}
     line["warnings"] = list(run.warnings)
     if earlier and "true" in earlier:
         line |= {key: earlier[key] for key in ("true", "doubt")}
     else:
         line["true"], line["doubt"] = solve_patch(tomllib.loads(patch.text)["contact"], patch.trace)
     rows = measure_rows(run.measures, line["true"], line["doubt"])
-    # A row whose reference is less certain than the stated error proves nothing unless it fails.
-    line["rows"] = [
-        row
-        for row in rows
-        if row.doubt <= MAX_DOUBT_RATIO * max(row.error, row.floor) or not row.holds
-    ]
-    return line
+    return line | select_known_rows(rows, tolerance)
 
 
 compare_coarse_patch = partial(compare_patch, tolerance=1e-2)

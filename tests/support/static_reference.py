@@ -14,13 +14,8 @@ from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
-from scipy import sparse
-from scipy.linalg import cho_factor, cho_solve
-from scipy.sparse.linalg import splu
-from study_module import load_study
+from patch_of_order_four import ORDER, Level, Piece, condense, order_four
 
-cells_of = load_study("contact/order_four.py")
-ORDER = 4
 # Three refinements: factor on `fine` at contact edges, cell at the corners of the bodies over the
 # shorter side, growth, cells across a contact. With corner cells of 1/60, errors reached 40 times
 # the stated errors at a tolerance of 1e-5.
@@ -89,8 +84,8 @@ def grade_points(
     return np.array(out)
 
 
-def condense_face(body: BodySection, plane: str, inner, growth: float, corner: float) -> tuple:
-    """Return compliances (nn, tt, nt), (m, m) [m2/N], of the common part of the face.
+def condense_face(body: BodySection, plane: str, inner, growth: float, corner: float) -> np.ndarray:
+    """Return compliances (3, m, m) [m2/N], nn, tt and nt, of the common part of the face.
 
     They are per unit width, at the nodes of the cells of `inner`; nt is the normal displacement due
     to shear.
@@ -107,66 +102,11 @@ def condense_face(body: BodySection, plane: str, inner, growth: float, corner: f
             body.length / 8,
         )
         x = np.concatenate([-overhang[:0:-1], inner, overhang[1:]])
-        extra = (overhang.size - 1) * ORDER
-    surface_cell = float(np.diff(inner).min())
-    coating_thickness = body.thickness
-    points = [0.0, body.height]
-    sizes = [surface_cell, corner]
-    if coating_thickness:
-        points = [*points, coating_thickness]
-        sizes = [*sizes, max(surface_cell, min(coating_thickness / 4, corner))]
-    rows_of_grid = grade_points(
-        points, sizes, 0.0, body.height, growth, min(body.height, body.length) / 4
-    )
-    numbers, count = cells_of.numbering(x.size - 1, rows_of_grid.size - 1, ORDER)
-    m = (x.size - 1) * ORDER + 1
-    rows = []
-    columns = []
-    entries = []
-    for number, (young, nu) in enumerate(body.layers):
-        if plane == "stress":
-            young = young * (1 + 2 * nu) / (1 + nu) ** 2
-            nu = nu / (1 + nu)
-        layer = np.flatnonzero(
-            ((rows_of_grid[1:] + rows_of_grid[:-1]) / 2 > coating_thickness) == bool(number)
-        )
-        if not layer.size:
-            continue
-        iy, ix = (grid.ravel() for grid in np.meshgrid(layer, np.arange(x.size - 1), indexing="ij"))
-        ratio = np.diff(rows_of_grid)[iy] / np.diff(x)[ix]
-        cells, local = cells_of.condense_interior(
-            cells_of.cell_stiffness(ORDER, ratio, young, nu), ORDER
-        )
-        node = numbers[
-            iy[:, None] * ORDER + local // (ORDER + 1), ix[:, None] * ORDER + local % (ORDER + 1)
-        ]
-        # Nodes of the face; all tangential displacements are numbered before the normal ones.
-        last = node >= count - m
-        dof = np.concatenate(
-            [
-                np.where(last, node + count - m, 2 * node),
-                np.where(last, node + count, 2 * node + 1),
-            ],
-            axis=1,
-        )
-        dof = np.where(np.tile(node, 2) < 0, -1, dof)
-        rows.append(np.broadcast_to(dof[:, :, None], cells.shape).ravel())
-        columns.append(np.broadcast_to(dof[:, None, :], cells.shape).ravel())
-        entries.append(cells.ravel())
-    row = np.concatenate(rows)
-    column = np.concatenate(columns)
-    entry = np.concatenate(entries)
-    free = (row >= 0) & (column >= 0)
-    matrix = sparse.csc_array(
-        (entry[free], (row[free], column[free])), shape=(2 * count, 2 * count)
-    )
-    factor = splu(
-        matrix, permc_spec="NATURAL", diag_pivot_thresh=0.0, options={"SymmetricMode": True}
-    )
-    stiff = factor.L[-2 * m :, -2 * m :].toarray() @ factor.U[-2 * m :, -2 * m :].toarray()
-    c = cho_solve(cho_factor((stiff + stiff.T) / 2), np.eye(2 * m))
-    common = slice(extra, m - extra)
-    return c[m:, m:][common, common], c[:m, :m][common, common], c[m:, :m][common, common]
+        extra = overhang.size - 1
+    piece = Piece(body.length, body.height, body.thickness, *body.layers, "", 0.0)
+    level = Level(0.0, corner / min(body.height, body.length), growth, 0, 0)
+    face = slice(extra, extra + inner.size)
+    return condense(x, piece, plane, float(np.diff(inner).min()), level, face)
 
 
 def solve_contact(compliance, gap, load: float, active=None) -> tuple:
@@ -262,7 +202,7 @@ def press_scene(scene: PatchScene, edges, fine: float, lap: tuple = FIRST) -> Pr
         points = [*points, scene.step[1]]
         sizes = [*sizes, shortest * fine]
     x = grade_points(points, sizes, -half, half, growth, scene.length / 10)
-    place, weight = cells_of.face_nodes(x, ORDER)
+    place, weight = order_four.face_nodes(x, ORDER)
     bodies = [scene.lower] + [scene.upper] * (scene.upper != scene.lower)
     parts = [condense_face(one, scene.plane, x, growth, corner) for one in bodies]
     lower = parts[0]

@@ -94,7 +94,7 @@ def discretize(patch: reference.PatchScene, span: tuple, cells: int) -> WearMode
         points = [*points, patch.step[1]]
         sizes = [*sizes, size / 4]
     x = reference.grade_points(points, sizes, -half, half, 0.5, patch.length / 10)
-    place, weight = reference.cells_of.face_nodes(x, reference.ORDER)
+    place, weight = reference.order_four.face_nodes(x, reference.ORDER)
     bodies = [patch.lower] + [patch.upper] * (patch.upper != patch.lower)
     parts = [reference.condense_face(body, patch.plane, x, 0.5, corner) for body in bodies]
     low = parts[0]
