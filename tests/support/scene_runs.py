@@ -6,7 +6,7 @@ from patchfem.runs.run import run
 from patchfem.scene import loads
 
 REMEDY = (
-    r"\b(add|belongs|built|choose|give|keep|leave|lower|name|need|needed|needs|put|raise|set|use)\b"
+    r"\b(add|belongs|built|choose|give|keep|leave|lower|must|name|need|needed|needs|put|raise|set|use)\b"
 )
 # Reasons that say themselves what to do.
 OWN_REMEDY = "is not above|nothing moves|there is no such file"
