@@ -5,9 +5,7 @@ import re
 from patchfem.runs.run import run
 from patchfem.scene import loads
 
-REMEDY = (
-    r"\b(add|belongs|built|choose|give|keep|leave|lower|must|name|need|needed|needs|put|raise|set|use)\b"
-)
+REMEDY = r"\b(add|belongs|built|choose|give|keep|leave|lower|must|name|need|needed|needs|put|raise|set|use)\b"
 # Reasons that say themselves what to do.
 OWN_REMEDY = "is not above|nothing moves|there is no such file"
 
