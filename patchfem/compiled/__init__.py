@@ -560,21 +560,6 @@ def write_kernel_module(module: str, text: str, report=None, imported=()) -> Ker
     return KernelModule(name, path if is_stored else text, import_written_module)
 
 
-def record_run(kind: str) -> None:
-    """Record that a run of this kind was completed, so its compiled code is stored."""
-    if not IS_JIT_DISABLED:
-        path = _set_cache_folder() / "kinds" / hash_text(kind)
-        user_cache.write_cache_file(path, kind.encode())
-
-
-def has_run(kind: str) -> bool:
-    """Return whether a run of this kind needs no compilation, since one was completed before."""
-    file_name = hash_text(kind)
-    return IS_JIT_DISABLED or any(
-        (folder / "kinds" / file_name).is_file() for folder in _list_code_folders()
-    )
-
-
 def _list_code_folders(machine_folder: Path | None = None) -> list:
     """List the folders of compiled code: that of this machine and, if any, that of the wheel."""
     wheel_folder = prebuilt.find_folder(hash_sources)
@@ -618,12 +603,6 @@ def _set_cache_folder() -> Path:
     if "numba" in sys.modules:
         sys.modules["numba"].config.CACHE_DIR = str(folder)
     return folder
-
-
-def set_compile_callback(report) -> None:
-    """Set the callback that receives the message of `load` when a function is compiled."""
-    if report is not None:
-        _MESSAGE_CALLBACKS[:] = [report]
 
 
 def _report_compilation() -> None:

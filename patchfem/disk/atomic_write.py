@@ -110,15 +110,6 @@ def write_bytes(path, data) -> None:
         partial.write_bytes(data)
 
 
-def write_in_partial_folder(path: Path, text: str) -> None:
-    """Write a text file into a partial folder, which itself is renamed when it is complete."""
-    data = text.encode("utf-8", errors="replace")
-    try:
-        path.write_bytes(data)
-    except OSError as error:
-        raise explain_write_error(error, path, make_partial_path(path), len(data)) from None
-
-
 def forget_placed_paths() -> None:
     """Clear the lists of completed files and checkpoint folders at the start of a command."""
     PLACED_PATHS.clear()

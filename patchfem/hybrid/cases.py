@@ -7,7 +7,7 @@ import numpy as np
 
 from ..core import ModalBasis
 from ..structure.drive_sizes import find_max_acceleration
-from .drives import Signal, make_signal, make_slide
+from .drives import Signal, make_signal
 from .laws import LAWS, MIN_LOAD, is_rigid
 from .laws.springs import make_cubic, make_interlocking
 from .records import (
@@ -326,30 +326,6 @@ def find_sizes(modes: ModalBasis, signal: Signal, drive, start=None) -> tuple[fl
         speeds = np.append(rows @ np.asarray(start.v), omega * (rows @ np.asarray(start.z)))
         speed = max(speed, np.abs(speeds).max())
     return speed / omega, speed
-
-
-def make_bench_case(path, law: LawNumbers, load: Load, *, samples=(), rtol=DEFAULT_RTOL) -> Case:
-    """Return the case of a prescribed slide `path` (model.slide.SlidePath) under a law.
-
-    Parameters
-    ----------
-    path : SlidePath
-    law : LawNumbers
-    load : Load
-    samples : (S,) array_like
-        Times [s] at which the motion is stored.
-    rtol : float
-        Tolerance of a step.
-    """
-    signal = make_slide(path)
-    interface = Interface(law, load, np.ones(1))
-    speed = path.peak_speed
-    arrays = make_rig(None, signal, [interface], (path.amplitude, speed), Options(rtol=rtol))
-    duration = signal.pieces[-1, 0] if len(signal.pieces) else path.cycles * signal.period
-    ends, windows = make_schedule(duration / signal.period, signal.period, 1)
-    return Case(
-        arrays, make_start(arrays, [interface]), ends, windows, np.asarray(samples, float), 1
-    )
 
 
 def stack(arrays) -> tuple:

@@ -105,36 +105,6 @@ def make_sweep(drive) -> Signal:
     return Signal(np.array(pieces), np.zeros((0, 3)), drive.period, shortest, 0)
 
 
-def make_slide(path) -> Signal:
-    """Return the Signal of a prescribed slide of `model.slide.SlidePath`."""
-    if path.kind == "sine":
-        return make_tones([(path.amplitude, 2 * np.pi * path.frequency, 0.0)], path.period)
-    if path.kind == "constant":
-        corners = np.array([0.0, path.amplitude / path.speed]), np.array([0.0, path.amplitude])
-    elif path.corners is not None:
-        corners = path.corners
-    else:
-        corners = _triangle_corners(path)
-    time, slide = (np.asarray(corner, float) for corner in corners)
-    period = path.period or float(time[-1])
-    signal = make_record(time, slide, period)
-    # After its last corner the slide rests.
-    signal.pieces[-1, Piece.CONSTANT] = slide[-1]
-    return signal
-
-
-def _triangle_corners(path) -> tuple[np.ndarray, np.ndarray]:
-    """Return times [s] and displacements [m] of the corners of a triangle wave, with its run-in."""
-    quarter = path.amplitude / path.speed
-    n = round(4 * path.cycles)
-    shape = np.array([0.0, 1.0, 0.0, -1.0])[np.arange(n + 1) % 4] * path.amplitude
-    time = quarter * np.arange(n + 1)
-    if not path.run_in:
-        return time, shape
-    time = np.concatenate([[0.0], path.run_in / path.speed + time])
-    return time, np.concatenate([[0.0], path.run_in - shape])
-
-
 def _make_piece(start: float, **columns) -> np.ndarray:
     """Return a piece of a drive from its columns by their names in `records.Piece`; the others are 0."""
     piece = np.zeros(len(Piece))

@@ -283,12 +283,6 @@ def estimate_errors(values: dict, coarse: dict, rtol: float) -> dict:
     return errors
 
 
-def run_with_errors(cases) -> tuple[Batch, list[dict]]:
-    """Run cases; return them with the errors of each window by name."""
-    fine = run_batch(cases)
-    return fine, _compare(cases, fine)
-
-
 def _compare(cases, fine: Batch) -> list[dict]:
     """Return the errors of each window from a run with larger steps."""
     rtol = float(cases[0].rig.settings[Setting.RTOL])

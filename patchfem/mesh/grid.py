@@ -75,11 +75,6 @@ class TensorGrid:
         """Half the length [m] of the flat face between both ends."""
         return self.piece_length / 2 - self.end.size
 
-    @property
-    def is_rectangle(self) -> bool:
-        """Whether the piece is a rectangle as long as the interface."""
-        return self.outer.size == 1 and self.end.kind == "sharp"
-
     @cached_property
     def columns(self) -> np.ndarray:
         """Positions (nx,) [m] of all columns of nodes."""

@@ -75,15 +75,6 @@ def classify_motions(amplitudes, tolerance: float, floor=0.0) -> np.ndarray:
     return classes
 
 
-def geometric_remainder(values) -> complex | None:
-    """Return the remaining sum of a geometric series through three values, or None.
-
-    See `geometric_remainders`.
-    """
-    remainder = geometric_remainders(np.asarray(values) + 0.0)
-    return None if np.isnan(remainder) else remainder
-
-
 def geometric_remainders(values):
     """Return the remaining sums of geometric series through three values (Aitken's method).
 

@@ -15,7 +15,6 @@ def test_exact_geometric_transient_is_extrapolated(ratio):
     """The steady amplitude after a geometric transient is extrapolated within 1e-9."""
     a = 2.0 - 0.9 * ratio ** np.arange(6)
     assert settling.classify(a, 1e-6) is Outcome.TRANSIENT
-    assert a[-1] + settling.geometric_remainder(a[-3:]) == pytest.approx(2.0, rel=1e-9)
     steady, error = settling.extrapolate_steady_amplitude(a, a * np.exp(0.7j))
     assert steady == pytest.approx(2.0, rel=1e-9) and error < 1e-6
 

@@ -6,27 +6,14 @@ path.
 """
 
 from math import exp
-from typing import NamedTuple
 
 from ...compiled.flags_kernels import FASTMATH_FLAGS, NJIT_NO_REFCOUNT
 from ...compiled.jit import njit
-from ..bonds.point_kernels import shape_functions
 from ..protocol_kernels import Rates, RelaxedStretch
 
 # Smallest friction limit relative to the static force; z relaxes over limit/stiffness, which must
 # not be 0
 MIN_LIMIT_RATIO = 1e-9
-
-
-class _Relaxation(NamedTuple):
-    """Stretch after a step [m], its mean over the path [m], and their derivatives."""
-
-    end: float
-    mean: float
-    end_by_increment: float
-    mean_by_increment: float
-    end_by_stretch: float
-    end_by_time: float
 
 
 @njit(error_model="numpy", forceinline=True, **NJIT_NO_REFCOUNT)
@@ -59,54 +46,33 @@ def rate_equation(numbers, stretch, velocity, direction):
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def _relax(numbers, stretch, increment, dt):
-    """Return the stretch after a step at constant velocity.
+def relax_stretch(numbers, stretch, increment, dt):
+    """Return z after an increment at constant velocity, for harmonic balance.
 
-    If the step takes no time, the limit is the kinetic force.
+    z relaxes towards +-g/stiffness. If the step takes no time, the limit is the kinetic force.
+
+    Returns
+    -------
+    RelaxedStretch
     """
     direction = 1.0 if increment > 0 else -1.0
     path = abs(increment)
     length = max(numbers[2], MIN_LIMIT_RATIO * numbers[3]) / numbers[1]
     length_by_path = 0.0  # derivative of the length with respect to the path
     if dt > 0:
-        length, length_by_path = _relaxation_length(numbers, path / dt)
-        length_by_path /= dt
+        length, length_by_velocity = _relaxation_length(numbers, path / dt)
+        length_by_path = length_by_velocity / dt
     x = path / length
-    shapes = shape_functions(x)
+    decay = exp(-x)
     end = direction * length
     deviation = stretch - end
+
+    # The length changes with the velocity path/dt, so also with the time of the step.
     x_by_path = (1 - x * length_by_path) / length
-    mean_slope = (
-        direction * length_by_path * (1 - shapes.f1)
-        + deviation * (shapes.f2 - shapes.f1) * x_by_path
-    )
-    end_slope = (
-        direction * length_by_path * (1 - shapes.decay) - deviation * shapes.decay * x_by_path
-    )
+    by_path = direction * length_by_path * (1 - decay) - deviation * decay * x_by_path
     by_time = 0.0
     if dt > 0:
         length_by_time = -length_by_path * path / dt
-        by_time = direction * length_by_time * (1 - shapes.decay)
-        by_time += deviation * shapes.decay * x / length * length_by_time
-    return _Relaxation(
-        end + deviation * shapes.decay,
-        end + deviation * shapes.f1,
-        direction * end_slope,
-        direction * mean_slope,
-        shapes.decay,
-        by_time,
-    )
-
-
-@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def relax_stretch(numbers, stretch, increment, dt):
-    """Return z after an increment, for harmonic balance.
-
-    Returns
-    -------
-    RelaxedStretch
-    """
-    relaxed = _relax(numbers, stretch, increment, dt)
-    return RelaxedStretch(
-        relaxed.end, relaxed.end_by_stretch, relaxed.end_by_increment, relaxed.end_by_time
-    )
+        by_time = direction * length_by_time * (1 - decay)
+        by_time += deviation * decay * x / length * length_by_time
+    return RelaxedStretch(end + deviation * decay, decay, direction * by_path, by_time)

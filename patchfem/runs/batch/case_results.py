@@ -14,7 +14,6 @@ from weakref import finalize
 
 import numpy as np
 
-from ...core import Measure
 from ...inputs import measured
 from ...model.model import Model
 from ...model.similar_models import select_models
@@ -211,16 +210,6 @@ class CaseResults:
             results.reasons[name] = _renumber(reasons, new_indices)
         results.messages.update(_renumber(self.messages, new_indices))
         return results
-
-    def measures_with_errors(self, case: int) -> dict:
-        """Return the measures of a case that have an error estimate."""
-        measures = {}
-        for name, errors in self.errors.items():
-            if not np.isnan(errors[case]):
-                numbers = self.values[name][case], errors[case], self.floors[name][case]
-                value, error, floor = map(float, numbers)
-                measures[name] = Measure(value, self.units[name], error, floor)
-        return measures
 
     def has(self, name: str, case: int) -> bool:
         """Return whether a case has a value of a measure or a reason for its absence."""

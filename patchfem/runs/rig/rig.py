@@ -211,11 +211,6 @@ def _count_slip_period_cycles(model, numerics, solution) -> int:
     return n_cycles if 2 * n_cycles <= numerics.cycles else 0
 
 
-def are_tolerances_met(measures: dict, tolerance: float) -> bool:
-    """Return whether the errors of all measures are within the tolerance or their floors."""
-    return all(measure.error_ratio(tolerance) <= 1 for measure in measures.values())
-
-
 def _find_step_excess(run: CoupledRun) -> float:
     """Return the largest ratio of error to allowed error of the measures that need more steps.
 
