@@ -131,16 +131,6 @@ EARLIER_FAST = (
     large_test("6", 5, 1000, 1130, 0.117),
     large_test("11", 5, 15000, 24500, 2.18),
 )
-# measured strokes of these tests and of test 1 [m]
-EARLIER_STROKES = {
-    "1": 176.8e-6,
-    "3": 134e-6,
-    "4": 141e-6,
-    "6": 70e-6,
-    "11": 150.4e-6,
-    "13": 138e-6,
-    "14": 150e-6,
-}
 # friction power / track area [W/m^2] of the tests for which Appendix A gives it with a measured area
 POWER = {
     "RP_f_15": 5.32e4,

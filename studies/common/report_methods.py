@@ -155,26 +155,6 @@ def duhamel_maps(modes: ModalBasis, step: float) -> np.ndarray:
     return maps
 
 
-def accepted_force_error(
-    modes: ModalBasis, step: float, criterion: str, tolerance: float, relaxation: float
-) -> float:
-    """Return the error of the force [N] with which a step of Duhamel's integral is accepted.
-
-    Parameters
-    ----------
-    modes : ModalBasis
-    step : float
-        [s]
-    criterion : {"displacement", "velocity", "force"}
-    tolerance : float
-    relaxation : float
-    """
-    if criterion == "force":
-        return tolerance
-    gain = modes.slide**2 @ duhamel_maps(modes, step)[:, CRITERIA.index(criterion), 3]
-    return tolerance * modes.mass / (relaxation * gain)
-
-
 def solve_duhamel(
     modes: ModalBasis,
     drive,

@@ -14,7 +14,6 @@ DOMINANT = 80e-6  # [m] dominant wavelength, the 80 micron scale of the report, 
 SHORTEST = 8e-6  # [m] shortest wave that a stylus of 12.5 um traces
 # [m] rms height of the larger swings of 13 to 18 um in 4.D; Fig. 30 prints a range of 30.6 um, for which Rt is 31 um
 SIGMA = 6.3e-6
-SWINGS = {"peak-to-valley": 2.5, "zero-to-peak": 1.25, "rms": 1.0}  # amplitude / sigma
 
 
 def sine(x: np.ndarray, amplitude: float, wavelength: float, phase: float = 0.0) -> Profile:

@@ -22,12 +22,6 @@ def iwan_elements(count: int, scale: float = 1.0) -> tuple:
     return stiffness / scale, scale * (force[:-1] - force[1:]) / stiffness
 
 
-def iwan_loop(amplitude, scale: float = 1.0):
-    """Return the steady loop area of the continuous Iwan model by Masing's rule: 8 int F - 4 A F with the virgin curve F."""
-    x = np.asarray(amplitude, float) / scale
-    return 4 * scale * (x - 2 + np.exp(-x) * (2 + x))
-
-
 def bouc_wen(path, power: float, beta: float = 0.5) -> np.ndarray:
     """Integrate z of the Bouc-Wen law at the points of a path (k, ...).
 

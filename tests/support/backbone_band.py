@@ -44,7 +44,6 @@ MOST_STEPS = 4000
 MAX_CYCLES = 1500
 BLOCK = 25  # Cycles between two checks of whether the motion repeats.
 REPEATS = 1e-4  # Expected further change, relative to the response, at which the march ends.
-N_DECAY = 3  # The decay is evaluated at every third amplitude.
 
 
 class Joint(NamedTuple):

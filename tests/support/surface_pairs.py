@@ -37,8 +37,6 @@ KINDS = (
     "elsewhere",
     "scale",
 )
-# Kinds in which the short waves did not change.
-SAME = ("unworn", "even", "wedge", "dust", "mirrored", "turned", "elsewhere")
 RUBBED = ("groove", "edge", "run-in", "dropouts", "bent")  # Kinds with both worn and unworn parts.
 
 

@@ -98,11 +98,6 @@ class Trial:
         return float(f"{math.exp(self.r.uniform(math.log(low), math.log(high))):.4g}")
 
 
-def make_command_line(*words) -> list:
-    """Return the command line that runs these words in a new interpreter."""
-    return [sys.executable, "-m", "patchfem", *map(str, words)]
-
-
 def capture(command: Callable, words: list) -> CommandResult:
     """Run a command and capture both streams, including output that bypasses Python."""
     saved = [os.dup(1), os.dup(2)]
