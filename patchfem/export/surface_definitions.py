@@ -51,6 +51,13 @@ def name_in_track(name: str) -> str:
     return TRACK_NAMES.get(name, f"track_{name}")
 
 
+def list_names() -> list[str]:
+    """Return the names of all definitions; the parts of a track without the prefix track_."""
+    heights = [f"P{name}" for name in PROFILE if name != "z"]
+    roughness = [name if name.startswith("Mr") else f"R{name}" for name in PROFILE]
+    return list(dict.fromkeys([*_MEANINGS, *DEFINITIONS, *heights, *roughness, *AREAL]))
+
+
 def find(name: str) -> Definition | None:
     """Return the definition of a quantity of compare, pairs or profile; None if there is none."""
     for table in (_MEANINGS, DEFINITIONS, AREAL):
