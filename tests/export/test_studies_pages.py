@@ -62,7 +62,7 @@ def folders(tmp_path_factory):
     free_mode = (
         "structure.mode.axial.frequency=120 Hz..160 Hz,structure.mode.axial.damping=0.005..0.2"
     )
-    amplitudes = ("--amplitudes", "0.1 um..200 um:9")
+    amplitudes = ("--amplitudes", "0.1 um..2.5 um:9")
     commands = {
         "backbone": ("backbone", "block.toml", *amplitudes),
         "loop": (
