@@ -80,7 +80,7 @@ def test_exact_killed_worker_loses_one_case(tmp_path, support_on_path, once):
 
 
 def test_exact_death_of_process_loses_its_chunk_only(tmp_path, support_on_path):
-    """A process that dies loses its own chunk, one new process takes its place, and other child processes live on.
+    """A process that dies loses its own chunk, at most one new process takes its place, and other child processes live on.
 
     Once all processes were started anew, all chunks were computed again case by case without the other processes, and
     every child process that the program had started during the sweep was killed.
@@ -98,7 +98,8 @@ def test_exact_death_of_process_loses_its_chunk_only(tmp_path, support_on_path):
     try:
         deaths = [number for number, answer in answers.items() if isinstance(answer, WorkerDeath)]
         assert sorted(answers) == [0, 2, 4, 5, 6, 7] and deaths == [2]
-        assert len(pool.processes.started) == 3
+        # No third process is needed if the other one has computed all chunks before the death is seen.
+        assert 2 <= len(pool.processes.started) <= 3
         assert not any(process.is_alive() for process in pool.processes.started)
         assert other.is_alive()
     finally:
