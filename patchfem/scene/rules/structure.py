@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any, NamedTuple
 
 from ..keys.removed import describe_removed
@@ -14,8 +15,8 @@ from .scene_draft import SceneDraft
 ARRAY_EXTENSIONS = (".npz", ".mat")
 UNIVERSAL_EXTENSIONS = (".uff", ".unv")
 MATRIX_KEYS = ("stiffness", "mass", "damping")  # keys of the files of [structure.reduced]
-# Extensions of these files, and those of Nastran, which are no longer read.
 MATRIX_EXTENSIONS = (".mtx", ".mat", ".npz")
+# Files of Nastran, which have a refusal of their own because earlier versions read them.
 NASTRAN_EXTENSIONS = (".op4", ".pch", ".bdf", ".dat")
 # Largest plausible damping ratio, at which a free oscillation decays to a few per cent within one
 # cycle; a larger value probably has a wrong unit, because 1 % is 0.01.
@@ -83,7 +84,7 @@ def _check_description(structure: TableFacts) -> None:
 
 def _check_file(structure: TableFacts) -> None:
     """Report a file that cannot be read by its extension, and keys that do not fit to its kind."""
-    extension = find_file_extension(structure.file)
+    extension = Path(structure.file).suffix.lower()
     if extension not in (*ARRAY_EXTENSIONS, *UNIVERSAL_EXTENSIONS):
         advice = advise_on_name(extension, (*ARRAY_EXTENSIONS, ".uff"))
         structure.add_mistake(
@@ -141,9 +142,9 @@ def _check_reduced(structure: TableFacts) -> None:
     reduced = structure.reduced
     for key in MATRIX_KEYS:
         file = getattr(reduced.table, key)
-        if not isinstance(file, str) or find_file_extension(file) in MATRIX_EXTENSIONS:
+        if not isinstance(file, str) or Path(file).suffix.lower() in MATRIX_EXTENSIONS:
             continue
-        extension = find_file_extension(file)
+        extension = Path(file).suffix.lower()
         advice = advise_on_name(extension, MATRIX_EXTENSIONS)
         if extension in NASTRAN_EXTENSIONS:
             removed = describe_removed("files of Nastran", "reading files of Nastran")
@@ -177,13 +178,8 @@ def _check_reduced(structure: TableFacts) -> None:
         )
 
 
-def find_file_extension(name: str) -> str:
-    """Return the extension of a file name in lower case, with its dot; "" for a name without a dot."""
-    return f".{name.rpartition('.')[2].lower()}" if "." in name else ""
-
-
 def _describe_extension(extension: str) -> str:
-    """Return the clause of a message about a file whose extension is wrong."""
+    """Say in a message which extension a file has that cannot be read."""
     return f"the name ends in '{extension}'" if extension else "the name has no extension"
 
 
