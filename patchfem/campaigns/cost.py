@@ -359,7 +359,7 @@ def describe_fastest_setting(runs: list[Cost], tolerance: float) -> str:
             f"{tolerance:g}"
         )
 
-    # A run with unknown errors may meet the tolerance.
+    # A run without error estimates may be accurate enough: the sentence says then that none is known to meet it.
     is_unknown = any(judge_run(run, names, tolerance) is Judgement.UNKNOWN for run in runs)
     text = (
         f"no setting {'is known to meet' if is_unknown else 'meets'} the tolerance {tolerance:g}: "

@@ -10,8 +10,9 @@ BLOCK_ENTRIES = 2**15  # entries of the matrices that are computed together, few
 def find_exponentials(matrices) -> np.ndarray:
     """Return the exponentials of matrices by scaling and squaring of a Taylor series.
 
-    Products of stacks of matrices take a tenth of the time of `scipy.linalg.expm` for matrices of order 5, and half of it
-    for order 20. A matrix should be balanced, because round-off grows with its norm.
+    `scipy.linalg.expm` takes .5 ms for each small matrix, which is two thirds of the time of a curve of steady motions.
+    Products of stacks of matrices take a few microseconds. A matrix should be balanced, because round-off grows with
+    its norm.
 
     Parameters
     ----------

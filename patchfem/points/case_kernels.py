@@ -104,17 +104,17 @@ def solve_step(free, response, h, case, now, numbers, memory, j):
     free : float
         Increment of the slide without friction [m].
     response : (2, 5) array
-        Response of slide and velocity in the step, see `write_responses`.
+        Slide and velocity at the end of the step per unit of `write_responses`.
     h : float
         Duration of the step [s].
     case : (12,) array
-        Numbers of the case, see `case_rows.Number`.
+        Numbers of the case, in the rows of `case_rows.Number`.
     now : (20,) array
-        State of the case, see `case_rows.Now`; changed in place.
+        State of the case, in the rows of `case_rows.Now`; changed in place.
     numbers : (k, m) array
-        Numbers of the laws of m points, see `return_maps_kernels`.
+        Numbers of the laws of m points; row 0 is the `Law`.
     memory : (l, m) array
-        Memory of the laws of m points, see `return_maps_kernels`.
+        Memory of the laws of m points, a column for each.
     j : int
         Number of the point.
 
@@ -190,13 +190,13 @@ def end_at_event(q, v, h, hold, case, now, numbers, memory, j):
     hold : float
         Force that would keep the point at rest at the end of the step [N].
     case : (12,) array
-        Numbers of the case, see `case_rows.Number`.
+        Numbers of the case, in the rows of `case_rows.Number`.
     now : (20,) array
-        State of the case, see `case_rows.Now`; changed in place.
+        State of the case, in the rows of `case_rows.Now`; changed in place.
     numbers : (k, m) array
-        Numbers of the laws of m points, see `return_maps_kernels`.
+        Numbers of the laws of m points; row 0 is the `Law`.
     memory : (l, m) array
-        Memory of the laws of m points, see `return_maps_kernels`.
+        Memory of the laws of m points, a column for each.
     j : int
         Number of the point.
     """
@@ -245,20 +245,20 @@ def try_step(waves, h, response, is_shortest, max_bend, case, now, numbers, memo
     h : float
         Duration of the step [s].
     response : (2, 5) array
-        Response of slide and velocity in the step, see `write_responses`.
+        Slide and velocity at the end of the step per unit of `write_responses`.
     is_shortest : bool
         Whether the step cannot be halved.
     max_bend : float
         Largest difference [N] of the mean force from the mean of the forces at both ends; above it the law has a
         corner in the step.
     case : (12,) array
-        Numbers of the case, see `case_rows.Number`.
+        Numbers of the case, in the rows of `case_rows.Number`.
     now : (20,) array
-        State of the case, see `case_rows.Now`; changed in place.
+        State of the case, in the rows of `case_rows.Now`; changed in place.
     numbers : (k, m) array
-        Numbers of the laws of m points, see `return_maps_kernels`.
+        Numbers of the laws of m points; row 0 is the `Law`.
     memory : (l, m) array
-        Memory of the laws of m points, see `return_maps_kernels`.
+        Memory of the laws of m points, a column for each.
     j : int
         Number of the point.
     """
@@ -336,13 +336,13 @@ def find_force(wave, case, now, numbers, memory, j):
     wave : float
         Sine of the drive at the end of the step.
     case : (12,) array
-        Numbers of the case, see `case_rows.Number`.
+        Numbers of the case, in the rows of `case_rows.Number`.
     now : (20,) array
-        State of the case, see `case_rows.Now`; changed in place.
+        State of the case, in the rows of `case_rows.Now`; changed in place.
     numbers : (k, m) array
-        Numbers of the laws of m points, see `return_maps_kernels`.
+        Numbers of the laws of m points; row 0 is the `Law`.
     memory : (l, m) array
-        Memory of the laws of m points, see `return_maps_kernels`.
+        Memory of the laws of m points, a column for each.
     j : int
         Number of the point.
     """
@@ -368,11 +368,11 @@ def add_energies(waves, h, case, start, now):
     h : float
         Duration of the step [s].
     case : (12,) array
-        Numbers of the case, see `case_rows.Number`.
+        Numbers of the case, in the rows of `case_rows.Number`.
     start : tuple of float
         Slide [m], velocity [m/s], force [N] and irreversible slide [m] at the start of the step.
     now : (20,) array
-        State of the case, see `case_rows.Now`; changed in place.
+        State of the case, in the rows of `case_rows.Now`; changed in place.
     """
     middle = 1.5 * (now[Now.SLIDE] - start[0]) / h - 0.25 * (start[1] + now[Now.VELOCITY])
     end = now[Now.VELOCITY]
@@ -400,7 +400,7 @@ def find_turn(h, start, now):
     start : tuple of float
         Slide [m], velocity [m/s], force [N] and irreversible slide [m] at the start of the step.
     now : (20,) array
-        State of the case, see `case_rows.Now`; changed in place.
+        State of the case, in the rows of `case_rows.Now`; changed in place.
     """
     first = start[1]
     last = now[Now.VELOCITY]
@@ -427,13 +427,13 @@ def observe_extremes(h, law, start, now, seen, observes):
     h : float
         Duration of the step [s].
     law : float
-        Number of the law, see `law_rows.Law`.
+        Number of the `law_rows.Law`.
     start : tuple of float
         Slide [m], velocity [m/s], force [N] and irreversible slide [m] at the start of the step.
     now : (20,) array
-        State of the case, see `case_rows.Now`; changed in place.
+        State of the case, in the rows of `case_rows.Now`; changed in place.
     seen : (33,) array
-        What was observed, see `case_rows.Seen`; changed in place.
+        What was observed, in the rows of `case_rows.Seen`; changed in place.
     observes : bool
         Whether the cycle is measured.
     """
@@ -476,7 +476,7 @@ def find_acceleration(sine, q, v, force, case):
     force : float
         Friction force [N].
     case : (12,) array
-        Numbers of the case, see `case_rows.Number`.
+        Numbers of the case, in the rows of `case_rows.Number`.
     """
     a = case[Number.DRIVE] * sine - case[Number.DAMPING] * v - case[Number.STIFFNESS] * q
     return case[Number.OUTPUT] * (a - case[Number.MOBILITY] * force) + case[Number.BASE] * sine
@@ -514,13 +514,13 @@ def observe_acceleration(waves, h, case, start, now, seen):
     h : float
         Duration of the step [s].
     case : (12,) array
-        Numbers of the case, see `case_rows.Number`.
+        Numbers of the case, in the rows of `case_rows.Number`.
     start : tuple of float
         Slide [m], velocity [m/s], force [N] and irreversible slide [m] at the start of the step.
     now : (20,) array
-        State of the case, see `case_rows.Now`; changed in place.
+        State of the case, in the rows of `case_rows.Now`; changed in place.
     seen : (33,) array
-        What was observed, see `case_rows.Seen`; changed in place.
+        What was observed, in the rows of `case_rows.Seen`; changed in place.
     """
     q = now[Now.SLIDE]
     v = now[Now.VELOCITY]
@@ -557,9 +557,9 @@ def observe_harmonics(time, h, omega, start, now, seen):
     start : tuple of float
         Slide [m], velocity [m/s], force [N] and irreversible slide [m] at the start of the step.
     now : (20,) array
-        State of the case, see `case_rows.Now`; changed in place.
+        State of the case, in the rows of `case_rows.Now`; changed in place.
     seen : (33,) array
-        What was observed, see `case_rows.Seen`; changed in place.
+        What was observed, in the rows of `case_rows.Seen`; changed in place.
     """
     q = now[Now.SLIDE]
     v = now[Now.VELOCITY]
@@ -602,9 +602,9 @@ def observe_stick(time, h, omega, is_rigid, start, now, seen):
     start : tuple of float
         Slide [m], velocity [m/s], force [N] and irreversible slide [m] at the start of the step.
     now : (20,) array
-        State of the case, see `case_rows.Now`; changed in place.
+        State of the case, in the rows of `case_rows.Now`; changed in place.
     seen : (33,) array
-        What was observed, see `case_rows.Seen`; changed in place.
+        What was observed, in the rows of `case_rows.Seen`; changed in place.
     """
     dq = now[Now.SLIDE] - start[0]
     event = now[Now.EVENT]
@@ -668,11 +668,11 @@ def find_extreme_slip(h, start, now, numbers, memory, j, load):
     start : tuple of float
         Slide [m], velocity [m/s], force [N] and irreversible slide [m] at the start of the step.
     now : (20,) array
-        State of the case, see `case_rows.Now`; changed in place.
+        State of the case, in the rows of `case_rows.Now`; changed in place.
     numbers : (k, m) array
-        Numbers of the laws of m points, see `return_maps_kernels`.
+        Numbers of the laws of m points; row 0 is the `Law`.
     memory : (l, m) array
-        Memory of the laws of m points, see `return_maps_kernels`.
+        Memory of the laws of m points, a column for each.
     j : int
         Number of the point.
     load : float
@@ -700,9 +700,9 @@ def find_largest_force(h, start, now, numbers, j, load):
     start : tuple of float
         Slide [m], velocity [m/s], force [N] and irreversible slide [m] at the start of the step.
     now : (20,) array
-        State of the case, see `case_rows.Now`; changed in place.
+        State of the case, in the rows of `case_rows.Now`; changed in place.
     numbers : (k, m) array
-        Numbers of the laws of m points, see `return_maps_kernels`.
+        Numbers of the laws of m points; row 0 is the `Law`.
     j : int
         Number of the point.
     load : float
@@ -735,17 +735,17 @@ def observe_forces(h, start, now, numbers, memory, j, load, seen):
     start : tuple of float
         Slide [m], velocity [m/s], force [N] and irreversible slide [m] at the start of the step.
     now : (20,) array
-        State of the case, see `case_rows.Now`; changed in place.
+        State of the case, in the rows of `case_rows.Now`; changed in place.
     numbers : (k, m) array
-        Numbers of the laws of m points, see `return_maps_kernels`.
+        Numbers of the laws of m points; row 0 is the `Law`.
     memory : (l, m) array
-        Memory of the laws of m points, see `return_maps_kernels`.
+        Memory of the laws of m points, a column for each.
     j : int
         Number of the point.
     load : float
         Normal load [N].
     seen : (33,) array
-        What was observed, see `case_rows.Seen`; changed in place.
+        What was observed, in the rows of `case_rows.Seen`; changed in place.
     """
     dq = now[Now.SLIDE] - start[0]
     force = find_largest_force(h, start, now, numbers, j, load)
@@ -774,9 +774,9 @@ def end_cycle(now, seen, history):
     Parameters
     ----------
     now : (20,) array
-        State of the case, see `case_rows.Now`; changed in place.
+        State of the case, in the rows of `case_rows.Now`; changed in place.
     seen : (33,) array
-        What was observed, see `case_rows.Seen`; changed in place.
+        What was observed, in the rows of `case_rows.Seen`; changed in place.
     history : (4,) array
         Smallest and largest slide [m] and the integrals for its phasor; output.
     """
@@ -852,11 +852,11 @@ def store_sample(sine, case, now, seen, samples):
     sine : float
         Sine of the drive at this instant.
     case : (12,) array
-        Numbers of the case, see `case_rows.Number`.
+        Numbers of the case, in the rows of `case_rows.Number`.
     now : (20,) array
-        State of the case, see `case_rows.Now`; changed in place.
+        State of the case, in the rows of `case_rows.Now`; changed in place.
     seen : (33,) array
-        What was observed, see `case_rows.Seen`; changed in place.
+        What was observed, in the rows of `case_rows.Seen`; changed in place.
     samples : (S, 5) array
         Samples of the case, see `march_cases`.
     """
@@ -882,23 +882,23 @@ def march_cycle(steps, table, waves, observes, case, now, numbers, memory, j, se
     steps : int
         Steps per cycle.
     table : (LEVELS + 1, 2, 5) array
-        Responses, see `write_responses`.
+        Responses of `write_responses`.
     waves : (2, k) array
         Sines and cosines of the drive, see `march_cases`.
     observes : bool
         Whether the cycle is measured.
     case : (12,) array
-        Numbers of the case, see `case_rows.Number`.
+        Numbers of the case, in the rows of `case_rows.Number`.
     now : (20,) array
-        State of the case, see `case_rows.Now`; changed in place.
+        State of the case, in the rows of `case_rows.Now`; changed in place.
     numbers : (k, m) array
-        Numbers of the laws of m points, see `return_maps_kernels`.
+        Numbers of the laws of m points; row 0 is the `Law`.
     memory : (l, m) array
-        Memory of the laws of m points, see `return_maps_kernels`.
+        Memory of the laws of m points, a column for each.
     j : int
         Number of the point.
     seen : (33,) array
-        What was observed, see `case_rows.Seen`; changed in place.
+        What was observed, in the rows of `case_rows.Seen`; changed in place.
     samples : (S, 5) array
         Samples of the case, see `march_cases`.
     """

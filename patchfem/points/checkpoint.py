@@ -128,14 +128,14 @@ def flatten(value, name: str = "") -> dict[str, np.ndarray]:
 
 
 def rebuild(value, arrays: dict, name: str = ""):
-    """Return nested tuples like `value` with the arrays of `flatten`.
+    """Return a copy of nested tuples in which each array is replaced by the stored one of the same name.
 
     Parameters
     ----------
     value : tuple
         Nested tuples of the same form.
     arrays : mapping
-        Arrays by name, see `flatten`.
+        Stored arrays by name, as `flatten` names them.
     name : str
         Name of the value in the file.
     """

@@ -30,7 +30,7 @@ def climb(flank, q, dq, dt):
     Parameters
     ----------
     flank : (k,) array
-        Numbers of the flanks, see `march_rows.Flank`.
+        Numbers of the flanks, in the rows of `march_rows.Flank`.
     q : float
         Slide [m].
     dq : float
@@ -59,7 +59,7 @@ def find_stiffness(flank, q, dq, dt):
     Parameters
     ----------
     flank : (k,) array
-        Numbers of the flanks, see `march_rows.Flank`.
+        Numbers of the flanks, in the rows of `march_rows.Flank`.
     q : float
         Slide [m].
     dq : float
@@ -84,7 +84,7 @@ def find_normal(flank, q, friction, bound):
     Parameters
     ----------
     flank : (k,) array
-        Numbers of the flanks, see `march_rows.Flank`.
+        Numbers of the flanks, in the rows of `march_rows.Flank`.
     q : float
         Slide [m].
     friction : float

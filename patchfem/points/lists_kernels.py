@@ -42,9 +42,9 @@ def write_list_mean(numbers, values, lists, j, dt):
     Parameters
     ----------
     numbers : (k, m) array
-        Numbers of the laws of m points, see `return_maps_kernels`.
+        Numbers of the laws of m points; row 0 is the `Law`.
     values : (13, m) array
-        Values of the points, see `march_rows.Point`.
+        Values of the points, in the rows of `march_rows.Point`.
     lists : BondLists
         Lists of bonds of all points.
     j : int
@@ -86,9 +86,9 @@ def advance_list(numbers, values, lists, j, v0, v1, dt):
     Parameters
     ----------
     numbers : (k, m) array
-        Numbers of the laws of m points, see `return_maps_kernels`.
+        Numbers of the laws of m points; row 0 is the `Law`.
     values : (13, m) array
-        Values of the points, see `march_rows.Point`.
+        Values of the points, in the rows of `march_rows.Point`.
     lists : BondLists
         Lists of bonds of all points.
     j : int
@@ -128,7 +128,7 @@ def read_list(numbers, lists, j, load):
     Parameters
     ----------
     numbers : (k, m) array
-        Numbers of the laws of m points, see `return_maps_kernels`.
+        Numbers of the laws of m points; row 0 is the `Law`.
     lists : BondLists
         Lists of bonds of all points.
     j : int

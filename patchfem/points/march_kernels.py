@@ -336,7 +336,7 @@ def keep_sliding(values, count, direction):
     Parameters
     ----------
     values : (13, m) array
-        Values of the points, see `march_rows.Point`.
+        Values of the points, in the rows of `march_rows.Point`.
     count : int
         Number of points.
     direction : float
@@ -929,7 +929,9 @@ def find_holds(system, state, drive):
 
 @njit(**NJIT_CALL)
 def find_event(system, drive, is_shortest):
-    """Return whether the trial step contains an event of a rigid point; at the last level, change its regime instead.
+    """Return whether a rigid point stops or is released within the trial step.
+
+    A step that cannot be halved is not searched again: the point changes its regime there.
 
     Parameters
     ----------
@@ -1359,7 +1361,7 @@ def write_bond_sample(system, sample, first):
     system : march_rows.System
         Arrays of the march, changed in place.
     sample : (k,) array
-        Sample, see `march_rows.Sample`; output.
+        Sample, in the rows of `march_rows.Sample`; output.
     first : int
         Column of the force of the port.
     """
@@ -1396,7 +1398,7 @@ def write_sample(system, row, sample):
     row : int
         Number of the whole step.
     sample : (k,) array
-        Sample, see `march_rows.Sample`; output.
+        Sample, in the rows of `march_rows.Sample`; output.
     """
     ports = system.ports
     points = system.points
@@ -1552,7 +1554,7 @@ def add_work(system, sample, first_column, part):
     system : march_rows.System
         Arrays of the march, changed in place.
     sample : (k,) array
-        Sample, see `march_rows.Sample`; output.
+        Sample, in the rows of `march_rows.Sample`; output.
     first_column : int
         Column of the mean force of the first port.
     part : float

@@ -103,9 +103,9 @@ def mean_force(numbers, memory, j, load, step):
     Parameters
     ----------
     numbers : (k, m) array
-        Numbers of the laws of m points, see `return_maps_kernels`.
+        Numbers of the laws of m points; row 0 is the `Law`.
     memory : (l, m) array
-        Memory of the laws of m points, see `return_maps_kernels`.
+        Memory of the laws of m points, a column for each.
     j : int
         Number of the point.
     load : float
@@ -438,9 +438,9 @@ def prepare(numbers, memory, j, step):
     Parameters
     ----------
     numbers : (k, m) array
-        Numbers of the laws of m points, see `return_maps_kernels`.
+        Numbers of the laws of m points; row 0 is the `Law`.
     memory : (l, m) array
-        Memory of the laws of m points, see `return_maps_kernels`.
+        Memory of the laws of m points, a column for each.
     j : int
         Number of the point.
     step : Step
@@ -462,9 +462,9 @@ def advance(numbers, memory, j, load, step):
     Parameters
     ----------
     numbers : (k, m) array
-        Numbers of the laws of m points, see `return_maps_kernels`.
+        Numbers of the laws of m points; row 0 is the `Law`.
     memory : (l, m) array
-        Memory of the laws of m points, see `return_maps_kernels`.
+        Memory of the laws of m points, a column for each.
     j : int
         Number of the point.
     load : float
@@ -512,9 +512,9 @@ def read(numbers, memory, j, load):
     Parameters
     ----------
     numbers : (k, m) array
-        Numbers of the laws of m points, see `return_maps_kernels`.
+        Numbers of the laws of m points; row 0 is the `Law`.
     memory : (l, m) array
-        Memory of the laws of m points, see `return_maps_kernels`.
+        Memory of the laws of m points, a column for each.
     j : int
         Number of the point.
     load : float
@@ -563,9 +563,9 @@ def slip_since_zero(numbers, memory, j, load, velocity):
     Parameters
     ----------
     numbers : (k, m) array
-        Numbers of the laws of m points, see `return_maps_kernels`.
+        Numbers of the laws of m points; row 0 is the `Law`.
     memory : (l, m) array
-        Memory of the laws of m points, see `return_maps_kernels`.
+        Memory of the laws of m points, a column for each.
     j : int
         Number of the point.
     load : float
@@ -598,9 +598,9 @@ def press(numbers, memory, j, before, after):
     Parameters
     ----------
     numbers : (k, m) array
-        Numbers of the laws of m points, see `return_maps_kernels`.
+        Numbers of the laws of m points; row 0 is the `Law`.
     memory : (l, m) array
-        Memory of the laws of m points, see `return_maps_kernels`.
+        Memory of the laws of m points, a column for each.
     j : int
         Number of the point.
     before : float
@@ -630,9 +630,9 @@ def write_bond_means(numbers, memory, loads, slides, forces, slopes):
     Parameters
     ----------
     numbers : (k, m) array
-        Numbers of the laws of m points, see `return_maps_kernels`.
+        Numbers of the laws of m points; row 0 is the `Law`.
     memory : (l, m) array
-        Memory of the laws of m points, see `return_maps_kernels`.
+        Memory of the laws of m points, a column for each.
     loads : (m,) array
         Loads of the points [N].
     slides : (m,) array
@@ -660,7 +660,7 @@ def advance_bonds(memory, loads, slides):
     Parameters
     ----------
     memory : (l, m) array
-        Memory of the laws of m points, see `return_maps_kernels`.
+        Memory of the laws of m points, a column for each.
     loads : (m,) array
         Loads of the points [N].
     slides : (m,) array
@@ -682,9 +682,9 @@ def find_rest_limit(numbers, memory, j, load):
     Parameters
     ----------
     numbers : (k, m) array
-        Numbers of the laws of m points, see `return_maps_kernels`.
+        Numbers of the laws of m points; row 0 is the `Law`.
     memory : (l, m) array
-        Memory of the laws of m points, see `return_maps_kernels`.
+        Memory of the laws of m points, a column for each.
     j : int
         Number of the point.
     load : float

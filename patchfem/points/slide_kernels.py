@@ -32,7 +32,7 @@ def read_points(system, forces, stretch):
 
 @njit(cache=True, **NJIT_KERNEL)
 def march(system, steps, samples):
-    """Move the points over a number of steps; see `march_kernels.march`.
+    """Move the points along the prescribed slide over a number of steps.
 
     Parameters
     ----------
@@ -74,7 +74,7 @@ def march(system, steps, samples):
         if i == steps:
             break
 
-        # All points slide alike; the mean forces times the slide are the work of the laws.
+        # All points have the same slide. Their work is the mean force times the slide.
         slide = path[i + 1] - path[i]
         velocity = slide / h
         step = Step(slide, h, velocity, velocity, 0.0)

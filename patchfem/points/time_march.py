@@ -140,7 +140,7 @@ def load_kernels(contact: Contact, say=None):
 
 
 class Responses(NamedTuple):
-    """Motion, viscous loss and work of the drive in steps of several lengths, see `march_rows.Structure`."""
+    """Motion, viscous loss and work of the drive in steps of several lengths, in the rows of `march_rows.Structure`."""
 
     motion: np.ndarray
     loss: np.ndarray
@@ -776,7 +776,7 @@ def split_losses(samples, n: int, scale: float) -> np.ndarray:
     Parameters
     ----------
     samples : (k + 1, w) array
-        Samples, see `march_rows.Sample`.
+        Samples, in the rows of `march_rows.Sample`.
     n : int
         Number of columns of the motion.
     scale : float
@@ -1142,7 +1142,7 @@ def make_response(run: March, rows, numbers, energies) -> Response:
     run : March
         March that was run.
     rows : (k, w) array
-        Samples, see `march_rows.Sample`.
+        Samples, in the rows of `march_rows.Sample`.
     numbers : (k,) array
         Numbers of their steps.
     energies : (3, k) array

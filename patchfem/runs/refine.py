@@ -117,7 +117,7 @@ def bound_errors(measures: dict, before: dict) -> dict:
 
 
 def _can_repeat(model: Model, result, name: str) -> bool:
-    """Return whether finer passes can reduce the error of a measure.
+    """Return whether a repetition with finer meshes or more steps can reduce the error of a measure.
 
     Static patches are refined when they are pressed, and wear has its own passes. Measures on the points of a profile do
     not depend on the mesh.

@@ -163,7 +163,7 @@ def _describe_array_requirement(types: tuple) -> str:
 
 
 def _is_open_array(types: tuple) -> bool:
-    """Return whether an array may have any number of values, and not a fixed one."""
+    """Return whether the types of a key describe an array of any length."""
     return any(... in get_args(part) for part in types)
 
 

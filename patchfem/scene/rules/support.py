@@ -269,8 +269,8 @@ WITHOUT_JOINT = (
 )
 STEADY_ADVICE = "wear is computed from the last cycle of a steady motion: use"
 # Features that no run supports together, by what to do instead: a key of `effects.REMEDIES`, or the advice itself. A
-# mistake is reported at the key of the first feature. Only the first row that applies is reported at a key: of two rows
-# with the same key, that one comes first whose advice also removes the cause of the other.
+# mistake is reported at the key of the first feature. Only the first row that applies is reported at a key. If the advice of
+# one row also removes the cause of another row, it stands before that row.
 COMBINATIONS = {
     "out": (
         "patch.strips, law of an averaged pressure",

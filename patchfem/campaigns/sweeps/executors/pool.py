@@ -70,7 +70,7 @@ class FutureExecutor:
                 if not pending and not finished:
                     return
 
-                # The workers compute their next chunks while the caller writes the results of these.
+                # While the caller writes these results, the workers compute the chunks that were just submitted.
                 for chunk, future in finished:
                     yield chunk, *self.receive(future)
                 done = wait(pending, return_when=FIRST_COMPLETED).done if pending else ()
@@ -111,7 +111,7 @@ class _OwnProcesses(SpawnContext):
         self.started: list[SpawnProcess] = []
 
     def Process(self, *arguments, **keywords) -> SpawnProcess:
-        """Return a new process, which an executor starts."""
+        """Return a new process and keep it; an executor calls this method and starts the process."""
         process = SpawnProcess(*arguments, **keywords)
         self.started.append(process)
         return process

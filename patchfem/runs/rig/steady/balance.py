@@ -365,7 +365,7 @@ class BalanceFinder:
 
 
 def _note_end_of_branch(branch: branches.Branch, last: float) -> list[str]:
-    """Return a list of notes on a branch that does not reach the last frequency [Hz] of the sweep."""
+    """Return a note if a branch ends before the last frequency [Hz] of the sweep, else an empty list."""
     if branch.ended == "end":
         return []
     frequencies = [point.omega / (2 * np.pi) for point in branch.points]
