@@ -110,8 +110,11 @@ def is_complete(run_plan, target: Path) -> bool:
     )
 
 
-def write_results(result: Result, folder: Path) -> WrittenRun:
-    """Write all files of a run, except its page, into an existing folder."""
+def write_results(result: Result, folder: Path, case: dict[str, str] | None = None) -> WrittenRun:
+    """Write all files of a run, except its page, into an existing folder.
+
+    `case` has the swept keys with their values if the run is a case of a sweep.
+    """
     start_time = perf_counter()
     notes = result.extra.setdefault("notes", [])
     if result.patch is not None:
@@ -130,6 +133,8 @@ def write_results(result: Result, folder: Path) -> WrittenRun:
         notes += [f"interface {face.name}: {note}" for note in face_result.extra["notes"]]
     result.seconds["files"] = perf_counter() - start_time
     answer = make_answer(result)
+    if case is not None:
+        answer = replace(answer, details=answer.details | {"case": case})
     store.write(answer, folder)
     return WrittenRun(answer, result, identify_folder(folder))
 

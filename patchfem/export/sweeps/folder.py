@@ -89,7 +89,7 @@ class Writer:
             "not_in_scene": [],
             "seconds": {"total": float(results.seconds[case])},
             "numerics": results.numerics.get(case, {}),
-            "case": dict(zip([axis.key for axis in self.cases.axes], self.cases.texts(number))),
+            "case": self._name_case(number),
         }
         kind = "linear"
         title = ""
@@ -107,6 +107,10 @@ class Writer:
         answer = Answer(kind, title, (), quantities, remarks=remarks, details=details)
         return json.dumps(answers.make_summary(answer), allow_nan=False, ensure_ascii=False) + "\n"
 
+    def _name_case(self, number: int) -> dict[str, str]:
+        """Return the swept keys of a case with their values as written."""
+        return dict(zip([axis.key for axis in self.cases.axes], self.cases.texts(number)))
+
     def write_results(self, number: int, result) -> None:
         """Write the results folder of a case after its run."""
         # Only these sweeps need the modules that write the fields of a run.
@@ -114,7 +118,7 @@ class Writer:
         from ..run_folder import write_results, write_run_page
 
         with ResultsFolder(self.target / CASES / case_folder_name(self.names[number])) as folder:
-            written = write_results(result, folder.path)
+            written = write_results(result, folder.path, self._name_case(number))
         if self.keep == "pages":
             write_run_page(written, folder.target)
 
