@@ -63,6 +63,18 @@ def test_force_holds_the_amplitude_in_a_run(scene):
     assert (shift < 1e-3).all() if scene is JOINT else (shift > 1e-3).all()
 
 
+def test_rigid_friction_of_several_modes_has_no_force():
+    """With rigid friction and two modes there is no force, and a note says which law has one; with one mode it is known."""
+    for scene, is_known in ((JOINT, True), (TWO_MODES, False)):
+        text = scene.replace('law = "elastic-plastic"', 'law = "coulomb"').replace(
+            'bond_length = "60 um"\n', ""
+        )
+        curve = pf.backbone(text, amplitudes=[2e-4, 5e-4], method="balance")
+        assert np.isfinite(curve.balance_force.values).all() == is_known
+        notes = " ".join(curve.attrs["notes"])
+        assert ('law = "elastic-plastic"' in notes) != is_known
+
+
 def test_exact_quasi_static_force_replaces_the_energy_of_a_cycle():
     """The quasi-static force of a Jenkins element is its loss and that of the structure over pi A, within 1e-9."""
     amplitudes = np.array([5e-5, 2e-4, 1e-3])

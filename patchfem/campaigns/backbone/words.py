@@ -52,7 +52,7 @@ def write_notes(joint: JointMode, amplitudes, backbone: Backbone) -> tuple[str, 
         notes.append("no friction acts, so frequency and damping are the same at all amplitudes")
     for method, curve in curves.items():
         notes += _note_gaps(amplitudes, method, curve)
-        notes += _note_missing_forces(method, curve)
+        notes += _note_missing_forces(joint, method, curve)
     if not joint.is_linear:
         if backbone.exponents.micro_theory is not None and backbone.exponents.micro is None:
             notes.append(_note_micro_slip(joint, amplitudes))
@@ -95,11 +95,16 @@ def _note_micro_slip(joint: JointMode, amplitudes) -> str:
     )
 
 
-def _note_missing_forces(method: str, curve: Curve) -> list[str]:
+def _note_missing_forces(joint: JointMode, method: str, curve: Curve) -> list[str]:
     """Return a list of notes on the amplitudes of a curve whose force in phase resonance is not known."""
     missing = curve.amplitude[np.isnan(curve.force)]
     if not missing.size:
         return []
+    if joint.is_rigid:
+        return [
+            f"method {method}: with rigid friction the force in phase resonance is computed for a single mode only; use "
+            'law = "elastic-plastic" with a short bond_length for several modes'
+        ]
     ends = [format_length(missing[k], 3) for k in (0, -1)]
     return [
         f"method {method}: no force in phase resonance was found at {missing.size} of {curve.amplitude.size} amplitudes, "
