@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..core import PatchfemError
-from ..response.decay_curve import fit_decay_curve
+from ..response.decay_curve import HalfCycles, fit_decay_curve, fit_slopes
 from ..structure import places as structure_places
 from ..structure.places import MeasuredModes
 from .decay import fit_decay
@@ -257,6 +257,10 @@ def _select_decay(values: dict, begin: float | None) -> tuple:
     time = values["time"]
     if begin is not None:
         start = int(np.searchsorted(time, begin))
+        if start >= time.size:
+            raise PatchfemError(
+                f"the decay cannot begin at {begin:.4g} s (--begin): the record ends at {time[-1]:.4g} s"
+            )
     else:
         final = value[-value.size // 20 :].mean()
         start = int(np.argmax(np.abs(value - final)))
@@ -266,8 +270,9 @@ def _select_decay(values: dict, begin: float | None) -> tuple:
 def compute_decay_curve(values: dict, begin: float | None = None) -> tuple:
     """Compute frequency and damping ratio against amplitude from a measured free decay.
 
-    A velocity or an acceleration is converted to a displacement by the undamped angular frequency at each
-    amplitude. Amplitudes with a too uncertain damping ratio are omitted with a note.
+    The half cycles of a velocity or an acceleration are converted to those of a displacement by their own undamped
+    angular frequency, because a frequency that changes with the amplitude changes their decrement. Amplitudes with a
+    too uncertain damping ratio are omitted with a note.
 
     Parameters
     ----------
@@ -289,7 +294,8 @@ def compute_decay_curve(values: dict, begin: float | None = None) -> tuple:
     """
     time, value = _select_decay(values, begin)
     half_cycles = find_half_cycles(time, value)
-    curve = fit_decay_curve(half_cycles)
+    order = DERIVATIVE_ORDERS[find_response_name(values)]
+    curve = fit_decay_curve(_convert_to_displacement(half_cycles, order))
     notes = []
     is_certain = curve.damping_error <= MAX_ERROR_RATIO * np.abs(curve.damping)
     if curve.time.size and not is_certain.all():
@@ -306,9 +312,32 @@ def compute_decay_curve(values: dict, begin: float | None = None) -> tuple:
     reason = describe_missing_samples_at_end(time, half_cycles)
     if reason:
         notes.append(f"the decay is followed up to {half_cycles.middle[-1]:.4g} s only: {reason}")
-    omega = 2 * np.pi * curve.frequency / np.sqrt(1 - curve.damping**2)
-    displacement = curve.amplitude / omega ** DERIVATIVE_ORDERS[find_response_name(values)]
-    return curve._replace(amplitude=displacement), notes
+    return curve, notes
+
+
+def _convert_to_displacement(half_cycles: HalfCycles, order: int) -> HalfCycles:
+    """Return the half cycles of the displacement from those of its derivative of an order (0, 1 or 2).
+
+    The derivative of exp(-s t) sin(w t) is larger by the undamped angular frequency, hypot(s, w).
+    """
+    if order == 0 or half_cycles.size.size < 4:
+        return half_cycles
+    half_periods = fit_slopes(half_cycles.middle, half_cycles.middle_noise)
+    log_sizes = np.log(half_cycles.size)
+    decrements = fit_slopes(log_sizes, half_cycles.size_noise / half_cycles.size)
+    omega = _extend_to_ends(np.hypot(np.pi, decrements.slope) / half_periods.slope)
+    # half of the 95 % interval of the half period is about its standard deviation
+    omega_noise = order * _extend_to_ends(half_periods.error / half_periods.slope) / 2
+    size = half_cycles.size / omega**order
+    relative_noise = np.hypot(half_cycles.size_noise / half_cycles.size, omega_noise)
+    return half_cycles._replace(size=size, size_noise=relative_noise * size)
+
+
+def _extend_to_ends(values: np.ndarray) -> np.ndarray:
+    """Return values (n,) at inner half cycles extrapolated linearly to the first and the last half cycle, (n + 2,)."""
+    first = 2 * values[0] - values[min(1, values.size - 1)]
+    last = 2 * values[-1] - values[max(-2, -values.size)]
+    return np.concatenate([[first], values, [last]])
 
 
 def identify_decay_modes(values: dict, begin: float | None = None) -> ListedModes:
