@@ -148,15 +148,19 @@ class ShootingFinder(TracedCurve):
             name: errors.get(name, solution.errors.get(name, abs(value))) + relative * abs(value)
             for name, value in solution.values.items()
         }
-        # A periodic motion does not drift, and friction without slip does no work over a period.
-        zeros = {"drift_per_cycle": 0.0}
-        if is_stuck:
-            zeros |= dict.fromkeys(("friction_work", "energy_dissipated", "loop_area"), 0.0)
-            errors |= {name: 0.0 for name in zeros if name in errors}
+        # A periodic motion does not drift. Friction works what it dissipates, which is nothing where no element slips.
+        known = {"drift_per_cycle": 0.0}
+        dissipated = solution.values.get("energy_dissipated")
+        if is_stuck and dissipated is not None:
+            per_cycle = dissipated / run.cycles_done
+            known |= {"friction_work": dissipated, "loop_area": per_cycle}
+            if not dissipated:
+                errors |= dict.fromkeys(("friction_work", "energy_dissipated", "loop_area"), 0.0)
+        errors |= {"drift_per_cycle": 0.0}
         extra = {"multipliers": motion.multipliers, "residual": motion.change, "map": "shooting"}
         return replace(
             solution,
-            values=solution.values | zeros,
+            values=solution.values | known,
             outcome=outcome,
             errors=errors,
             extra=solution.extra | extra,
