@@ -115,15 +115,19 @@ def make_page(folders: list[Path]) -> str:
 
 
 def _read_all(folders: list[Path]) -> dict[str, Answer]:
-    """Return the answers in folders by their names in legends; "" for a single answer."""
+    """Return the answers in folders by their names in legends, such as "load 4 kN"; "" for a single answer."""
     if not folders:
         raise PatchfemError("report: at least one results folder is needed")
     if len(folders) == 1:
         return {"": store.read(folders[0])}
     answers = {}
     for folder in folders:
-        name = folder.resolve().name
-        answers[f"{name} ({len(answers) + 1})" if name in answers else name] = store.read(folder)
+        answer = store.read(folder)
+        # a case of a sweep is named by its keys, any other answer by its folder
+        case = answer.details.get("case") if answer.is_run else None
+        name = ", ".join(f"{key.rpartition('.')[2]} {value}" for key, value in (case or {}).items())
+        name = name or folder.resolve().name
+        answers[f"{name} ({len(answers) + 1})" if name in answers else name] = answer
     if len({"run" if answer.is_run else answer.kind for answer in answers.values()}) > 1:
         kinds = ", ".join(f"{name}: {answer.kind}" for name, answer in answers.items())
         raise PatchfemError(f"report: the folders have results of different kinds ({kinds})")

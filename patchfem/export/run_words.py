@@ -14,7 +14,7 @@ from ..formatting import (
     format_quantity,
     format_value,
 )
-from ..response.outcome import NOT_SETTLED_WARNING, OPEN_LOOP
+from ..response.outcome import OPEN_LOOP
 from ..response.rows import remove_interface_number
 from ..runs.results.patch_rows import find_unknown_measures
 from ..runs.results.result import Result
@@ -218,16 +218,13 @@ def _no_slip(has_patch: bool, cycles: str) -> str:
 
 def _stuck_outcome(result: Result, measures: dict[str, Quantity]) -> str:
     """Return the sentence for an interface that sticks as a whole."""
-    rings = ""
-    if any(warning.startswith(NOT_SETTLED_WARNING) for warning in result.warnings):
-        rings = " The amplitude has not settled: it is that of a transient."
     has_patch = "contact_fraction" in measures
     part = "part of the patch slips" if has_patch else "part of it slips"
     force, motion = (
         measures[name].value or 0.0 if name in measures else 0.0
         for name in ("friction_force_peak", "relative_displacement_amplitude")
     )
-    limits = {"loop_area": WORK_ROUND_OFF * abs(force * motion), "slip_amplitude": 0.0}
+    limits = {"loop_area": WORK_ROUND_OFF * abs(force * motion), "slip_amplitude": SLIP_ROUND_OFF}
     texts = {"loop_area": "{} per cycle", "slip_amplitude": "by {}"}
     for kind, limit in limits.items():
         slipping = {
@@ -238,8 +235,8 @@ def _stuck_outcome(result: Result, measures: dict[str, Quantity]) -> str:
         name = max(slipping, key=lambda one: slipping[one].value, default="")
         if name and slipping[name].value > max(_find_error(slipping[name]), limit):
             size = texts[kind].format(quantities.format_quantity(name, slipping[name]))
-            return f"The interface as a whole sticks, but {part} ({size}).{rings}"
-    return _no_slip(has_patch, "cycles") + rings
+            return f"The interface as a whole sticks, but {part} ({size})."
+    return _no_slip(has_patch, "cycles")
 
 
 def _describe_place(contact: dict | None, form: str = "In contact: {}.") -> str:

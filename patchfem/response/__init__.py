@@ -76,7 +76,6 @@ PUBLIC = {
     "outcome": (
         "AMPLITUDE_ROUND_OFF",
         "OPEN_LOOP",
-        "NOT_SETTLED_WARNING",
         "note_on_changing_drive",
         "check_piece_length",
         "classify_periodic",

@@ -27,7 +27,6 @@ from .settling import (
 # Smallest remaining change of the amplitude, as a fraction of the tolerance, at which the steady estimate is
 # reported.
 ESTIMATE_TOL = 0.02
-NOT_SETTLED_WARNING = "the interface sticks, but the amplitude has not settled"
 OPEN_LOOP = "the friction loop of the last cycle does not close"
 # Safety factor for the proposed number of cycles of a decay, because the last amplitudes may
 # contain a beat.
@@ -58,7 +57,7 @@ def judge_outcome(
     - Random drive: DONE if both halves of the record have the same mean square.
 
     A motion whose midpoint drifts is not steady (`is_drifting`), nor is a stuck interface whose
-    friction force still increases.
+    friction force still increases, or above which the rig still vibrates freely.
 
     Parameters
     ----------
@@ -85,7 +84,10 @@ def judge_outcome(
         and is_still_loading(solution.window, drive.period, tolerance)
     ):
         return Outcome.TRANSIENT, {}
-    if solution.outcome is not None:
+    is_ringing = not level_cycles and bool(
+        warn_if_ringing(solution, measures, (tolerance, min_decay_rate), drive, 0.0)
+    )
+    if solution.outcome is not None and not is_ringing:
         return solution.outcome, {}
     if hasattr(drive, "band"):
         is_stationary = stationary.is_stationary(solution.window, drive)
@@ -127,6 +129,8 @@ def judge_outcome(
         )
     )
     outcome = _reject_drifting(CLASSES[number], measures, tolerance)
+    if is_ringing:
+        outcome = Outcome.TRANSIENT
     if outcome is Outcome.GROWS or np.isnan(steady):
         return outcome, {}
     base = measures["relative_displacement_amplitude"]
@@ -352,17 +356,24 @@ def warn_if_ringing(solution, measures: dict, limits: tuple, drive, cycles: floa
     cycles : float
         Number of cycles of the run.
     """
-    tolerance, min_decay_rate = limits
+    free_vibration, window_decay = _find_free_vibration(solution, measures, limits[1], drive)
     amplitude = measures["relative_displacement_amplitude"]
-    if solution.outcome is not Outcome.STUCK or solution.extremes is None:
-        return []
-    if not drive_sizes.is_periodic(drive) or not amplitude.value:
-        return []
-    window = max(1, round((solution.window.time[-1] - solution.window.time[0]) / drive.period))
-    decay = min_decay_rate * drive.period
-    free_vibration = float(remaining_ringing(np.asarray(solution.extremes), window, decay))
     sizes = (amplitude.value, amplitude.floor + (amplitude.error or 0.0))
-    return warn_of_ringing(free_vibration, sizes, (tolerance, decay), cycles)
+    return warn_of_ringing(free_vibration, sizes, (limits[0], window_decay), cycles)
+
+
+def _find_free_vibration(solution, measures: dict, min_decay_rate: float, drive) -> tuple:
+    """Return the free vibration [m] of a sticking interface in its last cycles, and its logarithmic decay over a cycle [1].
+
+    The free vibration is 0 for another motion, and without a periodic drive.
+    """
+    decay = min_decay_rate * drive.period
+    is_stuck = solution.outcome is Outcome.STUCK and solution.extremes is not None
+    amplitude = measures["relative_displacement_amplitude"].value
+    if not is_stuck or not drive_sizes.is_periodic(drive) or not amplitude:
+        return 0.0, decay
+    window = max(1, round((solution.window.time[-1] - solution.window.time[0]) / drive.period))
+    return float(remaining_ringing(np.asarray(solution.extremes), window, decay)), decay
 
 
 def remaining_ringing(extremes, window: int, decay):
@@ -415,7 +426,7 @@ def warn_of_ringing(free_vibration: float, sizes: tuple, limits: tuple, cycles: 
         proposed = float(f"{cycles + CYCLES_SAFETY_FACTOR * more_cycles:.2g}")
         advice = f"set drive.cycles = {proposed:g}"
     return [
-        f"{NOT_SETTLED_WARNING}: by up to {100 * ratio:.2g} % (limit "
+        f"the interface sticks, but the amplitude has not settled: by up to {100 * ratio:.2g} % (limit "
         f"{100 * tolerance:g} %) it is free vibration that will decay, so "
         f"relative_displacement_amplitude and loop_area are those of a transient; {advice}"
     ]

@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...core import PatchfemError, frozen_array
-from ...formatting import format_length
+from ...formatting import format_length, format_number
 from ...identify.least_squares import Fit, Problem
 from ...identify.space import make_space_filling_points
 from ...inputs.cells import TableFormat
@@ -41,8 +41,10 @@ UNITS = {
     "damping": RATIO_UNITS,
 }
 HEADER = "amplitude [um],frequency [Hz],damping [%]"
-# Errors, relative to the value, of a table without columns of errors.
-DEFAULT_ERRORS = {"frequency": 1e-3, "damping": 5e-2}
+# First errors, relative to the value, of a table without columns of errors; their scatter replaces them.
+DEFAULT_ERRORS = {"frequency": 5e-2, "damping": 5e-2}
+MAX_REWEIGHTINGS = 8  # largest number of fits in which the scatter replaces the errors
+SAME_ERROR = 0.1  # relative change of an error at which it is known
 # Smallest relative standard deviation of a value, which keeps its weight finite.
 MIN_SPREAD = 1e-6
 METHODS = ("balance", "quasi-static")  # Reference method and fast method.
@@ -73,8 +75,8 @@ class MeasuredCurve(NamedTuple):
         Frequency [Hz] and damping ratio.
     error : (2, k) array
         Standard deviations of `value`.
-    assumed : str
-        Sentence about errors that the table does not give; "" if it gives all.
+    assumed : (2,) array of bool
+        Whether the table gives no errors of frequency and of damping.
     method : str
         Method of the rows, "decay" if the table does not state it.
     """
@@ -82,12 +84,37 @@ class MeasuredCurve(NamedTuple):
     amplitude: np.ndarray
     value: np.ndarray
     error: np.ndarray
-    assumed: str
+    assumed: np.ndarray
     method: str
 
     def normalized_residual(self, curve) -> np.ndarray:
         """Return the residual (2k,) of a computed curve (2, k), divided by the standard deviations."""
         return ((curve - self.value) / self.error).ravel()
+
+    def scale_assumed_errors(self, curve, n_values: int) -> "MeasuredCurve":
+        """Return the measured curve with assumed errors equal to the scatter around a fitted curve (2, k).
+
+        The `n_values` fitted values take up as many degrees of freedom, half of them of each quantity.
+        """
+        count = self.amplitude.size
+        square = ((curve - self.value) ** 2 / self.error**2).sum(axis=1)
+        scatter = np.sqrt(square / max(count - n_values / 2, 1.0))
+        factors = np.where(self.assumed, scatter, 1.0)
+        return self._replace(
+            error=np.maximum(factors[:, None] * self.error, MIN_SPREAD * np.abs(self.value))
+        )
+
+    def describe_assumed_errors(self) -> str:
+        """Return a sentence about the errors that the table does not give; "" if it gives all."""
+        percent = 200 * np.median(self.error / np.abs(self.value), axis=1)
+        parts = [
+            f"{format_number(float(percent[row]), 2)} % of each {name} (no column {name}_error)"
+            for row, name in enumerate(DEFAULT_ERRORS)
+            if self.assumed[row]
+        ]
+        if not parts:
+            return ""
+        return f"errors of the measured values, from their scatter around the fit: {' and '.join(parts)}"
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -147,13 +174,13 @@ def read_damping_curve(path) -> MeasuredCurve:
     # errors of a table without columns of errors are assumed
     value = np.array([columns["frequency"], columns["damping"]])
     error = np.zeros_like(value)
-    assumed = []
+    assumed = np.zeros(2, bool)
     for row, (name, fraction) in enumerate(DEFAULT_ERRORS.items()):
         if f"{name}_error" in columns:
             error[row] = columns[f"{name}_error"]
         else:
             error[row] = fraction * np.abs(value[row])
-            assumed.append(f"{100 * fraction:g} % of each {name} (no column {name}_error)")
+            assumed[row] = True
     if (error < 0).any():
         raise PatchfemError(
             f"{path}: errors must be 0 or more; of a value with a confidence interval, give half "
@@ -166,8 +193,9 @@ def read_damping_curve(path) -> MeasuredCurve:
     order = np.argsort(amplitude, kind="stable")
     # An error is half the width of a 95 % interval, which is two standard deviations.
     deviation = np.maximum(error / 2, MIN_SPREAD * np.abs(value))
-    note = f"assumed errors of the measured values: {' and '.join(assumed)}" if assumed else ""
-    return MeasuredCurve(amplitude[order], value[:, order], deviation[:, order], note, methods[0])
+    return MeasuredCurve(
+        amplitude[order], value[:, order], deviation[:, order], assumed, methods[0]
+    )
 
 
 class CurveModel:
@@ -353,19 +381,25 @@ def fit_curve(
     if say:
         say(f"{n_amplitudes} amplitudes computed by {' and '.join(curves.methods)}")
 
-    # the fast method gives the start of the search by the reference method
-    reference = curves.methods[0]
-    if len(curves.methods) > 1:
-        first = make_problem(curves.methods[-1], None).solve(starts, "")
-        problem = make_problem(reference, first.values)
-        fit = problem.solve(1, "series").count_earlier_search(first)
-    else:
-        problem = make_problem(reference, None)
-        fit = problem.solve(starts, "series")
+    # The fast method gives the start of the search by the reference method, and the errors that the table does not give.
+    reference, fast = curves.methods[0], curves.methods[-1]
+    first = make_problem(fast, None).solve(starts, "")
+    for _ in range(MAX_REWEIGHTINGS if measured.assumed.any() else 0):
+        before = measured.error
+        measured = measured.scale_assumed_errors(curves.compute(first.values, fast), len(ranges))
+        if np.abs(np.log(measured.error / before)).max() < SAME_ERROR:
+            break
+        first = make_problem(fast, first.values).solve(1, "").count_earlier_search(first)
+    problem = make_problem(reference, first.values)
+    fit = problem.solve(1, "series").count_earlier_search(first)
     fitted = curves.compute(fit.values, reference)
     widened, mode_notes = _widen_by_missing_modes(problem, fit, curves, measured)
     beyond, advice = extrapolate_curve(curves, measured, widened)
-    notes = [choice, measured.assumed, _note_different_methods(reference, measured)]
+    notes = [
+        choice,
+        measured.describe_assumed_errors(),
+        _note_different_methods(reference, measured),
+    ]
     return FittedCurve(
         keys=keys.make_fitted_keys(widened, begin),
         path=Path(curve_file),

@@ -15,6 +15,9 @@ from ...core import Outcome, compute_allowed_error
 from ...runs.batch.case_results import FAILED_OUTCOME, CaseResults
 from .cases import Cases
 
+MAX_TRUSTED_ERROR = (
+    0.5  # largest error of a value that counts for statements, relative to the value
+)
 # Outcomes of cases whose motion no longer changes.
 FINAL_OUTCOMES = (Outcome.STEADY, Outcome.STUCK, Outcome.DONE, Outcome.NO_CONTACT)
 
@@ -158,14 +161,15 @@ class SweepTable:
     def select_trusted(self, name: str) -> np.ndarray:
         """Return the values (n,) of a measure that count for statements on it; NaN for others.
 
-        A value counts if it meets the tolerance and its case has settled. The case need not have
-        settled if no settled case has a value, or if the measure is a steady estimate.
+        A value counts if its case has settled, and if its error is at most half of it or meets the tolerance. The
+        case need not have settled if no settled case has a value, or if the measure is a steady estimate.
         """
         column = self.measures[name]
         settled = self.has_settled
         needs_settling = not name.endswith("_steady") and np.isfinite(column.values[settled]).any()
         counts = settled if needs_settling else np.ones(len(self), bool)
-        return np.where(counts & ~column.misses(self.tolerance), column.values, np.nan)
+        is_vague = column.misses(MAX_TRUSTED_ERROR) & column.misses(self.tolerance)
+        return np.where(counts & ~is_vague, column.values, np.nan)
 
     def count_cases(self) -> dict[str, int | dict]:
         """Return the counts of cases in sweep.json.

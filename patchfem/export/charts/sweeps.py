@@ -111,14 +111,21 @@ def list_keys(answer: Answer) -> list[str]:
 
 
 def list_measures(answers: dict[str, Answer]) -> list[str]:
-    """Return the measures that have a value in at least one case, the main ones first."""
+    """Return the measures that have a value in at least one case.
+
+    The main ones that change come first, in the order of the verdict, then the others.
+    """
     names = {
         name: None
         for answer in answers.values()
         for name in answer.data
         if f"{name}_error" in answer.data and np.isfinite(answer.data[name].values).any()
     }
-    return sorted(names, key=lambda name: name not in MAIN_MEASURES)
+    ranges = [name for answer in answers.values() for name in answer.quantities]
+    changing = [name.removeprefix("smallest_") for name in ranges if name.startswith("smallest_")]
+    main = [*changing, *(name for name in MAIN_MEASURES if name not in changing)]
+    order = {name: place for place, name in enumerate(dict.fromkeys(main))}
+    return sorted(names, key=lambda name: order.get(name, len(order)))
 
 
 def spread_indices(size: int, count: int) -> np.ndarray:

@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...core import Measure, Outcome, Response, SineDrive
+from ...core import Measure, Outcome, Response, SineDrive, compute_allowed_error
 from ...effects import law_has_trait, needs_bond_list
 from ...model.model import Model
 from ...model.similar_models import SimilarModels, collect_columns
@@ -319,6 +319,12 @@ def make_results(
         Outcome.STUCK if stuck else CLASSES[number] for number, stuck in zip(classes, is_stuck)
     ]
     results.outcome[:] = list(map(str, outcomes))
+    ringing = _find_ringing(cases, scales, refined)
+    allowed = compute_allowed_error(
+        scales.tolerance, values[AMPLITUDE], find_floor(AMPLITUDE, values, scales)
+    )
+    is_ringing = is_stuck & (ringing > allowed + errors[AMPLITUDE])
+    results.outcome[is_ringing] = str(Outcome.TRANSIENT)
 
     # The steady amplitude is a measure if the motion still changes.
     is_transient = results.outcome == str(Outcome.TRANSIENT)
@@ -505,22 +511,26 @@ def _make_window(modes, drive, samples, steps: int) -> Response:
     )  # fmt: skip
 
 
+def _find_ringing(cases: Cases, scales: Scales, refined: Refined) -> np.ndarray:
+    """Return the part (n,) of the amplitudes [m] that is free vibration if the interface sticks."""
+    decay = scales.decay * 2 * np.pi / cases.parameters[:, Number.OMEGA]
+    return remaining_ringing(refined.march.extremes, int(cases.parameters[0, Number.WINDOW]), decay)
+
+
 def _warn_of_ringing(cases: Cases, scales: Scales, refined: Refined, results: CaseResults) -> None:
     """Warn where the amplitude of a sticking interface still decays."""
-    columns = cases.parameters.T
-    decay = scales.decay * 2 * np.pi / columns[Number.OMEGA]
-    extremes = refined.march.extremes
-    window = int(columns[Number.WINDOW, 0])
-    free = remaining_ringing(extremes, window, decay)
-    for case in np.flatnonzero(results.outcome == str(Outcome.STUCK)).tolist():
+    decay = scales.decay * 2 * np.pi / cases.parameters[:, Number.OMEGA]
+    ringing = _find_ringing(cases, scales, refined)
+    is_stuck = results.values["slip_amplitude"] <= _stick_tolerance(cases, scales)
+    is_ringing = is_stuck & (results.outcome == str(Outcome.TRANSIENT))
+    for case in np.flatnonzero(is_ringing).tolist():
         amplitude, error, floor = (
-            column[AMPLITUDE][case] for column in (results.values, results.errors, results.floors)
+            float(column[AMPLITUDE][case])
+            for column in (results.values, results.errors, results.floors)
         )
         limits = float(scales.tolerance[case]), float(decay[case])
-        sizes = float(amplitude), float(floor + error)
-        if amplitude and (
-            texts := warn_of_ringing(free[case], sizes, limits, int(columns[Number.CYCLES, case]))
-        ):
+        count = int(cases.parameters[case, Number.CYCLES])
+        if texts := warn_of_ringing(ringing[case], (amplitude, floor + error), limits, count):
             results.warnings[case] = [*results.warnings.get(case, ()), *texts]
 
 
