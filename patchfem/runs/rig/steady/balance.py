@@ -31,6 +31,7 @@ from .curves import (
     COLUMN_MEASURES,
     HARMONIC_ROUND_OFF,
     CurvePoint,
+    ObservedMotion,
     ResponseCurve,
     describe_instability,
 )
@@ -248,6 +249,29 @@ class BalanceFinder:
             )
         return StableMotion(motion, add_stability(motion, self.modes), (note,))
 
+    def observe(self, drive, guess=None, *, needs_histories: bool = True) -> ObservedMotion:
+        """Compute what sensors see of the steady motion under a drive, without errors.
+
+        Parameters
+        ----------
+        drive : SineDrive
+        guess : SteadyMotion, optional
+            Steady motion under a similar drive.
+        needs_histories : bool
+            Whether histories are requested; they are always returned.
+        """
+        motion = periodic_point(
+            self.modes, drive, self.group, self.harmonics, self.tolerance, start=guess
+        )
+        window = make_cycle_response(motion, self.modes, drive, SAMPLES_PER_CYCLE)
+        peak = compute_peak(window.acceleration)
+        return ObservedMotion(window, peak, motion.amplitude(self._measured_row), motion)
+
+    @property
+    def _measured_row(self) -> np.ndarray:
+        """Participation (n,) of the point whose displacement is measured."""
+        return self.modes.output if self.modes.gauge is None else self.modes.gauge
+
     def compute_curve_point(self, drive, guess=None) -> CurvePoint:
         """Compute one point of a response curve, without error estimates."""
         motion = periodic_point(
@@ -274,9 +298,8 @@ class BalanceFinder:
     def _compute_curve_measures(self, motion, drive) -> dict:
         """Return a dict of the measures of a point of a response curve."""
         response = make_cycle_response(motion, self.modes, drive, SAMPLES_PER_CYCLE)
-        row = self.modes.output if self.modes.gauge is None else self.modes.gauge
         values = {
-            COLUMN_MEASURES["amplitude"]: motion.amplitude(row),
+            COLUMN_MEASURES["amplitude"]: motion.amplitude(self._measured_row),
             COLUMN_MEASURES["acceleration_peak"]: compute_peak(response.acceleration),
             **harmonic_measures(*odd_harmonics(response, drive)),
         }

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ....core import NotConverged, Outcome, SineDrive
+from ....core import NotConverged, Outcome, Response, SineDrive
 from ....dynamics.curve_points import sample_adaptively
 from ....response.levels import LEVEL_MEASURES, Level
 from ..solution import replace_output_by_gauge
@@ -73,6 +73,24 @@ class CurvePoint(NamedTuple):
             errors,
             outcome=str(self.outcome),
         )
+
+
+class ObservedMotion(NamedTuple):
+    """Last cycles of a motion, with the quantities that its sensors measure.
+
+    - window: histories; None if they were not requested.
+    - acceleration: peak absolute acceleration [m s-2], as in the measures of a run.
+    - displacement: displacement amplitude [m], as in the measures of a run.
+    - initial_guess: initial guess for the motion under a similar drive, or None.
+    - fundamental: first harmonic of the absolute acceleration [m s-2]; None if it must be computed
+      from the window.
+    """
+
+    window: Response | None
+    acceleration: float
+    displacement: float
+    initial_guess: Any = None
+    fundamental: complex | None = None
 
 
 class ResponseCurve(NamedTuple):
