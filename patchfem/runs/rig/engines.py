@@ -121,11 +121,6 @@ class SteadyMethod(NamedTuple):
 STEADY_METHODS = {
     finder.name: finder
     for finder in (
-        SteadyMethod(
-            "march",
-            "a time integration whose initial state is corrected until the motion repeats",
-            "march",
-        ),
         SteadyMethod("shooting", "Newton's method on the map of a period", "hybrid"),
         SteadyMethod("balance", "harmonic balance", "harmonic"),
     )
@@ -137,12 +132,9 @@ def choose_steady_method(model: Model) -> SteadyMethod:
 
     Coulomb friction, elastic-plastic elements and grooves need Newton's method on the map of a period, because their
     forces change their slope or jump. Harmonic balance is used for all other models, and for elements in scenes that set
-    `harmonics`. A law with memory on grooves needs a time integration.
+    `harmonics`.
     """
-    if model.grooves is not None:
-        is_shot = not HYBRID.find_unsupported_feature(model, steady=True)
-        return STEADY_METHODS["shooting" if is_shot else "march"]
-    is_shot = not find_obstacle_of_map("exact", model)
+    is_shot = model.grooves is not None or not find_obstacle_of_map("exact", model)
     if model.accuracy.harmonics is None:
         is_shot |= not find_obstacle_of_map("piecewise", model)
     return STEADY_METHODS["shooting" if is_shot else "balance"]
