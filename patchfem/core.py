@@ -419,6 +419,11 @@ class MeasureDefinition(NamedTuple):
     - order: order of the sampling error of an exact motion in the sample spacing.
     - needs_run: whether the function uses the histories of the whole run, which the coarse runs then store as well.
     - minimum: smallest possible value.
+    - flags: sets to which the measure belongs, separated by blanks: "main" (the tolerance of a run applies to it),
+      "interface" (one value per interface), "level" (one value per drive level), "curve" (a column of a response
+      curve), "mesh" (its error controls the mesh), "displacement" (its floor is limited by the displacement of the
+      drive), "error" (it is itself an error), "sine" (it exists only under a sine), "loop" (an integral or a peak of
+      samples of the friction loop), "run" (a sum over the whole run).
     """
 
     name: str
@@ -432,6 +437,11 @@ class MeasureDefinition(NamedTuple):
     order: float = 1.0
     needs_run: bool = False
     minimum: float = -np.inf
+    flags: str = ""
+
+    def has(self, flag: str) -> bool:
+        """Return whether the measure belongs to a set."""
+        return flag in self.flags.split()
 
 
 @dataclass(frozen=True, eq=False, slots=True)

@@ -42,7 +42,6 @@ PUBLIC = {
     "events": ("EVENT_KIND_NAMES",),
     "inside_steps": ("add_substep_samples",),
     "levels": (
-        "LEVEL_MEASURES",
         "Level",
         "MIN_JUMP_FACTOR",
         "bracket_onset",
@@ -119,6 +118,7 @@ PUBLIC = {
         "find_definition",
         "larger_term",
         "remove_interface_number",
+        "select_names",
         "set_final_floors",
         "stick_fraction",
     ),

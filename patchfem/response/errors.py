@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..core import ErrorCauses, Measure
-from .rows import error_floor, find_definition
+from .rows import error_floor, find_definition, select_names
 
 # Roache's safety factor for two runs; it also covers runs outside the asymptotic range.
 SAFETY_FACTOR = 3.0
@@ -28,10 +28,10 @@ MAX_ORDER = 2.0
 MAX_CHANGE_RATIO = 16.0
 # Lowest observed order of convergence at which an error is assumed to decrease with the step size.
 MIN_OBSERVED_ORDER = 0.5
+# Measures that are errors of the solution, so that their own error is their value.
+ERROR_MEASURES = select_names("error")
 # Round-off error of the mean position of a motion, relative to its amplitude.
 MEAN_ROUND_OFF = 1e-13
-# Measures that are errors of the solution, so that their own error is their value.
-ERROR_MEASURES = ("energy_balance", "work_check")
 
 
 def signed_change(fine: dict, coarse: dict) -> dict:

@@ -13,20 +13,9 @@ import numpy as np
 
 from ..core import Outcome
 from ..formatting import format_length
+from .rows import select_names
 
-LEVEL_MEASURES = (
-    "relative_displacement_amplitude",
-    "absolute_acceleration_peak",
-    "absolute_acceleration_fundamental",
-    "acceleration_distortion",
-    "slip_amplitude",
-    "stick_fraction",
-    "friction_force_peak",
-    "loop_area",
-    "equivalent_stiffness",
-    "secant_stiffness",
-    "equivalent_damping",
-)
+LEVEL_MEASURES = select_names("level")
 AMPLITUDE_MEASURE = LEVEL_MEASURES[0]
 # Smallest ratio of the third to the first harmonic of the acceleration that indicates slip.
 MIN_DISTORTION = 0.03

@@ -289,6 +289,7 @@ ROWS = (
         "the base; of a release, that of the last whole cycle of the "
         "motion, from a reversal to the second reversal after it",
         lambda s: float(s.extremes[:, 1].max() - s.extremes[:, 0].min()) / 2,
+        flags="main level curve displacement",
     ),
     MeasureDefinition(
         "absolute_acceleration_peak",
@@ -296,6 +297,7 @@ ROWS = (
         1e-4,
         "largest acceleration at the output, base motion included",
         lambda s: compute_peak(s.window.acceleration),
+        flags="main level curve",
     ),
     MeasureDefinition(
         "friction_force_peak",
@@ -310,6 +312,7 @@ ROWS = (
             else compute_peak(s.samples.force)
         ),
         group="friction",
+        flags="interface level loop",
     ),
     MeasureDefinition(
         "energy_balance",
@@ -320,6 +323,7 @@ ROWS = (
         lambda s: energy_balance(s.run_energies),
         group="energy",
         larger_term=("1", lambda _: 1.0),
+        flags="error",
     ),
     MeasureDefinition(
         "absolute_acceleration_fundamental",
@@ -327,6 +331,7 @@ ROWS = (
         MIN_HARMONIC,
         "first harmonic of the acceleration at the output, base motion included",
         lambda s: s.acceleration_measures.get("absolute_acceleration_fundamental"),
+        flags="level curve sine",
     ),
     MeasureDefinition(
         "acceleration_distortion",
@@ -335,6 +340,7 @@ ROWS = (
         "third harmonic of the acceleration at the output, base motion included, divided by the first harmonic; null "
         "if the output does not move",
         lambda s: s.acceleration_measures.get("acceleration_distortion"),
+        flags="level curve sine",
     ),
     MeasureDefinition(
         "drift_per_cycle",
@@ -346,6 +352,7 @@ ROWS = (
         lambda s: mean_drift(s.window.time, s.window.slide, s.window.slide_rate, s.drive.period),
         larger_term=("slip amplitude (without slip: amplitude of the motion)", _drift_scale),
         order=CUBIC_CONVERGENCE_ORDER,
+        flags="displacement",
     ),
     MeasureDefinition(
         "slip_amplitude",
@@ -355,6 +362,7 @@ ROWS = (
         "weighted by the pressure; for law 'iwan', the mean over the sliders, weighted by their slip forces",
         lambda s: s.slip_measures.get("slip_amplitude"),
         group="friction",
+        flags="interface level displacement loop",
     ),
     MeasureDefinition(
         "stick_fraction",
@@ -368,6 +376,7 @@ ROWS = (
         0.35,
         group="friction",
         larger_term=("1", lambda _: 1.0),
+        flags="interface level",
     ),
     MeasureDefinition(
         "slip_start_phase",
@@ -380,6 +389,7 @@ ROWS = (
         1.0,
         group="friction",
         larger_term=("pi", lambda _: np.pi),
+        flags="sine",
     ),
     MeasureDefinition(
         "normal_load",
@@ -398,6 +408,7 @@ ROWS = (
         "than it dissipates",
         lambda s: s.loop_measures.get("loop_area"),
         group="energy",
+        flags="main interface level loop",
     ),
     MeasureDefinition(
         "equivalent_stiffness",
@@ -411,6 +422,7 @@ ROWS = (
             "magnitude of the complex ratio of the two first harmonics",
             lambda values: np.nan_to_num(values.get("harmonic_force_ratio", 0.0)),
         ),
+        flags="level sine loop",
     ),
     MeasureDefinition(
         "secant_stiffness",
@@ -422,6 +434,7 @@ ROWS = (
         lambda s: s.loop_measures.get("secant_stiffness"),
         group="friction",
         order=CUBIC_CONVERGENCE_ORDER,
+        flags="level sine",
     ),
     MeasureDefinition(
         "equivalent_damping",
@@ -433,6 +446,7 @@ ROWS = (
         lambda s: s.loop_measures.get("equivalent_damping"),
         group="friction",
         order=CUBIC_CONVERGENCE_ORDER,
+        flags="level sine loop",
     ),
     MeasureDefinition(
         "friction_work",
@@ -442,6 +456,7 @@ ROWS = (
         "over two cycles",
         lambda s: s.final_energies.get("friction_work"),
         group="energy",
+        flags="run",
     ),
     MeasureDefinition(
         "energy_stored",
@@ -459,6 +474,7 @@ ROWS = (
         "method `harmonic`, over two cycles",
         lambda s: s.final_energies.get("energy_dissipated"),
         group="energy",
+        flags="run",
     ),
     MeasureDefinition(
         "energy_created",
@@ -502,6 +518,7 @@ ROWS = (
         "steady amplitude under a periodic drive, extrapolated if the motion has not settled or may still change by "
         "more than 0.02 tolerance × amplitude; absent if it has settled and cannot change by more; null if the motion "
         "has not settled and its limit cannot be extrapolated",
+        flags="displacement",
     ),
     MeasureDefinition(
         "peak_frequency",
@@ -523,6 +540,7 @@ ROWS = (
         1e-9,
         "largest value of friction force divided by normal load during the whole run",
         group="friction",
+        flags="main",
     ),
     MeasureDefinition(
         "flutter_amplitude",
@@ -538,6 +556,7 @@ ROWS = (
         "relative difference between two values of the friction work of the run: the value from the trapezoidal rule "
         "on the samples, and the value in the energy balance",
         group="energy",
+        flags="error",
     ),
     *_random_rows(
         "relative_displacement_rms",
@@ -611,24 +630,20 @@ INTERNAL_ROWS = (
         0.0,
         "magnitude of the complex ratio of the first harmonics of friction force and slide",
         lambda s: s.loop_measures.get("harmonic_force_ratio"),
+        flags="sine",
     ),
 )
 INTERNAL_VALUES = tuple(row.name for row in INTERNAL_ROWS)
 ROWS_NEEDING_RUN = tuple(row for row in ROWS if row.needs_run)
 TABLE = {row.name: row for row in (*ROWS, *INTERNAL_ROWS)}
-# Measures of each interface.
-INTERFACE_MEASURES = (
-    "slip_amplitude",
-    "stick_fraction",
-    "friction_force_peak",
-    "loop_area",
-)
-DISPLACEMENT_MEASURES = (
-    "relative_displacement_amplitude",
-    "relative_displacement_amplitude_steady",
-    "slip_amplitude",
-    "drift_per_cycle",
-)
+
+
+def select_names(flag: str) -> tuple[str, ...]:
+    """Return the names of the measures of a motion that belong to a set, in the order of the table."""
+    return tuple(row.name for row in TABLE.values() if row.has(flag))
+
+
+INTERFACE_MEASURES = select_names("interface")
 # Upper limit of the floor of a displacement error, relative to the displacement caused by the drive
 # alone.
 MAX_DISPLACEMENT_FLOOR = 1e-5
@@ -683,8 +698,9 @@ def error_floor(name: str, size=np.inf):
     size : float or (n,)
         Displacement caused by the drive alone [m]; 0 or inf without a drive.
     """
-    floor = find_definition(name).floor
-    if remove_interface_number(name) not in DISPLACEMENT_MEASURES:
+    definition = find_definition(name)
+    floor = definition.floor
+    if not definition.has("displacement"):
         return floor
     return np.where(
         np.greater(size, 0), np.minimum(floor, MAX_DISPLACEMENT_FLOOR * np.asarray(size)), floor

@@ -15,16 +15,13 @@ import numpy as np
 from ..core import Outcome
 from ..formatting import format_number
 from ..model.model import Model
+from ..response.rows import select_names
 from .results.patch_rows import TABLE as PATCH_TABLE
 
 # Main measures of a run, which have to meet the tolerance.
 MAIN_MEASURES = (
-    "relative_displacement_amplitude",
-    "absolute_acceleration_peak",
-    "loop_area",
-    "friction_ratio_peak",
-    "pressure_peak",
-    "contact_fraction",
+    *select_names("main"),
+    *(name for name, row in PATCH_TABLE.items() if row.has("main")),
 )
 MAX_SECONDS = 60.0  # Largest CPU time [s] of all passes without accuracy.max_seconds.
 COST_RATIO = 4.0  # Expected ratio of the CPU times of two successive passes.

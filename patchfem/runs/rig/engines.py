@@ -22,6 +22,7 @@ from ...response.errors import (
     finer_errors,
     friction_errors,
 )
+from ...response.rows import find_definition
 from ...scene.rules import methods
 from ...scene.rules.accuracy import has_effect, list_fixed_settings
 from ...slip import shear_modes
@@ -145,14 +146,6 @@ def _no_comparison_runs(*_) -> list:
     return []
 
 
-# Measures of the friction loop that are computed from samples by the trapezoidal rule.
-LOOP_MEASURES = (
-    "loop_area",
-    "equivalent_stiffness",
-    "equivalent_damping",
-    "slip_amplitude",
-    "friction_force_peak",
-)
 LOOP_SAMPLING_ERROR = 1e-4  # Relative error of loop measures from 400 samples per cycle.
 # Error of the stick fraction [1] and of the phase at slip start [rad] from 400 samples per cycle.
 INSTANT_SAMPLING_ERROR = 0.005
@@ -163,9 +156,10 @@ def estimate_sampling_errors(values: dict) -> dict:
     """Estimate the errors of measures due to sampling with 400 samples per cycle."""
     errors = {}
     for name, value in values.items():
-        if name in LOOP_MEASURES:
+        definition = find_definition(name)
+        if definition.has("loop"):
             errors[name] = LOOP_SAMPLING_ERROR * abs(value)
-        elif name in ("stick_fraction", "slip_start_phase"):
+        elif definition.sample_error:
             errors[name] = INSTANT_SAMPLING_ERROR
         else:
             errors[name] = MOTION_SAMPLING_ERROR * abs(value)

@@ -26,9 +26,10 @@ from ...hybrid.laws import is_rigid
 from ...hybrid.laws.masing import has_stick
 from ...hybrid.records import Margin, Memory, State, Status
 from ...response import run_events
+from ...response.levels import AMPLITUDE_MEASURE
 from ...response.measures import MIN_SLIDE_RANGE, compute_harmonic, relative_gap
 from ...response.ringing import compute_stuck_vibration, make_ringing_measures, select_strongest
-from ...response.rows import ROWS_NEEDING_RUN
+from ...response.rows import ROWS_NEEDING_RUN, select_names
 from ...structure.drive_sizes import (
     choose_samples_per_cycle,
     find_drive_omega,
@@ -55,24 +56,8 @@ N_CHANGE_WINDOWS = (
 MIN_RELATIVE_DECAY = 1e-6
 STEADY_RTOL = 1e-10  # step tolerance of the steady motion that follows a run
 MIN_SAMPLED_CYCLES = 2.0  # cycles at the end that have as many samples as the window
-MOTION_MEASURES = (
-    "relative_displacement_amplitude",
-    "absolute_acceleration_peak",
-    "absolute_acceleration_fundamental",
-    "acceleration_distortion",
-)
-# Measures that exist only under a sine.
-SINE_MEASURES = (
-    "absolute_acceleration_fundamental",
-    "acceleration_distortion",
-    "slip_start_phase",
-    "equivalent_stiffness",
-    "equivalent_damping",
-    "secant_stiffness",
-    "harmonic_force_ratio",
-)
-# Sums over all drive levels.
-WHOLE_RUN_MEASURES = ("friction_work", "energy_dissipated")
+# Measures of the motion, of the whole run and of its balance are those of the engine also for strips.
+STRIP_GROUPS = ("curve", "run", "error")
 EARLY_ENDS = {
     Status.EXCEEDS_TRAVEL: Outcome.EXCEEDS_TRAVEL,
     Status.LEAVES_GROOVES: Outcome.LEAVES_GROOVES,
@@ -144,7 +129,7 @@ def run_from_event_to_event(
         """Integrate the motion under a drive from the end of another run, None for the start of the rig."""
         state = None if before is None else before.end
         run = evaluator.integrate(drive, cycles, state, frames if is_last else 0)
-        for name in WHOLE_RUN_MEASURES:
+        for name in select_names("run"):
             if before is not None and name in before.values:
                 run.values[name] += before.values[name]
         return run
@@ -403,13 +388,14 @@ class LumpedEvaluator(RunEvaluator):
             name: None if np.isnan(value) else float(value) for name, value in run.values.items()
         }
         if not is_sinusoidal(drive):
-            values |= dict.fromkeys(SINE_MEASURES)
+            values |= dict.fromkeys(select_names("sine"))
         if self.has_friction:
             values |= self._limit_loop_measures(run, values)
             values["work_check"] = self._compute_work_check(run)
         if self.strips_slide_apart:
-            names = (*MOTION_MEASURES, "slip_start_phase", "energy_balance", "work_check")
-            names += ("friction_work", "energy_dissipated", "energy_stored")
+            names = ["slip_start_phase", "energy_stored"]
+            for group in STRIP_GROUPS:
+                names += select_names(group)
             loop = _compute_strips_loop(run, drive)
             return IntegratedMeasures({name: values.get(name) for name in names}, loops=(loop,))
         values.pop("energy_stored", None)
@@ -515,7 +501,7 @@ def find_stable_amplitude(motion: periodic.PeriodicMotion) -> tuple[float, float
     """Return the amplitude [m] of a periodic motion and its error; None if it is not known or not stable."""
     if motion.grows or not motion.change <= motion.tolerance or not motion.is_stable:
         return None
-    amplitude = float(motion.batch.windows[0][MOTION_MEASURES[0]][0])
+    amplitude = float(motion.batch.windows[0][AMPLITUDE_MEASURE][0])
     return amplitude, amplitude * (10 * motion.error + 1e2 * STEADY_RTOL)
 
 
