@@ -496,7 +496,7 @@ class InterfaceLoop(NamedTuple):
     - force_harmonic: first harmonic of the friction force [N].
     - work: friction work [J].
     - slip_range: range of the slip [m].
-    - stuck_time: time without slip [s]; None if it must be computed from samples.
+    - stuck_time: time without slip [s].
     - max_force: largest friction force [N].
     """
 
@@ -504,7 +504,7 @@ class InterfaceLoop(NamedTuple):
     force_harmonic: complex
     work: float
     slip_range: float
-    stuck_time: float | None
+    stuck_time: float
     max_force: float
 
 
@@ -516,16 +516,11 @@ class IntegratedMeasures:
     accurate than those from samples. A quantity that is missing here is computed from samples (`response.rows`).
 
     - values: values of measures by name; None if the run has no value.
-    - acceleration_harmonics: amplitudes of the first and third harmonic of the absolute acceleration [m s-2], or None.
     - loops: InterfaceLoop of each interface.
-    - slip_start_phases (s,): phases of the drive [rad], modulo pi, at which the first interface begins to slip, or
-      None.
     - reversals: (relative displacement [m], friction force [N]) of the first interface at the smallest and at the
       largest relative displacement of each cycle.
     """
 
     values: dict = field(default_factory=dict)
-    acceleration_harmonics: tuple | None = None
     loops: tuple = ()
-    slip_start_phases: np.ndarray | None = None
     reversals: tuple = ()

@@ -101,16 +101,14 @@ def bracket_onset(levels, is_above_onset: Callable[[Level], bool]) -> tuple | No
     return None
 
 
-def largest_jump(levels, name: str = AMPLITUDE_MEASURE) -> tuple | None:
-    """Return the largest relative jump of a measure between successive drive levels.
+def largest_jump(levels) -> tuple | None:
+    """Return the largest relative jump of the amplitude between successive drive levels.
 
     The jump is the ratio of the measures divided by the ratio of the drive levels.
 
     Parameters
     ----------
     levels : sequence of Level
-    name : str
-        Name of the measure.
 
     Returns
     -------
@@ -121,25 +119,22 @@ def largest_jump(levels, name: str = AMPLITUDE_MEASURE) -> tuple | None:
     """
     jumps = []
     for level, next_level in pairwise(levels):
-        amounts = level.drive, next_level.drive, level.values[name], next_level.values[name]
+        sizes = level.values[AMPLITUDE_MEASURE], next_level.values[AMPLITUDE_MEASURE]
+        amounts = level.drive, next_level.drive, *sizes
         if all(0 < size < np.inf for size in amounts) and not (level.stuck or next_level.stuck):
-            factor = (next_level.values[name] / level.values[name]) / (
-                next_level.drive / level.drive
-            )
+            factor = sizes[1] / sizes[0] / (next_level.drive / level.drive)
             jumps.append(
                 (abs(np.log(factor)), next_level.drive, factor, abs(next_level.drive - level.drive))
             )
     return max(jumps)[1:] if jumps and max(jumps)[0] >= np.log(MIN_JUMP_FACTOR) else None
 
 
-def largest_hysteresis(levels, name: str = AMPLITUDE_MEASURE) -> tuple | None:
-    """Return the largest difference of a measure between increasing and decreasing levels.
+def largest_hysteresis(levels) -> tuple | None:
+    """Return the largest difference of the amplitude between increasing and decreasing levels.
 
     Parameters
     ----------
     levels : sequence of Level
-    name : str
-        Name of the measure.
 
     Returns
     -------
@@ -153,8 +148,8 @@ def largest_hysteresis(levels, name: str = AMPLITUDE_MEASURE) -> tuple | None:
     for rising in levels[:highest]:
         falling = decreasing_levels.get(round(rising.drive, 9))
         if falling is not None:
-            difference = abs(rising.values[name] - falling.values[name])
+            difference = abs(rising.values[AMPLITUDE_MEASURE] - falling.values[AMPLITUDE_MEASURE])
             if np.isfinite(difference):
-                error = rising.errors.get(name, 0.0) + falling.errors.get(name, 0.0)
+                error = sum(level.errors.get(AMPLITUDE_MEASURE, 0.0) for level in (rising, falling))
                 differences.append((difference, error))
     return max(differences, default=None)

@@ -29,7 +29,6 @@ from .measures import (
     compute_peak,
     compute_slip_measures,
     energy_balance,
-    slip_start_measure,
 )
 from .spectrum import MIN_HARMONIC, harmonic_measures, odd_harmonics
 
@@ -53,7 +52,6 @@ class LastCycles:
     - reversal_rule: rule for the friction force at a reversal of the displacement (see
       `loops.find_reversals`).
     - slide_round_off: largest half range of the relative displacement that is round-off [m].
-    - uniform_window: equally spaced samples of the window; None if `window` has such samples.
     - add_substeps: function (window, index of the interface) that returns the window with samples
       inside the time steps; None if these are not needed.
     - is_single_interface: whether the interfaces are parts of a single one.
@@ -74,7 +72,6 @@ class LastCycles:
     ledger: np.ndarray | None = None
     reversal_rule: str = "rate"
     slide_round_off: float = 0.0
-    uniform_window: Response | None = None
     add_substeps: Callable | None = None
     is_single_interface: bool = False
     interface: int = 0
@@ -101,20 +98,16 @@ class LastCycles:
         """Slip amplitude [m], stick fraction [1] and phase of slip onset [rad] as a dict."""
         if self.load is None:
             return {}
-        first = self.integrated.loops[0] if self.integrated.loops else None
-        if first is None or first.stuck_time is None:
-            window = self.uniform_window or self.samples
-            steps = max(1, round((window.time.size - 1) * self.drive.period / self.span))
-            values = compute_slip_measures(window, self.drive, steps)
-        else:
-            phases = self.integrated.slip_start_phases
-            values = {"stick_fraction": stick_fraction(first.stuck_time, self.span)} | (
-                {} if phases is None else slip_start_measure(np.asarray(phases))
-            )
-        values |= {} if first is None else {"slip_amplitude": first.slip_range / 2}
-        return (
-            values if self.is_sine else {k: v for k, v in values.items() if k != "slip_start_phase"}
-        )
+        if self.integrated.loops:
+            loop = self.integrated.loops[0]
+            values = {"slip_amplitude": loop.slip_range / 2}
+            return values | {"stick_fraction": stick_fraction(loop.stuck_time, self.span)}
+        window = self.samples
+        steps = max(1, round((window.time.size - 1) * self.drive.period / self.span))
+        values = compute_slip_measures(window, self.drive, steps)
+        if not self.is_sine:
+            values.pop("slip_start_phase", None)
+        return values
 
     @cached_property
     def reversals(self) -> list:
@@ -169,11 +162,7 @@ class LastCycles:
         """
         if not (self.is_sine and self.has_full_cycle):
             return {}
-        if self.integrated.acceleration_harmonics is None:
-            return harmonic_measures(*odd_harmonics(self.window, self.drive))
-        return harmonic_measures(
-            *self.integrated.acceleration_harmonics, drive_sizes.find_max_acceleration(self.drive)
-        )
+        return harmonic_measures(*odd_harmonics(self.window, self.drive))
 
     @cached_property
     def final_energies(self) -> dict:
@@ -193,10 +182,7 @@ class LastCycles:
         return measures
 
     def further_interfaces(self) -> list:
-        """Return the last cycles of each interface after the first one.
-
-        The work of an interface is taken from `integrated.loops` if they exist, else from the samples.
-        """
+        """Return the last cycles of each interface after the first one."""
         extra = self.window.extra
         if self.load is None or self.is_single_interface or "slides" not in extra:
             return []
@@ -211,13 +197,12 @@ class LastCycles:
                 force=extra["forces"][:, k],
                 slip=slips[:, k],
             )
-            loops = self.integrated.loops[k : k + 1]
-            work = loops[0].work if loops else float(np.trapezoid(window.force, window.slide))
+            work = float(np.trapezoid(window.force, window.slide))
             interfaces.append(
                 replace(
                     self,
                     window=window,
-                    integrated=IntegratedMeasures(loops=loops),
+                    integrated=IntegratedMeasures(),
                     is_sine=False,
                     interface=k,
                     loop=(0j, 0j, work * self.drive.period / max(self.span, 1e-300)),

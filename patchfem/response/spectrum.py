@@ -7,8 +7,6 @@ instrument indicates. An instrument evaluates the computed motion and does not c
 
 import numpy as np
 
-# Round-off error of a harmonic, relative to the largest acceleration of the drive.
-ACCELERATION_ROUND_OFF = 1e-12
 MIN_HARMONIC = 1e-4  # Smallest first harmonic [m s-2] of an output that counts as moving.
 READINGS = ("peak", "fundamental", "rms", "lowpass")
 N_FILTER_HARMONICS = 64  # Number of harmonics of the filtered signal.
@@ -117,43 +115,21 @@ def odd_harmonics(window, drive) -> tuple:
     return float(abs(first)), float(abs(third))
 
 
-def harmonic_measures(
-    first_harmonic: float, third_harmonic: float, drive_acceleration: float = 0.0
-) -> dict:
+def harmonic_measures(first_harmonic: float, third_harmonic: float) -> dict:
     """Return fundamental [m s-2] and distortion [1] of the acceleration as a dict.
+
+    The distortion is None if the output does not move.
 
     Parameters
     ----------
     first_harmonic, third_harmonic : float
         Magnitudes of the first and the third harmonic [m s-2].
-    drive_acceleration : float
-        Acceleration amplitude of the drive [m s-2], which determines the round-off.
     """
-    ratio = distortion_ratio(first_harmonic, third_harmonic, drive_acceleration)
+    is_moving = first_harmonic > MIN_HARMONIC
     return {
         "absolute_acceleration_fundamental": float(first_harmonic),
-        "acceleration_distortion": None if np.isnan(ratio) else float(ratio),
+        "acceleration_distortion": third_harmonic / first_harmonic if is_moving else None,
     }
-
-
-def distortion_ratio(first_harmonic, third_harmonic, drive_acceleration):
-    """Return the ratio of the third to the first harmonic of an acceleration.
-
-    The ratio is NaN if the first harmonic is below its floor or within the round-off of the drive.
-
-    Parameters
-    ----------
-    first_harmonic, third_harmonic : float or (n,)
-        Magnitudes of the harmonics [m s-2].
-    drive_acceleration : float or (n,)
-        Acceleration amplitude of the drive [m s-2].
-    """
-    is_moving = np.asarray(first_harmonic) > np.maximum(
-        ACCELERATION_ROUND_OFF * np.asarray(drive_acceleration), MIN_HARMONIC
-    )
-    return np.where(is_moving, third_harmonic / np.where(is_moving, first_harmonic, 1.0), np.nan)[
-        ()
-    ]
 
 
 def friction_harmonic(window, modes, drive) -> complex:

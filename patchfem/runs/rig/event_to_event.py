@@ -18,7 +18,6 @@ from ...core import (
     Response,
     SineDrive,
 )
-from ...dynamics.event_list import DRIVE_CHANGE, RELEASE, REVERSAL, STOP, EventLog
 from ...dynamics.integrated import find_accelerations
 from ...hybrid import cases, periodic
 from ...hybrid import runs as engine
@@ -26,10 +25,18 @@ from ...hybrid.laws import is_rigid
 from ...hybrid.laws.masing import has_stick
 from ...hybrid.records import Margin, Memory, State, Status
 from ...response import run_events
+from ...response.errors import ERROR_MEASURES, absolute_change, convergence_error
+from ...response.events import (
+    EXACT_SOURCE,
+    SEGMENT_BORDER,
+    Events,
+    classify_changes,
+    sort_events,
+)
 from ...response.levels import AMPLITUDE_MEASURE
 from ...response.measures import MIN_SLIDE_RANGE, compute_harmonic, relative_gap
 from ...response.ringing import compute_stuck_vibration, make_ringing_measures, select_strongest
-from ...response.rows import ROWS_NEEDING_RUN, select_names
+from ...response.rows import ROWS_NEEDING_RUN, find_definition, select_names
 from ...structure.drive_sizes import (
     choose_samples_per_cycle,
     find_drive_omega,
@@ -38,7 +45,7 @@ from ...structure.drive_sizes import (
     is_sinusoidal,
 )
 from . import strips
-from .evaluation import RunEvaluator
+from .evaluation import RunEvaluator, thin_samples
 from .hybrid_laws import Joints, make_joints
 from .levels import remove_incomplete_cycle, run_levels
 from .solution import Solution, describe_escape, find_travel, first_mode_stiffness
@@ -76,7 +83,7 @@ class LumpedRun:
     - end: arrays of the engine at the end, from which another run can go on.
     - cycles_done: number of cycles.
     - events: number of stored events.
-    - log: events of rigid interfaces, or None.
+    - log: events of the interfaces, or None.
     - snapshots: states of the elements of a patch in the last cycle.
     - repeats: whether the motion repeats after each cycle.
     """
@@ -92,7 +99,7 @@ class LumpedRun:
     end: State
     cycles_done: float
     events: int
-    log: EventLog | None = None
+    log: Events | None = None
     snapshots: list = field(default_factory=list)
     repeats: bool = False
 
@@ -287,7 +294,7 @@ class LumpedEvaluator(RunEvaluator):
             end=motion.final,
             cycles_done=cycles,
             events=len(motion.event_rows),
-            log=self._make_log(motion, drive),
+            log=self._list_events(motion, drive),
             snapshots=self._list_snapshots(motion, response, times[2], start),
             repeats=motion.repeats,
         )
@@ -318,7 +325,7 @@ class LumpedEvaluator(RunEvaluator):
         force = self.joints.laws[0][1].mean + grooves.lifted_mass * rise
         return replace(response, extra=response.extra | {"normal_load": force})
 
-    def _make_log(self, motion, drive) -> EventLog | None:
+    def _list_events(self, motion, drive) -> Events | None:
         """Return stops, releases and reversals of the interfaces, and the changes of the drive.
 
         None for laws that have no such events, because some part of them always slips.
@@ -328,22 +335,15 @@ class LumpedEvaluator(RunEvaluator):
             return None
         directions = motion.find_directions()
         rows = motion.event_rows
-        slides = (
-            rows[:, 1 : 1 + self.model.rig.modes.omega.size] @ self.model.rig.modes.interfaces.T
-        )
-        events = [
-            (s.start, -1, DRIVE_CHANGE, 0.0) for s in drive.segments[1:] if s.start < motion.time
-        ]
-        for k in range(directions.shape[1]):
-            before, after = directions[:-1, k], directions[1:, k]
-            changed = np.flatnonzero(before != after)
-            start = np.where(before[changed] == 0, RELEASE, REVERSAL) * after[changed]
-            kinds = np.where(after[changed] == 0, STOP, start)
-            events += zip(rows[changed, 0], np.full(changed.size, k), kinds, slides[changed, k])
-        columns = np.array(sorted(events), float).reshape(-1, 4).T
-        time, number, kind, slide = columns
-        phase = find_drive_omega(drive) * time % (2 * np.pi)
-        return EventLog(time, phase, number.astype(int), kind.astype(int), slide, time.size)
+        modes = self.model.rig.modes
+        slides = rows[:, 1 : 1 + modes.omega.size] @ modes.interfaces.T
+        borders = [start for start in run_events.find_segment_borders(drive) if start < motion.time]
+        events = [(start, 0, SEGMENT_BORDER, np.nan) for start in borders]
+        for k, states in enumerate(directions.T):
+            changed = np.flatnonzero(states[:-1] != states[1:])
+            kinds = classify_changes(states[changed], states[changed + 1])
+            events += zip(rows[changed, 0], [k + 1] * changed.size, kinds, slides[changed, k])
+        return sort_events(events, source=EXACT_SOURCE)
 
     def _list_snapshots(self, motion, response: Response, times, start) -> list[dict]:
         """Return the stretches of the elements of patches at given times, from all reversals before.
@@ -421,10 +421,6 @@ class LumpedEvaluator(RunEvaluator):
         scale = run.ledger["power"] + run.ledger["peak_stored"]
         return float(relative_gap(parts.sum(), work[-1] - work[0], np.abs(parts).sum(), scale))
 
-    def find_friction_loops(self, run, drive) -> tuple:
-        """Return the mean loop of strips that slide independently, else ()."""
-        return (_compute_strips_loop(run, drive),) if self.strips_slide_apart else ()
-
     def collect_cycle_data(self, run, drive, *, stuck: bool) -> dict:
         """Return whether the interfaces are strips of a single one.
 
@@ -434,12 +430,6 @@ class LumpedEvaluator(RunEvaluator):
             See `RunEvaluator.collect_cycle_data`.
         """
         return {"is_single_interface": self.strips_slide_apart}
-
-    def is_stuck(self, run) -> bool:
-        """Return whether all interfaces or strips stick during the last cycles of a run."""
-        if not self.has_friction or self.creeps:
-            return False
-        return run_events.is_all_stuck(run.window, self.stick_tolerance)
 
     def measure_ringing(self, run, drive) -> tuple:
         """Compute frequency and damping of the free vibration during stick, with error estimates.
@@ -494,7 +484,18 @@ class LumpedEvaluator(RunEvaluator):
         run, drive, values
             See `RunEvaluator.estimate_run_errors`.
         """
-        return self.estimate_sampling_errors(run, drive, values) if hasattr(drive, "band") else {}
+        if not hasattr(drive, "band"):
+            return {}
+        # They follow from the changes when every second sample of the window is removed.
+        thinned = replace(run, window=thin_samples(run.window))
+        coarse_values = self.evaluate_measures(thinned, drive, run.response.extra.get("ledger"))
+        errors = {}
+        for name, change in absolute_change(values, coarse_values).items():
+            if change > 0 and name not in ERROR_MEASURES:
+                row = find_definition(name)
+                error = convergence_error(change, order=row.order)
+                errors[name] = error + row.sample_error / self.steps
+        return errors
 
 
 def find_stable_amplitude(motion: periodic.PeriodicMotion) -> tuple[float, float] | None:

@@ -10,7 +10,7 @@ from functools import partial
 import numpy as np
 
 from ...core import Measure, SineDrive
-from ...response import run_events
+from ...response.events import join_events
 from ...response.levels import (
     MIN_JUMP_FACTOR,
     Level,
@@ -264,7 +264,7 @@ def join_runs(runs: list, duration: float):
         response=_join_histories([run.response for run in runs], shifts),
         window=window,
         ledger=ledger,
-        log=None if last.log is None else run_events.join_logs([run.log for run in runs], shifts),
+        log=None if last.log is None else join_events([run.log for run in runs], shifts),
         extremes=np.concatenate([run.extremes for run in runs]),
         phasors=np.concatenate([run.phasors for run in runs]),
         events=sum(run.events for run in runs),

@@ -78,10 +78,6 @@ class BalanceEvaluator(RunEvaluator):
         values["slip_amplitude"] = float(np.ptp(slips)) / 2
         return IntegratedMeasures(values, reversals=(tuple(turn[:2] for turn in self.turns),))
 
-    def find_friction_loops(self, run, drive) -> tuple:
-        """Return an empty tuple, because the friction loop is computed from samples."""
-        return ()
-
     def collect_cycle_data(self, run, drive, *, stuck: bool) -> dict:
         """Return the friction loop of the cycle.
 
