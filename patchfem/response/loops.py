@@ -211,29 +211,15 @@ def interface_loop(amplitude: float, q: complex, f: complex, work: float, stiffn
         "loop_area" [J], "equivalent_stiffness" and "harmonic_force_ratio" |F1/q1| [N/m], and
         "equivalent_damping" W/(2 pi K A^2) [1]; without measures that have no value.
     """
-    measures = interface_loops(amplitude, q, f, work, stiffness)
-    return {name: float(value) for name, value in measures.items() if not np.isnan(value)}
-
-
-def interface_loops(amplitude, q, f, work, stiffness) -> dict:
-    """Return the measures of one friction loop, or of n loops as columns (n,).
-
-    Parameters
-    ----------
-    amplitude, q, f, work, stiffness
-        Numbers or (n,); see `interface_loop`.
-    """
-    is_moving = (np.asarray(amplitude) > 0) & (np.abs(q) > 0)
-    energy = 2 * np.pi * stiffness * np.square(amplitude)
-    has_damping = is_moving & (np.asarray(stiffness) > 0)
-    damping = np.where(has_damping, work / np.where(has_damping, energy, 1.0), np.nan)
-    ratio = np.where(is_moving, f / np.where(is_moving, q, 1.0), np.nan)
-    return {
-        "loop_area": work,
-        "equivalent_stiffness": ratio.real,
-        "harmonic_force_ratio": np.abs(ratio),
-        "equivalent_damping": damping,
-    }
+    measures = {"loop_area": float(work)}
+    if not (amplitude > 0 and abs(q) > 0):
+        return measures
+    ratio = f / q
+    measures["equivalent_stiffness"] = float(ratio.real)
+    measures["harmonic_force_ratio"] = float(abs(ratio))
+    if stiffness > 0:
+        measures["equivalent_damping"] = float(work / (2 * np.pi * stiffness * amplitude**2))
+    return measures
 
 
 def mean_drift(time, slide, rate, period: float) -> float:
