@@ -474,7 +474,7 @@ class LumpedEvaluator(RunEvaluator):
             return {}
         after = response.select(response.time >= response.time[moves[-1] + 1])
         vibration = self._find_stuck_vibration(run, after, drive)
-        return {"extra": {"tail": select_strongest(vibration, "displacement")}} if vibration else {}
+        return {"tail": select_strongest(vibration, "displacement")} if vibration else {}
 
     def estimate_run_errors(self, run, drive, values: dict) -> dict:
         """Estimate the errors of the samples of a random motion.

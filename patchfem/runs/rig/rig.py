@@ -124,7 +124,7 @@ def run_refined(inputs: RunInputs, numerics: Numerics) -> CoupledRun:
         numerics = replace(numerics, window=n_cycles)
         solution = runner.solve(numerics)
     if not inputs.estimate or solution.outcome is Outcome.NOT_CONVERGED:
-        measures = add_errors(solution.values, size=size) | compute_peak_frequency(solution.extra)
+        measures = add_errors(solution.values, size=size) | compute_peak_frequency(solution)
         return CoupledRun(inputs, numerics, solution, measures)
     space_runs = [
         *engine.coarser_in_space(model, numerics, inputs.patch, inputs.coarse[0], solution),
@@ -159,7 +159,7 @@ def run_refined(inputs: RunInputs, numerics: Numerics) -> CoupledRun:
         inputs.seconds["march"] = solution.seconds
     if runner.error_seconds:
         inputs.seconds["error"] = runner.error_seconds
-    measures |= compute_peak_frequency(solution.extra, runner.solutions.values())
+    measures |= compute_peak_frequency(solution, runner.solutions.values())
     solution = replace(solution, extra=solution.extra | {"step_runs": step_runs})
     return replace(run, solution=solution, measures=measures)
 

@@ -294,7 +294,8 @@ def solve_drive_levels(finder, drive):
     notes = tuple(f"{message}{one}" for one in failures[:1])
     return replace(
         best[0],
-        extra=best[0].extra | {"curve": tabulate_curve(points), "at": best[1]},
+        extra=best[0].extra | {"curve": tabulate_curve(points)},
+        drive=best[1],
         run_level=run_level,
         levels=tuple(point.drive_level for point in points),
         notes=(*best[0].notes, *notes),

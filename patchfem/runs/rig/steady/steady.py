@@ -21,7 +21,7 @@ def solve_steady_motion(
 ) -> Solution:
     """Compute the steady motion under a sine, or the largest one over a sweep or drive levels.
 
-    The drive of the largest motion is extra["at"].
+    The drive of the largest motion is `Solution.drive`.
 
     Parameters
     ----------
