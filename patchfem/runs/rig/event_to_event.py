@@ -34,7 +34,7 @@ from ...response.events import (
     sort_events,
 )
 from ...response.levels import AMPLITUDE_MEASURE
-from ...response.measures import MIN_SLIDE_RANGE, compute_harmonic, relative_gap
+from ...response.measures import MIN_SLIDE_RANGE, compute_harmonic
 from ...response.ringing import compute_stuck_vibration, make_ringing_measures, select_strongest
 from ...response.rows import ROWS_NEEDING_RUN, find_definition, select_names
 from ...structure.drive_sizes import (
@@ -45,7 +45,7 @@ from ...structure.drive_sizes import (
     is_sinusoidal,
 )
 from . import strips
-from .evaluation import RunEvaluator, thin_samples
+from .evaluation import RunEvaluator, compute_sampled_work, compute_work_check, thin_samples
 from .hybrid_laws import Joints, make_joints
 from .levels import remove_incomplete_cycle, run_levels
 from .solution import Solution, describe_escape, find_travel, first_mode_stiffness
@@ -391,7 +391,9 @@ class LumpedEvaluator(RunEvaluator):
             values |= dict.fromkeys(select_names("sine"))
         if self.has_friction:
             values |= self._limit_loop_measures(run, values)
-            values["work_check"] = self._compute_work_check(run)
+            work = run.window.extra["ledger"][0]
+            energies = run.ledger | compute_sampled_work(run.window)
+            values["work_check"] = compute_work_check(energies | {"booked": work[-1] - work[0]})
         if self.strips_slide_apart:
             names = ["slip_start_phase", "energy_stored"]
             for group in STRIP_GROUPS:
@@ -410,16 +412,6 @@ class LumpedEvaluator(RunEvaluator):
         elif not first_mode_stiffness(self.model, run.window):
             missing = {"equivalent_damping": None}
         return missing
-
-    def _compute_work_check(self, run) -> float:
-        """Return the relative difference of the friction work in the window from samples and from the engine."""
-        window = run.window
-        slides = window.extra.get("slides", window.slide[:, None])
-        forces = window.extra.get("forces", window.force[:, None])
-        parts = (forces[1:] + forces[:-1]) / 2 * np.diff(slides, axis=0)
-        work = window.extra["ledger"][0]
-        scale = run.ledger["power"] + run.ledger["peak_stored"]
-        return float(relative_gap(parts.sum(), work[-1] - work[0], np.abs(parts).sum(), scale))
 
     def collect_cycle_data(self, run, drive, *, stuck: bool) -> dict:
         """Return whether the interfaces are strips of a single one.
