@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..effects import law_has_trait
-from .measures import COORDINATE_ROUND_OFF
+from .measures import COORDINATE_ROUND_OFF, find_reversal_steps
 
 EVENT_TIME_TOL = 1e-9  # Largest time between two samples at the same event, in periods.
 # Largest rate at which an interface counts as at rest, relative to the largest rate.
@@ -101,22 +101,13 @@ def _find_largest(time, y, v, time_tolerance: float) -> tuple:
     """
     peak = int(np.argmax(y))
     best = (peak, float(y[peak]), 0.0)
-    step = np.diff(time)
-    # the maximum may lie on the cubic before or after the largest sample
-    for k in (peak - 1, peak):
-        if not 0 <= k < step.size or step[k] <= time_tolerance or v[k] <= 0 or v[k + 1] >= 0:
-            continue
-        a = y[k]
-        p = v[k] * step[k]
-        q = v[k + 1] * step[k]
-        rise = y[k + 1] - y[k]
-        mid = 3 * rise - 2 * p - q
-        big = p + q - 2 * rise
-        root = np.sqrt(max(mid**2 - 3 * big * p, 0.0))
-        s = p / (root - mid) if root > mid else 0.0
-        value = a + s * (p + s * (mid + s * big))
-        if 0 <= s <= 1 and value > best[1]:
-            best = (k, float(value), float(s))
+    # The maximum may lie on the cubic before or after the largest sample.
+    first = max(peak - 1, 0)
+    near = slice(first, peak + 2)
+    for step, fraction, value in zip(*find_reversal_steps(time[near], y[near], v[near])):
+        k = first + int(step)
+        if time[k + 1] - time[k] > time_tolerance and v[k] > 0 and value > best[1]:
+            best = (k, float(value), float(fraction))
     return best
 
 
