@@ -298,6 +298,7 @@ ROWS = (
         ),
         group="friction",
         flags="interface level loop",
+        friction_scale=lambda scale: scale.limit,
     ),
     MeasureDefinition(
         "energy_balance",
@@ -309,6 +310,7 @@ ROWS = (
         group="energy",
         larger_term=("1", lambda _: 1.0),
         flags="error",
+        friction_scale=lambda _: 0.0,
     ),
     MeasureDefinition(
         "absolute_acceleration_fundamental",
@@ -348,6 +350,7 @@ ROWS = (
         lambda s: s.slip_measures.get("slip_amplitude"),
         group="friction",
         flags="interface level displacement loop",
+        friction_scale=lambda scale: scale.bond_length,
     ),
     MeasureDefinition(
         "stick_fraction",
@@ -374,7 +377,7 @@ ROWS = (
         1.0,
         group="friction",
         larger_term=("pi", lambda _: np.pi),
-        flags="sine",
+        flags="sine phase",
     ),
     MeasureDefinition(
         "normal_load",
@@ -383,6 +386,7 @@ ROWS = (
         "normal load on the interface, summed over all equal patches (key `pairs`)",
         lambda s: s.load,
         group="friction",
+        friction_scale=lambda _: 0.0,
     ),
     MeasureDefinition(
         "loop_area",
@@ -394,6 +398,7 @@ ROWS = (
         lambda s: s.loop_measures.get("loop_area"),
         group="energy",
         flags="main interface level loop",
+        friction_scale=lambda scale: scale.cycle_work,
     ),
     MeasureDefinition(
         "equivalent_stiffness",
@@ -442,6 +447,7 @@ ROWS = (
         lambda s: s.final_energies.get("friction_work"),
         group="energy",
         flags="run",
+        friction_scale=lambda scale: scale.work,
     ),
     MeasureDefinition(
         "energy_stored",
@@ -450,6 +456,7 @@ ROWS = (
         "energy stored in all interfaces at the end of the run: elastic energy and, with "
         "grooves, the potential energy of the load",
         group="energy",
+        friction_scale=lambda scale: scale.limit * scale.bond_length,
     ),
     MeasureDefinition(
         "energy_dissipated",
@@ -460,6 +467,7 @@ ROWS = (
         lambda s: s.final_energies.get("energy_dissipated"),
         group="energy",
         flags="run",
+        friction_scale=lambda scale: scale.work,
     ),
     MeasureDefinition(
         "energy_created",
@@ -518,6 +526,7 @@ ROWS = (
         1e-9,
         "friction force divided by normal load, both at the end of the slide",
         group="friction",
+        friction_scale=lambda scale: scale.static,
     ),
     MeasureDefinition(
         "friction_ratio_peak",
@@ -526,6 +535,7 @@ ROWS = (
         "largest value of friction force divided by normal load during the whole run",
         group="friction",
         flags="main",
+        friction_scale=lambda scale: scale.static,
     ),
     MeasureDefinition(
         "flutter_amplitude",
@@ -542,6 +552,7 @@ ROWS = (
         "on the samples, and the value in the energy balance",
         group="energy",
         flags="error",
+        friction_scale=lambda _: 1.0,
     ),
     *_random_rows(
         "relative_displacement_rms",
