@@ -84,22 +84,19 @@ class Engine(NamedTuple):
         runs = tuple(replace(coarse_numerics, other_rig=number) for number in range(n_rigs))
         return [CoarserRuns(runs, finer_errors, beside, "reduced")]
 
-    def find_unsupported_feature(self, model: Model, *, steady: bool = False) -> str:
-        """Describe a property of a model that this engine cannot compute; "" if there is none.
-
-        If `steady` is true, the drive is a sine of a response curve instead of the drive of the
-        model.
-        """
-        return methods.find_unsupported_feature(
-            methods.ENGINE_SUPPORT[self.name], collect_motion_features(model, steady=steady)
-        )
+    def find_unsupported_feature(self, model: Model) -> str:
+        """Describe a property of a model that this engine cannot compute; "" if there is none."""
+        features = collect_motion_features(model)
+        return methods.find_unsupported_feature(methods.ENGINE_SUPPORT[self.name], features)
 
 
 def find_obstacle_of_map(name: str, model: Model) -> str:
-    """Describe a property of a model for which the map of a period "exact" or "piecewise" does not exist, or ""."""
-    return methods.find_unsupported_feature(
-        methods.ENGINE_SUPPORT[name], collect_motion_features(model, steady=True)
-    )
+    """Describe a property of a model that prevents its steady motion, or "".
+
+    `name` is "harmonic", or one of the maps of a period, "exact" and "piecewise".
+    """
+    features = collect_motion_features(model, steady=True)
+    return methods.find_unsupported_feature(methods.ENGINE_SUPPORT[name], features)
 
 
 def collect_motion_features(model: Model, *, steady: bool = False) -> methods.MotionFeatures:

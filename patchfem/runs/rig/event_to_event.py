@@ -6,6 +6,7 @@ the histories are those of the last cycles, of equal distances before them, and 
 
 from dataclasses import dataclass, field, replace
 from time import perf_counter
+from typing import NamedTuple
 
 import numpy as np
 
@@ -69,6 +70,23 @@ EARLY_ENDS = {
     Status.EXCEEDS_TRAVEL: Outcome.EXCEEDS_TRAVEL,
     Status.LEAVES_GROOVES: Outcome.LEAVES_GROOVES,
 }
+
+
+class ElementSnapshot(NamedTuple):
+    """State of the elements of patches at an instant of the last cycle.
+
+    - time: [s].
+    - slide, slip, force: of the first interface [m], [m], [N].
+    - stretch (e,): stretches of the elements of the first interface [m].
+    - faces: displacement [m] and stretches (e,) [m] of each interface.
+    """
+
+    time: float
+    slide: float
+    slip: float
+    force: float
+    stretch: np.ndarray
+    faces: list
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -345,7 +363,7 @@ class LumpedEvaluator(RunEvaluator):
             events += zip(rows[changed, 0], [k + 1] * changed.size, kinds, slides[changed, k])
         return sort_events(events, source=EXACT_SOURCE)
 
-    def _list_snapshots(self, motion, response: Response, times, start) -> list[dict]:
+    def _list_snapshots(self, motion, response: Response, times, start) -> list[ElementSnapshot]:
         """Return the stretches of the elements of patches at given times, from all reversals before.
 
         Those before the start of the motion are in the memory of its `State`, if it does not start from rest.
@@ -361,15 +379,14 @@ class LumpedEvaluator(RunEvaluator):
                 reversals = np.concatenate([_list_remembered_reversals(start, i), reversals])
             stretches.append(_find_stretches(reversals, (times, slides[at, i]), limit))
         return [
-            {
-                "time": float(response.time[k]),
-                "slide": float(response.slide[k]),
-                "force": float(response.force[k]),
-                "rate": float(response.slide_rate[k]),
-                "slip": float(response.slip[k]),
-                "stretch": stretches[0][number],
-                "faces": [(float(slides[k, i]), own[number]) for i, own in enumerate(stretches)],
-            }
+            ElementSnapshot(
+                time=float(response.time[k]),
+                slide=float(response.slide[k]),
+                slip=float(response.slip[k]),
+                force=float(response.force[k]),
+                stretch=stretches[0][number],
+                faces=[(float(slides[k, i]), own[number]) for i, own in enumerate(stretches)],
+            )
             for number, k in enumerate(at)
         ]
 

@@ -257,11 +257,7 @@ def collect_summary_data(run: CoupledRun, measures: dict, notes: list) -> dict:
     if solution.levels:
         extra["levels"] = levels.convert_to_scene_units(rig, solution.levels)
     snapshots = solution.snapshots
-    if (
-        rig.friction.has_partial_slip
-        and isinstance(snapshots[0] if snapshots else None, dict)
-        and "faces" in snapshots[0]
-    ):
+    if rig.friction.has_partial_slip and snapshots and hasattr(snapshots[0], "faces"):
         extra["shots"] = snapshots
     if run.has_friction:
         extra["events"] = run_events.list_events(
