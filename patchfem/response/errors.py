@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..core import ErrorCauses, Measure
-from .rows import error_floor, find_definition, select_names
+from .rows import AMPLITUDE, error_floor, find_definition, select_names
 
 # Roache's safety factor for two runs; it also covers runs outside the asymptotic range.
 SAFETY_FACTOR = 3.0
@@ -288,7 +288,7 @@ def add_errors(
         Displacement caused by the drive alone [m], as in `rows.error_floor`.
     """
     measures = {}
-    amplitude = values.get("relative_displacement_amplitude", 0.0)
+    amplitude = values.get(AMPLITUDE, 0.0)
     for name, causes in split_errors(values, errors, step_values).items():
         value = float(values[name])
         error = total_error(name, value, causes.parts.values(), min_relative_error, amplitude)

@@ -13,10 +13,9 @@ import numpy as np
 
 from ..core import Outcome
 from ..formatting import format_length
-from .rows import select_names
+from .rows import AMPLITUDE, select_names
 
 LEVEL_MEASURES = select_names("level")
-AMPLITUDE_MEASURE = LEVEL_MEASURES[0]
 # Smallest ratio of the third to the first harmonic of the acceleration that indicates slip.
 MIN_DISTORTION = 0.03
 # Smallest ratio of a measure at neighbouring levels, divided by the ratio of the drive levels, that
@@ -59,7 +58,7 @@ def make_onset_test(kind: str, length: float | None = None) -> Callable[[Level],
     """
     exceeds_onset = {
         "slip": lambda level: not level.stuck,
-        "gauge": lambda level: level.values[AMPLITUDE_MEASURE] > length,
+        "gauge": lambda level: level.values[AMPLITUDE] > length,
     }.get(kind, lambda level: level.values.get("acceleration_distortion", 0.0) > MIN_DISTORTION)
     return lambda level: level.outcome == Outcome.GROWS or exceeds_onset(level)
 
@@ -119,7 +118,7 @@ def largest_jump(levels) -> tuple | None:
     """
     jumps = []
     for level, next_level in pairwise(levels):
-        sizes = level.values[AMPLITUDE_MEASURE], next_level.values[AMPLITUDE_MEASURE]
+        sizes = level.values[AMPLITUDE], next_level.values[AMPLITUDE]
         amounts = level.drive, next_level.drive, *sizes
         if all(0 < size < np.inf for size in amounts) and not (level.stuck or next_level.stuck):
             factor = sizes[1] / sizes[0] / (next_level.drive / level.drive)
@@ -148,8 +147,8 @@ def largest_hysteresis(levels) -> tuple | None:
     for rising in levels[:highest]:
         falling = decreasing_levels.get(round(rising.drive, 9))
         if falling is not None:
-            difference = abs(rising.values[AMPLITUDE_MEASURE] - falling.values[AMPLITUDE_MEASURE])
+            difference = abs(rising.values[AMPLITUDE] - falling.values[AMPLITUDE])
             if np.isfinite(difference):
-                error = sum(level.errors.get(AMPLITUDE_MEASURE, 0.0) for level in (rising, falling))
+                error = sum(level.errors.get(AMPLITUDE, 0.0) for level in (rising, falling))
                 differences.append((difference, error))
     return max(differences, default=None)

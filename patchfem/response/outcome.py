@@ -12,6 +12,7 @@ import numpy as np
 from ..core import Measure, Outcome
 from ..structure import drive_sizes
 from . import stationary
+from .rows import AMPLITUDE
 from .settling import (
     CLASSES,
     GROWS_CLASS,
@@ -108,7 +109,7 @@ def judge_outcome(
         extremes = None if extremes is None else extremes[-int(level_cycles) :]
     if not drive_sizes.is_periodic(drive):
         outcome = Outcome.STEADY
-        if amplitudes[-1] > max(floor, measures["relative_displacement_amplitude"].floor):
+        if amplitudes[-1] > max(floor, measures[AMPLITUDE].floor):
             outcome = classify(amplitudes, tolerance, floor)
             drift = _midpoint_drift(extremes, window)
             outcome = _reject_drifting(outcome, measures, tolerance, drift)
@@ -129,7 +130,7 @@ def judge_outcome(
     outcome = _reject_drifting(CLASSES[number], measures, tolerance)
     if outcome is Outcome.GROWS or np.isnan(steady):
         return outcome, {}
-    base = measures["relative_displacement_amplitude"]
+    base = measures[AMPLITUDE]
     if outcome is not Outcome.TRANSIENT and not is_still_changing(
         steady, error, base.value, tolerance
     ):
@@ -184,7 +185,7 @@ def _reject_drifting(
     (`window_drift`, [m] per cycle) exceed the tolerance.
     """
     drift = measures.get("drift_per_cycle")
-    amplitude = measures["relative_displacement_amplitude"]
+    amplitude = measures[AMPLITUDE]
     if outcome is not Outcome.STEADY or drift is None or drift.value is None:
         return outcome
     drifts = is_drifting(
@@ -353,7 +354,7 @@ def warn_if_ringing(solution, measures: dict, limits: tuple, drive, cycles: floa
         Number of cycles of the run.
     """
     tolerance, min_decay_rate = limits
-    amplitude = measures["relative_displacement_amplitude"]
+    amplitude = measures[AMPLITUDE]
     if solution.outcome is not Outcome.STUCK or solution.extremes is None:
         return []
     if not drive_sizes.is_periodic(drive) or not amplitude.value:

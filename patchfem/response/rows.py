@@ -230,7 +230,7 @@ def _drift_scale(values: dict):
         Measures of one run, or (n,) of n runs.
     """
     slip = np.abs(np.nan_to_num(np.asarray(values.get("slip_amplitude", 0.0), float)))
-    return np.where(slip > 0, slip, np.abs(values.get("relative_displacement_amplitude", 0.0)))
+    return np.where(slip > 0, slip, np.abs(values.get(AMPLITUDE, 0.0)))
 
 
 def _random_rows(
@@ -260,6 +260,7 @@ def _random_rows(
     )
 
 
+AMPLITUDE = "relative_displacement_amplitude"  # measure on which a run is refined
 # Measures that only single runs compute. If there are any, a sweep computes the cases of a rig one by one,
 # because batches compute only the measures of this package.
 SINGLE_RUN_ROWS: tuple[MeasureDefinition, ...] = ()

@@ -21,7 +21,7 @@ from ...response.measures import (
     window_end_values,
 )
 from ...response.outcome import estimate_steady
-from ...response.rows import ROWS_NEEDING_RUN, LastCycles, compute_measures
+from ...response.rows import AMPLITUDE, ROWS_NEEDING_RUN, LastCycles, compute_measures
 from ...structure.drive_sizes import choose_samples_per_cycle, is_sinusoidal
 from .solution import Solution, find_release_amplitude, first_interface_load, first_mode_stiffness
 
@@ -125,8 +125,7 @@ class RunEvaluator:
         )
         values = compute_measures(last_cycles)
         if model.rig.drive.kind == "free":
-            name = "relative_displacement_amplitude"
-            values[name] = find_release_amplitude(window, drive.period, values[name])
+            values[AMPLITUDE] = find_release_amplitude(window, drive.period, values[AMPLITUDE])
         return values
 
     def is_stuck(self, run) -> bool:

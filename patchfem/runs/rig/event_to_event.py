@@ -34,10 +34,9 @@ from ...response.events import (
     classify_changes,
     sort_events,
 )
-from ...response.levels import AMPLITUDE_MEASURE
 from ...response.measures import MIN_SLIDE_RANGE, compute_harmonic
 from ...response.ringing import compute_stuck_vibration, make_ringing_measures, select_strongest
-from ...response.rows import ROWS_NEEDING_RUN, find_definition, select_names
+from ...response.rows import AMPLITUDE, ROWS_NEEDING_RUN, find_definition, select_names
 from ...structure.drive_sizes import (
     choose_samples_per_cycle,
     find_drive_omega,
@@ -511,7 +510,7 @@ def find_stable_amplitude(motion: periodic.PeriodicMotion) -> tuple[float, float
     """Return the amplitude [m] of a periodic motion and its error; None if it is not known or not stable."""
     if motion.grows or not motion.change <= motion.tolerance or not motion.is_stable:
         return None
-    amplitude = float(motion.batch.windows[0][AMPLITUDE_MEASURE][0])
+    amplitude = float(motion.batch.windows[0][AMPLITUDE][0])
     return amplitude, amplitude * (10 * motion.error + 1e2 * STEADY_RTOL)
 
 

@@ -14,7 +14,7 @@ from ...core import Outcome, PatchfemError
 from ...response.coarser import CoarserRuns
 from ...response.errors import absolute_change, add_errors
 from ...response.reasons import find_missing_unbounded
-from ...response.rows import set_final_floors
+from ...response.rows import AMPLITUDE, set_final_floors
 from ...response.settling import slip_period
 from ...structure.drive_sizes import find_decay_rate, is_periodic
 from ..results.result import Result, RunInputs
@@ -148,7 +148,7 @@ def run_refined(inputs: RunInputs, numerics: Numerics) -> CoupledRun:
         )
         if solution.levels or model.rig.drive.kind == "free":
             solution = _add_level_errors(solution, coarser_runs, runner.solutions)
-        displacement_errors.append(measures["relative_displacement_amplitude"].error or 0.0)
+        displacement_errors.append(measures[AMPLITUDE].error or 0.0)
         run = CoupledRun(inputs, numerics, solution, measures)
         if not time_runs or _is_finest(run, displacement_errors) or _meets_tolerance(run, excesses):
             break
@@ -227,7 +227,7 @@ def _meets_tolerance(run: CoupledRun, excesses: list) -> bool:
     excesses : list
         Result of `_find_step_excess` of the coarser runs; that of the run is added.
     """
-    displacement = run.measures["relative_displacement_amplitude"]
+    displacement = run.measures[AMPLITUDE]
     if run.numerics.local and displacement.causes is not None:
         # Smaller steps do not reduce the errors of meshes and samples.
         own = displacement.causes.parts.get("own", 0.0)

@@ -13,6 +13,7 @@ from ...formatting import format_length
 from ...response.decay_curve import measure_last_cycle_amplitude
 from ...response.measures import compute_harmonic, measure_half_range
 from ...response.reasons import MAX_OTHER_MODES_FRACTION
+from ...response.rows import AMPLITUDE
 from ...structure.drive_sizes import find_drive_omega, has_full_cycle
 
 # Displacement at which a motion has left the range of a softening spring, relative to that without restoring force.
@@ -124,7 +125,7 @@ def replace_output_by_gauge(model, solution: Solution) -> Solution:
     gauge = model.rig.modes.gauge
     if gauge is None:
         return solution
-    name = "relative_displacement_amplitude"
+    name = AMPLITUDE
     window = _compute_gauge_histories(solution.window, gauge)
     amplitude = measure_half_range(window.time, window.output, window.output_rate)
     if model.rig.drive.kind == "free":

@@ -23,6 +23,7 @@ from ....dynamics.integrated import EngineResult
 from ....formatting import format_length, format_quantity
 from ....response.errors import finer_errors
 from ....response.measures import compute_peak
+from ....response.rows import AMPLITUDE
 from ....response.spectrum import harmonic_measures, odd_harmonics
 from ..evaluation import RunEvaluator, compute_sampled_work, compute_work_check
 from ..interface import make_single_law
@@ -174,7 +175,7 @@ class BalanceFinder:
             "multipliers": stability.multipliers,
             "harmonics": motion.harmonics,
         }
-        amplitude = np.array([values["relative_displacement_amplitude"]])
+        amplitude = np.array([values[AMPLITUDE]])
         outcome = Outcome.STUCK if is_stuck else Outcome.STEADY
         message = ""
         if not stability.stable:

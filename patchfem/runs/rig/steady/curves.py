@@ -12,11 +12,12 @@ import numpy as np
 from ....core import NotConverged, Outcome, Response, SineDrive
 from ....dynamics.curve_points import sample_adaptively
 from ....response.levels import LEVEL_MEASURES, Level
+from ....response.rows import AMPLITUDE
 from ..solution import replace_output_by_gauge
 
 # Name of the measure in each column of a response curve.
 COLUMN_MEASURES = {
-    "amplitude": "relative_displacement_amplitude",
+    "amplitude": AMPLITUDE,
     "acceleration_peak": "absolute_acceleration_peak",
     "acceleration_fundamental": "absolute_acceleration_fundamental",
     "acceleration_distortion": "acceleration_distortion",

@@ -16,10 +16,10 @@ import numpy as np
 
 from ....core import NotConverged
 from ....response.errors import absolute_change
+from ....response.rows import AMPLITUDE
 from ..solution import Solution, replace_output_by_gauge
-from .curves import COLUMN_MEASURES, ResponseCurve, find_largest_point, tabulate_curve
+from .curves import ResponseCurve, find_largest_point, tabulate_curve
 
-AMPLITUDE = COLUMN_MEASURES["amplitude"]
 MAX_ADDED_POINTS = 40  # Largest number of points that are added to refine a peak.
 # Smallest fraction of the peak at which a resonance curve is assumed concave; that of a single mode
 # is concave above 0.816.
