@@ -323,7 +323,7 @@ def split_errors(values: dict, errors, step_values=()) -> dict:
     return causes
 
 
-def add_run_error_estimates(measures: dict, error_estimates: dict) -> dict:
+def add_run_error_estimates(measures: dict, error_estimates: dict, end_errors: dict) -> dict:
     """Add the error estimates of a run itself to the errors of its measures.
 
     Parameters
@@ -332,6 +332,9 @@ def add_run_error_estimates(measures: dict, error_estimates: dict) -> dict:
         Measure by name; a measure without an error is not changed.
     error_estimates : dict
         Errors by name, in the unit of each measure.
+    end_errors : dict
+        Further errors by name, because the last sample does not lie at the requested end time. They
+        are stated as the cause "end".
 
     Returns
     -------
@@ -340,8 +343,12 @@ def add_run_error_estimates(measures: dict, error_estimates: dict) -> dict:
     """
     updated = dict(measures)
     for name, measure in measures.items():
-        if measure.error is not None and error_estimates.get(name):
-            updated[name] = replace(measure, error=measure.error + error_estimates[name])
+        causes = measure.causes
+        if causes is not None and end_errors:
+            causes = causes._replace(parts=causes.parts | {"end": end_errors.get(name, 0.0)})
+        if measure.error is not None:
+            error = measure.error + error_estimates.get(name, 0.0) + end_errors.get(name, 0.0)
+            updated[name] = replace(measure, error=error, causes=causes)
     return updated
 
 

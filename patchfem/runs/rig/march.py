@@ -15,6 +15,7 @@ from ...core import IntegratedMeasures, Outcome
 from ...effects import law_has_trait
 from ...friction.record import make_law
 from ...points import time_march as engine
+from ...response.ends import estimate_window_error
 from ...response.inside_steps import add_substep_samples
 from ...response.measures import compute_step_harmonic, peak_sampling_errors
 from ...response.spectrum import friction_harmonic, motion_harmonic
@@ -37,6 +38,10 @@ from .solution import (
     find_travel,
     first_interface_load,
 )
+
+# Safety factor on the first-order error due to a run that does not end exactly at the requested
+# time.
+END_ERROR_FACTOR = 1.5
 
 
 def march_in_time(model, numerics, patch, frames: int = 0, say=None, progress=None) -> Solution:
@@ -114,8 +119,15 @@ class MarchEvaluator(RunEvaluator):
         super().__init__(model, numerics, patch, contact, stick_tolerance)
 
     def collect_solution_fields(self, run, drive) -> dict:
-        """Return the bond summation of the run."""
-        return {"bond_summation": self.choose_bond_summation()}
+        """Return drive levels, bond summation and errors due to an end between two steps."""
+        late = {}
+        n_steps = self.numerics.cycles * self.numerics.steps
+        if n_steps != round(n_steps):
+            period = self.model.rig.drive.signal.period
+            changes = estimate_window_error(run.window, period, n_steps - round(n_steps))
+            late = {name: END_ERROR_FACTOR * change for name, change in changes.items()}
+        fields = {"bond_summation": self.choose_bond_summation(), "extra": {"late": late}}
+        return fields
 
     def estimate_run_errors(self, run, drive, values: dict) -> dict:
         """Estimate how far the peaks of a motion exceed its samples.
