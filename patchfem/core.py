@@ -419,6 +419,13 @@ class MeasureDefinition(NamedTuple):
     - order: order of the sampling error of an exact motion in the sample spacing.
     - needs_run: whether the function uses the histories of the whole run, which the coarse runs then store as well.
     - minimum: smallest possible value.
+    - flags: sets to which the measure belongs, separated by blanks: "main" (the tolerance of a run applies to it),
+      "interface" (one value per interface), "level" (one value per drive level), "curve" (a column of a response
+      curve), "mesh" (its error controls the mesh), "displacement" (its floor is limited by the displacement of the
+      drive), "error" (it is itself an error), "sine" (it exists only under a sine), "loop" (an integral or a peak of
+      samples of the friction loop), "run" (a sum over the whole run), "phase" (an angle modulo pi).
+    - friction_scale: function of an `errors.FrictionScale` that returns the error of the measure for a relative error 1
+      of the friction force; None if this is the value of the measure.
     """
 
     name: str
@@ -432,6 +439,12 @@ class MeasureDefinition(NamedTuple):
     order: float = 1.0
     needs_run: bool = False
     minimum: float = -np.inf
+    flags: str = ""
+    friction_scale: Callable | None = None
+
+    def has(self, flag: str) -> bool:
+        """Return whether the measure belongs to a set."""
+        return flag in self.flags.split()
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -486,7 +499,7 @@ class InterfaceLoop(NamedTuple):
     - force_harmonic: first harmonic of the friction force [N].
     - work: friction work [J].
     - slip_range: range of the slip [m].
-    - stuck_time: time without slip [s]; None if it must be computed from samples.
+    - stuck_time: time without slip [s].
     - max_force: largest friction force [N].
     """
 
@@ -494,7 +507,7 @@ class InterfaceLoop(NamedTuple):
     force_harmonic: complex
     work: float
     slip_range: float
-    stuck_time: float | None
+    stuck_time: float
     max_force: float
 
 
@@ -506,16 +519,11 @@ class IntegratedMeasures:
     accurate than those from samples. A quantity that is missing here is computed from samples (`response.rows`).
 
     - values: values of measures by name; None if the run has no value.
-    - acceleration_harmonics: amplitudes of the first and third harmonic of the absolute acceleration [m s-2], or None.
     - loops: InterfaceLoop of each interface.
-    - slip_start_phases (s,): phases of the drive [rad], modulo pi, at which the first interface begins to slip, or
-      None.
     - reversals: (relative displacement [m], friction force [N]) of the first interface at the smallest and at the
       largest relative displacement of each cycle.
     """
 
     values: dict = field(default_factory=dict)
-    acceleration_harmonics: tuple | None = None
     loops: tuple = ()
-    slip_start_phases: np.ndarray | None = None
     reversals: tuple = ()

@@ -32,6 +32,8 @@ from import_graph import child_nodes, syntax_nodes  # noqa: E402
 
 BASELINE = "tests/house.toml"
 TREES = ("patchfem", "studies", "tests")
+# Modules that define measures; every other module of the package asks them.
+MEASURE_TABLES = ("patchfem/response/rows.py", "patchfem/runs/results/patch_rows.py")
 SHOWN_LINES = 12  # largest number of lines that a message lists
 FUNCTIONS = (ast.FunctionDef, ast.AsyncFunctionDef)
 CALLABLES = (*FUNCTIONS, ast.Lambda)
@@ -73,6 +75,7 @@ RULES = {
     "F8": "several values are assigned in one statement",
     "F9": "more than two functions inside a function",
     "R1": "a record with more than 8 fields",
+    "M1": "a measure is named outside the tables of measures",
     "deep": "a name imported from a module inside a folder of the package",
     "inner": "such a name that no other folder of the package imports",
     "private": "a private name of the package",
@@ -284,6 +287,26 @@ def style_rules(source: Source):
             yield from record_rules(node)
 
 
+def measure_names(sources: list, root: Path) -> frozenset:
+    """Return the names of all measures: the first text in each row of the tables."""
+    names = set()
+    for source in sources:
+        if str(source.path.relative_to(root)) not in MEASURE_TABLES:
+            continue
+        for node in source.nodes:
+            if isinstance(node, ast.Call) and node.args and isinstance(node.args[0], ast.Constant):
+                if getattr(node.func, "id", "") in ("MeasureDefinition", "_random_rows"):
+                    names.add(node.args[0].value)
+    return frozenset(names)
+
+
+def measure_rules(nodes: tuple, names: frozenset):
+    """Yield the rule that a module breaks where it names a measure."""
+    for node in nodes:
+        if isinstance(node, ast.Constant) and isinstance(node.value, str) and node.value in names:
+            yield "M1", node, node.value
+
+
 def absolute_module(node, package: tuple) -> str:
     """Return the dotted name of the module of a `from` import in a module of a package."""
     base = package[: len(package) - node.level + 1] if node.level else ()
@@ -377,13 +400,19 @@ def count_sources(root: Path = ROOT) -> Counts:
     paths = sorted(path for tree in TREES for path in (root / tree).rglob("*.py"))
     sources = [parse_source(path.read_text("utf-8"), path) for path in paths]
     offered = offered_names(sources, root)
+    measures = measure_names(sources, root)
     for source in sources:
         folder = folder_of_file(source.path, root)
         values[folder]["tokens"] += count_tokens(source)
         if folder.startswith("tests"):
             found = border_rules(source.nodes, offered)
         else:
-            found = style_rules(source)
+            found = [*style_rules(source)]
+        if (
+            folder.startswith("patchfem")
+            and str(source.path.relative_to(root)) not in MEASURE_TABLES
+        ):
+            found += measure_rules(source.nodes, measures)
         for rule, node, words in found:
             values[folder][rule] += 1
             line = getattr(node, "lineno", 1)

@@ -10,6 +10,7 @@ from house import (  # fmt: skip
     count_tokens,
     exceeded_counts,
     lower_baseline,
+    measure_rules,
     offered_names,
     parse_source,
     read_baseline,
@@ -56,6 +57,7 @@ PLANTED = {
     "F8": "def solve():\n    first, second = 1, 2",
     "F9": "def solve():\n    return lambda: 1, [lambda: 2, lambda: 3]",
     "R1": "class Rig(NamedTuple):\n" + "\n".join(f"    field{k}: int" for k in range(9)),
+    "M1": "area = values['loop_area']",
     "deep": "from patchfem.contact.gaps import crown",
     "inner": "from patchfem.contact.gaps import curvature",
     "private": "from patchfem import api\napi._check()",
@@ -67,7 +69,11 @@ OFFERED = frozenset({"patchfem.contact.gaps.crown"})
 def broken_rules(text: str) -> set:
     """Return the rules that a text of a module breaks."""
     source = parse_source(text, Path("module.py"))
-    found = (*style_rules(source), *border_rules(source.nodes, OFFERED))
+    found = (
+        *style_rules(source),
+        *border_rules(source.nodes, OFFERED),
+        *measure_rules(source.nodes, frozenset({"loop_area"})),
+    )
     return {rule for rule, _, _ in found}
 
 

@@ -6,9 +6,8 @@ entry of this list and the entries before it:
 1. `exponentials`     exponentials of many small matrices
 2. `integrated`       accelerations and phases of slip of a run
 3. `curve_points`     adaptive points of a curve, denser where its curvature is larger
-4. `event_list`       log of the events of a run
-5. `harmonic`         steady motions by harmonic balance, branches and stability
-6. `limit_cycles`     limit cycles of modes with negative damping and friction
+4. `harmonic`         steady motions by harmonic balance, branches and stability
+5. `limit_cycles`     limit cycles of modes with negative damping and friction
 
 Motion in time is computed by `hybrid` and `points`.
 """
@@ -16,13 +15,6 @@ Motion in time is computed by `hybrid` and `points`.
 # Names that other folders use, by module.
 PUBLIC = {
     "curve_points": ("sample_adaptively",),
-    "event_list": (
-        "DRIVE_CHANGE",
-        "RELEASE",
-        "REVERSAL",
-        "STOP",
-        "EventLog",
-    ),
     "harmonic.backbone": (
         "find_free_motions",
         "make_free_balance",
@@ -33,7 +25,6 @@ PUBLIC = {
         "measure_distance",
         "trace_over_frequency",
     ),
-    "harmonic.equations": ("has_undamped_resonance",),
     "harmonic.forces": ("LawGroup",),
     "harmonic.laws": (
         "Interlock",

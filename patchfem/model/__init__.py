@@ -35,10 +35,7 @@ PUBLIC = {
         "make_piece_meshes",
     ),
     "profile": ("find_sample_spacing",),
-    "rig": (
-        "DriveLevels",
-        "MAX_TRAVEL",
-    ),
+    "rig": ("MAX_TRAVEL",),
     "similar_models": (
         "SimilarModels",
         "collect_columns",

@@ -10,7 +10,6 @@ nodes in partial slip, laws that are much faster than the drive; and, with one p
 5. `march_rows`, `lists_kernels`, `flanks_kernels`, `march_kernels`  steps of modes with many points
 6. `checkpoint`, `time_march`  march over the cycles of a drive, with its record; its state on disk
 7. `slide_kernels`, `slides`  points along a prescribed slide
-8. `orbits`               periodic motions by marching, and their multipliers
 
 A law is a number in `law_rows.Law` with a branch in each of five functions. Read `return_maps_kernels` first.
 """
@@ -35,6 +34,5 @@ PUBLIC = {
     ),
     "laws": ("make_point_law",),
     "time_march": ("March", "Motion", "Snapshot", "count_list_bytes", "load_kernels", "march"),
-    "orbits": ("MAX_CYCLES", "estimate_multipliers", "march_cycle", "march_to_periodic"),
     "slides": ("SlideMotion", "follow"),
 }

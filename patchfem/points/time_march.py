@@ -537,18 +537,6 @@ class March:
             other.drive = drive
         return other
 
-    def continue_from(self, other: "March") -> None:
-        """Take motion and memory of another march of this contact, which may have steps of another length."""
-        theirs = copy_system(other.system)
-        points = self.system.points._replace(
-            memory=theirs.points.memory,
-            trial=theirs.points.trial,
-            values=theirs.points.values,
-            shear=theirs.points.shear,
-        )
-        self.system = self.system._replace(points=points, flank=theirs.flank, lists=theirs.lists)
-        self.state[:] = other.state
-
     @property
     def state(self) -> np.ndarray:
         """Modal coordinates [m] and velocities [m/s], (2, n)."""

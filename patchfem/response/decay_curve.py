@@ -16,6 +16,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
+from .measures import find_reversal_steps
+
 # Candidate spans of a fit: number of half cycles on either side of a point.
 SPAN_LENGTHS = (
     1,
@@ -47,8 +49,7 @@ VALUE_ROUND_OFF = 1e-12  # Relative round-off error of a value.
 REST_SPEED_TOL = 1e-12
 # Smallest half cycle that is not attributed to round-off, relative to the largest one.
 MIN_HALF_CYCLE = 1e-9
-# Largest fraction of a step by which a reversal may lie outside its step due to round-off.
-STEP_END_TOL = 1e-9
+STEP_END_TOL = 1e-9  # Round-off of a period by which a sample may lie before it.
 # Largest motion between two reversals, relative to the range in one period, that is attributed to a
 # faster mode.
 MAX_RIPPLE = 0.25
@@ -143,15 +144,10 @@ def locate_reversals(time, position, speed) -> tuple:
     """
     speed = np.where(np.abs(speed) <= REST_SPEED_TOL * np.abs(speed).max(initial=0.0), 0.0, speed)
     resting_samples = np.flatnonzero(speed == 0)
-    k = np.flatnonzero(speed[:-1] * speed[1:] < 0)
-    span = time[k + 1] - time[k]
-    positions = (position[k], position[k + 1])
-    speeds = speed[k] * span, speed[k + 1] * span
-    fraction = _find_reversal_fraction(positions, speeds)
-    times = np.concatenate([time[resting_samples], time[k] + fraction * span])
-    reversal_positions = np.concatenate(
-        [position[resting_samples], _evaluate_cubic(positions, speeds, fraction)]
-    )
+    inside = find_reversal_steps(time, position, speed)
+    step_times = time[inside.step] + inside.fraction * np.diff(time)[inside.step]
+    times = np.concatenate([time[resting_samples], step_times])
+    reversal_positions = np.concatenate([position[resting_samples], inside.position])
     order = np.lexsort((reversal_positions, times))
     # a reversal with a jump of the force has two samples at the same time
     min_interval = VALUE_ROUND_OFF * float(np.ptp(time))
@@ -424,34 +420,3 @@ def _interpolate_monotone(x, knots, values) -> np.ndarray:
 
     x = np.clip(x, knots[0], knots[-1])
     return PchipInterpolator(knots, values)(x) if knots.size > 1 else np.interp(x, knots, values)
-
-
-def _evaluate_cubic(position, speed, fraction):
-    """Evaluate Hermite cubics at given fractions (k,) of their steps.
-
-    position, speed: pairs of values at both ends of the steps; speeds are multiplied by the durations
-    of the steps.
-    """
-    a, b = position
-    c, d = speed
-    s = fraction
-    return a + s * (c + s * (3 * (b - a) - 2 * c - d + s * (2 * (a - b) + c + d)))
-
-
-def _find_reversal_fraction(position, speed) -> np.ndarray:
-    """Return the time of the reversal on a cubic as a fraction (k,) of the step.
-
-    The speeds at both ends of a step must have opposite signs.
-    """
-    a, b = position
-    c, d = speed
-    quadratic = 2 * (3 * (b - a) - 2 * c - d)
-    cubic = 3 * (2 * (a - b) + c + d)
-    discriminant_root = np.sqrt(np.maximum(quadratic**2 - 4 * cubic * c, 0.0))
-    scaled_root = -(quadratic + np.copysign(discriminant_root, quadratic)) / 2
-    with np.errstate(divide="ignore", invalid="ignore"):
-        first_root = c / scaled_root
-        second_root = scaled_root / cubic
-    return np.clip(
-        np.where(np.abs(first_root - 0.5) <= 0.5 + STEP_END_TOL, first_root, second_root), 0.0, 1.0
-    )

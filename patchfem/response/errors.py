@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..core import ErrorCauses, Measure
-from .rows import error_floor, find_definition
+from .rows import AMPLITUDE, error_floor, find_definition, select_names
 
 # Roache's safety factor for two runs; it also covers runs outside the asymptotic range.
 SAFETY_FACTOR = 3.0
@@ -28,17 +28,19 @@ MAX_ORDER = 2.0
 MAX_CHANGE_RATIO = 16.0
 # Lowest observed order of convergence at which an error is assumed to decrease with the step size.
 MIN_OBSERVED_ORDER = 0.5
+# Measures that are errors of the solution, so that their own error is their value.
+ERROR_MEASURES = select_names("error")
+PHASES = select_names("phase")  # Angles modulo pi.
 # Round-off error of the mean position of a motion, relative to its amplitude.
 MEAN_ROUND_OFF = 1e-13
-# Measures that are errors of the solution, so that their own error is their value.
-ERROR_MEASURES = ("energy_balance", "work_check")
 
 
 def signed_change(fine: dict, coarse: dict) -> dict:
     """Return the difference of each measure, fine minus coarse; that of phases is reduced modulo pi."""
     changes = {name: fine[name] - coarse[name] for name in fine if name in coarse}
-    if "slip_start_phase" in changes:
-        changes["slip_start_phase"] = (changes["slip_start_phase"] + np.pi / 2) % np.pi - np.pi / 2
+    for name in PHASES:
+        if name in changes:
+            changes[name] = (changes[name] + np.pi / 2) % np.pi - np.pi / 2
     return changes
 
 
@@ -224,23 +226,12 @@ def friction_errors(values: dict, fraction: float, scale: FrictionScale) -> dict
         Error of the friction force relative to the friction limit [1].
     scale : FrictionScale
     """
-    ratio_error = fraction * scale.static
-    force_error = fraction * scale.limit
-    work_error = fraction * scale.work
-    errors = {
-        "friction_force_peak": force_error,
-        "friction_ratio_end": ratio_error,
-        "friction_ratio_peak": ratio_error,
-        "slip_amplitude": fraction * scale.bond_length,
-        "work_check": fraction,
-        "energy_stored": force_error * scale.bond_length,
-        "friction_work": work_error,
-        "energy_dissipated": work_error,
-        "loop_area": fraction * scale.cycle_work,
-        "energy_balance": 0.0,
-        "normal_load": 0.0,
-    }
-    return {name: errors.get(name, fraction * abs(value)) for name, value in values.items()}
+    errors = {}
+    for name, value in values.items():
+        find_scale = find_definition(name).friction_scale
+        size = abs(value) if find_scale is None else find_scale(scale)
+        errors[name] = fraction * size
+    return errors
 
 
 def observed_orders(*values: dict) -> dict:
@@ -297,7 +288,7 @@ def add_errors(
         Displacement caused by the drive alone [m], as in `rows.error_floor`.
     """
     measures = {}
-    amplitude = values.get("relative_displacement_amplitude", 0.0)
+    amplitude = values.get(AMPLITUDE, 0.0)
     for name, causes in split_errors(values, errors, step_values).items():
         value = float(values[name])
         error = total_error(name, value, causes.parts.values(), min_relative_error, amplitude)
@@ -377,7 +368,7 @@ def total_error(name: str, value, parts, min_relative_error: float, size):
         Amplitude of the output [m].
     """
     error = sum(parts) + np.abs(value) * min_relative_error
-    if name == "slip_start_phase":  # a phase modulo pi has an error of at most pi/2
+    if name in PHASES:  # a phase modulo pi has an error of at most pi/2
         return np.minimum(error, np.pi / 2)
     if name in ERROR_MEASURES:  # The value of such a measure is itself an error.
         return np.maximum(error, np.abs(value))

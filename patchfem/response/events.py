@@ -1,7 +1,7 @@
 """Stick-slip events of a run, detected in samples, and the stick intervals between them.
 
-In: samples of slip and relative displacement, or event rows. Out: `Events`, and stick intervals.
-`run_events` converts the log of an event-driven engine.
+In: samples of slip and relative displacement, or event rows of an engine. Out: `Events`, and stick
+intervals.
 """
 
 from dataclasses import dataclass
@@ -19,6 +19,7 @@ REVERSAL_DOWN = 4
 SEGMENT_BORDER = 5
 EVENT_KIND_NAMES = ("stop", "release_up", "release_down", "reversal_up", "reversal_down", "border")
 MAX_EVENTS = 100_000
+EXACT_SOURCE = "the times of stick and slip are those of the exact solution"
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -66,6 +67,36 @@ def sort_events(rows, count: int | None = None, source: str = "") -> Events:
         count,
         source,
     )
+
+
+def classify_changes(before, after) -> np.ndarray:
+    """Return the kind of each change from one stick-slip state to another one.
+
+    Parameters
+    ----------
+    before, after : (k,)
+        States: +1 or -1 for slip in this direction, 0 for stick.
+    """
+    is_reversal = (before != 0) & (after != 0)
+    upwards = np.where(is_reversal, REVERSAL_UP, RELEASE_UP)
+    downwards = np.where(is_reversal, REVERSAL_DOWN, RELEASE_DOWN)
+    return np.where(after == 0, STOP, np.where(after > 0, upwards, downwards))
+
+
+def join_events(parts: list, shifts: list) -> Events:
+    """Join the exact events of successive runs, with a border between segments of the drive at each start.
+
+    Parameters
+    ----------
+    parts : list of Events
+    shifts : list of float
+        Start times of the runs relative to the first one [s].
+    """
+    rows = [(shift, 0, SEGMENT_BORDER, np.nan) for shift in shifts[1:]]
+    for events, shift in zip(parts, shifts):
+        rows += zip(events.time + shift, events.interface, events.kind, events.slide)
+    count = sum(events.count for events in parts) + len(shifts) - 1
+    return sort_events(rows, count, EXACT_SOURCE)
 
 
 def detect_events(
@@ -150,12 +181,7 @@ def _detect_interface_events(
     rise = relative_speed[k + 1] - relative_speed[k]
     is_reversal = (before != 0) & (after != 0)
     direction = np.where(before != 0, before, after)
-    kind = np.where(
-        after > 0,
-        np.where(is_reversal, REVERSAL_UP, RELEASE_UP),
-        np.where(is_reversal, REVERSAL_DOWN, RELEASE_DOWN),
-    )
-    kind = np.where(after == 0, STOP, kind)
+    kind = classify_changes(before, after)
     fraction = np.clip(
         (np.where(is_reversal, 0.0, direction * STICK_SPEED_RATIO) - speed_before)
         / np.where(rise != 0, rise, 1.0),

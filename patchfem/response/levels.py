@@ -13,21 +13,9 @@ import numpy as np
 
 from ..core import Outcome
 from ..formatting import format_length
+from .rows import AMPLITUDE, select_names
 
-LEVEL_MEASURES = (
-    "relative_displacement_amplitude",
-    "absolute_acceleration_peak",
-    "absolute_acceleration_fundamental",
-    "acceleration_distortion",
-    "slip_amplitude",
-    "stick_fraction",
-    "friction_force_peak",
-    "loop_area",
-    "equivalent_stiffness",
-    "secant_stiffness",
-    "equivalent_damping",
-)
-AMPLITUDE_MEASURE = LEVEL_MEASURES[0]
+LEVEL_MEASURES = select_names("level")
 # Smallest ratio of the third to the first harmonic of the acceleration that indicates slip.
 MIN_DISTORTION = 0.03
 # Smallest ratio of a measure at neighbouring levels, divided by the ratio of the drive levels, that
@@ -70,7 +58,7 @@ def make_onset_test(kind: str, length: float | None = None) -> Callable[[Level],
     """
     exceeds_onset = {
         "slip": lambda level: not level.stuck,
-        "gauge": lambda level: level.values[AMPLITUDE_MEASURE] > length,
+        "gauge": lambda level: level.values[AMPLITUDE] > length,
     }.get(kind, lambda level: level.values.get("acceleration_distortion", 0.0) > MIN_DISTORTION)
     return lambda level: level.outcome == Outcome.GROWS or exceeds_onset(level)
 
@@ -112,16 +100,14 @@ def bracket_onset(levels, is_above_onset: Callable[[Level], bool]) -> tuple | No
     return None
 
 
-def largest_jump(levels, name: str = AMPLITUDE_MEASURE) -> tuple | None:
-    """Return the largest relative jump of a measure between successive drive levels.
+def largest_jump(levels) -> tuple | None:
+    """Return the largest relative jump of the amplitude between successive drive levels.
 
     The jump is the ratio of the measures divided by the ratio of the drive levels.
 
     Parameters
     ----------
     levels : sequence of Level
-    name : str
-        Name of the measure.
 
     Returns
     -------
@@ -132,25 +118,22 @@ def largest_jump(levels, name: str = AMPLITUDE_MEASURE) -> tuple | None:
     """
     jumps = []
     for level, next_level in pairwise(levels):
-        amounts = level.drive, next_level.drive, level.values[name], next_level.values[name]
+        sizes = level.values[AMPLITUDE], next_level.values[AMPLITUDE]
+        amounts = level.drive, next_level.drive, *sizes
         if all(0 < size < np.inf for size in amounts) and not (level.stuck or next_level.stuck):
-            factor = (next_level.values[name] / level.values[name]) / (
-                next_level.drive / level.drive
-            )
+            factor = sizes[1] / sizes[0] / (next_level.drive / level.drive)
             jumps.append(
                 (abs(np.log(factor)), next_level.drive, factor, abs(next_level.drive - level.drive))
             )
     return max(jumps)[1:] if jumps and max(jumps)[0] >= np.log(MIN_JUMP_FACTOR) else None
 
 
-def largest_hysteresis(levels, name: str = AMPLITUDE_MEASURE) -> tuple | None:
-    """Return the largest difference of a measure between increasing and decreasing levels.
+def largest_hysteresis(levels) -> tuple | None:
+    """Return the largest difference of the amplitude between increasing and decreasing levels.
 
     Parameters
     ----------
     levels : sequence of Level
-    name : str
-        Name of the measure.
 
     Returns
     -------
@@ -164,8 +147,8 @@ def largest_hysteresis(levels, name: str = AMPLITUDE_MEASURE) -> tuple | None:
     for rising in levels[:highest]:
         falling = decreasing_levels.get(round(rising.drive, 9))
         if falling is not None:
-            difference = abs(rising.values[name] - falling.values[name])
+            difference = abs(rising.values[AMPLITUDE] - falling.values[AMPLITUDE])
             if np.isfinite(difference):
-                error = rising.errors.get(name, 0.0) + falling.errors.get(name, 0.0)
+                error = sum(level.errors.get(AMPLITUDE, 0.0) for level in (rising, falling))
                 differences.append((difference, error))
     return max(differences, default=None)

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..effects import law_has_trait
-from .measures import COORDINATE_ROUND_OFF
+from .measures import COORDINATE_ROUND_OFF, find_reversal_steps
 
 EVENT_TIME_TOL = 1e-9  # Largest time between two samples at the same event, in periods.
 # Largest rate at which an interface counts as at rest, relative to the largest rate.
@@ -101,22 +101,13 @@ def _find_largest(time, y, v, time_tolerance: float) -> tuple:
     """
     peak = int(np.argmax(y))
     best = (peak, float(y[peak]), 0.0)
-    step = np.diff(time)
-    # the maximum may lie on the cubic before or after the largest sample
-    for k in (peak - 1, peak):
-        if not 0 <= k < step.size or step[k] <= time_tolerance or v[k] <= 0 or v[k + 1] >= 0:
-            continue
-        a = y[k]
-        p = v[k] * step[k]
-        q = v[k + 1] * step[k]
-        rise = y[k + 1] - y[k]
-        mid = 3 * rise - 2 * p - q
-        big = p + q - 2 * rise
-        root = np.sqrt(max(mid**2 - 3 * big * p, 0.0))
-        s = p / (root - mid) if root > mid else 0.0
-        value = a + s * (p + s * (mid + s * big))
-        if 0 <= s <= 1 and value > best[1]:
-            best = (k, float(value), float(s))
+    # The maximum may lie on the cubic before or after the largest sample.
+    first = max(peak - 1, 0)
+    near = slice(first, peak + 2)
+    for step, fraction, value in zip(*find_reversal_steps(time[near], y[near], v[near])):
+        k = first + int(step)
+        if time[k + 1] - time[k] > time_tolerance and v[k] > 0 and value > best[1]:
+            best = (k, float(value), float(fraction))
     return best
 
 
@@ -211,29 +202,15 @@ def interface_loop(amplitude: float, q: complex, f: complex, work: float, stiffn
         "loop_area" [J], "equivalent_stiffness" and "harmonic_force_ratio" |F1/q1| [N/m], and
         "equivalent_damping" W/(2 pi K A^2) [1]; without measures that have no value.
     """
-    measures = interface_loops(amplitude, q, f, work, stiffness)
-    return {name: float(value) for name, value in measures.items() if not np.isnan(value)}
-
-
-def interface_loops(amplitude, q, f, work, stiffness) -> dict:
-    """Return the measures of one friction loop, or of n loops as columns (n,).
-
-    Parameters
-    ----------
-    amplitude, q, f, work, stiffness
-        Numbers or (n,); see `interface_loop`.
-    """
-    is_moving = (np.asarray(amplitude) > 0) & (np.abs(q) > 0)
-    energy = 2 * np.pi * stiffness * np.square(amplitude)
-    has_damping = is_moving & (np.asarray(stiffness) > 0)
-    damping = np.where(has_damping, work / np.where(has_damping, energy, 1.0), np.nan)
-    ratio = np.where(is_moving, f / np.where(is_moving, q, 1.0), np.nan)
-    return {
-        "loop_area": work,
-        "equivalent_stiffness": ratio.real,
-        "harmonic_force_ratio": np.abs(ratio),
-        "equivalent_damping": damping,
-    }
+    measures = {"loop_area": float(work)}
+    if not (amplitude > 0 and abs(q) > 0):
+        return measures
+    ratio = f / q
+    measures["equivalent_stiffness"] = float(ratio.real)
+    measures["harmonic_force_ratio"] = float(abs(ratio))
+    if stiffness > 0:
+        measures["equivalent_damping"] = float(work / (2 * np.pi * stiffness * amplitude**2))
+    return measures
 
 
 def mean_drift(time, slide, rate, period: float) -> float:

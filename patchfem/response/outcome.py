@@ -12,6 +12,7 @@ import numpy as np
 from ..core import Measure, Outcome
 from ..structure import drive_sizes
 from . import stationary
+from .rows import AMPLITUDE
 from .settling import (
     CLASSES,
     GROWS_CLASS,
@@ -110,7 +111,7 @@ def judge_outcome(
         extremes = None if extremes is None else extremes[-int(level_cycles) :]
     if not drive_sizes.is_periodic(drive):
         outcome = Outcome.STEADY
-        if amplitudes[-1] > max(floor, measures["relative_displacement_amplitude"].floor):
+        if amplitudes[-1] > max(floor, measures[AMPLITUDE].floor):
             outcome = classify(amplitudes, tolerance, floor)
             drift = _midpoint_drift(extremes, window)
             outcome = _reject_drifting(outcome, measures, tolerance, drift)
@@ -133,7 +134,7 @@ def judge_outcome(
         outcome = Outcome.TRANSIENT
     if outcome is Outcome.GROWS or np.isnan(steady):
         return outcome, {}
-    base = measures["relative_displacement_amplitude"]
+    base = measures[AMPLITUDE]
     if outcome is not Outcome.TRANSIENT and not is_still_changing(
         steady, error, base.value, tolerance
     ):
@@ -188,7 +189,7 @@ def _reject_drifting(
     (`window_drift`, [m] per cycle) exceed the tolerance.
     """
     drift = measures.get("drift_per_cycle")
-    amplitude = measures["relative_displacement_amplitude"]
+    amplitude = measures[AMPLITUDE]
     if outcome is not Outcome.STEADY or drift is None or drift.value is None:
         return outcome
     drifts = is_drifting(
@@ -356,24 +357,17 @@ def warn_if_ringing(solution, measures: dict, limits: tuple, drive, cycles: floa
     cycles : float
         Number of cycles of the run.
     """
-    free_vibration, window_decay = _find_free_vibration(solution, measures, limits[1], drive)
-    amplitude = measures["relative_displacement_amplitude"]
-    sizes = (amplitude.value, amplitude.floor + (amplitude.error or 0.0))
-    return warn_of_ringing(free_vibration, sizes, (limits[0], window_decay), cycles)
-
-
-def _find_free_vibration(solution, measures: dict, min_decay_rate: float, drive) -> tuple:
-    """Return the free vibration [m] of a sticking interface in its last cycles, and its logarithmic decay over a cycle [1].
-
-    The free vibration is 0 for another motion, and without a periodic drive.
-    """
-    decay = min_decay_rate * drive.period
-    is_stuck = solution.outcome is Outcome.STUCK and solution.extremes is not None
-    amplitude = measures["relative_displacement_amplitude"].value
-    if not is_stuck or not drive_sizes.is_periodic(drive) or not amplitude:
-        return 0.0, decay
+    tolerance, min_decay_rate = limits
+    amplitude = measures[AMPLITUDE]
+    if solution.outcome is not Outcome.STUCK or solution.extremes is None:
+        return []
+    if not drive_sizes.is_periodic(drive) or not amplitude.value:
+        return []
     window = max(1, round((solution.window.time[-1] - solution.window.time[0]) / drive.period))
-    return float(remaining_ringing(np.asarray(solution.extremes), window, decay)), decay
+    decay = min_decay_rate * drive.period
+    free_vibration = float(remaining_ringing(np.asarray(solution.extremes), window, decay))
+    sizes = (amplitude.value, amplitude.floor + (amplitude.error or 0.0))
+    return warn_of_ringing(free_vibration, sizes, (tolerance, decay), cycles)
 
 
 def remaining_ringing(extremes, window: int, decay):

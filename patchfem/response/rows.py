@@ -29,7 +29,6 @@ from .measures import (
     compute_peak,
     compute_slip_measures,
     energy_balance,
-    slip_start_measure,
 )
 from .spectrum import MIN_HARMONIC, harmonic_measures, odd_harmonics
 
@@ -53,7 +52,6 @@ class LastCycles:
     - reversal_rule: rule for the friction force at a reversal of the displacement (see
       `loops.find_reversals`).
     - slide_round_off: largest half range of the relative displacement that is round-off [m].
-    - uniform_window: equally spaced samples of the window; None if `window` has such samples.
     - add_substeps: function (window, index of the interface) that returns the window with samples
       inside the time steps; None if these are not needed.
     - is_single_interface: whether the interfaces are parts of a single one.
@@ -74,7 +72,6 @@ class LastCycles:
     ledger: np.ndarray | None = None
     reversal_rule: str = "rate"
     slide_round_off: float = 0.0
-    uniform_window: Response | None = None
     add_substeps: Callable | None = None
     is_single_interface: bool = False
     interface: int = 0
@@ -101,20 +98,16 @@ class LastCycles:
         """Slip amplitude [m], stick fraction [1] and phase of slip onset [rad] as a dict."""
         if self.load is None:
             return {}
-        first = self.integrated.loops[0] if self.integrated.loops else None
-        if first is None or first.stuck_time is None:
-            window = self.uniform_window or self.samples
-            steps = max(1, round((window.time.size - 1) * self.drive.period / self.span))
-            values = compute_slip_measures(window, self.drive, steps)
-        else:
-            phases = self.integrated.slip_start_phases
-            values = {"stick_fraction": stick_fraction(first.stuck_time, self.span)} | (
-                {} if phases is None else slip_start_measure(np.asarray(phases))
-            )
-        values |= {} if first is None else {"slip_amplitude": first.slip_range / 2}
-        return (
-            values if self.is_sine else {k: v for k, v in values.items() if k != "slip_start_phase"}
-        )
+        if self.integrated.loops:
+            loop = self.integrated.loops[0]
+            values = {"slip_amplitude": loop.slip_range / 2}
+            return values | {"stick_fraction": stick_fraction(loop.stuck_time, self.span)}
+        window = self.samples
+        steps = max(1, round((window.time.size - 1) * self.drive.period / self.span))
+        values = compute_slip_measures(window, self.drive, steps)
+        if not self.is_sine:
+            values.pop("slip_start_phase", None)
+        return values
 
     @cached_property
     def reversals(self) -> list:
@@ -169,11 +162,7 @@ class LastCycles:
         """
         if not (self.is_sine and self.has_full_cycle):
             return {}
-        if self.integrated.acceleration_harmonics is None:
-            return harmonic_measures(*odd_harmonics(self.window, self.drive))
-        return harmonic_measures(
-            *self.integrated.acceleration_harmonics, drive_sizes.find_max_acceleration(self.drive)
-        )
+        return harmonic_measures(*odd_harmonics(self.window, self.drive))
 
     @cached_property
     def final_energies(self) -> dict:
@@ -193,10 +182,7 @@ class LastCycles:
         return measures
 
     def further_interfaces(self) -> list:
-        """Return the last cycles of each interface after the first one.
-
-        The work of an interface is taken from `integrated.loops` if they exist, else from the samples.
-        """
+        """Return the last cycles of each interface after the first one."""
         extra = self.window.extra
         if self.load is None or self.is_single_interface or "slides" not in extra:
             return []
@@ -211,13 +197,12 @@ class LastCycles:
                 force=extra["forces"][:, k],
                 slip=slips[:, k],
             )
-            loops = self.integrated.loops[k : k + 1]
-            work = loops[0].work if loops else float(np.trapezoid(window.force, window.slide))
+            work = float(np.trapezoid(window.force, window.slide))
             interfaces.append(
                 replace(
                     self,
                     window=window,
-                    integrated=IntegratedMeasures(loops=loops),
+                    integrated=IntegratedMeasures(),
                     is_sine=False,
                     interface=k,
                     loop=(0j, 0j, work * self.drive.period / max(self.span, 1e-300)),
@@ -245,7 +230,7 @@ def _drift_scale(values: dict):
         Measures of one run, or (n,) of n runs.
     """
     slip = np.abs(np.nan_to_num(np.asarray(values.get("slip_amplitude", 0.0), float)))
-    return np.where(slip > 0, slip, np.abs(values.get("relative_displacement_amplitude", 0.0)))
+    return np.where(slip > 0, slip, np.abs(values.get(AMPLITUDE, 0.0)))
 
 
 def _random_rows(
@@ -275,6 +260,7 @@ def _random_rows(
     )
 
 
+AMPLITUDE = "relative_displacement_amplitude"  # measure on which a run is refined
 # Measures that only single runs compute. If there are any, a sweep computes the cases of a rig one by one,
 # because batches compute only the measures of this package.
 SINGLE_RUN_ROWS: tuple[MeasureDefinition, ...] = ()
@@ -289,6 +275,7 @@ ROWS = (
         "the base; of a release, that of the last whole cycle of the "
         "motion, from a reversal to the second reversal after it",
         lambda s: float(s.extremes[:, 1].max() - s.extremes[:, 0].min()) / 2,
+        flags="main level curve displacement",
     ),
     MeasureDefinition(
         "absolute_acceleration_peak",
@@ -296,6 +283,7 @@ ROWS = (
         1e-4,
         "largest acceleration at the output, base motion included",
         lambda s: compute_peak(s.window.acceleration),
+        flags="main level curve",
     ),
     MeasureDefinition(
         "friction_force_peak",
@@ -310,6 +298,8 @@ ROWS = (
             else compute_peak(s.samples.force)
         ),
         group="friction",
+        flags="interface level loop",
+        friction_scale=lambda scale: scale.limit,
     ),
     MeasureDefinition(
         "energy_balance",
@@ -320,6 +310,8 @@ ROWS = (
         lambda s: energy_balance(s.run_energies),
         group="energy",
         larger_term=("1", lambda _: 1.0),
+        flags="error",
+        friction_scale=lambda _: 0.0,
     ),
     MeasureDefinition(
         "absolute_acceleration_fundamental",
@@ -327,6 +319,7 @@ ROWS = (
         MIN_HARMONIC,
         "first harmonic of the acceleration at the output, base motion included",
         lambda s: s.acceleration_measures.get("absolute_acceleration_fundamental"),
+        flags="level curve sine",
     ),
     MeasureDefinition(
         "acceleration_distortion",
@@ -335,6 +328,7 @@ ROWS = (
         "third harmonic of the acceleration at the output, base motion included, divided by the first harmonic; null "
         "if the output does not move",
         lambda s: s.acceleration_measures.get("acceleration_distortion"),
+        flags="level curve sine",
     ),
     MeasureDefinition(
         "drift_per_cycle",
@@ -346,6 +340,7 @@ ROWS = (
         lambda s: mean_drift(s.window.time, s.window.slide, s.window.slide_rate, s.drive.period),
         larger_term=("slip amplitude (without slip: amplitude of the motion)", _drift_scale),
         order=CUBIC_CONVERGENCE_ORDER,
+        flags="displacement",
     ),
     MeasureDefinition(
         "slip_amplitude",
@@ -355,6 +350,8 @@ ROWS = (
         "weighted by the pressure; for law 'iwan', the mean over the sliders, weighted by their slip forces",
         lambda s: s.slip_measures.get("slip_amplitude"),
         group="friction",
+        flags="interface level displacement loop",
+        friction_scale=lambda scale: scale.bond_length,
     ),
     MeasureDefinition(
         "stick_fraction",
@@ -368,6 +365,7 @@ ROWS = (
         0.35,
         group="friction",
         larger_term=("1", lambda _: 1.0),
+        flags="interface level",
     ),
     MeasureDefinition(
         "slip_start_phase",
@@ -380,6 +378,7 @@ ROWS = (
         1.0,
         group="friction",
         larger_term=("pi", lambda _: np.pi),
+        flags="sine phase",
     ),
     MeasureDefinition(
         "normal_load",
@@ -388,6 +387,7 @@ ROWS = (
         "normal load on the interface, summed over all equal patches (key `pairs`)",
         lambda s: s.load,
         group="friction",
+        friction_scale=lambda _: 0.0,
     ),
     MeasureDefinition(
         "loop_area",
@@ -398,6 +398,8 @@ ROWS = (
         "than it dissipates",
         lambda s: s.loop_measures.get("loop_area"),
         group="energy",
+        flags="main interface level loop",
+        friction_scale=lambda scale: scale.cycle_work,
     ),
     MeasureDefinition(
         "equivalent_stiffness",
@@ -411,6 +413,7 @@ ROWS = (
             "magnitude of the complex ratio of the two first harmonics",
             lambda values: np.nan_to_num(values.get("harmonic_force_ratio", 0.0)),
         ),
+        flags="level sine loop",
     ),
     MeasureDefinition(
         "secant_stiffness",
@@ -422,6 +425,7 @@ ROWS = (
         lambda s: s.loop_measures.get("secant_stiffness"),
         group="friction",
         order=CUBIC_CONVERGENCE_ORDER,
+        flags="level sine",
     ),
     MeasureDefinition(
         "equivalent_damping",
@@ -433,6 +437,7 @@ ROWS = (
         lambda s: s.loop_measures.get("equivalent_damping"),
         group="friction",
         order=CUBIC_CONVERGENCE_ORDER,
+        flags="level sine loop",
     ),
     MeasureDefinition(
         "friction_work",
@@ -442,6 +447,8 @@ ROWS = (
         "over two cycles",
         lambda s: s.final_energies.get("friction_work"),
         group="energy",
+        flags="run",
+        friction_scale=lambda scale: scale.work,
     ),
     MeasureDefinition(
         "energy_stored",
@@ -450,6 +457,7 @@ ROWS = (
         "energy stored in all interfaces at the end of the run: elastic energy and, with "
         "grooves, the potential energy of the load",
         group="energy",
+        friction_scale=lambda scale: scale.limit * scale.bond_length,
     ),
     MeasureDefinition(
         "energy_dissipated",
@@ -459,6 +467,8 @@ ROWS = (
         "method `harmonic`, over two cycles",
         lambda s: s.final_energies.get("energy_dissipated"),
         group="energy",
+        flags="run",
+        friction_scale=lambda scale: scale.work,
     ),
     MeasureDefinition(
         "energy_created",
@@ -502,6 +512,7 @@ ROWS = (
         "steady amplitude under a periodic drive, extrapolated if the motion has not settled or may still change by "
         "more than 0.02 tolerance × amplitude; absent if it has settled and cannot change by more; null if the motion "
         "has not settled and its limit cannot be extrapolated",
+        flags="displacement",
     ),
     MeasureDefinition(
         "peak_frequency",
@@ -516,6 +527,7 @@ ROWS = (
         1e-9,
         "friction force divided by normal load, both at the end of the slide",
         group="friction",
+        friction_scale=lambda scale: scale.static,
     ),
     MeasureDefinition(
         "friction_ratio_peak",
@@ -523,6 +535,8 @@ ROWS = (
         1e-9,
         "largest value of friction force divided by normal load during the whole run",
         group="friction",
+        flags="main",
+        friction_scale=lambda scale: scale.static,
     ),
     MeasureDefinition(
         "flutter_amplitude",
@@ -538,6 +552,8 @@ ROWS = (
         "relative difference between two values of the friction work of the run: the value from the trapezoidal rule "
         "on the samples, and the value in the energy balance",
         group="energy",
+        flags="error",
+        friction_scale=lambda _: 1.0,
     ),
     *_random_rows(
         "relative_displacement_rms",
@@ -611,24 +627,20 @@ INTERNAL_ROWS = (
         0.0,
         "magnitude of the complex ratio of the first harmonics of friction force and slide",
         lambda s: s.loop_measures.get("harmonic_force_ratio"),
+        flags="sine",
     ),
 )
 INTERNAL_VALUES = tuple(row.name for row in INTERNAL_ROWS)
 ROWS_NEEDING_RUN = tuple(row for row in ROWS if row.needs_run)
 TABLE = {row.name: row for row in (*ROWS, *INTERNAL_ROWS)}
-# Measures of each interface.
-INTERFACE_MEASURES = (
-    "slip_amplitude",
-    "stick_fraction",
-    "friction_force_peak",
-    "loop_area",
-)
-DISPLACEMENT_MEASURES = (
-    "relative_displacement_amplitude",
-    "relative_displacement_amplitude_steady",
-    "slip_amplitude",
-    "drift_per_cycle",
-)
+
+
+def select_names(flag: str) -> tuple[str, ...]:
+    """Return the names of the measures of a motion that belong to a set, in the order of the table."""
+    return tuple(row.name for row in TABLE.values() if row.has(flag))
+
+
+INTERFACE_MEASURES = select_names("interface")
 # Upper limit of the floor of a displacement error, relative to the displacement caused by the drive
 # alone.
 MAX_DISPLACEMENT_FLOOR = 1e-5
@@ -683,8 +695,9 @@ def error_floor(name: str, size=np.inf):
     size : float or (n,)
         Displacement caused by the drive alone [m]; 0 or inf without a drive.
     """
-    floor = find_definition(name).floor
-    if remove_interface_number(name) not in DISPLACEMENT_MEASURES:
+    definition = find_definition(name)
+    floor = definition.floor
+    if not definition.has("displacement"):
         return floor
     return np.where(
         np.greater(size, 0), np.minimum(floor, MAX_DISPLACEMENT_FLOOR * np.asarray(size)), floor

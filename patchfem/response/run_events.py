@@ -1,43 +1,14 @@
-"""Stick-slip events of a coupled run, from an event log or from samples, and its ringing.
+"""Stick-slip events of a coupled run, from its engine or from samples, and its ringing.
 
-In: the window of a run, its drive, and the EventLog if an event-driven engine recorded one. Out:
+In: the window of a run, its drive, and the `Events` if its engine recorded them. Out:
 `Events`, stick intervals, and the ringing during stick.
 """
 
 import numpy as np
 
-from ..dynamics import event_list as listed
 from . import ringing
-from .events import (
-    MAX_EVENTS,
-    RELEASE_UP,
-    REVERSAL_UP,
-    SEGMENT_BORDER,
-    STOP,
-    Events,
-    compute_slip_states,
-    detect_events,
-    find_stick_spans,
-    sort_events,
-)
+from .events import Events, compute_slip_states, detect_events, find_stick_spans
 from .measures import slip_round_off
-
-KIND_BY_LOG_NUMBER = {
-    0: STOP,
-    1: RELEASE_UP,
-    -1: RELEASE_UP + 1,
-    2: REVERSAL_UP,
-    -2: REVERSAL_UP + 1,
-    9: SEGMENT_BORDER,
-}
-LOG_OFFSET = -min(KIND_BY_LOG_NUMBER)
-KIND_BY_SHIFTED_LOG_NUMBER = np.full(
-    LOG_OFFSET + max(KIND_BY_LOG_NUMBER) + 1, np.nan
-)  # kind of an event, by its number in a log plus LOG_OFFSET
-KIND_BY_SHIFTED_LOG_NUMBER[np.array(list(KIND_BY_LOG_NUMBER)) + LOG_OFFSET] = list(
-    KIND_BY_LOG_NUMBER.values()
-)
-EXACT_SOURCE = "the times of stick and slip are those of the exact solution"
 
 
 def slips_and_displacements(response) -> tuple:
@@ -53,31 +24,20 @@ def find_segment_borders(drive) -> list:
     return [segment.start for segment in drive.segments[1:]]
 
 
-def convert_event_log(log) -> Events:
-    """Return the events in the log of an event-driven engine."""
-    last_events = slice(-MAX_EVENTS, None)
-    kind = KIND_BY_SHIFTED_LOG_NUMBER[log.kind[last_events] + LOG_OFFSET]
-    slide = np.where(kind == SEGMENT_BORDER, np.nan, log.slide[last_events])
-    return sort_events(
-        np.stack([log.time[last_events], log.interface[last_events] + 1.0, kind, slide], axis=1),
-        log.count,
-        EXACT_SOURCE,
-    )
-
-
 def list_events(window, drive, log=None, max_stick_slip: float = 0.0) -> Events:
-    """Return the events of a run from its log, or if there is none, detected in the last cycles.
+    """Return the events that the engine recorded, or if there are none, those detected in the last cycles.
 
     Parameters
     ----------
     window : Response
     drive
-    log : EventLog, optional
+    log : Events, optional
+        Events that the engine recorded.
     max_stick_slip : float
         Largest slip amplitude of a sticking interface in a cycle [m].
     """
     if log is not None:
-        return convert_event_log(log)
+        return log
     slips, slides = slips_and_displacements(window)
     return detect_events(
         window.time,
@@ -96,8 +56,8 @@ def list_slipping_interfaces(window, drive, log=None, max_stick_slip: float = 0.
     ----------
     window : Response
     drive
-    log : array, optional
-        Events that the engine recorded, as in `list_events`.
+    log : Events, optional
+        Events that the engine recorded.
     max_stick_slip : float
         Largest range of the slip of a sticking interface [m].
     """
@@ -121,8 +81,8 @@ def find_stick_intervals(window, drive, log=None, max_stick_slip: float = 0.0) -
     ----------
     window : Response
     drive
-    log : array, optional
-        Events that the engine recorded, as in `list_events`.
+    log : Events, optional
+        Events that the engine recorded.
     max_stick_slip : float
         Largest range of the slip of a sticking interface [m].
     """
@@ -167,7 +127,8 @@ def measure_ringing_in_sticks(
     window : Response
     modes
     drive
-    log : EventLog, optional
+    log : Events, optional
+        Events that the engine recorded.
     max_stick_slip : float
         Largest range of the slip of a sticking interface in a cycle [m].
     repeats : bool
@@ -197,26 +158,3 @@ def is_all_stuck(window, max_stick_slip: float) -> bool:
     slips = slips_and_displacements(window)[0]
     slips = np.column_stack([window.slip, slips])
     return bool(np.ptp(slips, axis=0).max() / 2 <= max(max_stick_slip, slip_round_off(window)))
-
-
-def join_logs(logs, shifts) -> object:
-    """Join the event logs of successive runs, with a segment border between them.
-
-    shifts: start times of the runs relative to the first one [s].
-    """
-    first = logs[0]
-    columns = {name: [] for name in ("time", "phase", "interface", "kind", "slide")}
-    for number, (log, shift) in enumerate(zip(logs, shifts)):
-        border = {
-            "time": shift,
-            "phase": 0.0,
-            "interface": -1,
-            "kind": listed.DRIVE_CHANGE,
-            "slide": 0.0,
-        }
-        for name, parts in columns.items():
-            if number:
-                parts.append([border[name]])
-            parts.append(getattr(log, name) + (shift if name == "time" else 0))
-    arrays = {name: np.concatenate(parts) for name, parts in columns.items()}
-    return type(first)(**arrays, count=sum(log.count for log in logs) + len(logs) - 1)

@@ -7,8 +7,6 @@ instrument indicates. An instrument evaluates the computed motion and does not c
 
 import numpy as np
 
-# Round-off error of a harmonic, relative to the largest acceleration of the drive.
-ACCELERATION_ROUND_OFF = 1e-12
 MIN_HARMONIC = 1e-4  # Smallest first harmonic [m s-2] of an output that counts as moving.
 READINGS = ("peak", "fundamental", "rms", "lowpass")
 N_FILTER_HARMONICS = 64  # Number of harmonics of the filtered signal.
@@ -22,7 +20,7 @@ def harmonic_weights(time, omega: float) -> tuple:
     """Return the weights of values and rates in a Fourier coefficient of a piecewise cubic motion.
 
     With four Gauss points per step, the only error of the coefficient is that of the cubic: h^4/384 times
-    the fourth derivative. Several motions use the same weights, whose computation takes most of the time.
+    the fourth derivative.
 
     Parameters
     ----------
@@ -52,108 +50,113 @@ def harmonic_weights(time, omega: float) -> tuple:
     return value_weights, rate_weights
 
 
-def motion_harmonic(time, value, rate, omega: float, weights: tuple | None = None) -> complex:
-    """Return a Fourier coefficient of the piecewise cubic motion through samples.
+def motion_harmonic(time, value, rate, omega: float):
+    """Return the Fourier coefficient of the piecewise cubic motion through samples.
 
     Parameters
     ----------
     time : (k,)
         Times [s], at any spacing.
-    value, rate : (k,)
-        Samples of the motion and its rate.
+    value, rate : (k,) or (k, n)
+        Samples of one motion or of n motions, and their rates.
     omega : float
         Angular frequency [rad/s].
-    weights : tuple, optional
-        `harmonic_weights` of the same times and frequency.
     """
-    value_weights, rate_weights = weights or harmonic_weights(time, omega)
-    return complex(value_weights @ value + rate_weights @ rate)
+    value_weights, rate_weights = harmonic_weights(time, omega)
+    return value_weights @ value + rate_weights @ rate
 
 
-def acceleration_harmonic(time, value, rate, omega: float) -> complex:
-    """Return a Fourier coefficient [m s-2] of the acceleration from displacement and velocity.
+def differentiate_harmonic(harmonic, values, time, omega: float):
+    """Return the Fourier coefficient of the derivative of a motion by integration by parts.
 
-    Integration by parts is used: the acceleration jumps due to friction, whereas displacement and velocity
-    are continuous.
+    The derivative may jump, whereas the motion is continuous.
 
     Parameters
     ----------
-    time, value, rate : (k,)
-        Samples over whole cycles [s], [m], [m/s].
+    harmonic : complex or (n,)
+        Coefficient of the motion.
+    values : (k,) or (k, n)
+        Samples of the motion.
+    time : (k,)
+        Times over whole cycles [s].
     omega : float
         Angular frequency [rad/s].
     """
-    return _convert_to_acceleration(
-        time, value, rate, omega, motion_harmonic(time, value, rate, omega)
-    )
+    first, last = np.exp(-1j * omega * time[[0, -1]])
+    change = values[-1] * last - values[0] * first
+    return 2 / (time[-1] - time[0]) * change + 1j * omega * harmonic
 
 
-def _convert_to_acceleration(
-    time, value, rate, omega: float, displacement_harmonic: complex
-) -> complex:
-    """Convert a Fourier coefficient of the displacement to that of the acceleration."""
-    span = time[-1] - time[0]
-    phase_factors = np.exp(-1j * omega * time[[0, -1]])
-    boundary_term = (rate[-1] + 1j * omega * value[-1]) * phase_factors[1] - (
-        rate[0] + 1j * omega * value[0]
-    ) * phase_factors[0]
-    return complex(2 / span * boundary_term - omega**2 * displacement_harmonic)
+def acceleration_harmonic(time, value, rate, omega: float):
+    """Return the Fourier coefficient [m s-2] of the acceleration from displacement and velocity.
+
+    Parameters
+    ----------
+    time : (k,)
+        Times over whole cycles [s].
+    value, rate : (k,) or (k, n)
+        Displacements [m] and velocities [m/s] of one motion or of n motions.
+    omega : float
+        Angular frequency [rad/s].
+    """
+    velocity = differentiate_harmonic(motion_harmonic(time, value, rate, omega), value, time, omega)
+    return differentiate_harmonic(velocity, rate, time, omega)
 
 
-def odd_harmonics(window, drive) -> tuple:
+def _find_last_segment(window, drive):
+    """Return the segment of a drive at the end of a window, a sinusoid."""
+    return [part for part in drive.segments if part.start < window.time[-1]][-1]
+
+
+def _drive_harmonic(segment) -> complex:
+    """Return the Fourier coefficient -i a exp(i (phase - omega start)) [m s-2] of a segment of a drive."""
+    return -1j * segment.amplitude * np.exp(1j * (segment.phase - segment.omega * segment.start))
+
+
+def absolute_harmonic(window, drive, n: int) -> complex:
+    """Return the n-th harmonic [m s-2] of the absolute acceleration at the sensor.
+
+    Parameters
+    ----------
+    window : Response
+        Complete cycles of a drive that ends as a sinusoid.
+    drive
+    n : int
+        Number of the harmonic, from 1.
+    """
+    segment = _find_last_segment(window, drive)
+    displacement = window.extra.get("sensor", window.output)
+    rate = window.extra.get("sensor_rate", window.output_rate)
+    harmonic = acceleration_harmonic(window.time, displacement, rate, n * segment.omega)
+    return harmonic + _drive_harmonic(segment) if n == 1 and drive.moving else harmonic
+
+
+def odd_harmonics(window, drive) -> tuple[float, float]:
     """Return the magnitudes [m s-2] of the first and third harmonic of the absolute acceleration.
 
     window: Response over complete cycles of a drive that ends as a sinusoid.
     """
-    segment = [part for part in drive.segments if part.start < window.time[-1]][-1]
-    motion = (window.time, window.output, window.output_rate)
-    first = acceleration_harmonic(*motion, segment.omega)
-    third = acceleration_harmonic(*motion, 3 * segment.omega)
-    # the Fourier coefficient of a sin(omega (t - start) + phase) is -i a exp(i (phase - omega start))
-    if drive.moving:
-        first += (
-            -1j * segment.amplitude * np.exp(1j * (segment.phase - segment.omega * segment.start))
-        )
-    return float(abs(first)), float(abs(third))
+    return (
+        float(abs(absolute_harmonic(window, drive, 1))),
+        float(abs(absolute_harmonic(window, drive, 3))),
+    )
 
 
-def harmonic_measures(
-    first_harmonic: float, third_harmonic: float, drive_acceleration: float = 0.0
-) -> dict:
+def harmonic_measures(first_harmonic: float, third_harmonic: float) -> dict:
     """Return fundamental [m s-2] and distortion [1] of the acceleration as a dict.
+
+    The distortion is None if the output does not move.
 
     Parameters
     ----------
     first_harmonic, third_harmonic : float
         Magnitudes of the first and the third harmonic [m s-2].
-    drive_acceleration : float
-        Acceleration amplitude of the drive [m s-2], which determines the round-off.
     """
-    ratio = distortion_ratio(first_harmonic, third_harmonic, drive_acceleration)
+    is_moving = first_harmonic > MIN_HARMONIC
     return {
         "absolute_acceleration_fundamental": float(first_harmonic),
-        "acceleration_distortion": None if np.isnan(ratio) else float(ratio),
+        "acceleration_distortion": third_harmonic / first_harmonic if is_moving else None,
     }
-
-
-def distortion_ratio(first_harmonic, third_harmonic, drive_acceleration):
-    """Return the ratio of the third to the first harmonic of an acceleration.
-
-    The ratio is NaN if the first harmonic is below its floor or within the round-off of the drive.
-
-    Parameters
-    ----------
-    first_harmonic, third_harmonic : float or (n,)
-        Magnitudes of the harmonics [m s-2].
-    drive_acceleration : float or (n,)
-        Acceleration amplitude of the drive [m s-2].
-    """
-    is_moving = np.asarray(first_harmonic) > np.maximum(
-        ACCELERATION_ROUND_OFF * np.asarray(drive_acceleration), MIN_HARMONIC
-    )
-    return np.where(is_moving, third_harmonic / np.where(is_moving, first_harmonic, 1.0), np.nan)[
-        ()
-    ]
 
 
 def friction_harmonic(window, modes, drive) -> complex:
@@ -171,33 +174,17 @@ def friction_harmonic(window, modes, drive) -> complex:
         Modal basis with one interface.
     drive
     """
-    segment = [part for part in drive.segments if part.start < window.time[-1]][-1]
+    segment = _find_last_segment(window, drive)
     time = window.time
     omega = segment.omega
-    weights = harmonic_weights(time, omega)
-    motions = list(zip(window.modal.T, window.modal_rate.T))
-    phase_factors = np.exp(-1j * omega * time[[0, -1]])
-    displacement_harmonics = np.array(
-        [motion_harmonic(time, z, v, omega, weights) for z, v in motions]
-    )
-    end_changes = (
-        2
-        / (time[-1] - time[0])
-        * (window.modal[-1] * phase_factors[1] - window.modal[0] * phase_factors[0])
-    )
-    velocity_harmonics = end_changes + 1j * omega * displacement_harmonics
-    acceleration_harmonics = np.array(
-        [
-            _convert_to_acceleration(time, z, v, omega, harmonic)
-            for (z, v), harmonic in zip(motions, displacement_harmonics)
-        ]
-    )
-    drive_harmonic = -1j * segment.amplitude * np.exp(1j * (segment.phase - omega * segment.start))
+    z = motion_harmonic(time, window.modal, window.modal_rate, omega)
+    velocity = differentiate_harmonic(z, window.modal, time, omega)
+    acceleration = differentiate_harmonic(velocity, window.modal_rate, time, omega)
     residual = (
-        -modes.base * drive_harmonic
-        - acceleration_harmonics
-        - modes.damping_matrix @ velocity_harmonics
-        - modes.omega**2 * displacement_harmonics
+        -modes.base * _drive_harmonic(segment)
+        - acceleration
+        - modes.damping_matrix @ velocity
+        - modes.omega**2 * z
     )
     return complex(modes.mass * (modes.slide @ residual) / (modes.slide @ modes.slide))
 
@@ -229,33 +216,17 @@ def read_instrument(
     if kind == "peak":
         return peak
     if kind == "rms":
-        step = np.diff(window.time)
-        squared = window.acceleration**2
-        return float(
-            np.sqrt(
-                np.sum(step * (squared[1:] + squared[:-1]) / 2) / (window.time[-1] - window.time[0])
-            )
-        )
+        span = window.time[-1] - window.time[0]
+        return float(np.sqrt(np.trapezoid(window.acceleration**2, window.time) / span))
     if kind == "fundamental":
-        return abs(_acceleration_harmonic_n(window, drive, 1))
+        return abs(absolute_harmonic(window, drive, 1))
     if kind != "lowpass":
         raise ValueError(f"reading '{kind}' is not possible; use one of {', '.join(READINGS)}")
     n = np.arange(1, N_FILTER_HARMONICS + 1)
     s = 1j * n * drive.omega / (2 * np.pi * cutoff)
-    filtered_harmonics = np.array([_acceleration_harmonic_n(window, drive, k) for k in n]) / (
+    filtered_harmonics = np.array([absolute_harmonic(window, drive, k) for k in n]) / (
         1 + np.sqrt(2) * s + s**2
     )
     spectrum = np.zeros(N_FILTER_SAMPLES // 2 + 1, complex)
     spectrum[1 : N_FILTER_HARMONICS + 1] = filtered_harmonics * N_FILTER_SAMPLES / 2
     return float(np.abs(np.fft.irfft(spectrum, N_FILTER_SAMPLES)).max())
-
-
-def _acceleration_harmonic_n(window, drive, n: int) -> complex:
-    """Return the complex n-th harmonic [m s-2] of the absolute acceleration at the sensor.
-
-    Integration by parts avoids an error due to jumps of the acceleration.
-    """
-    displacement = window.extra.get("sensor", window.output)
-    rate = window.extra.get("sensor_rate", window.output_rate)
-    harmonic = acceleration_harmonic(window.time, displacement, rate, n * drive.omega)
-    return harmonic - 1j * drive.acceleration if n == 1 and drive.moving else harmonic

@@ -7,7 +7,7 @@ In: a Result whose `extra["step_runs"]` has the run and its runs with fewer step
 from typing import NamedTuple
 
 from ..response.errors import ERROR_MEASURES, MIN_ORDER, absolute_change
-from .refine import MAIN_MEASURES
+from .refine import is_main
 
 ROUND_OFF = 1e-9  # Largest relative error that counts as round-off in long sums.
 # Smallest ratio of the errors with finer and coarser steps at which the steps do not matter.
@@ -119,7 +119,7 @@ def _select_measures(measures: dict, step_runs) -> dict:
         is_in_all_runs = all(name in run.values for run in step_runs)
         if is_known and is_in_all_runs and name not in ERROR_MEASURES:
             common[name] = measure
-    main = {name: measure for name, measure in common.items() if name in MAIN_MEASURES}
+    main = {name: measure for name, measure in common.items() if is_main(name)}
     return main or common
 
 

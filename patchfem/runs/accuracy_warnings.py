@@ -158,7 +158,7 @@ def _select_named_measures(context: AccuracyContext, excess: dict) -> list[str]:
     measure with the largest ratio of error to allowed error.
     """
     known = context.measures
-    main = [name for name in refine.MAIN_MEASURES if name in excess]
+    main = [name for name in excess if refine.is_main(name)]
     main = [name for name in main if known[name].error < abs(known[name].value)]
     others = [name for name in excess if not name.startswith(RINGING_PREFIX)] or excess
     return main or [max(others, key=excess.get)]

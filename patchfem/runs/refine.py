@@ -15,17 +15,9 @@ import numpy as np
 from ..core import Outcome
 from ..formatting import format_number
 from ..model.model import Model
+from ..response import rows
 from .results.patch_rows import TABLE as PATCH_TABLE
 
-# Main measures of a run, which have to meet the tolerance.
-MAIN_MEASURES = (
-    "relative_displacement_amplitude",
-    "absolute_acceleration_peak",
-    "loop_area",
-    "friction_ratio_peak",
-    "pressure_peak",
-    "contact_fraction",
-)
 MAX_SECONDS = 60.0  # Largest CPU time [s] of all passes without accuracy.max_seconds.
 COST_RATIO = 4.0  # Expected ratio of the CPU times of two successive passes.
 ERROR_RATIO = 4.0  # Expected ratio of the errors of two successive passes.
@@ -129,9 +121,15 @@ def _can_repeat(model: Model, result, name: str) -> bool:
     )
 
 
+def is_main(name: str) -> bool:
+    """Return whether the tolerance of a run applies to a measure."""
+    row = PATCH_TABLE.get(name) or rows.TABLE.get(name)
+    return row is not None and row.has("main")
+
+
 def find_worst_measure(measures: dict, tolerance: float) -> tuple[str, float]:
     """Return the main measure with the largest ratio of error to allowed error, and this ratio; ("", 0) without one."""
-    found = [name for name in MAIN_MEASURES if name in measures]
+    found = filter(is_main, measures)
     ratios = {name: min(measures[name].error_ratio(tolerance), MAX_EXCESS) for name in found}
     worst = max(ratios, key=ratios.get, default="")
     return worst, ratios.get(worst, 0.0)

@@ -116,7 +116,6 @@ class SweepDrive:
     - acceleration: amplitude [m s-2], unless there is a displacement.
     - displacement: amplitude X [m] of the base displacement, for the acceleration X omega(t)^2.
     - logarithmic: whether the frequency changes by a constant factor, and not increment, per time.
-    - starts: number of frequencies with which a curve of steady motions begins, None for the default.
     """
 
     low: float
@@ -126,7 +125,6 @@ class SweepDrive:
     displacement: float | None = None
     logarithmic: bool = False
     moving: bool = True
-    starts: int | None = None
 
     @property
     def segments(self) -> tuple:

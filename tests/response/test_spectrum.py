@@ -68,7 +68,7 @@ def test_exact_distortion_includes_base_acceleration(moving):
         "absolute_acceleration_fundamental": first,
         "acceleration_distortion": third / first,
     }
-    assert spectrum.harmonic_measures(1e-16, 1e-17, 1.0)["acceleration_distortion"] is None
+    assert spectrum.harmonic_measures(1e-16, 1e-17)["acceleration_distortion"] is None
 
 
 SCENE = """\

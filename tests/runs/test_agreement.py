@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from scene_runs import assert_agree, run_scene
 from scene_texts import (
-    BLOCK,
     COATED,
     COULOMB,
     DRIVE,
@@ -31,8 +30,6 @@ SOFT_BONDS = POINT + NONLOCAL.replace("1 um", "5 um") + STRUCTURE
 GROWING = "friction.kinetic=0.2; friction.rest_growth=10 m/s^2; friction.slip_growth=0.2 um; "
 SHEARED = COATED + '[contact.tilt]\nangle = "0.02 mrad"\n' + SHEAR + COULOMB + STRUCTURE
 INTERLOCK = "structure.bonded.stiffness=3e6 N/m; structure.bonded.wavelength=80 um; "
-GROOVED = BLOCK + 'grooves = {wavelength = "80 um", amplitude = "7.5 um"}\n' + PLASTIC + STRUCTURE
-GROOVES = "normal.grooves.wavelength=80 um; normal.grooves.amplitude=7.5 um; normal.load=115 N; "
 YAW = (
     MODE
     + '[[structure.mode]]\nname = "yaw"\nfrequency = "129 Hz"\ndamping = 0.003\nslide = 0.0\nyaw = "30 rad/m"\n'
@@ -99,14 +96,6 @@ PAIRS = {
     "sheared patch with interlock": (
         SHEARED, INTERLOCK + "structure.mode.axial.damping=0.05", "accuracy.method=harmonic",
         "accuracy.method=march; accuracy.steps_per_cycle=800; drive.cycles=60", MAIN, "harmonic march", 0.005,
-    ),
-    "grooves": (
-        RIG, GROOVES + "structure.moving_mass=1.2 kg; friction.static=0.4", "accuracy.method=harmonic",
-        "accuracy.method=march; accuracy.steps_per_cycle=1600; drive.cycles=100", MAIN, "harmonic march", 0.001,
-    ),
-    "sheared patch on grooves": (
-        GROOVED, "contact.element_size=2 mm; contact.shear={}; accuracy.steps_per_cycle=100",
-        "accuracy.method=harmonic", "accuracy.method=march; drive.cycles=40", MAIN, "harmonic march", 1e-9,
     ),
     "strips that yaw": (
         STRIPS + COULOMB + YAW + DRIVE, "", "", "accuracy.method=march", MAIN + " friction_work", "hybrid march", 5e-4,

@@ -176,6 +176,11 @@ REFUSALS = [
         GROOVES + "normal.grooves.amplitude=-1 um",
         r"normal\.grooves\.amplitude: must be >= 0, not '-1 um'",
     ),
+    (
+        BONDED_RIG,
+        GROOVES + "accuracy.method=harmonic",
+        r"accuracy\.method: 'harmonic' with \[normal\.grooves\] for law 'nonlocal' is not supported yet; use 'march'",
+    ),
     (BENCH, GROOVES + WEAR, r"wear: .*with \[normal.grooves\]; a \[normal\] contact has no area"),
     (
         COULOMB_RIG,

@@ -85,6 +85,7 @@ PROPERTY = re.compile(r"\\\{.*?\}")
 # More assignments for rows whose scene has, with the assignments of its features alone, those of another row, too.
 MORE_SETS = {
     "grooves, patch.strips, partial slip": "{law}.law=coulomb",
+    "accuracy.harmonics, accuracy.method=harmonic, grooves": "{law}.law=coulomb",
     "wear, patch.strips, partial slip": "{law}.law=coulomb",
     "shape on the lower piece, interface": BONDS,
     "mode with yaw, patch.strips, rig, law for one interface": f"{BONDS} {{law}}.order=2",

@@ -27,7 +27,6 @@ class ModelReadings:
         self.patch = None
         self.last_motions = {}
         self.last_readings = (None, {})
-        self.observer = None
         self.n_motions = 0
         instrument = models.instrument
         self.reading = ("peak", None)
@@ -70,11 +69,10 @@ class ModelReadings:
         with locate_errors(model.source):
             model, patch = self._solve_contact(model)
             needs_cycle = self.reading[0] not in ("peak", "fundamental")
-            observer = MotionObserver(model, patch, self.say, needs_cycle, self.observer)
-            self.observer = observer
+            observer = MotionObserver(model, patch, self.say, needs_cycle)
             for k in conditions:
                 self.n_motions += 1
-                if not observer.method:
+                if not observer.finds_periodic_motion:
                     model_at_k = self.models.with_condition_drive(model, k)
                     observer = MotionObserver(model_at_k, patch, self.say, needs_cycle)
                 drive = self.models.sine_drive(k)

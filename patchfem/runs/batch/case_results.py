@@ -1,16 +1,12 @@
 """Results of many cases, with one column per measure.
 
-In: measures, outcomes and messages of cases. Out: `CaseResults`, whose columns may be on disk.
+In: measures, outcomes and messages of cases. Out: `CaseResults`.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
-from math import prod
-from pathlib import Path
-from tempfile import TemporaryFile
-from weakref import finalize
 
 import numpy as np
 
@@ -18,53 +14,7 @@ from ...inputs import measured
 from ...model.model import Model
 from ...model.similar_models import select_models
 
-# Smallest number of cases whose columns may be stored on disk: a measure takes 25 kB per 1000 cases.
-MIN_CASES_ON_DISK = 50_000
 FAILED_OUTCOME = "failed"  # outcome of a case that was rejected or ended with an error
-
-
-class ArrayOnDisk:
-    """Array of floats in a temporary file, which uses memory only during an access.
-
-    Parameters
-    ----------
-    file
-        Temporary file.
-    shape : tuple
-    base : ArrayOnDisk, optional
-        Array that owns the file, for a reshaped view.
-    """
-
-    def __init__(self, file, shape: tuple, base: ArrayOnDisk | None = None):
-        # the file is closed when its owner is deleted, so that a view must refer to the owner
-        self.file = file
-        self.shape = shape
-        self.base = base
-        self.file.truncate(8 * self.size)
-        if base is None:
-            finalize(self, file.close)
-
-    @property
-    def size(self) -> int:
-        """Number of floats in the array."""
-        return prod(self.shape)
-
-    def __len__(self) -> int:
-        return self.shape[0]
-
-    def __array__(self, dtype=None, copy=None) -> np.ndarray:
-        array = np.memmap(self.file, float, "r+", shape=self.shape).view(np.ndarray)
-        return array if dtype in (None, array.dtype) and not copy else array.astype(dtype or float)
-
-    def __getitem__(self, index) -> np.ndarray:
-        return np.array(np.asarray(self)[index])
-
-    def __setitem__(self, index, values) -> None:
-        np.asarray(self)[index] = values
-
-    def reshape(self, shape: tuple) -> ArrayOnDisk:
-        """Return a view of the array with another shape."""
-        return ArrayOnDisk(self.file, tuple(shape), self)
 
 
 @dataclass(eq=False, slots=True)
@@ -80,7 +30,6 @@ class CaseResults:
     - warnings, notes: {case: list of sentences}.
     - numerics: {case: dict} with the numerical settings; cases may share a dict.
     - seconds (n,): computing time [s]; the time of a batch is divided equally among its cases.
-    - disk_folder: folder for columns on disk, or None (see `blank`).
     """
 
     outcome: np.ndarray
@@ -94,7 +43,6 @@ class CaseResults:
     notes: dict = field(default_factory=dict)
     numerics: dict = field(default_factory=dict)
     seconds: np.ndarray = None
-    disk_folder: Path | None = None
 
     def __post_init__(self) -> None:
         if self.seconds is None:
@@ -104,29 +52,16 @@ class CaseResults:
         return len(self.outcome)
 
     @classmethod
-    def blank(cls, count: int, disk_folder: Path | None = None) -> CaseResults:
-        """Return the results of `count` cases without outcomes and measures.
-
-        disk_folder: folder in which the columns are stored if there are many cases; None: in memory.
-        """
-        return cls(
-            np.full(count, "", object),
-            disk_folder=disk_folder if count > MIN_CASES_ON_DISK else None,
-        )
+    def blank(cls, count: int) -> CaseResults:
+        """Return the results of `count` cases without outcomes and measures."""
+        return cls(np.full(count, "", object))
 
     def add_measure(self, name: str, unit: str) -> None:
         """Add columns for a measure, filled with NaN, unless they exist."""
         if name not in self.values:
             self.units[name] = unit
             for columns in self._result_columns:
-                columns[name] = self._empty_column()
-                columns[name][:] = np.nan
-
-    def _empty_column(self) -> np.ndarray | ArrayOnDisk:
-        """Return an uninitialized column (n,), in memory or on disk."""
-        if self.disk_folder is None:
-            return np.empty(len(self))
-        return ArrayOnDisk(TemporaryFile(dir=self.disk_folder), (len(self),))
+                columns[name] = np.full(len(self), np.nan)
 
     def fail(self, case: int, message: str) -> None:
         """Mark a case as failed and store its error message."""

@@ -40,7 +40,7 @@ from ...response.reasons import (
     find_missing,
 )
 from ...response.ringing import MIN_PERIODS, MIN_REFINED_FRACTION
-from ...response.rows import INTERNAL_VALUES, TABLE, error_floor, larger_term
+from ...response.rows import AMPLITUDE, INTERNAL_VALUES, TABLE, error_floor, larger_term
 from ...response.run_events import measure_ringing_in_sticks
 from ...response.settling import (
     CLASSES,
@@ -75,7 +75,6 @@ MAX_STICK_SLIP = 1e-3
 # law is not negative
 MAX_MICRO_DAMPING = 4.0
 MIN_RING_STEPS = 24  # smallest number of steps per period of a free vibration
-AMPLITUDE = "relative_displacement_amplitude"
 RIGID_SECANT = "secant_stiffness"
 
 

@@ -158,12 +158,12 @@ def solve_faces_with_slip_fields(model, snapshots) -> tuple:
             make_patch_elements(law, model.accuracy.tolerance)[2] if face.partial_slip else None
         )
         if jenkins_set is not None and snapshots:
-            states = [snapshot["faces"][face.number] for snapshot in snapshots]
+            states = [snapshot.faces[face.number] for snapshot in snapshots]
             length = record.make_law(law.numbers, law.load).element(law.load).length
             tau, local = slip_fields.element_fields(face.patch, jenkins_set, states, length)
             fields = make_interface_frames(
                 face.patch,
-                np.array([snapshot["time"] for snapshot in snapshots]),
+                np.array([snapshot.time for snapshot in snapshots]),
                 tau,
                 local,
                 np.array([slide for slide, _ in states]),

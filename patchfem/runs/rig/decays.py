@@ -76,7 +76,7 @@ def _measure_decay_curve(run: Solution) -> DecayCurve:
     reversals of a sum of several modes belong to none of them.
     """
     motion = run.response
-    mode = run.extra.get("tail")
+    mode = run.tail
     reversals = locate_reversals(motion.time, motion.output, motion.output_rate)
     half_cycles = fit_decay_curve(make_half_cycles(*reversals))
     if mode is None:

@@ -22,6 +22,7 @@ from ...response.errors import (
     finer_errors,
     friction_errors,
 )
+from ...response.rows import find_definition
 from ...scene.rules import methods
 from ...scene.rules.accuracy import has_effect, list_fixed_settings
 from ...slip import shear_modes
@@ -83,22 +84,19 @@ class Engine(NamedTuple):
         runs = tuple(replace(coarse_numerics, other_rig=number) for number in range(n_rigs))
         return [CoarserRuns(runs, finer_errors, beside, "reduced")]
 
-    def find_unsupported_feature(self, model: Model, *, steady: bool = False) -> str:
-        """Describe a property of a model that this engine cannot compute; "" if there is none.
-
-        If `steady` is true, the drive is a sine of a response curve instead of the drive of the
-        model.
-        """
-        return methods.find_unsupported_feature(
-            methods.ENGINE_SUPPORT[self.name], collect_motion_features(model, steady=steady)
-        )
+    def find_unsupported_feature(self, model: Model) -> str:
+        """Describe a property of a model that this engine cannot compute; "" if there is none."""
+        features = collect_motion_features(model)
+        return methods.find_unsupported_feature(methods.ENGINE_SUPPORT[self.name], features)
 
 
 def find_obstacle_of_map(name: str, model: Model) -> str:
-    """Describe a property of a model for which the map of a period "exact" or "piecewise" does not exist, or ""."""
-    return methods.find_unsupported_feature(
-        methods.ENGINE_SUPPORT[name], collect_motion_features(model, steady=True)
-    )
+    """Describe a property of a model that prevents its steady motion, or "".
+
+    `name` is "harmonic", or one of the maps of a period, "exact" and "piecewise".
+    """
+    features = collect_motion_features(model, steady=True)
+    return methods.find_unsupported_feature(methods.ENGINE_SUPPORT[name], features)
 
 
 def collect_motion_features(model: Model, *, steady: bool = False) -> methods.MotionFeatures:
@@ -121,11 +119,6 @@ class SteadyMethod(NamedTuple):
 STEADY_METHODS = {
     finder.name: finder
     for finder in (
-        SteadyMethod(
-            "march",
-            "a time integration whose initial state is corrected until the motion repeats",
-            "march",
-        ),
         SteadyMethod("shooting", "Newton's method on the map of a period", "hybrid"),
         SteadyMethod("balance", "harmonic balance", "harmonic"),
     )
@@ -137,12 +130,9 @@ def choose_steady_method(model: Model) -> SteadyMethod:
 
     Coulomb friction, elastic-plastic elements and grooves need Newton's method on the map of a period, because their
     forces change their slope or jump. Harmonic balance is used for all other models, and for elements in scenes that set
-    `harmonics`. A law with memory on grooves needs a time integration.
+    `harmonics`.
     """
-    if model.grooves is not None:
-        is_shot = not HYBRID.find_unsupported_feature(model, steady=True)
-        return STEADY_METHODS["shooting" if is_shot else "march"]
-    is_shot = not find_obstacle_of_map("exact", model)
+    is_shot = model.grooves is not None or not find_obstacle_of_map("exact", model)
     if model.accuracy.harmonics is None:
         is_shot |= not find_obstacle_of_map("piecewise", model)
     return STEADY_METHODS["shooting" if is_shot else "balance"]
@@ -153,14 +143,6 @@ def _no_comparison_runs(*_) -> list:
     return []
 
 
-# Measures of the friction loop that are computed from samples by the trapezoidal rule.
-LOOP_MEASURES = (
-    "loop_area",
-    "equivalent_stiffness",
-    "equivalent_damping",
-    "slip_amplitude",
-    "friction_force_peak",
-)
 LOOP_SAMPLING_ERROR = 1e-4  # Relative error of loop measures from 400 samples per cycle.
 # Error of the stick fraction [1] and of the phase at slip start [rad] from 400 samples per cycle.
 INSTANT_SAMPLING_ERROR = 0.005
@@ -171,9 +153,10 @@ def estimate_sampling_errors(values: dict) -> dict:
     """Estimate the errors of measures due to sampling with 400 samples per cycle."""
     errors = {}
     for name, value in values.items():
-        if name in LOOP_MEASURES:
+        definition = find_definition(name)
+        if definition.has("loop"):
             errors[name] = LOOP_SAMPLING_ERROR * abs(value)
-        elif name in ("stick_fraction", "slip_start_phase"):
+        elif definition.sample_error:
             errors[name] = INSTANT_SAMPLING_ERROR
         else:
             errors[name] = MOTION_SAMPLING_ERROR * abs(value)

@@ -12,17 +12,16 @@ from ...core import IntegratedMeasures, Outcome
 from ...effects import law_has_trait
 from ...friction import path_work
 from ...response import run_events
-from ...response.errors import ERROR_MEASURES, absolute_change, convergence_error
+from ...response.errors import convergence_error
 from ...response.levels import LEVEL_MEASURES, Level
 from ...response.loops import reversal_force_rule
 from ...response.measures import (
     relative_gap,
-    slip_round_off,
     window_amplitudes,
     window_end_values,
 )
 from ...response.outcome import estimate_steady
-from ...response.rows import ROWS_NEEDING_RUN, LastCycles, compute_measures, find_definition
+from ...response.rows import AMPLITUDE, ROWS_NEEDING_RUN, LastCycles, compute_measures
 from ...structure.drive_sizes import choose_samples_per_cycle, is_sinusoidal
 from .solution import Solution, find_release_amplitude, first_interface_load, first_mode_stiffness
 
@@ -79,10 +78,6 @@ class RunEvaluator:
         """
         return IntegratedMeasures()
 
-    def find_friction_loops(self, run, drive) -> tuple:
-        """Return the friction loops that the engine integrates over the last cycles."""
-        return self.compute_integrated_measures(run, drive).loops
-
     def collect_cycle_data(self, run, drive, *, stuck: bool) -> dict:
         """Return fields of `LastCycles` that the engine computes more accurately than from samples.
 
@@ -130,17 +125,13 @@ class RunEvaluator:
         )
         values = compute_measures(last_cycles)
         if model.rig.drive.kind == "free":
-            name = "relative_displacement_amplitude"
-            values[name] = find_release_amplitude(window, drive.period, values[name])
+            values[AMPLITUDE] = find_release_amplitude(window, drive.period, values[AMPLITUDE])
         return values
 
     def is_stuck(self, run) -> bool:
-        """Return whether all interfaces stick during the last cycles of a run."""
+        """Return whether all interfaces or strips stick during the last cycles of a run."""
         if not self.has_friction or self.creeps:
             return False
-        if loops := self.find_friction_loops(run, self.model.rig.drive.signal):
-            limit = max(self.stick_tolerance, slip_round_off(run.window))
-            return all(loop.slip_range / 2 <= limit for loop in loops)
         return run_events.is_all_stuck(run.window, self.stick_tolerance)
 
     def measure_ringing(self, run, drive) -> tuple:
@@ -164,47 +155,6 @@ class RunEvaluator:
             Measures by name.
         """
         return {}
-
-    def thin_run(self, run):
-        """Return a run without every second sample of its window."""
-        return replace(run, window=thin_samples(run.window))
-
-    def estimate_sampling_errors(self, run, drive, values: dict) -> dict:
-        """Estimate the errors of measures due to sampling of an exact motion.
-
-        They follow from the changes when every second sample is removed. Measures that the engine
-        integrates have no such error.
-
-        Parameters
-        ----------
-        run
-            Run of the engine.
-        drive
-            Drive of the run.
-        values : dict
-            Measures by name.
-        """
-        if not self.find_friction_loops(run, drive) and not hasattr(drive, "band"):
-            return {}
-        return self.compare_with_half_the_samples(run, drive, values)
-
-    def compare_with_half_the_samples(self, run, drive, values: dict) -> dict:
-        """Estimate the errors of measures due to sampling by their changes without every second sample.
-
-        Parameters
-        ----------
-        run, drive, values
-            See `estimate_sampling_errors`.
-        """
-        ledger = run.response.extra.get("ledger")
-        coarse_values = self.evaluate_measures(self.thin_run(run), drive, ledger)
-        errors = {}
-        for name, change in absolute_change(values, coarse_values).items():
-            if change > 0 and name not in ERROR_MEASURES:
-                row = find_definition(name)
-                error = convergence_error(change, order=row.order)
-                errors[name] = error + row.sample_error / self.steps
-        return errors
 
     def find_uniform_histories(self, run, drive):
         """Return the histories of the whole run if they are uniformly sampled; None otherwise."""

@@ -6,6 +6,7 @@ the histories are those of the last cycles, of equal distances before them, and 
 
 from dataclasses import dataclass, field, replace
 from time import perf_counter
+from typing import NamedTuple
 
 import numpy as np
 
@@ -18,7 +19,6 @@ from ...core import (
     Response,
     SineDrive,
 )
-from ...dynamics.event_list import DRIVE_CHANGE, RELEASE, REVERSAL, STOP, EventLog
 from ...dynamics.integrated import find_accelerations
 from ...hybrid import cases, periodic
 from ...hybrid import runs as engine
@@ -26,9 +26,17 @@ from ...hybrid.laws import is_rigid
 from ...hybrid.laws.masing import has_stick
 from ...hybrid.records import Margin, Memory, State, Status
 from ...response import run_events
-from ...response.measures import MIN_SLIDE_RANGE, compute_harmonic, relative_gap
+from ...response.errors import ERROR_MEASURES, absolute_change, convergence_error
+from ...response.events import (
+    EXACT_SOURCE,
+    SEGMENT_BORDER,
+    Events,
+    classify_changes,
+    sort_events,
+)
+from ...response.measures import MIN_SLIDE_RANGE, compute_harmonic
 from ...response.ringing import compute_stuck_vibration, make_ringing_measures, select_strongest
-from ...response.rows import ROWS_NEEDING_RUN
+from ...response.rows import AMPLITUDE, ROWS_NEEDING_RUN, find_definition, select_names
 from ...structure.drive_sizes import (
     choose_samples_per_cycle,
     find_drive_omega,
@@ -37,7 +45,7 @@ from ...structure.drive_sizes import (
     is_sinusoidal,
 )
 from . import strips
-from .evaluation import RunEvaluator
+from .evaluation import RunEvaluator, compute_sampled_work, compute_work_check, thin_samples
 from .hybrid_laws import Joints, make_joints
 from .levels import remove_incomplete_cycle, run_levels
 from .solution import Solution, describe_escape, find_travel, first_mode_stiffness
@@ -55,28 +63,29 @@ N_CHANGE_WINDOWS = (
 MIN_RELATIVE_DECAY = 1e-6
 STEADY_RTOL = 1e-10  # step tolerance of the steady motion that follows a run
 MIN_SAMPLED_CYCLES = 2.0  # cycles at the end that have as many samples as the window
-MOTION_MEASURES = (
-    "relative_displacement_amplitude",
-    "absolute_acceleration_peak",
-    "absolute_acceleration_fundamental",
-    "acceleration_distortion",
-)
-# Measures that exist only under a sine.
-SINE_MEASURES = (
-    "absolute_acceleration_fundamental",
-    "acceleration_distortion",
-    "slip_start_phase",
-    "equivalent_stiffness",
-    "equivalent_damping",
-    "secant_stiffness",
-    "harmonic_force_ratio",
-)
-# Sums over all drive levels.
-WHOLE_RUN_MEASURES = ("friction_work", "energy_dissipated")
+# Measures of the motion, of the whole run and of its balance are those of the engine also for strips.
+STRIP_GROUPS = ("curve", "run", "error")
 EARLY_ENDS = {
     Status.EXCEEDS_TRAVEL: Outcome.EXCEEDS_TRAVEL,
     Status.LEAVES_GROOVES: Outcome.LEAVES_GROOVES,
 }
+
+
+class ElementSnapshot(NamedTuple):
+    """State of the elements of patches at an instant of the last cycle.
+
+    - time: [s].
+    - slide, slip, force: of the first interface [m], [m], [N].
+    - stretch (e,): stretches of the elements of the first interface [m].
+    - faces: displacement [m] and stretches (e,) [m] of each interface.
+    """
+
+    time: float
+    slide: float
+    slip: float
+    force: float
+    stretch: np.ndarray
+    faces: list
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -91,7 +100,7 @@ class LumpedRun:
     - end: arrays of the engine at the end, from which another run can go on.
     - cycles_done: number of cycles.
     - events: number of stored events.
-    - log: events of rigid interfaces, or None.
+    - log: events of the interfaces, or None.
     - snapshots: states of the elements of a patch in the last cycle.
     - repeats: whether the motion repeats after each cycle.
     """
@@ -107,7 +116,7 @@ class LumpedRun:
     end: State
     cycles_done: float
     events: int
-    log: EventLog | None = None
+    log: Events | None = None
     snapshots: list = field(default_factory=list)
     repeats: bool = False
 
@@ -144,7 +153,7 @@ def run_from_event_to_event(
         """Integrate the motion under a drive from the end of another run, None for the start of the rig."""
         state = None if before is None else before.end
         run = evaluator.integrate(drive, cycles, state, frames if is_last else 0)
-        for name in WHOLE_RUN_MEASURES:
+        for name in select_names("run"):
             if before is not None and name in before.values:
                 run.values[name] += before.values[name]
         return run
@@ -302,7 +311,7 @@ class LumpedEvaluator(RunEvaluator):
             end=motion.final,
             cycles_done=cycles,
             events=len(motion.event_rows),
-            log=self._make_log(motion, drive),
+            log=self._list_events(motion, drive),
             snapshots=self._list_snapshots(motion, response, times[2], start),
             repeats=motion.repeats,
         )
@@ -333,7 +342,7 @@ class LumpedEvaluator(RunEvaluator):
         force = self.joints.laws[0][1].mean + grooves.lifted_mass * rise
         return replace(response, extra=response.extra | {"normal_load": force})
 
-    def _make_log(self, motion, drive) -> EventLog | None:
+    def _list_events(self, motion, drive) -> Events | None:
         """Return stops, releases and reversals of the interfaces, and the changes of the drive.
 
         None for laws that have no such events, because some part of them always slips.
@@ -343,24 +352,17 @@ class LumpedEvaluator(RunEvaluator):
             return None
         directions = motion.find_directions()
         rows = motion.event_rows
-        slides = (
-            rows[:, 1 : 1 + self.model.rig.modes.omega.size] @ self.model.rig.modes.interfaces.T
-        )
-        events = [
-            (s.start, -1, DRIVE_CHANGE, 0.0) for s in drive.segments[1:] if s.start < motion.time
-        ]
-        for k in range(directions.shape[1]):
-            before, after = directions[:-1, k], directions[1:, k]
-            changed = np.flatnonzero(before != after)
-            start = np.where(before[changed] == 0, RELEASE, REVERSAL) * after[changed]
-            kinds = np.where(after[changed] == 0, STOP, start)
-            events += zip(rows[changed, 0], np.full(changed.size, k), kinds, slides[changed, k])
-        columns = np.array(sorted(events), float).reshape(-1, 4).T
-        time, number, kind, slide = columns
-        phase = find_drive_omega(drive) * time % (2 * np.pi)
-        return EventLog(time, phase, number.astype(int), kind.astype(int), slide, time.size)
+        modes = self.model.rig.modes
+        slides = rows[:, 1 : 1 + modes.omega.size] @ modes.interfaces.T
+        borders = [start for start in run_events.find_segment_borders(drive) if start < motion.time]
+        events = [(start, 0, SEGMENT_BORDER, np.nan) for start in borders]
+        for k, states in enumerate(directions.T):
+            changed = np.flatnonzero(states[:-1] != states[1:])
+            kinds = classify_changes(states[changed], states[changed + 1])
+            events += zip(rows[changed, 0], [k + 1] * changed.size, kinds, slides[changed, k])
+        return sort_events(events, source=EXACT_SOURCE)
 
-    def _list_snapshots(self, motion, response: Response, times, start) -> list[dict]:
+    def _list_snapshots(self, motion, response: Response, times, start) -> list[ElementSnapshot]:
         """Return the stretches of the elements of patches at given times, from all reversals before.
 
         Those before the start of the motion are in the memory of its `State`, if it does not start from rest.
@@ -376,15 +378,14 @@ class LumpedEvaluator(RunEvaluator):
                 reversals = np.concatenate([_list_remembered_reversals(start, i), reversals])
             stretches.append(_find_stretches(reversals, (times, slides[at, i]), limit))
         return [
-            {
-                "time": float(response.time[k]),
-                "slide": float(response.slide[k]),
-                "force": float(response.force[k]),
-                "rate": float(response.slide_rate[k]),
-                "slip": float(response.slip[k]),
-                "stretch": stretches[0][number],
-                "faces": [(float(slides[k, i]), own[number]) for i, own in enumerate(stretches)],
-            }
+            ElementSnapshot(
+                time=float(response.time[k]),
+                slide=float(response.slide[k]),
+                slip=float(response.slip[k]),
+                force=float(response.force[k]),
+                stretch=stretches[0][number],
+                faces=[(float(slides[k, i]), own[number]) for i, own in enumerate(stretches)],
+            )
             for number, k in enumerate(at)
         ]
 
@@ -403,13 +404,16 @@ class LumpedEvaluator(RunEvaluator):
             name: None if np.isnan(value) else float(value) for name, value in run.values.items()
         }
         if not is_sinusoidal(drive):
-            values |= dict.fromkeys(SINE_MEASURES)
+            values |= dict.fromkeys(select_names("sine"))
         if self.has_friction:
             values |= self._limit_loop_measures(run, values)
-            values["work_check"] = self._compute_work_check(run)
+            work = run.window.extra["ledger"][0]
+            energies = run.ledger | compute_sampled_work(run.window)
+            values["work_check"] = compute_work_check(energies | {"booked": work[-1] - work[0]})
         if self.strips_slide_apart:
-            names = (*MOTION_MEASURES, "slip_start_phase", "energy_balance", "work_check")
-            names += ("friction_work", "energy_dissipated", "energy_stored")
+            names = ["slip_start_phase", "energy_stored"]
+            for group in STRIP_GROUPS:
+                names += select_names(group)
             loop = _compute_strips_loop(run, drive)
             return IntegratedMeasures({name: values.get(name) for name in names}, loops=(loop,))
         values.pop("energy_stored", None)
@@ -425,20 +429,6 @@ class LumpedEvaluator(RunEvaluator):
             missing = {"equivalent_damping": None}
         return missing
 
-    def _compute_work_check(self, run) -> float:
-        """Return the relative difference of the friction work in the window from samples and from the engine."""
-        window = run.window
-        slides = window.extra.get("slides", window.slide[:, None])
-        forces = window.extra.get("forces", window.force[:, None])
-        parts = (forces[1:] + forces[:-1]) / 2 * np.diff(slides, axis=0)
-        work = window.extra["ledger"][0]
-        scale = run.ledger["power"] + run.ledger["peak_stored"]
-        return float(relative_gap(parts.sum(), work[-1] - work[0], np.abs(parts).sum(), scale))
-
-    def find_friction_loops(self, run, drive) -> tuple:
-        """Return the mean loop of strips that slide independently, else ()."""
-        return (_compute_strips_loop(run, drive),) if self.strips_slide_apart else ()
-
     def collect_cycle_data(self, run, drive, *, stuck: bool) -> dict:
         """Return whether the interfaces are strips of a single one.
 
@@ -448,12 +438,6 @@ class LumpedEvaluator(RunEvaluator):
             See `RunEvaluator.collect_cycle_data`.
         """
         return {"is_single_interface": self.strips_slide_apart}
-
-    def is_stuck(self, run) -> bool:
-        """Return whether all interfaces or strips stick during the last cycles of a run."""
-        if not self.has_friction or self.creeps:
-            return False
-        return run_events.is_all_stuck(run.window, self.stick_tolerance)
 
     def measure_ringing(self, run, drive) -> tuple:
         """Compute frequency and damping of the free vibration during stick, with error estimates.
@@ -498,7 +482,7 @@ class LumpedEvaluator(RunEvaluator):
             return {}
         after = response.select(response.time >= response.time[moves[-1] + 1])
         vibration = self._find_stuck_vibration(run, after, drive)
-        return {"extra": {"tail": select_strongest(vibration, "displacement")}} if vibration else {}
+        return {"tail": select_strongest(vibration, "displacement")} if vibration else {}
 
     def estimate_run_errors(self, run, drive, values: dict) -> dict:
         """Estimate the errors of the samples of a random motion.
@@ -508,14 +492,25 @@ class LumpedEvaluator(RunEvaluator):
         run, drive, values
             See `RunEvaluator.estimate_run_errors`.
         """
-        return self.estimate_sampling_errors(run, drive, values) if hasattr(drive, "band") else {}
+        if not hasattr(drive, "band"):
+            return {}
+        # They follow from the changes when every second sample of the window is removed.
+        thinned = replace(run, window=thin_samples(run.window))
+        coarse_values = self.evaluate_measures(thinned, drive, run.response.extra.get("ledger"))
+        errors = {}
+        for name, change in absolute_change(values, coarse_values).items():
+            if change > 0 and name not in ERROR_MEASURES:
+                row = find_definition(name)
+                error = convergence_error(change, order=row.order)
+                errors[name] = error + row.sample_error / self.steps
+        return errors
 
 
 def find_stable_amplitude(motion: periodic.PeriodicMotion) -> tuple[float, float] | None:
     """Return the amplitude [m] of a periodic motion and its error; None if it is not known or not stable."""
     if motion.grows or not motion.change <= motion.tolerance or not motion.is_stable:
         return None
-    amplitude = float(motion.batch.windows[0][MOTION_MEASURES[0]][0])
+    amplitude = float(motion.batch.windows[0][AMPLITUDE][0])
     return amplitude, amplitude * (10 * motion.error + 1e2 * STEADY_RTOL)
 
 

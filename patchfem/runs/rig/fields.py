@@ -4,8 +4,6 @@ In: the Solution with its snapshots, and the Patch. Out: pressure, gap, shear st
 interface nodes by name.
 """
 
-from types import SimpleNamespace
-
 import numpy as np
 
 from ...effects import law_has_trait, needs_bond_list
@@ -54,8 +52,6 @@ def collect_interface_fields(model, numerics, patch, solution) -> dict:
     snapshots = solution.snapshots
     reduction = getattr(solution.contact, "reduction", None)
     is_march = isinstance(snapshots[0], time_march.Snapshot)
-    if not is_march:
-        snapshots = [SimpleNamespace(**one) for one in snapshots]
     rule = SlipRule()
     has_node_bonds = numerics.per_point and model.grooves is None and not needs_bond_list(f)
     has_points = is_march and snapshots[0].forces.size > 1

@@ -12,7 +12,7 @@ from ...effects import law_has_trait
 from ...formatting import format_length
 from ...model.rig import MAX_TRAVEL
 from ...response.rows import TABLE
-from .engines import ENGINES
+from .engines import find_obstacle_of_map
 from .interface import make_single_law
 from .steady.balance import BalanceFinder
 
@@ -112,7 +112,7 @@ def _find_limit_cycles(model, numerics, patch) -> LimitCycles:
     if not row[limit_cycles.find_unstable_modes(modes)].any():
         return LimitCycles([], NO_INTERFACE_NOTE)
     load = patch.pressure.load if patch is not None else model.point.load
-    if reason := ENGINES["harmonic"].find_unsupported_feature(model, steady=True):
+    if reason := find_obstacle_of_map("harmonic", model):
         return LimitCycles([], f"limit cycles cannot be computed {reason}")
     element = make_single_law(model, numerics, patch).element
     try:

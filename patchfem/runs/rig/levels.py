@@ -10,7 +10,7 @@ from functools import partial
 import numpy as np
 
 from ...core import Measure, SineDrive
-from ...response import run_events
+from ...response.events import join_events
 from ...response.levels import (
     MIN_JUMP_FACTOR,
     Level,
@@ -27,6 +27,10 @@ from ...structure.drive_sizes import find_drive_omega
 EXACT_RELATIVE_ERROR = 1e-9
 # Largest number of bisections of an onset; 40 of them reduce the bracket to 1e-12.
 MAX_BISECTIONS = 40
+NO_JUMP_REASON = (
+    "the amplitude does not jump: between neighbouring drive levels the ratio of the amplitudes is always below "
+    f"{MIN_JUMP_FACTOR:g} times the ratio of the levels"
+)
 
 
 def add_level_errors(levels, coarser_runs: list, solutions: dict) -> tuple:
@@ -130,6 +134,10 @@ def compute_level_measures(
     unit = _find_level_unit(rig)
     unit_factor = _find_level_factor(rig)
     measures = {}
+    if has_friction:
+        measures["onset_level"] = _make_missing(
+            "onset_level", unit, make_no_onset_reason(*rig.drive.levels.onset)
+        )
     is_past_onset = make_onset_test(*rig.drive.levels.onset)
     lowest = find_onset(levels, run_level, tolerance, is_past_onset) if has_friction else None
     if lowest is not None:
@@ -142,32 +150,21 @@ def compute_level_measures(
                 reference = find_onset(beside.levels, beside.run_level, tolerance, is_past_onset)
             is_missing = coarse_onset is None or reference is None
             change += level if is_missing else abs(coarse_onset[0] - reference[0])
-        measures["onset_level"] = Measure(
-            unit_factor * level, unit, unit_factor * (half_width + change), 1e-9
-        )
-    elif has_friction:
-        measures["onset_level"] = Measure(
-            None,
-            unit,
-            None,
-            TABLE["onset_level"].floor,
-            reason=make_no_onset_reason(*rig.drive.levels.onset),
-        )
+        error = unit_factor * (half_width + change)
+        measures["onset_level"] = Measure(unit_factor * level, unit, error, 1e-9)
+
+    measures["jump_level"] = _make_missing("jump_level", unit, NO_JUMP_REASON)
     if (jump := largest_jump(levels)) is not None:
         width = unit_factor * float(jump[2])  # The jump may lie anywhere between two levels.
         measures["jump_level"] = Measure(unit_factor * jump[0], unit, width, width)
-    else:
-        measures["jump_level"] = Measure(
-            None,
-            unit,
-            None,
-            TABLE["jump_level"].floor,
-            reason="the amplitude does not jump: between neighbouring drive levels the ratio of the "
-            f"amplitudes is always below {MIN_JUMP_FACTOR:g} times the ratio of the levels",
-        )
     if (loop := largest_hysteresis(levels)) is not None:
         measures["level_hysteresis"] = Measure(float(loop[0]), "m", float(loop[1]), 1e-10)
     return measures
+
+
+def _make_missing(name: str, unit: str, reason: str) -> Measure:
+    """Return a measure of the levels without a value."""
+    return Measure(None, unit, None, TABLE[name].floor, reason=reason)
 
 
 def convert_to_scene_units(rig, levels) -> tuple:
@@ -264,7 +261,7 @@ def join_runs(runs: list, duration: float):
         response=_join_histories([run.response for run in runs], shifts),
         window=window,
         ledger=ledger,
-        log=None if last.log is None else run_events.join_logs([run.log for run in runs], shifts),
+        log=None if last.log is None else join_events([run.log for run in runs], shifts),
         extremes=np.concatenate([run.extremes for run in runs]),
         phasors=np.concatenate([run.phasors for run in runs]),
         events=sum(run.events for run in runs),

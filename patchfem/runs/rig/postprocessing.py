@@ -57,7 +57,7 @@ class CoupledRun:
     @property
     def drive(self):
         """Drive at which the measures are evaluated."""
-        return self.solution.extra.get("at", self.model.rig.drive.signal)
+        return self.solution.drive or self.model.rig.drive.signal
 
     @property
     def has_friction(self) -> bool:
@@ -255,16 +255,10 @@ def collect_summary_data(run: CoupledRun, measures: dict, notes: list) -> dict:
     extra = {"engine": numerics.engine, "cycles": numerics.cycles}
     extra |= solution.extra | {"window": numerics.window}
     extra |= {name: numbers[name] for name in ENGINES[numerics.engine].summary_numbers}
-    for name in ("at", "at_error", "tail"):
-        extra.pop(name, None)
     if solution.levels:
         extra["levels"] = levels.convert_to_scene_units(rig, solution.levels)
     snapshots = solution.snapshots
-    if (
-        rig.friction.has_partial_slip
-        and isinstance(snapshots[0] if snapshots else None, dict)
-        and "faces" in snapshots[0]
-    ):
+    if rig.friction.has_partial_slip and snapshots and hasattr(snapshots[0], "faces"):
         extra["shots"] = snapshots
     if run.has_friction:
         extra["events"] = run_events.list_events(

@@ -7,7 +7,6 @@ functions of `postprocessing`.
 
 from dataclasses import replace
 from math import ceil
-from typing import NamedTuple
 
 import numpy as np
 
@@ -15,7 +14,7 @@ from ...core import Outcome, PatchfemError
 from ...response.coarser import CoarserRuns
 from ...response.errors import absolute_change, add_errors
 from ...response.reasons import find_missing_unbounded
-from ...response.rows import set_final_floors
+from ...response.rows import AMPLITUDE, set_final_floors
 from ...response.settling import slip_period
 from ...structure.drive_sizes import find_decay_rate, is_periodic
 from ..results.result import Result, RunInputs
@@ -42,18 +41,6 @@ MAX_REFINED_WORK = 1e8
 PRESSING_WORK = 40.0
 
 
-class RefinedRun(NamedTuple):
-    """Run with the first numerical settings whose errors meet the tolerance, or with the finest ones.
-
-    - numerics, solution: settings and Solution of the engine.
-    - measures: measures by name, with error estimates from coarse runs if requested.
-    """
-
-    numerics: Numerics
-    solution: Solution
-    measures: dict
-
-
 def run_rig(inputs: RunInputs) -> Result:
     """Compute the motion of a rig and return its Result.
 
@@ -77,7 +64,7 @@ def run_rig(inputs: RunInputs) -> Result:
         )
     numerics = choose_numerics(model)
     refuse_long_run(model, numerics)
-    run = CoupledRun(inputs, *run_refined(inputs, numerics))
+    run = run_refined(inputs, numerics)
     if run.solution.levels:
         run = postprocessing.add_level_measures(run)
     run = postprocessing.add_outcome_and_errors(run)
@@ -109,7 +96,7 @@ def run_rig(inputs: RunInputs) -> Result:
     )
 
 
-def run_refined(inputs: RunInputs, numerics: Numerics) -> RefinedRun:
+def run_refined(inputs: RunInputs, numerics: Numerics) -> CoupledRun:
     """Repeat a run with finer settings until the errors of its measures meet the tolerance.
 
     Only settings that the scene does not fix are refined. All coarse runs are stored in
@@ -137,8 +124,8 @@ def run_refined(inputs: RunInputs, numerics: Numerics) -> RefinedRun:
         numerics = replace(numerics, window=n_cycles)
         solution = runner.solve(numerics)
     if not inputs.estimate or solution.outcome is Outcome.NOT_CONVERGED:
-        measures = add_errors(solution.values, size=size) | compute_peak_frequency(solution.extra)
-        return RefinedRun(numerics, solution, measures)
+        measures = add_errors(solution.values, size=size) | compute_peak_frequency(solution)
+        return CoupledRun(inputs, numerics, solution, measures)
     space_runs = [
         *engine.coarser_in_space(model, numerics, inputs.patch, inputs.coarse[0], solution),
         *engine.list_runs_with_other_modes(model, numerics),
@@ -161,13 +148,9 @@ def run_refined(inputs: RunInputs, numerics: Numerics) -> RefinedRun:
         )
         if solution.levels or model.rig.drive.kind == "free":
             solution = _add_level_errors(solution, coarser_runs, runner.solutions)
-        displacement_errors.append(measures["relative_displacement_amplitude"].error or 0.0)
-        run = RefinedRun(numerics, solution, measures)
-        if (
-            not time_runs
-            or _is_finest(model, run, displacement_errors)
-            or _meets_tolerance(CoupledRun(inputs, *run), excesses)
-        ):
+        displacement_errors.append(measures[AMPLITUDE].error or 0.0)
+        run = CoupledRun(inputs, numerics, solution, measures)
+        if not time_runs or _is_finest(run, displacement_errors) or _meets_tolerance(run, excesses):
             break
         runner.solutions[numerics] = solution
         runner.error_seconds += solution.seconds
@@ -176,9 +159,9 @@ def run_refined(inputs: RunInputs, numerics: Numerics) -> RefinedRun:
         inputs.seconds["march"] = solution.seconds
     if runner.error_seconds:
         inputs.seconds["error"] = runner.error_seconds
-    measures |= compute_peak_frequency(solution.extra, runner.solutions.values())
+    measures |= compute_peak_frequency(solution, runner.solutions.values())
     solution = replace(solution, extra=solution.extra | {"step_runs": step_runs})
-    return RefinedRun(numerics, solution, measures)
+    return replace(run, solution=solution, measures=measures)
 
 
 def _list_joint_runs(inputs: RunInputs, space_runs: list) -> list:
@@ -244,7 +227,7 @@ def _meets_tolerance(run: CoupledRun, excesses: list) -> bool:
     excesses : list
         Result of `_find_step_excess` of the coarser runs; that of the run is added.
     """
-    displacement = run.measures["relative_displacement_amplitude"]
+    displacement = run.measures[AMPLITUDE]
     if run.numerics.local and displacement.causes is not None:
         # Smaller steps do not reduce the errors of meshes and samples.
         own = displacement.causes.parts.get("own", 0.0)
@@ -265,13 +248,12 @@ def _meets_tolerance(run: CoupledRun, excesses: list) -> bool:
     return work > MAX_REFINED_WORK
 
 
-def _is_finest(model, run: RefinedRun, displacement_errors: list) -> bool:
+def _is_finest(run: CoupledRun, displacement_errors: list) -> bool:
     """Return whether no finer run is possible.
 
     Parameters
     ----------
-    model : Model
-    run : RefinedRun
+    run : CoupledRun
     displacement_errors : list
         Errors of the displacement [m] of all runs up to this one.
     """
@@ -284,7 +266,7 @@ def _is_finest(model, run: RefinedRun, displacement_errors: list) -> bool:
         "steps_per_cycle" in numerics.pinned
         or steps > MAX_MARCH_STEPS
         or steps * numerics.cycles > MAX_RUN_STEPS
-        or bond_lists.is_bond_list_too_long(model, numerics, book)
+        or bond_lists.is_bond_list_too_long(run.model, numerics, book)
         or bond_lists.has_doubling_failed(book, displacement_errors)
         or run.solution.outcome in EARLY_OUTCOMES
     )

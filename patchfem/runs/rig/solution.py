@@ -8,11 +8,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...core import Measure, Outcome, Response
+from ...core import Measure, Outcome, Response, SineDrive
 from ...formatting import format_length
 from ...response.decay_curve import measure_last_cycle_amplitude
 from ...response.measures import compute_harmonic, measure_half_range
 from ...response.reasons import MAX_OTHER_MODES_FRACTION
+from ...response.rows import AMPLITUDE
 from ...structure.drive_sizes import find_drive_omega, has_full_cycle
 
 # Displacement at which a motion has left the range of a softening spring, relative to that without restoring force.
@@ -49,6 +50,9 @@ class Solution:
     - extremes (c, 2): minimum and maximum output of every cycle [m], from which the outcome is
       determined; None if the engine sets the outcome.
     - bounded: whether a bounded steady motion is known to exist.
+    - drive: drive of the largest motion of a response curve or of drive levels; None for a single motion.
+    - peak_error: error of the frequency of this drive [Hz]; inf for a curve without a peak, NaN without a curve.
+    - tail: `ringing.VibratingMode` that remains after the last slip of a release, or None.
     - extra: further data of the result.
     """
 
@@ -75,6 +79,9 @@ class Solution:
     coarser: tuple = ()
     extremes: np.ndarray | None = None
     bounded: bool = False
+    drive: SineDrive | None = None
+    peak_error: float = np.nan
+    tail: object = None
     extra: dict = field(default_factory=dict)
 
 
@@ -118,7 +125,7 @@ def replace_output_by_gauge(model, solution: Solution) -> Solution:
     gauge = model.rig.modes.gauge
     if gauge is None:
         return solution
-    name = "relative_displacement_amplitude"
+    name = AMPLITUDE
     window = _compute_gauge_histories(solution.window, gauge)
     amplitude = measure_half_range(window.time, window.output, window.output_rate)
     if model.rig.drive.kind == "free":
@@ -213,15 +220,14 @@ def compute_sampled_loop(
     return CycleLoop(slide, force, work)
 
 
-def compute_peak_frequency(extra: dict, coarser=()) -> dict:
+def compute_peak_frequency(solution: Solution, coarser=()) -> dict:
     """Return a dict with the frequency [Hz] of the peak of a response curve and its error.
 
     The measure has no value if the amplitude is 0. The dict is empty without a curve.
 
     Parameters
     ----------
-    extra : dict
-        `Solution.extra`.
+    solution : Solution
     coarser : sequence of Solution
         Coarse runs; the shift of their peaks is part of the error.
 
@@ -230,12 +236,12 @@ def compute_peak_frequency(extra: dict, coarser=()) -> dict:
     dict
         `peak_frequency`, or {}.
     """
-    if "at_error" not in extra:
+    if np.isnan(solution.peak_error):
         return {}
-    if extra["at_error"] is None:
+    if np.isinf(solution.peak_error):
         return {"peak_frequency": Measure(None, "Hz", None, 0.0, reason=NO_PEAK_REASON)}
-    peak_frequency = float(extra["at"].omega / (2 * np.pi))
-    peaks = [run.extra["at"].omega / (2 * np.pi) for run in coarser if "at" in run.extra]
+    peak_frequency = float(solution.drive.omega / (2 * np.pi))
+    peaks = [run.drive.omega / (2 * np.pi) for run in coarser if run.drive is not None]
     shift = float(np.abs(np.array(peaks) - peak_frequency).max(initial=0.0))
-    error = extra["at_error"] + PEAK_SHIFT_FACTOR * shift
+    error = solution.peak_error + PEAK_SHIFT_FACTOR * shift
     return {"peak_frequency": Measure(peak_frequency, "Hz", error, 0.0)}

@@ -310,9 +310,15 @@ def _find_harmonic_obstacle(motion: MotionFeatures) -> str:
         )
     if feature := find_unsupported_feature(ENGINE_SUPPORT["harmonic"], motion):
         return describe_unsupported(f"'harmonic' {feature}", "march")
+    if motion.has_grooves:
+        # The steady motion over grooves is found by the map of a period from event to event.
+        feature = find_unsupported_feature(ENGINE_SUPPORT["hybrid"], motion)
+        return feature and describe_unsupported(
+            f"'harmonic' with {motion.spring} {feature}", "march"
+        )
     is_exact = not all(find_unsupported_feature(support, motion) for support in EXACT_SUPPORTS)
-    if not motion.joints or is_exact or motion.has_grooves:
-        return ""  # with grooves, the method integrates in time until the motion repeats
+    if not motion.joints or is_exact:
+        return ""
     return _find_harmonic_law_obstacle(motion)
 
 

@@ -332,7 +332,7 @@ COMBINATIONS = {
     ),
     "kinetic": ("kinetic below static, partial slip",),
     "{grooves_advice}": ("law for flat faces, grooves",),
-    "leave `harmonics` out: the motion is integrated until it repeats": (
+    "leave `harmonics` out: the steady motion is found without it": (
         "accuracy.harmonics, accuracy.method=harmonic, grooves",
     ),
     "leave `harmonics` out: the steady motion of all interfaces is found without it": (

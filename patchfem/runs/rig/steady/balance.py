@@ -23,6 +23,7 @@ from ....dynamics.integrated import EngineResult
 from ....formatting import format_length, format_quantity
 from ....response.errors import finer_errors
 from ....response.measures import compute_peak
+from ....response.rows import AMPLITUDE
 from ....response.spectrum import harmonic_measures, odd_harmonics
 from ..evaluation import RunEvaluator, compute_sampled_work, compute_work_check
 from ..interface import make_single_law
@@ -31,6 +32,7 @@ from .curves import (
     COLUMN_MEASURES,
     HARMONIC_ROUND_OFF,
     CurvePoint,
+    ObservedMotion,
     ResponseCurve,
     describe_instability,
 )
@@ -76,10 +78,6 @@ class BalanceEvaluator(RunEvaluator):
         values["friction_force_peak"] = float(np.abs(forces).max())
         values["slip_amplitude"] = float(np.ptp(slips)) / 2
         return IntegratedMeasures(values, reversals=(tuple(turn[:2] for turn in self.turns),))
-
-    def find_friction_loops(self, run, drive) -> tuple:
-        """Return an empty tuple, because the friction loop is computed from samples."""
-        return ()
 
     def collect_cycle_data(self, run, drive, *, stuck: bool) -> dict:
         """Return the friction loop of the cycle.
@@ -177,7 +175,7 @@ class BalanceFinder:
             "multipliers": stability.multipliers,
             "harmonics": motion.harmonics,
         }
-        amplitude = np.array([values["relative_displacement_amplitude"]])
+        amplitude = np.array([values[AMPLITUDE]])
         outcome = Outcome.STUCK if is_stuck else Outcome.STEADY
         message = ""
         if not stability.stable:
@@ -248,6 +246,29 @@ class BalanceFinder:
             )
         return StableMotion(motion, add_stability(motion, self.modes), (note,))
 
+    def observe(self, drive, guess=None, *, needs_histories: bool = True) -> ObservedMotion:
+        """Compute what sensors see of the steady motion under a drive, without errors.
+
+        Parameters
+        ----------
+        drive : SineDrive
+        guess : SteadyMotion, optional
+            Steady motion under a similar drive.
+        needs_histories : bool
+            Whether histories are requested; they are always returned.
+        """
+        motion = periodic_point(
+            self.modes, drive, self.group, self.harmonics, self.tolerance, start=guess
+        )
+        window = make_cycle_response(motion, self.modes, drive, SAMPLES_PER_CYCLE)
+        peak = compute_peak(window.acceleration)
+        return ObservedMotion(window, peak, motion.amplitude(self._measured_row), motion)
+
+    @property
+    def _measured_row(self) -> np.ndarray:
+        """Participation (n,) of the point whose displacement is measured."""
+        return self.modes.output if self.modes.gauge is None else self.modes.gauge
+
     def compute_curve_point(self, drive, guess=None) -> CurvePoint:
         """Compute one point of a response curve, without error estimates."""
         motion = periodic_point(
@@ -274,9 +295,8 @@ class BalanceFinder:
     def _compute_curve_measures(self, motion, drive) -> dict:
         """Return a dict of the measures of a point of a response curve."""
         response = make_cycle_response(motion, self.modes, drive, SAMPLES_PER_CYCLE)
-        row = self.modes.output if self.modes.gauge is None else self.modes.gauge
         values = {
-            COLUMN_MEASURES["amplitude"]: motion.amplitude(row),
+            COLUMN_MEASURES["amplitude"]: motion.amplitude(self._measured_row),
             COLUMN_MEASURES["acceleration_peak"]: compute_peak(response.acceleration),
             **harmonic_measures(*odd_harmonics(response, drive)),
         }

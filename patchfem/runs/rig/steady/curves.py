@@ -9,14 +9,15 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ....core import NotConverged, Outcome, SineDrive
+from ....core import NotConverged, Outcome, Response, SineDrive
 from ....dynamics.curve_points import sample_adaptively
 from ....response.levels import LEVEL_MEASURES, Level
+from ....response.rows import AMPLITUDE
 from ..solution import replace_output_by_gauge
 
 # Name of the measure in each column of a response curve.
 COLUMN_MEASURES = {
-    "amplitude": "relative_displacement_amplitude",
+    "amplitude": AMPLITUDE,
     "acceleration_peak": "absolute_acceleration_peak",
     "acceleration_fundamental": "absolute_acceleration_fundamental",
     "acceleration_distortion": "acceleration_distortion",
@@ -26,13 +27,6 @@ EXACT_RELATIVE_ERROR = 1e-9
 # Round-off of the third harmonic of the acceleration relative to the first one.
 HARMONIC_ROUND_OFF = 1e-12
 N_SWEEP_POINTS = 121  # Number of points of a response curve before its refinement.
-# Fraction of a peak at which its neighbourhood ends; outside it, no other peak may exceed this
-# fraction.
-PEAK_END_RATIO = 0.8
-# Largest ratio of the width of the neighbourhood to that of the sweep at which a narrow sweep is
-# used.
-MAX_PEAK_FRACTION = 0.75
-N_START_POINTS = 7  # Number of points of a narrow sweep before its refinement.
 # Largest relative error of linear interpolation between the points of a response curve.
 INTERPOLATION_TOL = 0.01
 
@@ -73,6 +67,24 @@ class CurvePoint(NamedTuple):
             errors,
             outcome=str(self.outcome),
         )
+
+
+class ObservedMotion(NamedTuple):
+    """Last cycles of a motion, with the quantities that its sensors measure.
+
+    - window: histories; None if they were not requested.
+    - acceleration: peak absolute acceleration [m s-2], as in the measures of a run.
+    - displacement: displacement amplitude [m], as in the measures of a run.
+    - initial_guess: initial guess for the motion under a similar drive, or None.
+    - fundamental: first harmonic of the absolute acceleration [m s-2]; None if it must be computed
+      from the window.
+    """
+
+    window: Response | None
+    acceleration: float
+    displacement: float
+    initial_guess: Any = None
+    fundamental: complex | None = None
 
 
 class ResponseCurve(NamedTuple):
@@ -201,51 +213,11 @@ def choose_start_frequencies(modes, drive) -> np.ndarray:
     ends = sorted((drive.low, drive.high))
     natural_frequencies = modes.omega / (2 * np.pi)
     frequencies = np.union1d(
-        space(*ends, drive.starts or N_SWEEP_POINTS),
+        space(*ends, N_SWEEP_POINTS),
         natural_frequencies[(natural_frequencies > ends[0]) & (natural_frequencies < ends[1])],
     )
     frequencies = frequencies[np.append(True, np.diff(frequencies) > 1e-9 * frequencies[1:])]
     return frequencies if drive.low < drive.high else frequencies[::-1]
-
-
-def sweep_around_peak(drive, curve: dict, peak_frequency: float):
-    """Return a narrow sweep around the largest peak of a response curve.
-
-    The neighbourhood of the peak ends where the curve falls to PEAK_END_RATIO of the peak. The
-    sweep is wider than this by a quarter of the width on each side.
-
-    Parameters
-    ----------
-    drive : SweepDrive
-    curve : dict
-        Columns from `tabulate_curve`.
-    peak_frequency : float
-        Frequency of the largest amplitude [Hz].
-
-    Returns
-    -------
-    SweepDrive or None
-        None if another peak is nearly as high, or if the neighbourhood covers most of the sweep.
-    """
-    order = np.argsort(curve["frequency"], kind="stable")
-    frequencies = curve["frequency"][order]
-    heights = np.nan_to_num(curve["amplitude"][order])
-    best = int(np.argmin(np.abs(frequencies - peak_frequency)))
-    low = heights < PEAK_END_RATIO * heights[best]
-    before = np.flatnonzero(low[:best])
-    after = np.flatnonzero(low[best:])
-    first = before[-1] if before.size else 0
-    last = best + after[0] if after.size else len(frequencies) - 1
-    outside = np.delete(heights, slice(first, last + 1))
-    if heights[best] <= 0 or outside.max(initial=0.0) > PEAK_END_RATIO * heights[best]:
-        return None
-    a = frequencies[first]
-    b = frequencies[last]
-    ends = np.clip([a - (b - a) / 4, b + (b - a) / 4], frequencies[0], frequencies[-1])
-    if not 0 < ends[1] - ends[0] < MAX_PEAK_FRACTION * (frequencies[-1] - frequencies[0]):
-        return None
-    low, high = ends if drive.low < drive.high else ends[::-1]
-    return replace(drive, low=float(low), high=float(high), starts=N_START_POINTS)
 
 
 def find_largest_point(points) -> int:
@@ -323,7 +295,8 @@ def solve_drive_levels(finder, drive):
     notes = tuple(f"{message}{one}" for one in failures[:1])
     return replace(
         best[0],
-        extra=best[0].extra | {"curve": tabulate_curve(points), "at": best[1]},
+        extra=best[0].extra | {"curve": tabulate_curve(points)},
+        drive=best[1],
         run_level=run_level,
         levels=tuple(point.drive_level for point in points),
         notes=(*best[0].notes, *notes),

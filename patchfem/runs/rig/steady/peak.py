@@ -16,10 +16,10 @@ import numpy as np
 
 from ....core import NotConverged
 from ....response.errors import absolute_change
+from ....response.rows import AMPLITUDE
 from ..solution import Solution, replace_output_by_gauge
-from .curves import COLUMN_MEASURES, ResponseCurve, find_largest_point, tabulate_curve
+from .curves import ResponseCurve, find_largest_point, tabulate_curve
 
-AMPLITUDE = COLUMN_MEASURES["amplitude"]
 MAX_ADDED_POINTS = 40  # Largest number of points that are added to refine a peak.
 # Smallest fraction of the peak at which a resonance curve is assumed concave; that of a single mode
 # is concave above 0.816.
@@ -208,14 +208,15 @@ def solve_peak(curve: ResponseCurve, finder) -> Solution:
     solution = finder.compute_steady_motion(peak_point.drive, peak_point.guess)[0]
     solution = replace(solution, notes=(*solution.notes, *curve.notes))
     errors = dict(solution.errors or {})
-    extra = {"curve": tabulate_curve(points, curve.folds), "at": peak_point.drive}
+    solution = replace(
+        solution,
+        extra=solution.extra | {"curve": tabulate_curve(points, curve.folds)},
+        drive=peak_point.drive,
+    )
     height = peak_point.values.get(AMPLITUDE, 0.0)
     y = _collect_amplitudes(points)
     if not height > 0 or AMPLITUDE not in solution.values:
-        # The error None indicates that the curve has no peak.
-        return replace(
-            solution, extra=solution.extra | extra | {"at_error": None if height == 0 else 0.0}
-        )
+        return replace(solution, peak_error=np.inf if height == 0 else 0.0)
     # The curve point was computed with fewer samples, which adds this error.
     missed = abs(replace_output_by_gauge(finder.model, solution).values[AMPLITUDE] - height)
     error = min(missed + errors.get(AMPLITUDE, 0.0), height)
@@ -245,11 +246,7 @@ def solve_peak(curve: ResponseCurve, finder) -> Solution:
             )
     position_errors[AMPLITUDE] = min(above, solution.values[AMPLITUDE]) + missed
     errors = {name: error + position_errors.get(name, 0.0) for name, error in errors.items()}
-    return replace(
-        solution,
-        errors=errors,
-        extra=solution.extra | extra | {"at_error": float(max_position_error)},
-    )
+    return replace(solution, errors=errors, peak_error=float(max_position_error))
 
 
 def _compute_neighbour_differences(finder, neighbour, solution: Solution) -> dict:

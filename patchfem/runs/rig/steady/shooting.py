@@ -24,6 +24,7 @@ from ..solution import Solution
 from .curves import (
     COLUMN_MEASURES,
     CurvePoint,
+    ObservedMotion,
     ResponseCurve,
     TracedCurve,
     compute_response_curve,
@@ -35,6 +36,7 @@ from .curves import (
 N_CYCLES_IN_GROOVES = 30
 RTOL = 1e-11  # tolerance of a step, so that the change over a period is far below the motion
 STEPS_ERROR = 100.0  # error of a periodic motion that is due to its steps, relative to RTOL
+SENSED_COLUMNS = ("amplitude", "acceleration_peak")  # columns of a curve that sensors measure
 N_CYCLES = 2.0  # computed cycles of a periodic motion, so that each stick is complete
 MIN_STOP = 1e-9  # shortest stop that is counted, in periods
 N_NEAR_CYCLES = 1  # cycles before the first correction of a motion that starts from a similar one
@@ -238,8 +240,8 @@ class ShootingFinder(TracedCurve):
         # The ratio of two harmonics has the error of the first.
         return errors | {"acceleration_distortion": errors["acceleration_distortion"] + relative}
 
-    def observe(self, drive, guess=None, *, needs_histories: bool = True) -> tuple | None:
-        """Return what sensors see of the periodic motion under a drive, without errors; None if it is unbounded.
+    def observe(self, drive, guess=None, *, needs_histories: bool = True) -> ObservedMotion | None:
+        """Compute what sensors see of the periodic motion under a drive, without errors; None if it is unbounded.
 
         Parameters
         ----------
@@ -247,14 +249,13 @@ class ShootingFinder(TracedCurve):
         guess : hybrid.records.State, optional
             State of a similar motion at phase 0 of the drive.
         needs_histories : bool
-            Whether the first value is needed.
-
-        Returns
-        -------
-        tuple
-            Histories of a cycle or None; peak of the absolute acceleration [m s-2]; displacement amplitude [m]; guess
-            for a similar drive; first harmonic of the acceleration (complex) [m s-2].
+            Whether the histories of a cycle are needed.
         """
+        if not (needs_histories or self.joints.laws):
+            point = self._compute_linear_point(drive)
+            if point is not None:
+                amplitude, peak = (point.values[COLUMN_MEASURES[name]] for name in SENSED_COLUMNS)
+                return ObservedMotion(None, peak, amplitude, fundamental=peak)
         motion = self.find_periodic_motion(drive, guess)
         if motion.grows or self._leave_grooves(drive) is not None:
             return None
@@ -263,10 +264,10 @@ class ShootingFinder(TracedCurve):
         if needs_histories:
             window = self.evaluator.integrate(drive, N_CYCLES, state, 0).window
         values = motion.batch.windows[0]
+        amplitude, peak = (float(values[COLUMN_MEASURES[name]][0]) for name in SENSED_COLUMNS)
         whole = motion.batch.records.whole[0, 0]
         fundamental = 2 / whole[Whole.SPAN] * complex(whole[Whole.COS_1], -whole[Whole.SIN_1])
-        peak = float(values["absolute_acceleration_peak"][0])
-        return window, peak, float(values[COLUMN_MEASURES["amplitude"]][0]), state, fundamental
+        return ObservedMotion(window, peak, amplitude, state, fundamental)
 
     def _compute_linear_point(self, drive) -> CurvePoint | None:
         """Return the point of a response curve of a linear rig in closed form, or None at an undamped resonance."""

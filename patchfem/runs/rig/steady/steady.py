@@ -2,8 +2,7 @@
 
 In: a Model, its Numerics and its Patch. Out: the Solution of the periodic motion with its regime,
 Floquet multipliers and stability. Coulomb interfaces, elastic-plastic elements and grooves are solved by shooting with
-the map of a period (`shooting`), laws with memory on grooves by marching (`periodic_march`), and other laws by harmonic
-balance (`balance`).
+the map of a period (`shooting`), and other laws by harmonic balance (`balance`).
 """
 
 from ....core import SineDrive
@@ -12,10 +11,9 @@ from ..solution import Solution
 from .balance import BalanceFinder
 from .curves import solve_drive_levels
 from .peak import solve_peak
-from .periodic_march import MarchFinder
 from .shooting import ShootingFinder
 
-FINDERS = {"shooting": ShootingFinder, "march": MarchFinder, "balance": BalanceFinder}
+FINDERS = {"shooting": ShootingFinder, "balance": BalanceFinder}
 
 
 def solve_steady_motion(
@@ -23,7 +21,7 @@ def solve_steady_motion(
 ) -> Solution:
     """Compute the steady motion under a sine, or the largest one over a sweep or drive levels.
 
-    The drive of the largest motion is extra["at"].
+    The drive of the largest motion is `Solution.drive`.
 
     Parameters
     ----------
