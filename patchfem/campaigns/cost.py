@@ -8,7 +8,6 @@ affected by other programs.
 """
 
 import os
-import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
@@ -36,8 +35,6 @@ TOLERANCE = "tolerance"
 N_TIMINGS = 3
 # Smallest CPU time [s] of a run that is timed only once; longer runs scatter by a few percent.
 MIN_SECONDS_TIMED_ONCE = 0.3
-# Advice at the end of a warning about a missed tolerance.
-_REMEDY_TEXT = re.compile(r"; the tolerance is [^;]*; (.*)", re.DOTALL)
 # Smallest ratio of elapsed to CPU time at which both times are reported.
 MIN_ELAPSED_TO_CPU_RATIO = 1.5
 EQUAL_COST_RATIO = 1.1  # Largest ratio of the CPU times of equally expensive runs.
@@ -79,7 +76,7 @@ class Cost:
     tolerance : float
         Tolerance of the run.
     remedies : tuple of str
-        Advice from the warnings of a run that misses its tolerance.
+        Advice for a run that misses its tolerance.
     steps : int or None
         Number of time steps per cycle; None if the method takes no time steps.
     nodes : int or None
@@ -198,13 +195,13 @@ def _describe_timing(cost: Cost) -> str:
 
 
 class _FinishedRun(NamedTuple):
-    """Measures, warnings, number of steps per cycle and number of interface nodes of a finished run.
+    """Measures, advice, number of steps per cycle and number of interface nodes of a finished run.
 
     The number of steps is None if the method takes no time steps, and that of nodes without a patch.
     """
 
     measures: dict[str, Measure]
-    warnings: Sequence[str]
+    remedies: tuple[str, ...]
     steps: int | None = None
     nodes: int | None = None
 
@@ -214,7 +211,6 @@ def _make_cost(
 ) -> Cost:
     """Return the cost of a setting from its pairs of CPU time and elapsed time [s]."""
     known = {name: one for name, one in finished.measures.items() if one.value is not None}
-    remedies = map(_REMEDY_TEXT.search, finished.warnings)
     seconds, wall_seconds = min(timings)
     return Cost(
         label=setting.label,
@@ -227,7 +223,7 @@ def _make_cost(
         errors={name: one.error for name, one in known.items() if one.error is not None},
         floors={name: measure.floor for name, measure in known.items()},
         tolerance=setting.model.accuracy.tolerance,
-        remedies=tuple(remedy[1] for remedy in remedies if remedy),
+        remedies=finished.remedies,
         steps=finished.steps,
         nodes=finished.nodes,
     )
@@ -258,7 +254,9 @@ def _run_setting(setting: Setting, label: str, say: Callable | None) -> _Finishe
         result = run_plan(plan(setting.model), fresh=True)
         steps = result.extra.get("steps_per_cycle") or result.extra.get("steps")
         nodes = None if result.patch is None else int(result.patch.x.size)
-        return _FinishedRun(result.measures, result.warnings, steps, nodes)
+        advice = [finding.advice for finding in result.findings]
+        remedies = tuple(one.text for one in advice if one is not None)
+        return _FinishedRun(result.measures, remedies, steps, nodes)
     except (NotConverged, MemoryError) as error:
         if say is not None:
             say(f"{label}: left out ({error or 'out of memory'})")

@@ -17,7 +17,7 @@ from ..model.model import Model, build
 from ..model.source import locate_errors
 from ..response import rows
 from ..structure import drive_sizes
-from . import joint, memory
+from . import joint
 from .bench import engine as of_bench
 from .patch import plan as patch_plan
 from .rig import engines
@@ -205,13 +205,12 @@ def _make_plan(model: Model) -> Plan:
         and rig.drive.cycles >= MIN_SKIPPED_CYCLES
     ):
         law_sentences.append(SKIPPING_NOTE)
-    refusal = memory.reason_for_refusal(sizes.parts)
-    memory_sentence = memory.describe_largest_part(sizes.parts)
-    if refusal:
-        memory_sentence = f"`run` will refuse this scene: {refusal}"
-    sentences = _arrange_sentences(
-        model, groups, memory_sentence, (motion_sentences, patch_sentences, law_sentences)
-    )
+    sentences = [
+        *motion_sentences,
+        *patch_sentences,
+        *law_sentences,
+        *_describe_shear(model, groups),
+    ]
     return Plan(
         model,
         model.kind,
@@ -260,17 +259,9 @@ def _describe_wear(model: Model) -> str:
     return f"wear: {model.wear.cycles:.6g} cycles in {jumps}; {repetition}"
 
 
-def _arrange_sentences(
-    model: Model, groups: dict, memory_sentence: str, sentence_groups: tuple
-) -> list:
-    """Return the sentences of a plan in their final order, with those on memory and shear.
-
-    sentence_groups: sentences on the motion, on the patch, and on the friction law.
-    """
-    sentences = list(sentence_groups[0])
-    if memory_sentence:
-        sentences.append(memory_sentence)
-    sentences += [*sentence_groups[1], *sentence_groups[2]]
+def _describe_shear(model: Model, groups: dict) -> list:
+    """Describe in sentences how the pieces of [contact] shear."""
+    sentences = []
     if "slip_length" in groups:
         shear_phrase = (
             f"by {format_length(groups['slip_length'], 3)} or more before the whole patch slips"

@@ -47,7 +47,7 @@ def plan_text(text, *sets):
 )
 def test_refuses_large_run_before_allocation_with_key(text, sets, key, monkeypatch):
     """A run that needs more memory than is free is refused with the key to change, before large arrays are allocated."""
-    monkeypatch.setattr(memory, "free_bytes", lambda **_: GIGABYTE)
+    monkeypatch.setattr(memory, "free_bytes", lambda: GIGABYTE)
     tracemalloc.start()
     run_plan = plan_text(text, *sets)
     reason = memory.reason_for_refusal(run_plan.sizes.parts)

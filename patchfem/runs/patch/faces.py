@@ -1,11 +1,11 @@
-"""Patches of the interfaces of a rig, each replaced by parallel elements in the motion.
+"""Pressed interfaces of a run: the patch of [contact], or those of the interfaces of a rig.
 
 In: a model whose interfaces have patches. Out: `Face`s with solved patches on two or more meshes,
-their Jenkins elements for the motion, static measures, warnings and fields.
+their Jenkins elements for the motion, static measures, findings and fields.
 """
 
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -16,20 +16,28 @@ from ...friction import record
 from ...model.source import locate_errors
 from ...response import rows
 from ...slip import fields as slip_fields
-from ..results.result import SlipRule, collect_rest_frame, make_interface_frames, patch_surface
+from ..results.result import (
+    Finding,
+    SlipRule,
+    collect_rest_frame,
+    make_interface_frames,
+    patch_surface,
+)
 from . import jenkins_elements, result, store
 from .press import Patch
 from .values import compute_static_values
 
 
 class Face(NamedTuple):
-    """Solved patch of one interface of a rig, on several meshes.
+    """Pressed interface of a run, on several meshes.
 
     - number: index of the interface.
-    - name: nodes of the interface as the scene writes them, "1-0".
-    - model: model of the rig whose patch and friction law are those of this interface.
+    - name: nodes of the interface as the scene writes them, "1-0"; "" for the table [contact].
+    - model: model of the run whose patch and friction law are those of this interface.
     - patches: the solved Patch and those on coarser meshes; None for a missing one.
     - fields: frames of the interface by name (see `Result`); None before its run.
+    - static: the patch on the meshes of its static measures, from fine to coarse; () if these are the same meshes.
+    - unworn: the patch before wear, from fine to coarse; () without wear.
     """
 
     number: int
@@ -37,6 +45,8 @@ class Face(NamedTuple):
     model: object
     patches: tuple
     fields: dict | None = None
+    static: tuple = ()
+    unworn: tuple = ()
 
     @property
     def patch(self) -> Patch:
@@ -61,7 +71,7 @@ class Face(NamedTuple):
     def slide(self, response) -> np.ndarray:
         """Return the relative displacement (k,) [m] of the interface in a Response."""
         slides = response.extra.get("slides")
-        return response.slide if slides is None else slides[:, self.number]
+        return slides[:, self.number] if self.name and slides is not None else response.slide
 
 
 def solve_interface_patches(model) -> Iterator[Face]:
@@ -138,26 +148,27 @@ def group_interfaces_with_coarse_mesh(model) -> list:
     return [tuple(numbers) for numbers in out.values()]
 
 
-def solve_faces_with_slip_fields(model, snapshots) -> tuple:
-    """Return all interfaces that have a patch, with frames of their slip and shear stress.
+def add_slip_fields(model, faces: tuple, snapshots) -> tuple:
+    """Return interfaces of a rig with frames of their slip and shear stress.
 
     Without elements or snapshots, an interface has only the fields of its static contact.
 
     Parameters
     ----------
     model : Model
+    faces : tuple of Face
     snapshots : list
         States of the event-driven engine: time [s], and for each interface its slide [m] and the
         stretch (t,) [m] of its elements.
     """
     out = []
-    for face in solve_interface_patches(model):
+    for face in faces:
         law = model.rig.friction.interfaces[face.number]
         fields = collect_rest_frame(face.patch)
-        jenkins_set = (
-            make_patch_elements(law, model.accuracy.tolerance)[2] if face.partial_slip else None
-        )
-        if jenkins_set is not None and snapshots:
+        jenkins_set = None
+        if face.partial_slip and snapshots:
+            jenkins_set = make_patch_elements(law, model.accuracy.tolerance)[2]
+        if jenkins_set is not None:
             states = [snapshot["faces"][face.number] for snapshot in snapshots]
             length = record.make_law(law.numbers, law.load).element(law.load).length
             tau, local = slip_fields.element_fields(face.patch, jenkins_set, states, length)
@@ -181,71 +192,63 @@ def has_error_meshes(model) -> bool:
 
 def static_measures_without_errors(model) -> dict:
     """Return the static measures of all patches of a model by name, without error estimates."""
-    if model.patch is not None:
-        return result.static_measures_without_errors(model)
     values = {}
     with locate_errors(model.source):
+        if model.patch is not None:
+            patches = result.solve_with_coarser(model.patch, model.accuracy.tolerance, False)
+            return compute_static_values(patches[0])
         for face in solve_interface_patches(model):
             for name, value in compute_static_values(face.patch).items():
                 values[rows.add_interface_number(name, face.number)] = value
     return values
 
 
-def static_measures(model) -> dict:
-    """Return the static measures of all patches of a model by name, with error estimates.
+def static_measures(faces: Iterable[Face]) -> dict:
+    """Return the static measures of interfaces by name, with error estimates.
 
     From the second interface on, the name ends with the number of the interface.
     """
     measures = {}
-    for face in solve_interface_patches(model):
-        face_measures = result.static_measures(face.model, face.patch, face.patches[1:])
-        for name, measure in face_measures.items():
+    for face in faces:
+        patch, *coarse = face.static or face.patches
+        for name, measure in result.static_measures(face.model, patch, tuple(coarse)).items():
             measures[rows.add_interface_number(name, face.number)] = measure
     return measures
 
 
-def collect_warnings(model) -> list:
-    """Return warnings on large strains and missing error estimates of the patches of a model."""
-    return merge_interface_sentences(
-        model,
-        lambda face: [
-            *result.patch_warnings(face.model.patch, face.patch),
-            *([NO_ERROR_ESTIMATE] if face.patches[1] is None else []),
-        ],
-    )
+def merge_sentences(model, faces: Iterable[Face], list_sentences: Callable) -> list[str]:
+    """Merge sentences on interfaces as `merge_findings` does; `list_sentences` returns those on a Face."""
+    findings = merge_findings(model, faces, lambda face: map(Finding, list_sentences(face)))
+    return [finding.words for finding in findings]
 
 
-NO_ERROR_ESTIMATE = "the interface has too few elements for an estimate of the error; leave out contact.element_size"
-
-
-def collect_notes(model) -> list:
-    """Return notes on effects that the static model of the patches neglects."""
-    return merge_interface_sentences(
-        model,
-        lambda face: result.notes_on_neglected_effects(face.model, face.patch, face.patches[1:]),
-    )
-
-
-def merge_interface_sentences(model, list_sentences: Callable) -> list:
-    """Merge sentences that are equal for several interfaces, and name these interfaces.
+def merge_findings(model, faces: Iterable[Face], list_findings: Callable) -> list[Finding]:
+    """Merge findings that are equal for several interfaces, and name these interfaces.
 
     Scene keys are written as they occur in the scene.
 
     Parameters
     ----------
     model : Model
-    list_sentences : callable
-        Function that returns the sentences on a Face.
+    faces : iterable of Face
+    list_findings : callable
+        Function that returns the findings on a Face.
     """
-    names_by_text: dict = {}
-    for face in solve_interface_patches(model):
-        for text in list_sentences(face):
-            names_by_text.setdefault(replace_contact_keys(model, text), []).append(face.name)
-    sentences = []
-    for text, names in names_by_text.items():
-        plural = "s" * (len(names) > 1)
-        sentences.append(f"interface{plural} {', '.join(names)}: {text}")
-    return sentences
+    names_by_finding: dict[Finding, list[str]] = {}
+    for face in faces:
+        for finding in list_findings(face):
+            words, advice = finding
+            if advice is not None:
+                text = replace_contact_keys(model, advice.text)
+                advice = advice._replace(text=text, key=replace_contact_keys(model, advice.key))
+            merged = Finding(replace_contact_keys(model, words), advice)
+            names_by_finding.setdefault(merged, []).append(face.name)
+    findings = []
+    for finding, names in names_by_finding.items():
+        # The table [contact] has no name.
+        place = f"interface{'s' * (len(names) > 1)} {', '.join(names)}: " if names[0] else ""
+        findings.append(finding._replace(words=place + finding.words))
+    return findings
 
 
 def replace_contact_keys(model, text: str) -> str:
