@@ -15,10 +15,10 @@ from ..effects import law_has_trait
 from ..formatting import format_number
 from ..model.gap import longest_loaded_cell
 from ..model.model import Model
-from ..response import rows
 from . import refine
-from .patch import faces, mesh_levels
+from .patch import mesh_levels
 from .results import notes, patch_rows
+from .results.interfaces import Face, merge_findings
 from .results.result import Advice, Finding
 from .rig import costs, engines
 
@@ -124,12 +124,12 @@ def find_missed_measures(run: Missed) -> list[Finding]:
         if ratio > 1 and not is_warned_of:
             excess[name] = ratio
 
-    def find_on_face(face: faces.Face) -> list[Finding]:
+    def find_on_face(face: Face) -> list[Finding]:
         """Return the findings on one interface, whose measures have no number there."""
         own = {}
         missed = {}
         for name in patch_rows.TABLE:
-            numbered = rows.add_interface_number(name, face.number)
+            numbered = face.name_measure(name)
             own[name] = run.measures.get(numbered)
             if numbered in excess:
                 missed[name] = excess.pop(numbered)
@@ -137,7 +137,7 @@ def find_missed_measures(run: Missed) -> list[Finding]:
         on_face = run._replace(model=face.model, measures=own, faces=(face,), excess=missed)
         return _find_static(on_face) if missed else []
 
-    findings = faces.merge_findings(run.model, run.faces, find_on_face)
+    findings = merge_findings(run.model, run.faces, find_on_face)
     if excess:
         motion = run._replace(excess=excess)
         findings.append(motion.make_finding(_advise_on_motion(motion)))
@@ -166,7 +166,7 @@ def _find_static(missed: Missed) -> list[Finding]:
     return findings
 
 
-def _advise_on_statics(missed: Missed, face: faces.Face) -> Advice:
+def _advise_on_statics(missed: Missed, face: Face) -> Advice:
     """Return the advice for inaccurate static measures: more strips or a finer mesh."""
     patch_model = face.model.patch
     strips = patch_model.interface.strips

@@ -74,16 +74,15 @@ def solve_without_joint(model: Model) -> FreeRig:
     return remove_joint(model, solve_patch(model))
 
 
-def solve_patch(model: Model, *, estimate: bool = True) -> tuple:
+def solve_patch(model: Model) -> tuple:
     """Return the patch of a model on its meshes, from fine to coarse.
 
     The patch of a bolted joint is solved once for the plan, the run and all cases of a study.
     """
-    tolerance = model.accuracy.tolerance
+    solve = partial(patch_result.solve_with_coarser, model.patch, model.accuracy.tolerance)
     if not model.has_bolted_patch:
-        return patch_result.solve_with_coarser(model.patch, tolerance, estimate)
-    solve = partial(patch_result.solve_with_coarser, model.patch, tolerance)
-    return store.get_or_compute(("bolted patch", model.patch, tolerance), solve)
+        return solve()
+    return store.get_or_compute(("bolted patch", model.patch, model.accuracy.tolerance), solve)
 
 
 def remove_joint(model: Model, patches: Sequence) -> FreeRig:

@@ -25,6 +25,7 @@ from .findings import Missed, find_missed_measures
 from .patch import faces, store, strength
 from .patch import result as patch_result
 from .plan import Plan, plan
+from .results.interfaces import Face, merge_sentences
 from .results.patch_rows import find_unknown_measures
 from .results.result import Result, RunInputs, describe_measure, shorten_file_names
 from .rig import engines, rig
@@ -130,7 +131,7 @@ class FinishedPass(NamedTuple):
     result: Result
     notes: list
     start: float
-    pressed: tuple[faces.Face, ...]
+    pressed: tuple[Face, ...]
 
 
 def _run_pass(
@@ -160,10 +161,9 @@ def _run_pass(
         contact = contact._replace(model=model, patches=tuple(patches))
         pressed = (contact,)
         run_plan = replace(run_plan, model=model)
-    warnings += faces.merge_sentences(
-        model, pressed, partial(_warn_of_pressed_patch, estimate=estimate)
-    )
-    notes += faces.merge_sentences(model, pressed, patch_result.notes_on_neglected_effects)
+    warnings += merge_sentences(model, pressed, partial(_warn_of_pressed_patch, estimate=estimate))
+    if pressed:
+        notes += merge_sentences(model, pressed, patch_result.notes_on_neglected_effects)
     notes += model.describe_removed_joint()
     patch, *coarse = (None, None, None) if contact is None else contact.patches
     inputs = RunInputs(
@@ -201,7 +201,7 @@ def _run_pass(
                 )
             raise
         if pressed and model.kind != "patch":
-            static = faces.static_measures(pressed)
+            static = _collect_static_measures(pressed)
             motion = {name: m for name, m in result.measures.items() if name not in static}
             result = replace(result, measures=static | motion)
         if model.has_interface_patches:
@@ -214,16 +214,28 @@ def _run_pass(
     return FinishedPass(mark_unbalanced(result), notes, start, pressed)
 
 
-def _press_interfaces(model: Model, *, estimate: bool) -> tuple[faces.Face, ...]:
+def _press_interfaces(model: Model, *, estimate: bool) -> tuple[Face, ...]:
     """Press all interfaces of a model that have a patch, on the meshes of the run and of its error estimate."""
     if model.patch is None:
-        return tuple(faces.solve_interface_patches(model))
-    patches = joint.solve_patch(model, estimate=estimate)
+        return tuple(faces.solve_interface_patches(model)) if model.has_interface_patches else ()
+    if model.has_bolted_patch:
+        return (Face(0, "", model, joint.solve_patch(model)),)
+    tolerance = model.accuracy.tolerance
+    patches = patch_result.solve_with_coarser(model.patch, tolerance, estimate)
     static = ()
     if model.kind == "bench" and not _is_open(patches[0]):
-        tolerance = model.accuracy.tolerance
         static = patch_result.solve_on_static_meshes(model.patch, tolerance, estimate)
-    return (faces.Face(0, "", model, patches, static=static),)
+    return (Face(0, "", model, patches, static=static),)
+
+
+def _collect_static_measures(pressed: tuple[Face, ...]) -> dict:
+    """Return the static measures of interfaces by name, with error estimates."""
+    measures = {}
+    for face in pressed:
+        patch, *coarse = face.static or face.patches
+        for name, measure in patch_result.static_measures(face.model, patch, tuple(coarse)).items():
+            measures[face.name_measure(name)] = measure
+    return measures
 
 
 def _is_open(patch) -> bool:
@@ -231,7 +243,7 @@ def _is_open(patch) -> bool:
     return patch is not None and patch.pressure.outcome is Outcome.NO_CONTACT
 
 
-def _warn_of_pressed_patch(face: faces.Face, *, estimate: bool) -> list:
+def _warn_of_pressed_patch(face: Face, *, estimate: bool) -> list:
     """Return warnings on large strains, and on a mesh too coarse for an error estimate."""
     has_error_mesh = not estimate or face.patches[1] is not None
     return patch_result.patch_warnings(face.model.patch, face.patch, has_error_mesh=has_error_mesh)

@@ -1,13 +1,11 @@
-"""Pressed interfaces of a run: the patch of [contact], or those of the interfaces of a rig.
+"""Patches of the interfaces of a rig, each replaced by parallel elements in the motion.
 
 In: a model whose interfaces have patches. Out: `Face`s with solved patches on two or more meshes,
-their Jenkins elements for the motion, static measures, findings and fields.
+their Jenkins elements for the motion, and fields.
 """
 
-import re
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
-from typing import NamedTuple
 
 import numpy as np
 
@@ -16,62 +14,10 @@ from ...friction import record
 from ...model.source import locate_errors
 from ...response import rows
 from ...slip import fields as slip_fields
-from ..results.result import (
-    Finding,
-    SlipRule,
-    collect_rest_frame,
-    make_interface_frames,
-    patch_surface,
-)
+from ..results.interfaces import Face
+from ..results.result import SlipRule, collect_rest_frame, make_interface_frames
 from . import jenkins_elements, result, store
-from .press import Patch
 from .values import compute_static_values
-
-
-class Face(NamedTuple):
-    """Pressed interface of a run, on several meshes.
-
-    - number: index of the interface.
-    - name: nodes of the interface as the scene writes them, "1-0"; "" for the table [contact].
-    - model: model of the run whose patch and friction law are those of this interface.
-    - patches: the solved Patch and those on coarser meshes; None for a missing one.
-    - fields: frames of the interface by name (see `Result`); None before its run.
-    - static: the patch on the meshes of its static measures, from fine to coarse; () if these are the same meshes.
-    - unworn: the patch before wear, from fine to coarse; () without wear.
-    """
-
-    number: int
-    name: str
-    model: object
-    patches: tuple
-    fields: dict | None = None
-    static: tuple = ()
-    unworn: tuple = ()
-
-    @property
-    def patch(self) -> Patch:
-        """Patch of the interface, solved on the finest mesh."""
-        return self.patches[0]
-
-    @property
-    def surface(self):
-        """Points at which the fields of the interface are given (`press.Surface`)."""
-        return patch_surface(self.patch, self.fields or {})
-
-    @property
-    def folder(self) -> str:
-        """Name of the subfolder of the interface in the output of a run."""
-        return self.name.replace(" (", "_").removesuffix(")")
-
-    @property
-    def partial_slip(self) -> str:
-        """Scene key that enables partial slip of the patch; "" if the patch slips as a whole."""
-        return self.model.patch.interface.partial_slip
-
-    def slide(self, response) -> np.ndarray:
-        """Return the relative displacement (k,) [m] of the interface in a Response."""
-        slides = response.extra.get("slides")
-        return slides[:, self.number] if self.name and slides is not None else response.slide
 
 
 def solve_interface_patches(model) -> Iterator[Face]:
@@ -201,61 +147,3 @@ def static_measures_without_errors(model) -> dict:
             for name, value in compute_static_values(face.patch).items():
                 values[rows.add_interface_number(name, face.number)] = value
     return values
-
-
-def static_measures(faces: Iterable[Face]) -> dict:
-    """Return the static measures of interfaces by name, with error estimates.
-
-    From the second interface on, the name ends with the number of the interface.
-    """
-    measures = {}
-    for face in faces:
-        patch, *coarse = face.static or face.patches
-        for name, measure in result.static_measures(face.model, patch, tuple(coarse)).items():
-            measures[rows.add_interface_number(name, face.number)] = measure
-    return measures
-
-
-def merge_sentences(model, faces: Iterable[Face], list_sentences: Callable) -> list[str]:
-    """Merge sentences on interfaces as `merge_findings` does; `list_sentences` returns those on a Face."""
-    findings = merge_findings(model, faces, lambda face: map(Finding, list_sentences(face)))
-    return [finding.words for finding in findings]
-
-
-def merge_findings(model, faces: Iterable[Face], list_findings: Callable) -> list[Finding]:
-    """Merge findings that are equal for several interfaces, and name these interfaces.
-
-    Scene keys are written as they occur in the scene.
-
-    Parameters
-    ----------
-    model : Model
-    faces : iterable of Face
-    list_findings : callable
-        Function that returns the findings on a Face.
-    """
-    names_by_finding: dict[Finding, list[str]] = {}
-    for face in faces:
-        for finding in list_findings(face):
-            words, advice = finding
-            if advice is not None:
-                text = replace_contact_keys(model, advice.text)
-                advice = advice._replace(text=text, key=replace_contact_keys(model, advice.key))
-            merged = Finding(replace_contact_keys(model, words), advice)
-            names_by_finding.setdefault(merged, []).append(face.name)
-    findings = []
-    for finding, names in names_by_finding.items():
-        # The table [contact] has no name.
-        place = f"interface{'s' * (len(names) > 1)} {', '.join(names)}: " if names[0] else ""
-        findings.append(finding._replace(words=place + finding.words))
-    return findings
-
-
-def replace_contact_keys(model, text: str) -> str:
-    """Replace keys of [contact] in a sentence by those of the interface in the scene.
-
-    In a model without [contact], they are keys of [structure.interface.contact].
-    """
-    if model.patch is not None:
-        return text
-    return re.sub(r"(?<![\w.])contact\.(?=[a-z])", "structure.interface.contact.", text)

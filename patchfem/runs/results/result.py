@@ -77,7 +77,7 @@ class RunInputs:
     - estimate: whether to estimate the errors from coarser runs.
     - stiffer: rig and patch with a stiffer joint (`joint.FreeRig`), if a joint was subtracted from the
       modes; else None.
-    - faces: pressed interfaces (`faces.Face`); a worn patch of [contact] is not the one among them.
+    - faces: pressed interfaces (`interfaces.Face`); a worn patch of [contact] is not the one among them.
     """
 
     plan: object
@@ -106,7 +106,7 @@ class Result:
     - warnings: sentences.
     - extra: engine, steps, notes and other data for the report.
     - findings: `Finding`s on measures that miss the tolerance; `warnings` has their sentences.
-    - faces: interfaces of a rig that have a patch of their own (`faces.Face`), with their fields.
+    - faces: interfaces of a rig that have a patch of their own (`interfaces.Face`), with their fields.
     - yielding_faces: notes on surfaces that yield under the peak pressure, by Strength.
     """
 

@@ -10,7 +10,7 @@ from ...effects import law_has_trait
 from ...formatting import format_length, format_number, format_quantity
 from ...response.outcome import note_on_changing_drive, warn_if_ringing
 from ...structure.drive_sizes import find_min_decay_rate
-from ..patch import faces
+from ..results.interfaces import merge_sentences
 from ..results.notes import (
     note_on_groove_slope,
     note_on_growth,
@@ -84,7 +84,7 @@ def collect_warnings(run) -> list:
         )
     if solution.message and solution.outcome is not Outcome.LEAVES_GROOVES:
         warnings.append(solution.message)
-    warnings += faces.merge_sentences(
+    warnings += merge_sentences(
         model,
         run.inputs.faces,
         lambda face: _warn_of_interface_patch(face, solution.response),
