@@ -90,41 +90,30 @@ def free_in_control_group(
     except OSError:
         return float("inf")
     free = float("inf")
-    for _, kinds, path in (line for line in lines if len(line) == 3):
-        is_version_1 = "memory" in kinds.split(",")
-        if not is_version_1 and kinds:
-            continue
-        base = root
-        names = ("memory.max", "memory.current")
-        if is_version_1:
-            base = root / "memory"
-            names = ("memory.limit_in_bytes", "memory.usage_in_bytes")
-        group_folder = base / path.strip("/")
+    # The only hierarchy of version 2 has the number 0 and no names of controllers.
+    for path in (line[2] for line in lines if line[:2] == ["0", ""]):
+        group_folder = root / path.strip("/")
         for folder in (group_folder, *group_folder.parents):
-            free = min(free, _remaining_bytes(folder, *names) + used)
-            if folder == base:
+            free = min(free, _remaining_bytes(folder) + used)
+            if folder == root:
                 break
     return free
 
 
-def _remaining_bytes(folder: Path, limit: str, usage: str) -> float:
+def _remaining_bytes(folder: Path) -> float:
     """Return the memory [bytes] that a control group still allows; inf if unlimited.
 
     Inactive cached files count as free memory.
     """
     try:
-        max_bytes = int((folder / limit).read_text("ascii"))
-        used_bytes = int((folder / usage).read_text("ascii"))
+        max_bytes = int((folder / "memory.max").read_text("ascii"))
+        used_bytes = int((folder / "memory.current").read_text("ascii"))
         lines = (folder / "memory.stat").read_text("ascii").splitlines()
-        known = dict(line.split() for line in lines)
     # The limit is "max", which means unlimited, or a file is missing.
     except (OSError, ValueError):
         return float("inf")
-    return float(
-        max_bytes
-        - used_bytes
-        + int(known.get("total_inactive_file", known.get("inactive_file", 0)))
-    )
+    inactive = dict(line.split() for line in lines).get("inactive_file", 0)
+    return float(max_bytes - used_bytes + int(inactive))
 
 
 def reason_for_refusal(parts: tuple) -> str:

@@ -22,7 +22,7 @@ from . import joint, memory, refine
 from .balances import mark_unbalanced
 from .bench import result as bench_result
 from .findings import Missed, find_missed_measures
-from .patch import faces, store, strength
+from .patch import faces, mesh_levels, store, strength
 from .patch import result as patch_result
 from .plan import Plan, plan
 from .results.interfaces import Face, merge_sentences
@@ -221,10 +221,10 @@ def _press_interfaces(model: Model, *, estimate: bool) -> tuple[Face, ...]:
     if model.has_bolted_patch:
         return (Face(0, "", model, joint.solve_patch(model)),)
     tolerance = model.accuracy.tolerance
-    patches = patch_result.solve_with_coarser(model.patch, tolerance, estimate)
+    patches = mesh_levels.solve_with_coarser(model.patch, tolerance, estimate)
     static = ()
     if model.kind == "bench" and not _is_open(patches[0]):
-        static = patch_result.solve_on_static_meshes(model.patch, tolerance, estimate)
+        static = mesh_levels.solve_on_static_meshes(model.patch, tolerance, estimate)
     return (Face(0, "", model, patches, static=static),)
 
 

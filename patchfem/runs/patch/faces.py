@@ -16,7 +16,7 @@ from ...response import rows
 from ...slip import fields as slip_fields
 from ..results.interfaces import Face
 from ..results.result import SlipRule, collect_rest_frame, make_interface_frames
-from . import jenkins_elements, result, store
+from . import jenkins_elements, mesh_levels, store
 from .values import compute_static_values
 
 
@@ -49,7 +49,9 @@ def solve_contact_on_meshes(interface, tolerance: float) -> tuple:
     files = patch_model.mesh.file is not None or patch_model.gap.profile is not None
     key = ("face", patch_model if files else store.content_key(patch_model), tolerance)
     try:
-        return store.get_or_compute(key, lambda: result.solve_with_coarser(patch_model, tolerance))
+        return store.get_or_compute(
+            key, lambda: mesh_levels.solve_with_coarser(patch_model, tolerance)
+        )
     except PatchfemError as error:
         error.key = error.key and f"{interface.key}.{error.key}"
         raise
@@ -141,7 +143,7 @@ def static_measures_without_errors(model) -> dict:
     values = {}
     with locate_errors(model.source):
         if model.patch is not None:
-            patches = result.solve_with_coarser(model.patch, model.accuracy.tolerance, False)
+            patches = mesh_levels.solve_with_coarser(model.patch, model.accuracy.tolerance, False)
             return compute_static_values(patches[0])
         for face in solve_interface_patches(model):
             for name, value in compute_static_values(face.patch).items():

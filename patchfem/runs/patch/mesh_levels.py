@@ -252,7 +252,15 @@ def solve_on_static_meshes(patch_model, tolerance: float, estimate: bool = True)
 
 
 def resolves_slip_work(patch_model, patches, tolerance: float) -> bool:
-    """Return whether the meshes of a patch resolve the friction work of a prescribed displacement."""
+    """Return whether the meshes of a patch resolve the friction work of a prescribed displacement.
+
+    Parameters
+    ----------
+    patch_model : PatchModel
+    patches : sequence of Patch or None
+        From fine to coarse; None for a missing mesh.
+    tolerance : float
+    """
     slip = patch_model.mesh.slip
     if slip is None:
         return True

@@ -18,7 +18,7 @@ from ...surface import nodes
 from ..results.result import Result, RunInputs, collect_rest_frame
 from . import skin, store
 from .measures import add_strip_count_errors, note_on_plane_state
-from .mesh_levels import solve_on_static_meshes, solve_with_coarser
+from .mesh_levels import solve_with_coarser
 from .values import contact_reaches_steep_end
 
 # Largest Poisson's ratio at which the error estimates are reliable despite volumetric locking.
@@ -26,15 +26,6 @@ MAX_POISSON = 0.499
 # Largest strain at which second-order effects may be neglected.
 MAX_SMALL_STRAIN = 0.02
 
-__all__ = [
-    "make_piece_meshes_of_run",
-    "make_static_result",
-    "notes_on_neglected_effects",
-    "patch_warnings",
-    "solve_on_static_meshes",
-    "solve_with_coarser",
-    "static_measures",
-]
 # Smallest ratio of normal to tangential displacement under a shear force that a note reports.
 MIN_COUPLING_RATIO = 0.02
 # Smallest ratio of load to buckling load that a note reports; it is about the relative error of the
@@ -113,7 +104,15 @@ def make_static_result(inputs: RunInputs) -> Result:
 
 
 def patch_warnings(patch_model, patch, *, has_error_mesh: bool = True) -> list:
-    """Return warnings on large strains, locking elements, the gap, the ends of the pieces and a missing coarser mesh."""
+    """Return warnings on large strains, locking elements, the gap, the ends of the pieces and a missing coarser mesh.
+
+    Parameters
+    ----------
+    patch_model : PatchModel
+    patch : Patch
+    has_error_mesh : bool
+        Whether the patch is solved on another mesh too, from which its errors follow.
+    """
     materials = []
     for piece in patch_model.pieces.both:
         materials += [piece.substrate, *([piece.coating.material] if piece.coating else [])]

@@ -64,7 +64,15 @@ class Face(NamedTuple):
 
 
 def merge_sentences(model, faces: Iterable[Face], list_sentences: Callable) -> list[str]:
-    """Merge sentences on interfaces as `merge_findings` does; `list_sentences` returns those on a Face."""
+    """Merge sentences that are equal for several interfaces, and name these interfaces.
+
+    Parameters
+    ----------
+    model : Model
+    faces : iterable of Face
+    list_sentences : callable
+        Function that returns the sentences on a Face.
+    """
     findings = merge_findings(model, faces, lambda face: map(Finding, list_sentences(face)))
     return [finding.words for finding in findings]
 

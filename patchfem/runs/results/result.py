@@ -44,7 +44,15 @@ class Advice(NamedTuple):
 
     @classmethod
     def set_key(cls, key: str, value: float, more: str = "") -> "Advice":
-        """Return the advice to set a key to a number, with a clause that follows."""
+        """Return the advice to set a key to a number.
+
+        Parameters
+        ----------
+        key : str
+        value : float
+        more : str
+            Words that follow the value.
+        """
         return cls(f"set {key} = {value}{more}", key, value)
 
 

@@ -104,6 +104,17 @@ def list_repeated_axes(
 
     A static patch is refined when it is pressed, wear has its own passes, and the steps of a rig are refined within a
     pass.
+
+    Parameters
+    ----------
+    kind : str
+        Kind of the run.
+    has_wear : bool
+        Whether the scene has [wear].
+    has_automatic_mesh : bool
+        Whether the mesh of a patch follows from the tolerance.
+    has_fixed_steps : bool
+        Whether the scene fixes the steps per cycle.
     """
     if kind == "patch" or has_wear:
         return ()
