@@ -9,7 +9,6 @@ from math import inf
 
 from ..core import PatchfemError
 from ..effects import EFFECTS, law_has_trait
-from ..formatting import format_length
 from ..friction import record
 from ..friction.bonds import spread
 from ..inputs import measured
@@ -186,8 +185,10 @@ def _make_plan(model: Model) -> Plan:
             for name, link in patch_plan.stiffness_chain(interface.patch).items():
                 if link != "rigid":
                     chain[rows.add_interface_number(name, number)] = link
-            patch_sentences += patch_plan.describe_interface_patch(
-                rig.friction.names[number], interface
+            slip_force = interface.numbers.static * interface.load
+            slip_length = slip_force / interface.patch.pieces.shear_stiffness
+            patch_sentences.append(
+                patch_plan.describe_shear(interface.patch, slip_length, rig.friction.names[number])
             )
     sizes = _count_sizes(model)
     law_sentences += sizes.sentences
@@ -205,12 +206,14 @@ def _make_plan(model: Model) -> Plan:
         and rig.drive.cycles >= MIN_SKIPPED_CYCLES
     ):
         law_sentences.append(SKIPPING_NOTE)
-    sentences = [
-        *motion_sentences,
-        *patch_sentences,
-        *law_sentences,
-        *_describe_shear(model, groups),
-    ]
+    sentences = [*motion_sentences, *patch_sentences, *law_sentences]
+    if "slip_length" in groups:
+        sentences.append(patch_plan.describe_shear(model.patch, groups["slip_length"]))
+    if model.kind == "rig" and model.partial_slip and rig.friction.load_varies:
+        sentences.append(
+            f"the normal load changes with the motion, so {model.partial_slip} is computed with the tangential modes of "
+            "all nodes; the numerical error is estimated from a second run with half as many modes"
+        )
     return Plan(
         model,
         model.kind,
@@ -257,28 +260,6 @@ def _describe_wear(model: Model) -> str:
     if changes_motion:
         repetition = "the motion is computed again after each jump"
     return f"wear: {model.wear.cycles:.6g} cycles in {jumps}; {repetition}"
-
-
-def _describe_shear(model: Model, groups: dict) -> list:
-    """Describe in sentences how the pieces of [contact] shear."""
-    sentences = []
-    if "slip_length" in groups:
-        shear_phrase = (
-            f"by {format_length(groups['slip_length'], 3)} or more before the whole patch slips"
-        )
-        sentence = (
-            f"the pieces are rigid in shear in this scene; elastic pieces would shear {shear_phrase}; add "
-            "[contact.shear] to include this shear"
-        )
-        if model.patch.interface.has_shear:
-            sentence = f"the pieces shear elastically {shear_phrase}"
-        sentences.append(sentence)
-    if model.kind == "rig" and model.partial_slip and model.rig.friction.load_varies:
-        sentences.append(
-            f"the normal load changes with the motion, so {model.partial_slip} is computed with the tangential modes of "
-            "all nodes; the numerical error is estimated from a second run with half as many modes"
-        )
-    return sentences
 
 
 def _interface_stiffnesses(model: Model) -> dict:

@@ -170,23 +170,26 @@ def compute_patch_groups(model: Model) -> dict:
     return dimensionless_groups
 
 
-def describe_interface_patch(name: str, interface) -> list:
-    """Describe the patch of an interface in sentences for a plan.
+def describe_shear(patch_model, slip_length: float, name: str = "") -> str:
+    """Describe how the pieces of an interface shear before they slip.
 
-    name: nodes of the interface.
+    Parameters
+    ----------
+    patch_model : PatchModel
+    slip_length : float
+        Elastic slide of the pieces under their friction limit [m].
+    name : str
+        Nodes of the interface; "" for the table [contact].
     """
-    shear_displacement = format_length(
-        interface.numbers.static * interface.load / interface.patch.pieces.shear_stiffness, 3
+    place = f"interface {name}: " if name else ""
+    shear = f"by {format_length(slip_length, 3)} or more before the whole patch slips"
+    if patch_model.interface.has_shear:
+        return f"{place}the pieces shear elastically {shear}"
+    table = "structure.interface.contact.shear" if name else "contact.shear"
+    return (
+        f"{place}the pieces are rigid in shear in this scene; elastic pieces would shear {shear}; add "
+        f"[{table}] to include this shear"
     )
-    sentence = (
-        f"the pieces shear elastically by {shear_displacement} or more before the whole patch slips"
-        if interface.partial_slip
-        else (
-            "the patch moves as one point under the same load; add [structure.interface.contact.shear] to let the patch "
-            "slip part by part"
-        )
-    )
-    return [f"interface {name} has a patch of its own: {sentence}"]
 
 
 def describe_patch_plan(dimensionless_groups: dict, patch_model) -> list:
