@@ -85,7 +85,7 @@ class RunInputs:
     - estimate: whether to estimate the errors from coarser runs.
     - stiffer: rig and patch with a stiffer joint (`joint.FreeRig`), if a joint was subtracted from the
       modes; else None.
-    - faces: pressed interfaces (`interfaces.Face`); a worn patch of [contact] is not the one among them.
+    - faces: pressed interfaces (`interfaces.Face`), with their worn surfaces.
     """
 
     plan: object
