@@ -90,7 +90,7 @@ def run_prescribed(inputs: RunInputs) -> Result:
         "notes": [*note_on_growth(model, peak_ratio), *note_on_groove_slope(model, patch)],
         "step_runs": error_estimates.step_runs,
     }
-    if count := shear.count_shear_modes(model, patch):
+    if model.partial_slip and (count := shear.count_shear_modes(model, patch)):
         extra["shear_modes"] = count
     return Result(
         inputs.plan,
