@@ -1401,7 +1401,7 @@ class Plots:
         If the interfaces have separate patches, the normal stress on each is drawn. With `ax`, only the first of these
         charts is drawn.
         """
-        has_patch = self._result.patch is not None or self._result.extra.get("faces")
+        has_patch = self._result.patch is not None or self._result.faces
         reason = "the pieces do not touch" if has_patch else "the scene has no [contact]"
         titles = ("Pressure on the interface", "Shear stress on the interface")
         return self._draw(ax, "pressure", titles, reason)
@@ -1574,7 +1574,7 @@ class Result(run_result.Result):
 
     def _explain_missing_pieces(self) -> str:
         """Return why a run has no single pair of pieces, and what to use instead."""
-        faces = self.extra.get("faces", ())
+        faces = self.faces
         if not faces:
             return "the scene has no [contact], so there are no pieces; see to_xarray()"
         return (

@@ -8,7 +8,6 @@ affected by other programs.
 """
 
 import os
-import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
@@ -17,11 +16,12 @@ from time import perf_counter, process_time
 from typing import NamedTuple
 
 from .. import compiled
-from ..core import Measure, NotConverged, PatchfemError, compute_allowed_error
+from ..core import NotConverged, PatchfemError, compute_allowed_error
 from ..formatting import format_number
 from ..model.model import Model
 from ..model.source import locate_errors
 from ..runs.plan import plan
+from ..runs.results.result import Result
 from ..runs.run import run as run_plan
 from .numerical_settings import (
     Setting,
@@ -36,8 +36,6 @@ TOLERANCE = "tolerance"
 N_TIMINGS = 3
 # Smallest CPU time [s] of a run that is timed only once; longer runs scatter by a few percent.
 MIN_SECONDS_TIMED_ONCE = 0.3
-# Advice at the end of a warning about a missed tolerance.
-_REMEDY_TEXT = re.compile(r"; the tolerance is [^;]*; (.*)", re.DOTALL)
 # Smallest ratio of elapsed to CPU time at which both times are reported.
 MIN_ELAPSED_TO_CPU_RATIO = 1.5
 EQUAL_COST_RATIO = 1.1  # Largest ratio of the CPU times of equally expensive runs.
@@ -79,7 +77,7 @@ class Cost:
     tolerance : float
         Tolerance of the run.
     remedies : tuple of str
-        Advice from the warnings of a run that misses its tolerance.
+        Advice for a run that misses its tolerance.
     steps : int or None
         Number of time steps per cycle; None if the method takes no time steps.
     nodes : int or None
@@ -197,24 +195,10 @@ def _describe_timing(cost: Cost) -> str:
     return text + ", timed once" * (cost.timings == 1)
 
 
-class _FinishedRun(NamedTuple):
-    """Measures, warnings, number of steps per cycle and number of interface nodes of a finished run.
-
-    The number of steps is None if the method takes no time steps, and that of nodes without a patch.
-    """
-
-    measures: dict[str, Measure]
-    warnings: Sequence[str]
-    steps: int | None = None
-    nodes: int | None = None
-
-
-def _make_cost(
-    setting: Setting, timings: list[tuple[float, float]], finished: _FinishedRun
-) -> Cost:
-    """Return the cost of a setting from its pairs of CPU time and elapsed time [s]."""
-    known = {name: one for name, one in finished.measures.items() if one.value is not None}
-    remedies = map(_REMEDY_TEXT.search, finished.warnings)
+def _make_cost(setting: Setting, timings: list[tuple[float, float]], result: Result) -> Cost:
+    """Return the cost of a setting from its pairs of CPU time and elapsed time [s], and the result of its run."""
+    known = {name: one for name, one in result.measures.items() if one.value is not None}
+    advice = [finding.advice for finding in result.findings if finding.advice is not None]
     seconds, wall_seconds = min(timings)
     return Cost(
         label=setting.label,
@@ -227,9 +211,9 @@ def _make_cost(
         errors={name: one.error for name, one in known.items() if one.error is not None},
         floors={name: measure.floor for name, measure in known.items()},
         tolerance=setting.model.accuracy.tolerance,
-        remedies=tuple(remedy[1] for remedy in remedies if remedy),
-        steps=finished.steps,
-        nodes=finished.nodes,
+        remedies=tuple(one.text for one in advice),
+        steps=result.extra.get("steps_per_cycle") or result.extra.get("steps"),
+        nodes=None if result.patch is None else int(result.patch.x.size),
     )
 
 
@@ -239,7 +223,7 @@ def _measure_cpu_time() -> float:
     return process_time() + children.children_user + children.children_system
 
 
-def _run_setting(setting: Setting, label: str, say: Callable | None) -> _FinishedRun | None:
+def _run_setting(setting: Setting, label: str, say: Callable | None) -> Result | None:
     """Run a model with a numerical setting; return None if the run fails.
 
     A run fails if it does not converge or runs out of memory. The pieces are condensed again instead
@@ -255,10 +239,7 @@ def _run_setting(setting: Setting, label: str, say: Callable | None) -> _Finishe
         Called with a line of text.
     """
     try:
-        result = run_plan(plan(setting.model), fresh=True)
-        steps = result.extra.get("steps_per_cycle") or result.extra.get("steps")
-        nodes = None if result.patch is None else int(result.patch.x.size)
-        return _FinishedRun(result.measures, result.warnings, steps, nodes)
+        return run_plan(plan(setting.model), fresh=True)
     except (NotConverged, MemoryError) as error:
         if say is not None:
             say(f"{label}: left out ({error or 'out of memory'})")

@@ -247,7 +247,7 @@ def collect_data(result: Result) -> dict[str, Variable]:
     if result.plan.kind == "linear":
         data = {name: one for name, one in data.items() if name not in FRICTIONLESS}
     data |= _motion(result) | _loop(result) | _patch(result)
-    for face in result.extra.get("faces", ()):
+    for face in result.faces:
         data |= _face(face)
     for key, collect in {
         "levels": _levels,

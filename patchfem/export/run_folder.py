@@ -119,7 +119,7 @@ def write_results(result: Result, folder: Path, case: dict[str, str] | None = No
     notes = result.extra.setdefault("notes", [])
     if result.patch is not None:
         vtkhdf.write_fields(result, folder / store.FIELDS)
-    for face in result.extra.get("faces", ())[:MAX_INTERFACES]:
+    for face in result.faces[:MAX_INTERFACES]:
         face_folder = folder / INTERFACES_FOLDER / face.folder
         face_folder.mkdir(parents=True, exist_ok=True)
         face_result = replace(

@@ -12,7 +12,7 @@ it:
 6.  `rig`  a driven structure with friction
 7.  `wear`  wear of a patch in a bench or a rig over many cycles
 8.  `refine`  repetition of a run with finer meshes or more steps until it meets the tolerance
-9.  `accuracy_warnings`  measures that miss the tolerance, and the setting to change
+9.  `findings`  measures that miss the tolerance, and the advice that reduces their errors
 10. `accuracy_curve`  accuracy of a motion against its computing time
 11. `memory`  the memory that a run may use
 12. `plan`  what would run: engine, sizes, stiffnesses
@@ -47,10 +47,7 @@ PUBLIC = {
     "bench.errors": ("estimate_bench_errors",),
     "bench.ledger": ("BenchOptions",),
     "joint": ("find_stuck_patch_stiffness",),
-    "patch.faces": (
-        "NO_ERROR_ESTIMATE",
-        "has_error_meshes",
-    ),
+    "patch.faces": ("has_error_meshes",),
     "patch.jenkins_elements": ("elements",),
     "patch.mesh_levels": ("solve_with_coarser",),
     "patch.press": ("nodal_areas",),

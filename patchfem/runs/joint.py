@@ -25,8 +25,7 @@ from ..model.source import locate_errors
 from ..model.structure import compute_sticking_stiffness
 from ..response.errors import convergence_error
 from ..slip.edge_springs import add_edge_springs
-from .patch import result as patch_result
-from .patch import store
+from .patch import mesh_levels, store
 from .patch.jenkins_elements import elements, strip_elements
 
 # Largest logarithm of the factor by which the compliance of a patch is scaled.
@@ -79,7 +78,7 @@ def solve_patch(model: Model) -> tuple:
 
     The patch of a bolted joint is solved once for the plan, the run and all cases of a study.
     """
-    solve = partial(patch_result.solve_with_coarser, model.patch, model.accuracy.tolerance)
+    solve = partial(mesh_levels.solve_with_coarser, model.patch, model.accuracy.tolerance)
     if not model.has_bolted_patch:
         return solve()
     return store.get_or_compute(("bolted patch", model.patch, model.accuracy.tolerance), solve)

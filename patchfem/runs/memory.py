@@ -5,18 +5,12 @@ the scene key to change.
 """
 
 import os
-from functools import lru_cache
 from pathlib import Path
-from time import monotonic
 
 from ..core import Missing
-from .sizes import COMPILED_CODE_LABEL
 
-MAPPED_BYTES = 60e6  # Address space [bytes] that the packages map in addition to the memory in use.
-COMPILER_BYTES = 150e6  # Address space [bytes] of the compiler library.
-READING_PERIOD = 0.5  # Time [s] for which the files of the system are not read again.
-# Smallest fraction of the total memory at which a plan names the largest contribution.
-MIN_NAMED_FRACTION = 0.3
+# Address space [bytes] that packages and the compiler map in addition to the memory in use.
+MAPPED_BYTES = 210e6
 KEY_ADVICE = {
     "contact.element_size": "make contact.element_size larger",
     "contact.mesh": "give contact.mesh fewer nodes on the interface",
@@ -27,36 +21,16 @@ KEY_ADVICE = {
 }
 
 
-def describe_largest_part(parts: tuple) -> str:
-    """Describe the largest memory contribution of a run and the scene key that determines it.
+def free_bytes() -> float:
+    """Return the total memory [bytes] that this process may use; inf if none is known.
 
-    The result is "" if the contribution is small, or if no scene key determines it.
+    The system, its control group and the limits of the process are considered.
     """
-    largest = next((part for part in parts if part.key), None)
-    if largest is None or largest.bytes < MIN_NAMED_FRACTION * sum(part.bytes for part in parts):
-        return ""
-    return f"{largest.bytes / 1e6:.0f} MB of the memory are for {largest.what}; {largest.key} sets their size"
-
-
-def free_bytes(*, needs_compiler: bool = False) -> float:
-    """Return the total memory [bytes] that this process may use.
-
-    The system, its control group and the limits of the process are considered; inf if none is
-    known. needs_compiler: whether the compiler library is needed, which affects the address space
-    only.
-    """
-    return _read_free_bytes(needs_compiler, int(monotonic() / READING_PERIOD))
-
-
-@lru_cache(maxsize=2)
-def _read_free_bytes(needs_compiler: bool, period: int) -> float:
-    """Return `free_bytes`; `period` counts the readings, since cases of a sweep follow each other within milliseconds."""
     used, mapped = read_process_bytes()
-    other_address_space = mapped - used + MAPPED_BYTES + (COMPILER_BYTES if needs_compiler else 0.0)
     return min(
         _read_available_bytes() + used,
         free_in_control_group(used),
-        *(limit - other_address_space for limit in _read_process_limits()),
+        _read_process_limit() - MAPPED_BYTES + used - mapped,
     )
 
 
@@ -80,14 +54,14 @@ def _read_available_bytes() -> float:
         return float("inf")
 
 
-def _read_process_limits() -> list:
-    """Return the limits on address space and data of this process [bytes]; inf if unlimited."""
+def _read_process_limit() -> float:
+    """Return the limit on the address space of this process [bytes]; inf if it has none."""
     try:
         import resource
     except ImportError:
-        return [float("inf")]
-    limits = (resource.getrlimit(kind)[0] for kind in (resource.RLIMIT_AS, resource.RLIMIT_DATA))
-    return [float("inf") if limit == resource.RLIM_INFINITY else float(limit) for limit in limits]
+        return float("inf")
+    limit = resource.getrlimit(resource.RLIMIT_AS)[0]
+    return float("inf") if limit == resource.RLIM_INFINITY else float(limit)
 
 
 def free_in_control_group(
@@ -116,51 +90,39 @@ def free_in_control_group(
     except OSError:
         return float("inf")
     free = float("inf")
-    for _, kinds, path in (line for line in lines if len(line) == 3):
-        is_version_1 = "memory" in kinds.split(",")
-        if not is_version_1 and kinds:
-            continue
-        base = root
-        names = ("memory.max", "memory.current")
-        if is_version_1:
-            base = root / "memory"
-            names = ("memory.limit_in_bytes", "memory.usage_in_bytes")
-        group_folder = base / path.strip("/")
+    # The only hierarchy of version 2 has the number 0 and no names of controllers.
+    for path in (line[2] for line in lines if line[:2] == ["0", ""]):
+        group_folder = root / path.strip("/")
         for folder in (group_folder, *group_folder.parents):
-            free = min(free, _remaining_bytes(folder, *names) + used)
-            if folder == base:
+            free = min(free, _remaining_bytes(folder) + used)
+            if folder == root:
                 break
     return free
 
 
-def _remaining_bytes(folder: Path, limit: str, usage: str) -> float:
+def _remaining_bytes(folder: Path) -> float:
     """Return the memory [bytes] that a control group still allows; inf if unlimited.
 
     Inactive cached files count as free memory.
     """
     try:
-        max_bytes = int((folder / limit).read_text("ascii"))
-        used_bytes = int((folder / usage).read_text("ascii"))
+        max_bytes = int((folder / "memory.max").read_text("ascii"))
+        used_bytes = int((folder / "memory.current").read_text("ascii"))
         lines = (folder / "memory.stat").read_text("ascii").splitlines()
-        known = dict(line.split() for line in lines)
     # The limit is "max", which means unlimited, or a file is missing.
     except (OSError, ValueError):
         return float("inf")
-    return float(
-        max_bytes
-        - used_bytes
-        + int(known.get("total_inactive_file", known.get("inactive_file", 0)))
-    )
+    inactive = dict(line.split() for line in lines).get("inactive_file", 0)
+    return float(max_bytes - used_bytes + int(inactive))
 
 
-def reason_for_refusal(parts: tuple, free: float | None = None) -> str:
+def reason_for_refusal(parts: tuple) -> str:
     """Return why a run needs more memory than is free, or "" if it does not.
 
     The reason gives the required and the free memory, and the largest contribution with its scene
     key.
     """
-    if free is None:
-        free = free_bytes(needs_compiler=any(part.what == COMPILED_CODE_LABEL for part in parts))
+    free = free_bytes()
     total = sum(part.bytes for part in parts)
     if total <= free:
         return ""

@@ -201,7 +201,7 @@ def add_yielding_notes(result, pieces: Pieces) -> None:
     peak = result.measures.get("pressure_peak")
     has_peak = peak is not None and peak.value is not None
     min_peak = peak.value - (peak.error or 0.0) if has_peak else 0.0
-    faces = result.extra.get("yielding_faces", {})
+    faces = result.yielding_faces
     yielding = faces | find_yielding(result.plan.model.patch, pieces, min_peak)
     notes = result.extra.setdefault("notes", [])
     notes[:] = [text for text in notes if text not in faces.values()]

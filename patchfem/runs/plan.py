@@ -9,7 +9,6 @@ from math import inf
 
 from ..core import PatchfemError
 from ..effects import EFFECTS, law_has_trait
-from ..formatting import format_length
 from ..friction import record
 from ..friction.bonds import spread
 from ..inputs import measured
@@ -17,7 +16,7 @@ from ..model.model import Model, build
 from ..model.source import locate_errors
 from ..response import rows
 from ..structure import drive_sizes
-from . import joint, memory
+from . import joint
 from .bench import engine as of_bench
 from .patch import plan as patch_plan
 from .rig import engines
@@ -186,8 +185,10 @@ def _make_plan(model: Model) -> Plan:
             for name, link in patch_plan.stiffness_chain(interface.patch).items():
                 if link != "rigid":
                     chain[rows.add_interface_number(name, number)] = link
-            patch_sentences += patch_plan.describe_interface_patch(
-                rig.friction.names[number], interface
+            slip_force = interface.numbers.static * interface.load
+            slip_length = slip_force / interface.patch.pieces.shear_stiffness
+            patch_sentences.append(
+                patch_plan.describe_shear(interface.patch, slip_length, rig.friction.names[number])
             )
     sizes = _count_sizes(model)
     law_sentences += sizes.sentences
@@ -205,13 +206,14 @@ def _make_plan(model: Model) -> Plan:
         and rig.drive.cycles >= MIN_SKIPPED_CYCLES
     ):
         law_sentences.append(SKIPPING_NOTE)
-    refusal = memory.reason_for_refusal(sizes.parts)
-    memory_sentence = memory.describe_largest_part(sizes.parts)
-    if refusal:
-        memory_sentence = f"`run` will refuse this scene: {refusal}"
-    sentences = _arrange_sentences(
-        model, groups, memory_sentence, (motion_sentences, patch_sentences, law_sentences)
-    )
+    sentences = [*motion_sentences, *patch_sentences, *law_sentences]
+    if "slip_length" in groups:
+        sentences.append(patch_plan.describe_shear(model.patch, groups["slip_length"]))
+    if model.kind == "rig" and model.partial_slip and rig.friction.load_varies:
+        sentences.append(
+            f"the normal load changes with the motion, so {model.partial_slip} is computed with the tangential modes of "
+            "all nodes; the numerical error is estimated from a second run with half as many modes"
+        )
     return Plan(
         model,
         model.kind,
@@ -258,36 +260,6 @@ def _describe_wear(model: Model) -> str:
     if changes_motion:
         repetition = "the motion is computed again after each jump"
     return f"wear: {model.wear.cycles:.6g} cycles in {jumps}; {repetition}"
-
-
-def _arrange_sentences(
-    model: Model, groups: dict, memory_sentence: str, sentence_groups: tuple
-) -> list:
-    """Return the sentences of a plan in their final order, with those on memory and shear.
-
-    sentence_groups: sentences on the motion, on the patch, and on the friction law.
-    """
-    sentences = list(sentence_groups[0])
-    if memory_sentence:
-        sentences.append(memory_sentence)
-    sentences += [*sentence_groups[1], *sentence_groups[2]]
-    if "slip_length" in groups:
-        shear_phrase = (
-            f"by {format_length(groups['slip_length'], 3)} or more before the whole patch slips"
-        )
-        sentence = (
-            f"the pieces are rigid in shear in this scene; elastic pieces would shear {shear_phrase}; add "
-            "[contact.shear] to include this shear"
-        )
-        if model.patch.interface.has_shear:
-            sentence = f"the pieces shear elastically {shear_phrase}"
-        sentences.append(sentence)
-    if model.kind == "rig" and model.partial_slip and model.rig.friction.load_varies:
-        sentences.append(
-            f"the normal load changes with the motion, so {model.partial_slip} is computed with the tangential modes of "
-            "all nodes; the numerical error is estimated from a second run with half as many modes"
-        )
-    return sentences
 
 
 def _interface_stiffnesses(model: Model) -> dict:

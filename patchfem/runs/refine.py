@@ -16,6 +16,7 @@ from ..core import Outcome
 from ..formatting import format_number
 from ..model.model import Model
 from ..response import rows
+from ..scene.rules.accuracy import list_repeated_axes
 from .results.patch_rows import TABLE as PATCH_TABLE
 
 MAX_SECONDS = 60.0  # Largest CPU time [s] of all passes without accuracy.max_seconds.
@@ -61,17 +62,19 @@ def judge_pass(
     """
     model = given if before is None else before.model
     name, excess = find_worst_measure(result.measures, model.accuracy.tolerance)
-    if excess <= 1 or result.outcome in FAILED_OUTCOMES or not _can_repeat(model, result, name):
+    if excess <= 1 or result.outcome in FAILED_OUTCOMES:
         return Pass(excess)
     if before is not None and excess * MIN_GAIN > before.excess:
         return Pass(excess)
     axis = find_axis(result.measures[name], name)
-    if axis == "mesh":
-        finer = refine_meshes(model)
-    elif axis == "steps" and model.kind == "bench" and given.accuracy.steps_per_cycle is None:
-        finer = _refine_steps(model, result.extra["steps"])
-    else:
-        finer = None
+    finer = None
+    if axis in list_repeated_axes(
+        model.kind,
+        has_wear=model.wear is not None,
+        has_automatic_mesh=not _is_on_points(result, name),
+        has_fixed_steps=given.accuracy.steps_per_cycle is not None,
+    ):
+        finer = refine_meshes(model) if axis == "mesh" else _refine_steps(model, result)
     n_passes = ceil(log(excess) / log(ERROR_RATIO))
     expected = total_seconds + seconds * sum(COST_RATIO**k for k in range(1, n_passes + 1))
     if finer is None:
@@ -108,17 +111,9 @@ def bound_errors(measures: dict, before: dict) -> dict:
     return bounded
 
 
-def _can_repeat(model: Model, result, name: str) -> bool:
-    """Return whether a repetition with finer meshes or more steps can reduce the error of a measure.
-
-    Static patches are refined when they are pressed, and wear has its own passes. Measures on the points of a profile do
-    not depend on the mesh.
-    """
-    if model.kind == "patch" or model.wear is not None:
-        return False
-    return not (
-        name in PATCH_TABLE and result.patch is not None and result.patch.points is not None
-    )
+def _is_on_points(result, name: str) -> bool:
+    """Return whether a measure may be that on the points of a profile, which do not depend on the mesh."""
+    return name in PATCH_TABLE and result.patch is not None and result.patch.points is not None
 
 
 def is_main(name: str) -> bool:
@@ -145,8 +140,9 @@ def find_axis(measure, name: str) -> str:
     return axis if measure.causes.parts.get(axis, 0.0) > 0 else "own"
 
 
-def _refine_steps(model: Model, steps: int) -> Model | None:
-    """Return the model of a bench with twice the steps per cycle; None if there are too many."""
+def _refine_steps(model: Model, result) -> Model | None:
+    """Return the model of a bench with twice the steps per cycle of a result; None if there are too many."""
+    steps = result.extra["steps"]
     if 2 * steps > MAX_BENCH_STEPS:
         return None
     accuracy = model.accuracy.model_copy(update={"steps_per_cycle": 2 * steps})

@@ -6,6 +6,7 @@ In: a `Plan`, or a Scene or Model that is planned first. Out: a `Result`.
 import hashlib
 from contextlib import nullcontext
 from dataclasses import replace
+from functools import partial
 from itertools import count
 from pathlib import Path
 from time import perf_counter, process_time
@@ -18,12 +19,13 @@ from ..model.model import Model
 from ..model.source import locate_errors
 from ..points import checkpoint
 from . import joint, memory, refine
-from .accuracy_warnings import AccuracyContext, tolerance_warnings
 from .balances import mark_unbalanced
 from .bench import result as bench_result
-from .patch import faces, store, strength
+from .findings import Missed, find_missed_measures
+from .patch import faces, mesh_levels, store, strength
 from .patch import result as patch_result
 from .plan import Plan, plan
+from .results.interfaces import Face, merge_sentences
 from .results.patch_rows import find_unknown_measures
 from .results.result import Result, RunInputs, describe_measure, shorten_file_names
 from .rig import engines, rig
@@ -45,22 +47,6 @@ class StateFile(NamedTuple):
     path: Path
     version: str
     resume: bool
-
-
-class PatchMeshes(NamedTuple):
-    """Patch of [contact], solved on several meshes.
-
-    - patch: patch on the finest mesh; None without [contact].
-    - coarse: patch on coarser meshes, from fine to coarse; None for a missing one.
-    - static: patch on the meshes of its static measures, from fine to coarse; () if these meshes
-      are the same.
-    - unworn: patch before wear on its nested meshes, from fine to coarse; () without wear.
-    """
-
-    patch: object = None
-    coarse: tuple = (None, None)
-    static: tuple = ()
-    unworn: tuple = ()
 
 
 def run(
@@ -134,18 +120,18 @@ def run(
 
 
 class FinishedPass(NamedTuple):
-    """Result of a pass of a run without its accuracy warnings.
+    """Result of a pass of a run, and what its warnings need.
 
     - result: Result.
     - notes: sentences on the scene and the patch.
     - start: start time of the pass [s].
-    - meshes: patch of [contact] on its meshes.
+    - pressed: pressed interfaces.
     """
 
     result: Result
     notes: list
     start: float
-    meshes: PatchMeshes
+    pressed: tuple[Face, ...]
 
 
 def _run_pass(
@@ -153,51 +139,50 @@ def _run_pass(
 ) -> FinishedPass:
     """Run a plan once, after a number of coarser passes.
 
-    The order is: patch of [contact] on its meshes, patches of the interfaces, wear, then the motion or
-    the static result, and finally static measures, balances and warnings. A patch without contact
-    and a rig without load have a result at once.
+    The order is: pressed interfaces, wear, then the motion or the static result, and finally static measures,
+    balances and warnings. A patch without contact and a rig without load have a result at once.
     """
     start = perf_counter()
     model = run_plan.model
     seconds = {}
     warnings = list(model.source.remarks)
     notes = list(model.source.notes)
-    meshes = PatchMeshes()
-    stiffer = None
     if model.rig is not None:
         warnings += engines.describe_unused_settings(model, run_plan.engine)
-    if model.patch is not None:
-        meshes = _solve_contact_patch(model, estimate=estimate)
+
+    pressed = _press_interfaces(model, estimate=estimate)
+    if pressed:
         seconds["contact"] = perf_counter() - start
-        if model.has_bolted_patch:
-            model, (patch, *coarse), stiffer = joint.remove_joint(
-                model, (meshes.patch, *meshes.coarse)
-            )
-            meshes = meshes._replace(patch=patch, coarse=tuple(coarse))
-            run_plan = replace(run_plan, model=model)
-        warnings += _warn_of_coarse_patch_mesh(model, meshes, estimate=estimate)
-        notes += patch_result.notes_on_neglected_effects(model, meshes.patch, meshes.coarse)
+    # The table [contact] is the only interface then.
+    contact = pressed[0] if model.patch is not None else None
+    stiffer = None
+    if contact is not None and model.has_bolted_patch:
+        model, patches, stiffer = joint.remove_joint(model, contact.patches)
+        contact = contact._replace(model=model, patches=tuple(patches))
+        pressed = (contact,)
+        run_plan = replace(run_plan, model=model)
+    warnings += merge_sentences(model, pressed, partial(_warn_of_pressed_patch, estimate=estimate))
+    if pressed:
+        notes += merge_sentences(model, pressed, patch_result.notes_on_neglected_effects)
     notes += model.describe_removed_joint()
-    if model.has_interface_patches:
-        warnings += faces.collect_warnings(model)
-        notes += faces.collect_notes(model)
-        seconds["contact"] = perf_counter() - start
+    patch, *coarse = (None, None, None) if contact is None else contact.patches
     inputs = RunInputs(
-        run_plan, meshes.patch, meshes.coarse, seconds, warnings, say, progress, estimate, stiffer
+        run_plan, patch, tuple(coarse), seconds, warnings, say, progress, estimate, stiffer, pressed
     )
-    if _is_open(meshes.patch) and model.kind != "patch":
+
+    if _is_open(patch) and model.kind != "patch":
         result = patch_result.make_static_result(replace(inputs, warnings=[*warnings, NO_MOTION]))
     elif _has_no_load(model):
         result = _make_result_without_load(inputs)
     else:
         worn_patch = None
-        if model.wear is not None and meshes.patch is not None:
+        if model.wear is not None and patch is not None:
             worn_patch = _wear_patch(inputs, state_file)
-            unworn = (meshes.patch, *meshes.coarse)
-            meshes = PatchMeshes(worn_patch.patch, tuple(worn_patch.coarse), meshes.static, unworn)
-            inputs = _make_worn_inputs(inputs, worn_patch)
+            worn = (worn_patch.patch, *worn_patch.coarse)
+            pressed = (contact._replace(patches=worn, unworn=contact.patches),)
+            inputs = _make_worn_inputs(replace(inputs, faces=pressed), worn_patch)
         try:
-            with _saving_context(state_file, run_plan, meshes.patch, n_before):
+            with _saving_context(state_file, run_plan, inputs.patch, n_before):
                 if run_plan.kind == "patch":
                     result = patch_result.make_static_result(inputs)
                 elif run_plan.kind == "bench":
@@ -205,36 +190,52 @@ def _run_pass(
                 else:
                     result = rig.run_rig(inputs)
         except NotConverged as error:
-            if meshes.patch is not None and run_plan.kind != "patch":
+            if contact is not None and run_plan.kind != "patch":
                 at_rest = patch_result.make_static_result(
                     replace(inputs, plan=run_plan, warnings=[*warnings, NO_MOTION_FOUND])
                 )
                 at_rest = replace(at_rest, outcome=Outcome.NOT_CONVERGED)
-                unworn = PatchMeshes(meshes.patch, meshes.coarse)
+                unmoved = (pressed[0]._replace(static=(), unworn=()),)
                 error.partial_result = _complete_result(
-                    FinishedPass(at_rest, notes, start, unworn), None
+                    FinishedPass(at_rest, notes, start, unmoved), None
                 )
             raise
-        if model.kind != "patch":
-            result = _add_static_measures(result, model, meshes)
+        if pressed and model.kind != "patch":
+            static = _collect_static_measures(pressed)
+            motion = {name: m for name, m in result.measures.items() if name not in static}
+            result = replace(result, measures=static | motion)
+        if model.has_interface_patches:
+            frames = faces.add_slip_fields(model, pressed, result.extra.get("shots", ()))
+            result = replace(result, faces=frames)
         if model.wear is not None:
             result = measures.add_wear_measures(
                 replace(result, plan=run_plan), worn_patch, estimate
             )
-    return FinishedPass(mark_unbalanced(result), notes, start, meshes)
+    return FinishedPass(mark_unbalanced(result), notes, start, pressed)
 
 
-def _solve_contact_patch(model: Model, *, estimate: bool) -> PatchMeshes:
-    """Solve the patch of [contact] on the meshes of the run and of its error estimate."""
-    tolerance = model.accuracy.tolerance
+def _press_interfaces(model: Model, *, estimate: bool) -> tuple[Face, ...]:
+    """Press all interfaces of a model that have a patch, on the meshes of the run and of its error estimate."""
+    if model.patch is None:
+        return tuple(faces.solve_interface_patches(model)) if model.has_interface_patches else ()
     if model.has_bolted_patch:
-        patch, *coarse = joint.solve_patch(model)
-    else:
-        patch, *coarse = patch_result.solve_with_coarser(model.patch, tolerance, estimate)
+        return (Face(0, "", model, joint.solve_patch(model)),)
+    tolerance = model.accuracy.tolerance
+    patches = mesh_levels.solve_with_coarser(model.patch, tolerance, estimate)
     static = ()
-    if model.kind == "bench" and not _is_open(patch):
-        static = patch_result.solve_on_static_meshes(model.patch, tolerance, estimate)
-    return PatchMeshes(patch, tuple(coarse), tuple(static))
+    if model.kind == "bench" and not _is_open(patches[0]):
+        static = mesh_levels.solve_on_static_meshes(model.patch, tolerance, estimate)
+    return (Face(0, "", model, patches, static=static),)
+
+
+def _collect_static_measures(pressed: tuple[Face, ...]) -> dict:
+    """Return the static measures of interfaces by name, with error estimates."""
+    measures = {}
+    for face in pressed:
+        patch, *coarse = face.static or face.patches
+        for name, measure in patch_result.static_measures(face.model, patch, tuple(coarse)).items():
+            measures[face.name_measure(name)] = measure
+    return measures
 
 
 def _is_open(patch) -> bool:
@@ -242,19 +243,10 @@ def _is_open(patch) -> bool:
     return patch is not None and patch.pressure.outcome is Outcome.NO_CONTACT
 
 
-def _warn_of_coarse_patch_mesh(model: Model, meshes: PatchMeshes, *, estimate: bool) -> list:
+def _warn_of_pressed_patch(face: Face, *, estimate: bool) -> list:
     """Return warnings on large strains, and on a mesh too coarse for an error estimate."""
-    patch = meshes.patch
-    warnings = list(patch_result.patch_warnings(model.patch, patch))
-    if estimate and meshes.coarse[0] is None:
-        remedy = "leave out contact.element_size"
-        if model.patch.mesh.file:
-            remedy = "split the elements of contact.mesh"
-        warnings.append(
-            f"the {patch.x.size - 1} elements along the interface are too few for an estimate of the "
-            f"error; {remedy}"
-        )
-    return warnings
+    has_error_mesh = not estimate or face.patches[1] is not None
+    return patch_result.patch_warnings(face.model.patch, face.patch, has_error_mesh=has_error_mesh)
 
 
 def _make_result_without_load(inputs: RunInputs) -> Result:
@@ -306,25 +298,6 @@ def _make_worn_inputs(inputs: RunInputs, worn_patch) -> RunInputs:
     )
 
 
-def _add_static_measures(result: Result, model: Model, meshes: PatchMeshes) -> Result:
-    """Add the static measures of the patches to the Result of a motion."""
-    if meshes.patch is not None:
-        motion = {name: m for name, m in result.measures.items() if name != "normal_load"}
-        patch, *coarse = meshes.static or (meshes.patch, *meshes.coarse)
-        static = patch_result.static_measures(model, patch, tuple(coarse))
-        result = replace(result, measures=static | motion)
-    if model.has_interface_patches:
-        static = faces.static_measures(model)
-        frames = faces.solve_faces_with_slip_fields(model, result.extra.get("shots", ()))
-        result = replace(
-            result,
-            extra=result.extra | {"faces": frames},
-            measures=static
-            | {name: m for name, m in result.measures.items() if name not in static},
-        )
-    return result
-
-
 def _complete_result(done: FinishedPass, passed: refine.Pass | None) -> Result:
     """Add CPU time, notes, accuracy warnings and definitions of the measures to a Result.
 
@@ -334,14 +307,13 @@ def _complete_result(done: FinishedPass, passed: refine.Pass | None) -> Result:
     passed : refine.Pass or None
         Why no further pass follows; None for a run without errors.
     """
-    result, notes, start, meshes = done
+    result, notes, start, pressed = done
     model = result.plan.model
     result.seconds["total"] = perf_counter() - start
     next_seconds = 0.0 if passed is None else passed.seconds
-    context = AccuracyContext(
-        model, result.measures, result.patch, result.extra, meshes.unworn, next_seconds
-    )
-    warnings = [*result.warnings, *tolerance_warnings(context, meshes.coarse, meshes.static)]
+    missed = Missed(model, result.measures, pressed, result.extra, next_seconds)
+    findings = tuple(find_missed_measures(missed))
+    warnings = [*result.warnings, *(finding.sentence for finding in findings)]
     notes = [*notes, *result.extra.get("notes", [])]
     yielding_faces = _note_on_yielding_faces(result)
     outcome = result.outcome
@@ -363,7 +335,9 @@ def _complete_result(done: FinishedPass, passed: refine.Pass | None) -> Result:
         patch=patch,
         measures=described,
         warnings=shorten_file_names(warnings, path),
-        extra=result.extra | {"notes": notes, "yielding_faces": yielding_faces},
+        extra=result.extra | {"notes": notes},
+        findings=findings,
+        yielding_faces=yielding_faces,
     )
 
 

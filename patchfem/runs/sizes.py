@@ -8,10 +8,6 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
-# Name under which the memory of compiled code is reported. A run that must compile it also needs
-# address space for the compiler (`memory.free_bytes`).
-COMPILED_CODE_LABEL = "compiled code"
-
 
 class MemoryPart(NamedTuple):
     """Contribution to the peak memory of a run, with the scene key that determines its size.
@@ -24,7 +20,7 @@ class MemoryPart(NamedTuple):
     key: str = ""
 
 
-COMPILED_CODE = MemoryPart(6e7, COMPILED_CODE_LABEL)  # for any engine with compiled code
+COMPILED_CODE = MemoryPart(6e7, "compiled code")  # for any engine with compiled code
 
 
 @dataclass(frozen=True, slots=True)

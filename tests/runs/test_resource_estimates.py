@@ -47,7 +47,7 @@ def plan_text(text, *sets):
 )
 def test_refuses_large_run_before_allocation_with_key(text, sets, key, monkeypatch):
     """A run that needs more memory than is free is refused with the key to change, before large arrays are allocated."""
-    monkeypatch.setattr(memory, "free_bytes", lambda **_: GIGABYTE)
+    monkeypatch.setattr(memory, "free_bytes", lambda: GIGABYTE)
     tracemalloc.start()
     run_plan = plan_text(text, *sets)
     reason = memory.reason_for_refusal(run_plan.sizes.parts)
@@ -59,8 +59,7 @@ def test_refuses_large_run_before_allocation_with_key(text, sets, key, monkeypat
 
 
 def test_exact_free_memory_of_control_group(tmp_path):
-    """The free memory of a control group is its limit minus the used memory plus the inactive cached files, for versions
-    1 and 2."""
+    """The free memory of a control group is its limit minus the used memory plus the inactive cached files."""
     groups, root = tmp_path / "cgroup", tmp_path / "fs"
     for place, limit, used, inactive in (("a", 9000, 5000, 600), ("a/b", "max", 4000, 0)):
         (root / place).mkdir(parents=True)
@@ -69,14 +68,4 @@ def test_exact_free_memory_of_control_group(tmp_path):
         (root / place / "memory.stat").write_text(f"anon 1\ninactive_file {inactive}\n")
     groups.write_text("0::/a/b\n")
     assert memory.free_in_control_group(50.0, groups, root) == 9000 - 5000 + 600 + 50
-    groups.write_text("5:cpu:/a\n4:memory:/c\n0::/\n")
-    place = root / "memory" / "c"
-    place.mkdir(parents=True)
-    for name, text in (
-        ("limit_in_bytes", "700"),
-        ("usage_in_bytes", "300"),
-        ("stat", "total_inactive_file 20"),
-    ):
-        (place / f"memory.{name}").write_text(text + "\n")
-    assert memory.free_in_control_group(50.0, groups, root) == 700 - 300 + 20 + 50
     assert memory.free_in_control_group(50.0, tmp_path / "none", root) == float("inf")

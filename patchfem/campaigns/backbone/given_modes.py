@@ -10,7 +10,7 @@ from ...formatting import format_quantity
 from ...model.model import Model
 from ...model.structure import compute_sticking_stiffness
 from ...runs import joint
-from ...runs.patch import result as patch_result
+from ...runs.patch import mesh_levels
 from ...scene.backbone_scene import ASSUMED_MASS, BackboneTables, GivenMode, parse_modes
 
 # Fraction of the stiffness of a mode that a joint of unknown `slide` is assumed to contribute.
@@ -78,7 +78,7 @@ def _find_sticking_stiffness(model: Model) -> float | None:
     if len(interfaces) != 1 or model.friction is None:
         return None
     if model.patch is not None:
-        patch = patch_result.solve_with_coarser(model.patch, model.accuracy.tolerance)[0]
+        patch = mesh_levels.solve_with_coarser(model.patch, model.accuracy.tolerance)[0]
         stiffness = joint.compute_full_stick_stiffness(model, patch)
         return stiffness if 0 < stiffness < np.inf else None
     try:

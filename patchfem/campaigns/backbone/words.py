@@ -69,10 +69,10 @@ def _note_missing_mesh(joint: JointMode) -> list[str]:
     """Return a list of notes on a contact with partial slip and without a coarser mesh."""
     model = joint.model
     if not model.partial_slip or joint.coarse is not None:
-        has_errors = not model.rig.friction.has_partial_slip or faces.has_error_meshes(model)
-        return [] if has_errors else [MISSING_ERRORS + faces.NO_ERROR_ESTIMATE]
+        if not model.rig.friction.has_partial_slip or faces.has_error_meshes(model):
+            return []
     advice = "leave out contact.element_size"
-    if model.patch.mesh.file is not None:
+    if model.patch is not None and model.patch.mesh.file is not None:
         advice = "split the elements of contact.mesh"
     return [f"{MISSING_ERRORS}the interface has too few elements for a coarser mesh; {advice}"]
 

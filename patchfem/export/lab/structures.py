@@ -22,7 +22,7 @@ from ...friction.cells import join_cells
 from ...model.model import Model
 from ...model.rig import MAX_TRAVEL
 from ...model.source import locate_errors
-from ...runs.patch import result as patch_result
+from ...runs.patch import mesh_levels
 from ...runs.rig import costs, engines, hybrid_laws, numerics
 from ...scene.rules import methods
 
@@ -179,7 +179,7 @@ def make_elements(model: Model, basis: np.ndarray) -> dict[str, np.ndarray | str
 
     patch = None
     if model.patch is not None:
-        patch = patch_result.solve_with_coarser(model.patch, model.accuracy.tolerance)[0]
+        patch = mesh_levels.solve_with_coarser(model.patch, model.accuracy.tolerance)[0]
         if patch.pressure.outcome is Outcome.NO_CONTACT:
             raise PatchfemError("the pieces do not touch, so no friction acts", "contact")
     settings = numerics.choose_numerics(model)

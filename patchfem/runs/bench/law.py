@@ -10,6 +10,7 @@ from ...effects import law_has_trait
 from ...friction.bonds import points
 from ...friction.record import make_law
 from . import averaged_law
+from .engine import uses_parallel_elements
 
 
 def make_numpy_law(model, patch=None, choice=None):
@@ -59,9 +60,4 @@ def find_rest_ends(model, slide) -> dict:
 
 def nodal_element_limit(model, patch):
     """Return the nodal friction limits (m,) [Pa] of parallel elements; None for other methods."""
-    is_element_bench = (
-        model.partial_slip
-        and model.grooves is None
-        and not law_has_trait(model.friction.law, "bonds")
-    )
-    return model.friction.static * patch.pressure.sigma_n if is_element_bench else None
+    return model.friction.static * patch.pressure.sigma_n if uses_parallel_elements(model) else None

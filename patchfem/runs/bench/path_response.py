@@ -37,15 +37,6 @@ def follow_slide(contact, task: SlideTask) -> slides.SlideMotion:
     return motion
 
 
-def find_energies(motion: slides.SlideMotion) -> np.ndarray:
-    """Return work, stored, dissipated and created energy (4, k) [J] of a motion along a slide."""
-    losses = np.zeros((motion.force.size, 2))
-    losses[1:, 0] = -np.minimum(motion.losses, 0.0)
-    losses[1:, 1] = np.maximum(motion.losses, 0.0)
-    work = np.append(0.0, np.cumsum(motion.losses + np.diff(motion.stored)))
-    return stack_energies(work, motion.stored, losses)
-
-
 def make_slide_histories(task: SlideTask, motion, load: float, tau, local) -> SlideHistories:
     """Return the histories of a bench run under constant load.
 
@@ -58,8 +49,16 @@ def make_slide_histories(task: SlideTask, motion, load: float, tau, local) -> Sl
     tau, local : (f, m)
         Traction [Pa] and slip [m] at the nodes in each frame.
     """
-    loads = np.full(motion.force.size, load)
-    energies = find_energies(motion)
+    losses = np.zeros((motion.force.size, 2))
+    losses[1:, 0] = -np.minimum(motion.losses, 0.0)
+    losses[1:, 1] = np.maximum(motion.losses, 0.0)
+    work = np.append(0.0, np.cumsum(motion.losses + np.diff(motion.stored)))
     return SlideHistories(
-        motion.force, loads, motion.slip, energies, task.frame_indices, tau, local
+        force=motion.force,
+        load=np.full(motion.force.size, load),
+        slip=motion.slip,
+        ledger=stack_energies(work, motion.stored, losses),
+        frames=task.frame_indices,
+        tau=tau,
+        local=local,
     )

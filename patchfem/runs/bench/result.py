@@ -8,7 +8,6 @@ from dataclasses import replace
 import numpy as np
 
 from ...core import Outcome
-from ...effects import law_has_trait
 from ...formatting import format_quantity
 from ...response.errors import add_errors
 from ...response.outcome import OPEN_LOOP, remove_errors
@@ -17,8 +16,7 @@ from ..results.notes import (
     note_on_groove_slope,
     note_on_growth,
     note_on_heating,
-    warn_of_unbounded_bonds,
-    warn_of_unformed_bonds,
+    warn_of_bonds,
     warn_of_work_check,
 )
 from ..results.result import (
@@ -63,7 +61,8 @@ def run_prescribed(inputs: RunInputs) -> Result:
     )
     warnings = [
         *inputs.warnings,
-        *_warn_of_bond_law(model),
+        *warn_of_bonds(model, model.speed_scale, measures, Outcome.DONE),
+        *_warn_of_kept_pressure(model),
         *_warn_of_created_energy(model, fine),
         *note_on_heating(model, patch, fine),
         *warn_of_work_check(measures, steps),
@@ -71,7 +70,7 @@ def run_prescribed(inputs: RunInputs) -> Result:
     ]
     fields = {}
     if patch is not None:
-        warnings += _warn_of_overhang(model.patch, patch, fine)
+        warnings += _warn_of_overhang(patch, fine)
         fields = make_interface_frames(
             patch,
             fine.time[fine.frames],
@@ -82,10 +81,13 @@ def run_prescribed(inputs: RunInputs) -> Result:
         )
     if not (inputs.estimate and can_estimate_mesh_error(model, patch, inputs.coarse)):
         measures = remove_errors(measures)
+    peak_ratio = None
+    if model.friction.static > 0 and not model.load_varies:
+        peak_ratio = fine.values["friction_ratio_peak"] / model.friction.static
     extra = {
         "engine": fine.engine.name,
         "steps": steps,
-        "notes": [*_note_on_growth(model, fine), *note_on_groove_slope(model, patch)],
+        "notes": [*note_on_growth(model, peak_ratio), *note_on_groove_slope(model, patch)],
         "step_runs": error_estimates.step_runs,
     }
     if model.partial_slip and (count := shear.count_shear_modes(model, patch)):
@@ -104,21 +106,15 @@ def run_prescribed(inputs: RunInputs) -> Result:
     )
 
 
-def _warn_of_bond_law(model) -> list:
-    """Return warnings on a bond law that do not depend on the displacement path."""
-    if not law_has_trait(model.friction.law, "bonds"):
+def _warn_of_kept_pressure(model) -> list:
+    """Return a list with a warning that bonds of the printed law keep the pressure at which they formed."""
+    if model.friction.reading != "report" or not model.load_varies:
         return []
-    warnings = [
-        *warn_of_unbounded_bonds(model.bonds),
-        *warn_of_unformed_bonds(model.bonds, model.speed_scale),
+    return [
+        "in the law as printed in the report, a bond keeps the pressure at which it formed, "
+        "so while the load falls the friction force may exceed mu_s N; set friction.reading "
+        '= "stretch" to avoid this'
     ]
-    if model.friction.reading == "report" and model.load_varies:
-        warnings.append(
-            "in the law as printed in the report, a bond keeps the pressure at which it formed, "
-            "so while the load falls the friction force may exceed mu_s N; set friction.reading "
-            '= "stretch" to avoid this'
-        )
-    return warnings
 
 
 def _warn_of_created_energy(model, fine) -> list:
@@ -132,17 +128,6 @@ def _warn_of_created_energy(model, fine) -> list:
         f"which is {100 * created / exchanged:.2g} % of the work exchanged; with friction.reading = "
         '"stretch" no energy is created'
     ]
-
-
-def _note_on_growth(model, fine) -> list:
-    """Return notes on the growth of bonds with contact time."""
-    friction = model.friction
-    if not law_has_trait(friction.law, "bonds"):
-        return []
-    peak = None
-    if friction.static > 0 and not model.load_varies:
-        peak = fine.values["friction_ratio_peak"] / friction.static
-    return note_on_growth(model.bonds, peak)
 
 
 def _compute_loop_closing_error(fine) -> float:
@@ -200,7 +185,7 @@ def _warn_of_open_loop(model, patch, fine, steps: int) -> list:
     ]
 
 
-def _warn_of_overhang(patch_model, patch, fine) -> list:
+def _warn_of_overhang(patch, fine) -> list:
     """Return warnings if the upper piece leaves the loaded area or the lower piece."""
     warnings = []
     load_loss = 1 - float(fine.load.min() / fine.load[0]) if fine.load[0] > 0 else 0.0

@@ -19,7 +19,7 @@ from . import shear
 from .engine import Method
 from .law import nodal_pressure
 from .ledger import SlideHistories, SlideTask, compute_interface_slip, compute_local_slip
-from .path_response import find_energies, follow_slide
+from .path_response import follow_slide, make_slide_histories
 
 
 def slide_rigidly(task: SlideTask) -> SlideHistories:
@@ -32,14 +32,14 @@ def slide_rigidly(task: SlideTask) -> SlideHistories:
     slide = task.slide
     ratio = motion.force[frames] / load if load > 0 else np.zeros(frames.size)
     tau = np.outer(ratio, sigma)
-    loads = np.full(slide.size, load)
     if task.engine.method is Method.ELEMENTS or model.grooves is not None:
         slip = motion.slip
         local = np.where(sigma > 0, slip[frames, None], slide[frames, None])
     else:
+        loads = np.full(slide.size, load)
         slip = compute_interface_slip(model, slide, motion.force, loads)
         local = compute_local_slip(model, slide[frames], tau, sigma)
-    return SlideHistories(motion.force, loads, slip, find_energies(motion), frames, tau, local)
+    return make_slide_histories(task, motion, load, tau, local)._replace(slip=slip)
 
 
 def _make_point(task: SlideTask, load: float) -> contacts.Contact:

@@ -1,13 +1,11 @@
 """Patches of the interfaces of a rig, each replaced by parallel elements in the motion.
 
 In: a model whose interfaces have patches. Out: `Face`s with solved patches on two or more meshes,
-their Jenkins elements for the motion, static measures, warnings and fields.
+their Jenkins elements for the motion, and fields.
 """
 
-import re
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
-from typing import NamedTuple
 
 import numpy as np
 
@@ -16,52 +14,10 @@ from ...friction import record
 from ...model.source import locate_errors
 from ...response import rows
 from ...slip import fields as slip_fields
-from ..results.result import SlipRule, collect_rest_frame, make_interface_frames, patch_surface
-from . import jenkins_elements, result, store
-from .press import Patch
+from ..results.interfaces import Face
+from ..results.result import SlipRule, collect_rest_frame, make_interface_frames
+from . import jenkins_elements, mesh_levels, store
 from .values import compute_static_values
-
-
-class Face(NamedTuple):
-    """Solved patch of one interface of a rig, on several meshes.
-
-    - number: index of the interface.
-    - name: nodes of the interface as the scene writes them, "1-0".
-    - model: model of the rig whose patch and friction law are those of this interface.
-    - patches: the solved Patch and those on coarser meshes; None for a missing one.
-    - fields: frames of the interface by name (see `Result`); None before its run.
-    """
-
-    number: int
-    name: str
-    model: object
-    patches: tuple
-    fields: dict | None = None
-
-    @property
-    def patch(self) -> Patch:
-        """Patch of the interface, solved on the finest mesh."""
-        return self.patches[0]
-
-    @property
-    def surface(self):
-        """Points at which the fields of the interface are given (`press.Surface`)."""
-        return patch_surface(self.patch, self.fields or {})
-
-    @property
-    def folder(self) -> str:
-        """Name of the subfolder of the interface in the output of a run."""
-        return self.name.replace(" (", "_").removesuffix(")")
-
-    @property
-    def partial_slip(self) -> str:
-        """Scene key that enables partial slip of the patch; "" if the patch slips as a whole."""
-        return self.model.patch.interface.partial_slip
-
-    def slide(self, response) -> np.ndarray:
-        """Return the relative displacement (k,) [m] of the interface in a Response."""
-        slides = response.extra.get("slides")
-        return response.slide if slides is None else slides[:, self.number]
 
 
 def solve_interface_patches(model) -> Iterator[Face]:
@@ -93,7 +49,9 @@ def solve_contact_on_meshes(interface, tolerance: float) -> tuple:
     files = patch_model.mesh.file is not None or patch_model.gap.profile is not None
     key = ("face", patch_model if files else store.content_key(patch_model), tolerance)
     try:
-        return store.get_or_compute(key, lambda: result.solve_with_coarser(patch_model, tolerance))
+        return store.get_or_compute(
+            key, lambda: mesh_levels.solve_with_coarser(patch_model, tolerance)
+        )
     except PatchfemError as error:
         error.key = error.key and f"{interface.key}.{error.key}"
         raise
@@ -138,26 +96,27 @@ def group_interfaces_with_coarse_mesh(model) -> list:
     return [tuple(numbers) for numbers in out.values()]
 
 
-def solve_faces_with_slip_fields(model, snapshots) -> tuple:
-    """Return all interfaces that have a patch, with frames of their slip and shear stress.
+def add_slip_fields(model, faces: tuple, snapshots) -> tuple:
+    """Return interfaces of a rig with frames of their slip and shear stress.
 
     Without elements or snapshots, an interface has only the fields of its static contact.
 
     Parameters
     ----------
     model : Model
+    faces : tuple of Face
     snapshots : list
         States of the event-driven engine: time [s], and for each interface its slide [m] and the
         stretch (t,) [m] of its elements.
     """
     out = []
-    for face in solve_interface_patches(model):
+    for face in faces:
         law = model.rig.friction.interfaces[face.number]
         fields = collect_rest_frame(face.patch)
-        jenkins_set = (
-            make_patch_elements(law, model.accuracy.tolerance)[2] if face.partial_slip else None
-        )
-        if jenkins_set is not None and snapshots:
+        jenkins_set = None
+        if face.partial_slip and snapshots:
+            jenkins_set = make_patch_elements(law, model.accuracy.tolerance)[2]
+        if jenkins_set is not None:
             states = [snapshot.faces[face.number] for snapshot in snapshots]
             length = record.make_law(law.numbers, law.load).element(law.load).length
             tau, local = slip_fields.element_fields(face.patch, jenkins_set, states, length)
@@ -181,78 +140,12 @@ def has_error_meshes(model) -> bool:
 
 def static_measures_without_errors(model) -> dict:
     """Return the static measures of all patches of a model by name, without error estimates."""
-    if model.patch is not None:
-        return result.static_measures_without_errors(model)
     values = {}
     with locate_errors(model.source):
+        if model.patch is not None:
+            patches = mesh_levels.solve_with_coarser(model.patch, model.accuracy.tolerance, False)
+            return compute_static_values(patches[0])
         for face in solve_interface_patches(model):
             for name, value in compute_static_values(face.patch).items():
                 values[rows.add_interface_number(name, face.number)] = value
     return values
-
-
-def static_measures(model) -> dict:
-    """Return the static measures of all patches of a model by name, with error estimates.
-
-    From the second interface on, the name ends with the number of the interface.
-    """
-    measures = {}
-    for face in solve_interface_patches(model):
-        face_measures = result.static_measures(face.model, face.patch, face.patches[1:])
-        for name, measure in face_measures.items():
-            measures[rows.add_interface_number(name, face.number)] = measure
-    return measures
-
-
-def collect_warnings(model) -> list:
-    """Return warnings on large strains and missing error estimates of the patches of a model."""
-    return merge_interface_sentences(
-        model,
-        lambda face: [
-            *result.patch_warnings(face.model.patch, face.patch),
-            *([NO_ERROR_ESTIMATE] if face.patches[1] is None else []),
-        ],
-    )
-
-
-NO_ERROR_ESTIMATE = "the interface has too few elements for an estimate of the error; leave out contact.element_size"
-
-
-def collect_notes(model) -> list:
-    """Return notes on effects that the static model of the patches neglects."""
-    return merge_interface_sentences(
-        model,
-        lambda face: result.notes_on_neglected_effects(face.model, face.patch, face.patches[1:]),
-    )
-
-
-def merge_interface_sentences(model, list_sentences: Callable) -> list:
-    """Merge sentences that are equal for several interfaces, and name these interfaces.
-
-    Scene keys are written as they occur in the scene.
-
-    Parameters
-    ----------
-    model : Model
-    list_sentences : callable
-        Function that returns the sentences on a Face.
-    """
-    names_by_text: dict = {}
-    for face in solve_interface_patches(model):
-        for text in list_sentences(face):
-            names_by_text.setdefault(replace_contact_keys(model, text), []).append(face.name)
-    sentences = []
-    for text, names in names_by_text.items():
-        plural = "s" * (len(names) > 1)
-        sentences.append(f"interface{plural} {', '.join(names)}: {text}")
-    return sentences
-
-
-def replace_contact_keys(model, text: str) -> str:
-    """Replace keys of [contact] in a sentence by those of the interface in the scene.
-
-    In a model without [contact], they are keys of [structure.interface.contact].
-    """
-    if model.patch is not None:
-        return text
-    return re.sub(r"(?<![\w.])contact\.(?=[a-z])", "structure.interface.contact.", text)

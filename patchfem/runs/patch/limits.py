@@ -4,9 +4,8 @@ In: values on two or more meshes, each with cells half as long as those of the p
 `Limit` with the error of the value on the finest mesh and of the extrapolated value.
 """
 
+from math import inf
 from typing import NamedTuple
-
-import numpy as np
 
 # Upper bound of the ratio of successive changes in the extrapolation; it is about that of second
 # order.
@@ -36,10 +35,10 @@ class Limit(NamedTuple):
     - extrapolated_error: half-width of the interval around `extrapolated`.
     """
 
-    value: np.ndarray
-    error: np.ndarray
-    extrapolated: np.ndarray
-    extrapolated_error: np.ndarray
+    value: float
+    error: float
+    extrapolated: float
+    extrapolated_error: float
 
 
 def extrapolate_to_zero_cell_length(values, nested: bool = True) -> Limit:
@@ -58,8 +57,8 @@ def extrapolate_to_zero_cell_length(values, nested: bool = True) -> Limit:
 
     Parameters
     ----------
-    values : (n, ...)
-        Values of one or many series, from the coarsest to the finest mesh.
+    values : sequence of float
+        Values from the coarsest to the finest mesh, two or more.
     nested : bool
         Whether each mesh halves the cells of the previous one.
 
@@ -67,46 +66,38 @@ def extrapolate_to_zero_cell_length(values, nested: bool = True) -> Limit:
     -------
     Limit
     """
-    values = np.asarray(values, float)
     finest = values[-1]
-    last_change = values[-1] - values[-2]
-    last_size = np.abs(last_change)
+    last_change = finest - values[-2]
+    last_size = abs(last_change)
     if len(values) < 3:
-        return Limit(
-            finest, IRREGULAR_ERROR_FACTOR * last_size, finest, IRREGULAR_ERROR_FACTOR * last_size
-        )
-    previous_change = values[-2] - values[-3]
-    previous_size = np.abs(previous_change)
-    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        ratio = np.where(
-            last_change != 0,
-            previous_change / last_change,
-            np.where(previous_change >= 0, np.inf, -np.inf),
-        )
-    if not nested:
-        largest_change = np.maximum(last_size, previous_size / MAX_RATIO_NOT_NESTED)
-        remainder = largest_change / (np.clip(ratio, MIN_RATIO, MAX_RATIO_NOT_NESTED) - 1)
-        error = IRREGULAR_ERROR_FACTOR * remainder
+        error = IRREGULAR_ERROR_FACTOR * last_size
         return Limit(finest, error, finest, error)
-    remainder = last_change / (np.clip(ratio, MIN_RATIO, MAX_RATIO) - 1)
-    irregular_error = IRREGULAR_ERROR_FACTOR * np.where(
-        ratio > MAX_REGULAR_RATIO,
-        np.maximum(last_size / (MAX_RATIO - 1), previous_size / MAX_RATIO**2 * 2),
-        np.maximum(last_size, previous_size / MAX_RATIO),
-    )
+    previous_change = values[-2] - values[-3]
+    previous_size = abs(previous_change)
+    ratio = inf if previous_change >= 0 else -inf
+    if last_change != 0:
+        ratio = previous_change / last_change
+    if not nested:
+        largest_change = max(last_size, previous_size / MAX_RATIO_NOT_NESTED)
+        bounded_ratio = min(max(ratio, MIN_RATIO), MAX_RATIO_NOT_NESTED)
+        error = IRREGULAR_ERROR_FACTOR * largest_change / (bounded_ratio - 1)
+        return Limit(finest, error, finest, error)
+
+    if not MIN_CONVERGING_RATIO <= ratio <= MAX_REGULAR_RATIO:
+        largest_change = max(last_size, previous_size / MAX_RATIO)
+        if ratio > MAX_REGULAR_RATIO:
+            largest_change = max(last_size / (MAX_RATIO - 1), previous_size / MAX_RATIO**2 * 2)
+        error = IRREGULAR_ERROR_FACTOR * largest_change
+        return Limit(finest, error, finest, error)
+
     # The error of the extrapolated value is its change due to the last refinement, but at least a
     # quarter of the remainder.
+    remainder = last_change / (min(max(ratio, MIN_RATIO), MAX_RATIO) - 1)
     extrapolated = finest + remainder
-    extrapolated_error = np.abs(remainder) / np.where(ratio >= MIN_REGULAR_RATIO, 4, 2)
+    extrapolated_error = abs(remainder) / (4 if ratio >= MIN_REGULAR_RATIO else 2)
     if len(values) < 4:
         extrapolated_error = 2 * extrapolated_error
     else:
-        change = np.abs(extrapolated - extrapolate_to_zero_cell_length(values[:-1]).extrapolated)
-        extrapolated_error = np.maximum(extrapolated_error, change)
-    is_regular = (ratio >= MIN_CONVERGING_RATIO) & (ratio <= MAX_REGULAR_RATIO)
-    return Limit(
-        finest,
-        np.where(is_regular, REGULAR_ERROR_FACTOR * np.abs(remainder), irregular_error),
-        np.where(is_regular, extrapolated, finest),
-        np.where(is_regular, extrapolated_error, irregular_error),
-    )
+        change = abs(extrapolated - extrapolate_to_zero_cell_length(values[:-1]).extrapolated)
+        extrapolated_error = max(extrapolated_error, change)
+    return Limit(finest, REGULAR_ERROR_FACTOR * abs(remainder), extrapolated, extrapolated_error)

@@ -273,35 +273,34 @@ def extrapolate_static_measures(
     dict
         Estimate by name.
     """
-    names = list(values_by_mesh[-1])
-    series_values = np.array([[values[name] for name in names] for values in values_by_mesh])
-    hidden, floors = np.zeros((2, *series_values.shape[1:]))
-    for row, name in enumerate(names):
-        hidden[row] = hidden_errors.get(name, 0.0)
-        floors[row] = TABLE[name].floor
-    allowed = np.inf
-    if tolerance is not None:
-        allowed = compute_allowed_error(tolerance, series_values[-1], floors)
-    with np.errstate(invalid="ignore", divide="ignore"):  # Patches that were not solved have NaN.
-        limit = extrapolate_to_zero_cell_length(series_values, nested)
-        error = np.maximum(error_factor * limit.error, hidden)
-        extrapolated_error = np.where(
-            (limit.extrapolated != limit.value) & (error > allowed),
-            np.maximum(error_factor * limit.extrapolated_error, EXTRAPOLATED_ERROR_RATIO * hidden),
-            np.inf,
-        )
-        best = np.where(extrapolated_error < error, limit.extrapolated, limit.value)
-        error = np.minimum(extrapolated_error, error)
-        error = np.maximum(error, min_relative_error * np.abs(series_values[-1]))
-        out = dict(zip(names, map(Estimate, best, error, best != series_values[-1])))
-        peak, fraction = (out[name] for name in PEAK_MEASURES)
-        relative = np.where(peak.value > 0, peak.error / peak.value, 0.0)
-        fraction_error = increase_error_by_peak_error(fraction.value, fraction.error, relative)
-        out["loaded_fraction"] = fraction._replace(error=fraction_error)
+    out = {}
+    for name, finest in values_by_mesh[-1].items():
+        limit = extrapolate_to_zero_cell_length([values[name] for values in values_by_mesh], nested)
+        hidden = hidden_errors.get(name, 0.0)
+        value = finest
+        error = max(error_factor * limit.error, hidden)
+        allowed = np.inf
+        if tolerance is not None:
+            allowed = compute_allowed_error(tolerance, finest, TABLE[name].floor)
+        if limit.extrapolated != finest and error > allowed:
+            extrapolated_error = max(
+                error_factor * limit.extrapolated_error, EXTRAPOLATED_ERROR_RATIO * hidden
+            )
+            if extrapolated_error < error:
+                value = limit.extrapolated
+                error = extrapolated_error
+        error = max(error, min_relative_error * abs(finest))
+        out[name] = Estimate(value, error, value != finest)
+    peak, fraction = (out[name] for name in PEAK_MEASURES)
+    relative = peak.error / peak.value if peak.value > 0 else 0.0
+    fraction_error = increase_error_by_peak_error(fraction.value, fraction.error, relative)
+    out["loaded_fraction"] = fraction._replace(error=fraction_error)
     return out
 
 
-def increase_error_by_peak_error(fraction, error, relative_peak_error):
+def increase_error_by_peak_error(
+    fraction: float, error: float, relative_peak_error: float
+) -> float:
     """Increase the error of a loaded fraction to at least the part due to the peak pressure.
 
     A loaded fraction is the mean pressure divided by the peak pressure, so that both have the same
@@ -309,14 +308,12 @@ def increase_error_by_peak_error(fraction, error, relative_peak_error):
 
     Parameters
     ----------
-    fraction, error : float or (q,)
+    fraction, error : float
         Loaded fraction, and its error from the changes between meshes.
-    relative_peak_error : float or (q,)
+    relative_peak_error : float
         Relative error of the peak pressure.
     """
-    return np.maximum(
-        error, fraction * relative_peak_error / (1 - np.minimum(relative_peak_error, 0.5))
-    )
+    return max(error, fraction * relative_peak_error / (1 - min(relative_peak_error, 0.5)))
 
 
 def max_mesh_error_ratio(measures_by_name: dict, tolerance: float) -> float:
@@ -364,8 +361,6 @@ def are_cells_halved(fine, coarse) -> bool:
 
 class Resolution(NamedTuple):
     """Resolution of a contact by its mesh, from which hidden discretization errors follow.
-
-    The fields are numbers for one patch, or (q,) for q patches.
 
     - length: length of the interface [m].
     - n_nodes: nodes in contact.
@@ -467,23 +462,23 @@ def estimate_hidden_errors(resolution: Resolution, finest: dict) -> dict:
     load = finest["normal_load"]
     peak = finest["pressure_peak"]
     # Errors add up over the edges of the contact: half of all their cells, but at least the longest one.
-    cell = np.maximum(resolution.longest_cell, resolution.edge_cells / 2)
+    cell = max(resolution.longest_cell, resolution.edge_cells / 2)
     is_unresolved = n_nodes <= MAX_UNRESOLVED_NODES
-    centre_error = np.where(is_unresolved, cell / (2 * n_nodes**2), 1e-3 * cell)
-    has_few_nodes = (cell > 0) & (n_nodes <= MIN_RESOLVED_NODES)
-    peak_error = resolution.corner_pressure + np.where(has_few_nodes, peak / (4 * n_nodes**2), 0.0)
-    peak_error = np.maximum(peak_error, resolution.wedge_pressure)
-    peak_error = np.maximum(peak_error, resolution.rounding_pressure - peak)
+    centre_error = cell / (2 * n_nodes**2) if is_unresolved else 1e-3 * cell
+    peak_error = resolution.corner_pressure
+    if cell > 0 and n_nodes <= MIN_RESOLVED_NODES:
+        peak_error = peak_error + peak / (4 * n_nodes**2)
+    peak_error = max(peak_error, resolution.wedge_pressure, resolution.rounding_pressure - peak)
     displacement = (
-        ROUND_OFF_FRACTION * (np.abs(finest["approach"]) + resolution.closing)
-        + np.abs(finest["rotation"]) * centre_error * resolution.can_rotate
+        ROUND_OFF_FRACTION * (abs(finest["approach"]) + resolution.closing)
+        + abs(finest["rotation"]) * centre_error * resolution.can_rotate
     )
     fraction_per_pressure = finest["loaded_fraction"] / peak if peak else 0.0
     edge_offset = 0.0
     if resolution.edge_offset is not None:
         # In a contact of few nodes, an edge may lie anywhere in its cell.
-        min_offset = np.where(is_unresolved, 1.0, 1 / n_nodes**2)
-        edge_offset = np.maximum(resolution.edge_offset, min_offset)
+        min_offset = 1.0 if is_unresolved else 1 / n_nodes**2
+        edge_offset = max(resolution.edge_offset, min_offset)
     outer_cells = resolution.edge_cells - resolution.inner_cells
     length_error = edge_offset * resolution.edge_cells + resolution.open_ends
     width_error = edge_offset * outer_cells + resolution.open_ends
@@ -512,8 +507,8 @@ def _contact_edge_position_error(pair, cell):
         if grid.coating_thickness > 0:
             ratio = piece.layers.coating[0] / piece.layers.substrate[0]
             contrast = 1 - min(ratio, 1 / ratio)
-            cells = np.minimum(1.0, cell / grid.coating_thickness)
-            out = np.maximum(out, edges.edge_offset(cells, cells, 0.0) * contrast)
+            cells = min(1.0, cell / grid.coating_thickness)
+            out = max(out, edges.edge_offset(cells, cells, 0.0) * contrast)
     return out
 
 
@@ -538,83 +533,52 @@ def note_on_plane_state(patch_model, patch: Patch) -> list:
     The list is empty for a piece in plane strain that is far wider than tall, and for one in plane
     stress that is far taller than wide. No mesh refinement reduces this error.
     """
-    other_model = with_opposite_plane_state(patch_model)
-    if other_model is None:
-        return []
-    try:
-        own_values = compute_static_values(patch)
-        pair = condense_on_same_meshes(other_model, patch.pair)
-        return note_on_plane_state_changes(
-            patch_model,
-            own_values,
-            compute_static_values(solve_patch_contact(other_model, pair, coarse=patch)),
-        )
-    except PatchfemError as error:
-        return [
-            f"{_describe_plane_state(patch_model)}; how much the two "
-            f"differ is not known, because for plane {other_model.pieces.plane} the contact could not be solved ({error})"
-        ]
-
-
-def with_opposite_plane_state(patch_model):
-    """Return the model with the other plane state; None if the assumed state is certain."""
     pieces = patch_model.pieces
     ratio = pieces.width / pieces.height
     if pieces.plane == "strain":
+        other_plane = "stress"
         is_certain = ratio >= MIN_PLANE_STRAIN_RATIO
     else:
+        other_plane = "strain"
         is_certain = ratio <= 1 / MIN_PLANE_STRAIN_RATIO
     if is_certain:
-        return None
-    return replace(patch_model, pieces=replace(pieces, plane=_opposite_plane_state(pieces)))
-
-
-def _opposite_plane_state(pieces) -> str:
-    """Return "stress" for pieces in plane strain, and "strain" for pieces in plane stress."""
-    return "stress" if pieces.plane == "strain" else "strain"
-
-
-def _describe_plane_state(patch_model) -> str:
-    """Describe the assumed plane state and the width of the pieces."""
-    pieces = patch_model.pieces
-    ratio = pieces.width / pieces.height
-    return (
+        return []
+    assumption = (
         f"plane {pieces.plane} is assumed, and the pieces are {ratio:.2g} times as wide as tall; "
         "the true state lies between plane strain and plane stress"
     )
+    other_model = replace(patch_model, pieces=replace(pieces, plane=other_plane))
+    try:
+        pair = condense_on_same_meshes(other_model, patch.pair)
+        other_values = compute_static_values(solve_patch_contact(other_model, pair, coarse=patch))
+    except PatchfemError as error:
+        return [
+            f"{assumption}; how much the two "
+            f"differ is not known, because for plane {other_plane} the contact could not be solved ({error})"
+        ]
+    changes = _format_changes(patch_model, compute_static_values(patch), other_values)
+    if not changes:
+        return []
+    return [
+        f"{assumption}; plane {other_plane} would change the results by these amounts: {', '.join(changes)}"
+    ]
 
 
-def note_on_plane_state_changes(patch_model, own_values: dict, other_values: dict) -> list:
-    """Return a list with a note on how the opposite plane state would change the measures.
-
-    Parameters
-    ----------
-    patch_model : PatchModel
-    own_values, other_values : dict
-        Measures in the assumed plane state and in the opposite one.
-
-    Returns
-    -------
-    list of str
-    """
+def _format_changes(patch_model, values: dict, other_values: dict) -> list[str]:
+    """Format the changes of the measures from the assumed plane state to the opposite one."""
     changes = []
     names = MEASURES_WITH_BAND
     if patch_model.loading.approach is not None:
         names = ("normal_load", *names)
-    elif approach_change := other_values["approach"] - own_values["approach"]:
+    elif approach_change := other_values["approach"] - values["approach"]:
         changes.append(
             f"approach by {'+' * (approach_change > 0)}{format_length(approach_change, 3)}"
         )
     for name in names:
-        change = other_values[name] / own_values[name] - 1 if own_values[name] else 0.0
+        change = other_values[name] / values[name] - 1 if values[name] else 0.0
         if abs(change) > 1e-3:
             changes.append(f"{name} by {100 * change:+.2g} %")
-    if not changes:
-        return []
-    return [
-        f"{_describe_plane_state(patch_model)}; plane {_opposite_plane_state(patch_model.pieces)} would change "
-        f"the results by these amounts: {', '.join(changes)}"
-    ]
+    return changes
 
 
 def add_strip_count_errors(patch_model, patch: Patch, measures_by_name: dict) -> dict:

@@ -197,7 +197,7 @@ def solve_on_refined_meshes(patch_model, tolerance: float, estimate: bool = True
             patches = with_static_measures(patches, tolerance, points)
         # The points do not determine a peak that may be at a free corner, but a finer mesh does.
         is_done = is_within or (points is not None and "pressure_peak" in points.measures)
-        is_done = is_done and _resolves_slip_work(patch_model, patches, tolerance)
+        is_done = is_done and resolves_slip_work(patch_model, patches, tolerance)
         if is_done or seconds > max_condensing_seconds(patch_model, tolerance):
             if n_finer == 0:
                 return patches
@@ -251,11 +251,21 @@ def solve_on_static_meshes(patch_model, tolerance: float, estimate: bool = True)
     return solve_on_refined_meshes(static, patch_model.mesh.tolerance or tolerance, estimate)
 
 
-def _resolves_slip_work(patch_model, patches, tolerance: float) -> bool:
-    """Return whether the meshes of a patch resolve the friction work of a prescribed displacement."""
-    if patch_model.mesh.slip is None:
+def resolves_slip_work(patch_model, patches, tolerance: float) -> bool:
+    """Return whether the meshes of a patch resolve the friction work of a prescribed displacement.
+
+    Parameters
+    ----------
+    patch_model : PatchModel
+    patches : sequence of Patch or None
+        From fine to coarse; None for a missing mesh.
+    tolerance : float
+    """
+    slip = patch_model.mesh.slip
+    if slip is None:
         return True
-    return slip_zones.max_slip_error_ratio(patches, patch_model.mesh.slip, tolerance) <= 1
+    solved = [patch for patch in patches if patch is not None]
+    return slip_zones.max_slip_error_ratio(solved, slip, tolerance) <= 1
 
 
 def tolerance_for_finer_mesh(patch_model, patches, tolerance: float) -> float | None:
@@ -284,7 +294,7 @@ def tolerance_for_finer_mesh(patch_model, patches, tolerance: float) -> float | 
         tighter = tolerance * 10.0**-decade
         measures = estimate_static_measures(*solved, tolerance=tighter)
         is_within = max_mesh_error_ratio(measures, tighter) <= 1
-        is_done = is_within and _resolves_slip_work(patch_model, solved, tighter)
+        is_done = is_within and resolves_slip_work(patch_model, solved, tighter)
         if not is_done and seconds <= max_condensing_seconds(patch_model, tighter):
             return tighter
     return None

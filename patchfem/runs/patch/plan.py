@@ -1,11 +1,10 @@
 """Mesh size, stiffness and dimensionless groups of a patch before it is solved.
 
-In: a `PatchModel` or a Model. Out: `GridSizes`, `RunSizes`, stiffnesses in series, and sentences for
+In: a `PatchModel` or a Model. Out: `RunSizes`, stiffnesses in series, and sentences for
 the plan.
 """
 
 from math import sqrt
-from typing import NamedTuple
 
 from ...formatting import format_length
 from ...model.model import Model
@@ -32,32 +31,11 @@ TIGHT_TOL = 2e-3
 MAX_FULL_CONTACT_TILT = 0.7
 
 
-class GridSizes(NamedTuple):
-    """Expected number of nodes of the nested grids of a patch.
-
-    - points: nodes of the interface.
-    - nodes: nodes of the finest grids of both pieces; alike pieces share one grid.
-    - levels: number of nested grids.
-    """
-
-    points: int
-    nodes: int
-    levels: int
-
-
-def predict_grid_sizes(patch_model, tolerance: float) -> GridSizes:
-    """Predict the sizes of the grids on which a patch will be solved at a given tolerance.
-
-    The coarsest grid is that of the run. A mesh file is not read; an automatic grid takes its
-    place.
-    """
-    levels = _predict_mesh_levels(patch_model, tolerance)
-    bodies = [body for body in levels[0] if body is not None]
-    return GridSizes(bodies[0].x.size, sum(body.n_nodes for body in bodies), len(levels))
-
-
 def _predict_mesh_levels(patch_model, tolerance: float) -> list:
-    """Return the meshes of the pieces on each expected level, from fine to coarse."""
+    """Return the meshes of the pieces on each expected level, from fine to coarse.
+
+    The coarsest automatic mesh is that of the run. A mesh file is not read; an automatic mesh takes its place.
+    """
     if patch_model.mesh.shared is not None:
         return list(patch_model.mesh.shared.levels)
     if not patch_model.mesh.is_automatic:
@@ -96,11 +74,13 @@ def count_patch_sizes(model: Model) -> RunSizes:
     nodes = 0
     n_bytes = 0.0
     for patch in patches:
-        grids = predict_grid_sizes(patch, patch.mesh.tolerance or model.accuracy.tolerance)
-        points += grids.points
-        nodes += grids.nodes
-        n_bytes += PACKAGE_BYTES + BYTES_PER_NODE * grids.nodes
-        n_bytes += 0.0 if patch.mesh.is_static else FRAME_BYTES_PER_NODE * grids.nodes
+        tolerance = patch.mesh.tolerance or model.accuracy.tolerance
+        finest = [body for body in _predict_mesh_levels(patch, tolerance)[0] if body is not None]
+        n_nodes = sum(body.n_nodes for body in finest)
+        points += finest[0].x.size
+        nodes += n_nodes
+        frame_bytes = 0.0 if patch.mesh.is_static else FRAME_BYTES_PER_NODE
+        n_bytes += PACKAGE_BYTES + (BYTES_PER_NODE + frame_bytes) * n_nodes
     layers = [patch.interface.strips for patch in patches]
     strips = max(1 if layer is None else layer.count for layer in layers)
     key = "contact.mesh" if any(patch.mesh.file for patch in patches) else "contact.element_size"
@@ -190,23 +170,26 @@ def compute_patch_groups(model: Model) -> dict:
     return dimensionless_groups
 
 
-def describe_interface_patch(name: str, interface) -> list:
-    """Describe the patch of an interface in sentences for a plan.
+def describe_shear(patch_model, slip_length: float, name: str = "") -> str:
+    """Describe how the pieces of an interface shear before they slip.
 
-    name: nodes of the interface.
+    Parameters
+    ----------
+    patch_model : PatchModel
+    slip_length : float
+        Elastic slide of the pieces under their friction limit [m].
+    name : str
+        Nodes of the interface; "" for the table [contact].
     """
-    shear_displacement = format_length(
-        interface.numbers.static * interface.load / interface.patch.pieces.shear_stiffness, 3
+    place = f"interface {name}: " if name else ""
+    shear = f"by {format_length(slip_length, 3)} or more before the whole patch slips"
+    if patch_model.interface.has_shear:
+        return f"{place}the pieces shear elastically {shear}"
+    table = "structure.interface.contact.shear" if name else "contact.shear"
+    return (
+        f"{place}the pieces are rigid in shear in this scene; elastic pieces would shear {shear}; add "
+        f"[{table}] to include this shear"
     )
-    sentence = (
-        f"the pieces shear elastically by {shear_displacement} or more before the whole patch slips"
-        if interface.partial_slip
-        else (
-            "the patch moves as one point under the same load; add [structure.interface.contact.shear] to let the patch "
-            "slip part by part"
-        )
-    )
-    return [f"interface {name} has a patch of its own: {sentence}"]
 
 
 def describe_patch_plan(dimensionless_groups: dict, patch_model) -> list:

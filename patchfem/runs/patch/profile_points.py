@@ -27,7 +27,6 @@ from ...mesh.grading import Layout, divide_into_columns, divide_into_rows
 from ...mesh.grid import TensorGrid
 from ...model import profile
 from ...model.pieces import make_elastic_layers
-from .edge_values import EdgeValues
 from .measures import (
     MIN_EDGE_OFFSET,
     PEAK_MEASURES,
@@ -38,7 +37,7 @@ from .measures import (
     increase_error_by_peak_error,
 )
 from .press import PointSolution, Surface
-from .values import assemble_static_values, estimate_peak_pressure
+from .values import EdgeValues, assemble_static_values, estimate_peak_pressure
 
 MIN_LEVELS = 3  # Smallest number of refinement levels at which the order of convergence is known.
 # Largest number of points of a level; more would exceed the CPU time of a patch.

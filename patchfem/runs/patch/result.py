@@ -15,41 +15,22 @@ from ...formatting import format_length, format_quantity
 from ...model.pieces import make_piece_meshes
 from ...model.source import locate_errors
 from ...surface import nodes
-from ..results.patch_rows import TABLE
 from ..results.result import Result, RunInputs, collect_rest_frame
 from . import skin, store
 from .measures import add_strip_count_errors, note_on_plane_state
-from .mesh_levels import solve_on_static_meshes, solve_with_coarser
-from .values import compute_static_values, contact_reaches_steep_end
+from .mesh_levels import solve_with_coarser
+from .values import contact_reaches_steep_end
 
 # Largest Poisson's ratio at which the error estimates are reliable despite volumetric locking.
 MAX_POISSON = 0.499
 # Largest strain at which second-order effects may be neglected.
 MAX_SMALL_STRAIN = 0.02
 
-__all__ = [
-    "make_piece_meshes_of_run",
-    "make_static_result",
-    "notes_on_neglected_effects",
-    "patch_warnings",
-    "solve_on_static_meshes",
-    "solve_with_coarser",
-    "static_measures",
-    "static_measures_without_errors",
-]
 # Smallest ratio of normal to tangential displacement under a shear force that a note reports.
 MIN_COUPLING_RATIO = 0.02
 # Smallest ratio of load to buckling load that a note reports; it is about the relative error of the
 # sideways motion of a tall piece.
 MIN_BUCKLING_RATIO = 0.02
-
-
-def static_measures_without_errors(model) -> dict:
-    """Solve the patch of a model and return its static measures by name, without error estimates."""
-    with locate_errors(model.source):
-        return compute_static_values(
-            solve_with_coarser(model.patch, model.accuracy.tolerance, False)[0]
-        )
 
 
 def make_piece_meshes_of_run(model) -> tuple:
@@ -66,7 +47,9 @@ def make_piece_meshes_of_run(model) -> tuple:
 def static_measures(model, patch, coarse) -> dict:
     """Return the measures of a solved patch with the floors of their errors.
 
-    Values and errors are those of `Patch.measures`; only strips add the error due to their number.
+    Values and errors are those of `Patch.measures`; only strips add the error due to their number. The floor of a
+    measure that is a difference of larger terms is at least the tolerance times these terms: rotation times half the
+    length for the approach, half the length for the centre of pressure, and load times half the length for the moment.
 
     Parameters
     ----------
@@ -79,55 +62,30 @@ def static_measures(model, patch, coarse) -> dict:
     Returns
     -------
     dict
-        Measure by name, with the floors of `measure_floors`.
+        Measure by name.
     """
     patch_model = model.patch
-    values_by_name = {name: measure.value for name, measure in patch.measures.items()}
-    min_floors = measure_floors(patch_model, model.accuracy.tolerance, values_by_name)
+    tolerance = model.accuracy.tolerance
+    arm = patch_model.pieces.length / 2
+    larger_terms = {
+        "approach": abs(patch.measures["rotation"].value) * arm,
+        "pressure_centre": arm,
+        "moment": patch.measures["normal_load"].value * arm,
+    }
     measures = {}
     for name, measure in patch.measures.items():
-        measures[name] = replace(measure, floor=max(measure.floor, min_floors[name]))
+        floor = max(measure.floor, tolerance * larger_terms.get(name, 0.0))
+        measures[name] = replace(measure, floor=floor)
     # For worn strips, `wear.measures` adds the error due to their number.
     if patch.strips is None or coarse[0] is None or model.wear is not None:
         return measures
     return add_strip_count_errors(patch_model, coarse[0], measures)
 
 
-def measure_floors(patch_model, tolerance: float, values: dict) -> dict:
-    """Return a dict of the error floors of the static measures, for one patch or for q patches.
-
-    The floor of a measure that is a difference of larger terms is the tolerance times these terms:
-    rotation times half the length for the approach, half the length for the centre of pressure, and
-    load times half the length for the moment.
-
-    Parameters
-    ----------
-    patch_model : PatchModel
-    tolerance : float
-    values : dict
-        Values by name.
-
-    Returns
-    -------
-    dict
-    """
-    arm = patch_model.pieces.length / 2
-    terms = {
-        "approach": abs(values["rotation"]) * arm,
-        "pressure_centre": arm,
-        "moment": values["normal_load"] * arm,
-    }
-    floors = {}
-    for name in values:
-        floors[name] = np.maximum(TABLE[name].floor, tolerance * terms.get(name, 0.0))
-    return floors
-
-
 def make_static_result(inputs: RunInputs) -> Result:
     """Return the Result of a static patch, which may be without contact."""
     patch = inputs.patch
     pressure = patch.pressure
-    extra = {"residuals": dict(pressure.residuals), "iterations": pressure.iterations}
     warnings = inputs.warnings
     if pressure.outcome is Outcome.NO_CONTACT:
         warnings = [*warnings, Outcome.NO_CONTACT.sentence]
@@ -141,101 +99,77 @@ def make_static_result(inputs: RunInputs) -> Result:
         fields=collect_rest_frame(patch),
         seconds=inputs.seconds,
         warnings=warnings,
-        extra=extra,
+        extra={},
     )
 
 
-def patch_warnings(patch_model, patch) -> list:
-    """Return warnings on large strains, locking elements, the gap and the ends of the pieces."""
-    steep_end = []
-    if contact_reaches_steep_end(patch):
-        steep_end = [
-            "on a rounded end the contact reaches the point where the slope is 0.097, and beyond this point no "
-            "contact is computed; lower the tilt or the load"
-        ]
-    largest = patch.pressure.sigma_n.max(initial=0.0)
-    return [
-        *strain_warnings(patch_model, largest, patch.pressure.approach, steep_end),
-        *(text for text in patch.notes if not nodes.is_note(text)),
-    ]
-
-
-def strain_warnings(
-    patch_model, largest_pressure: float, approach: float, other_warnings=()
-) -> list:
-    """Return warnings on large strains and on volumetric locking of the elements.
+def patch_warnings(patch_model, patch, *, has_error_mesh: bool = True) -> list:
+    """Return warnings on large strains, locking elements, the gap, the ends of the pieces and a missing coarser mesh.
 
     Parameters
     ----------
     patch_model : PatchModel
-    largest_pressure : float
-        Largest nodal pressure [Pa].
-    approach : float
-        Approach [m].
-    other_warnings : sequence of str
-        Warnings to insert before the one on locking.
-
-    Returns
-    -------
-    list of str
+    patch : Patch
+    has_error_mesh : bool
+        Whether the patch is solved on another mesh too, from which its errors follow.
     """
-    out = []
-    sentences = (
-        "the peak pressure is {:.3g} of the lowest Young's modulus",
-        "the approach is {:.3g} of the total height of the two pieces",
-    )
-    for strain, sentence in zip(
-        _estimate_strains(patch_model, largest_pressure, approach), sentences
-    ):
+    materials = []
+    for piece in patch_model.pieces.both:
+        materials += [piece.substrate, *([piece.coating.material] if piece.coating else [])]
+    strains = {
+        "the peak pressure is {:.3g} of the lowest Young's modulus": (
+            patch.pressure.sigma_n.max(initial=0.0) / min(one.young for one in materials)
+        ),
+        "the approach is {:.3g} of the total height of the two pieces": (
+            patch.pressure.approach / sum(piece.height for piece in patch_model.pieces.both)
+        ),
+    }
+    warnings = []
+    for words, strain in strains.items():
         if strain > MAX_SMALL_STRAIN:
-            out.append(
-                sentence.format(strain)
-                + f", beyond the small strains that are assumed ({MAX_SMALL_STRAIN:g})"
-            )
-    out += other_warnings
-    poisson = max(material.poisson for material in _list_materials(patch_model))
-    mesh = patch_model.mesh
-    if patch_model.pieces.plane == "strain" and poisson > MAX_POISSON and not mesh.is_automatic:
-        remedy = "leave out contact.element_size"
-        if mesh.file is not None:
-            remedy = "split the elements of contact.mesh"
-        out.append(
+            limit = f", beyond the small strains that are assumed ({MAX_SMALL_STRAIN:g})"
+            warnings.append(words.format(strain) + limit)
+    if contact_reaches_steep_end(patch):
+        warnings.append(
+            "on a rounded end the contact reaches the point where the slope is 0.097, and beyond this point no "
+            "contact is computed; lower the tilt or the load"
+        )
+    poisson = max(material.poisson for material in materials)
+    is_fixed = not patch_model.mesh.is_automatic
+    if patch_model.pieces.plane == "strain" and poisson > MAX_POISSON and is_fixed:
+        warnings.append(
             "in plane strain the elements become too stiff (lock) as Poisson's ratio nears 0.5; here "
             f"Poisson's ratio is {poisson:g} (limit {MAX_POISSON:g}), so the true errors may be "
-            f"twice the estimates; {remedy}"
+            f"twice the estimates; {_advise_shorter_elements(patch_model)}"
         )
-    return out
+    warnings += [text for text in patch.notes if not nodes.is_note(text)]
+    if not has_error_mesh:
+        warnings.append(
+            f"the {patch.x.size - 1} elements along the interface are too few for an estimate of the "
+            f"error; {_advise_shorter_elements(patch_model)}"
+        )
+    return warnings
 
 
-def _estimate_strains(patch_model, largest_pressure, approach) -> tuple:
-    """Return two estimates of the strain: peak pressure/modulus and approach/height."""
-    young = min(material.young for material in _list_materials(patch_model))
-    height = patch_model.pieces.lower.height + patch_model.pieces.upper.height
-    return largest_pressure / young, approach / height
+def _advise_shorter_elements(patch_model) -> str:
+    """Return the advice for a mesh that the scene prescribes."""
+    if patch_model.mesh.file is not None:
+        return "split the elements of contact.mesh"
+    return "leave out contact.element_size"
 
 
-def _list_materials(patch_model) -> list:
-    """Return the materials of the pieces and of their coatings."""
-    out = []
-    for piece in patch_model.pieces.both:
-        out.append(piece.substrate)
-        if piece.coating:
-            out.append(piece.coating.material)
-    return out
+def notes_on_neglected_effects(face) -> list:
+    """Return notes on the effects that the model of a pressed interface neglects in any motion.
 
-
-def notes_on_neglected_effects(model, patch, coarse) -> list:
-    """Return notes on the effects that the model of a patch neglects in any motion.
+    Without a patch on coarser meshes there is no note on the plane state.
 
     Parameters
     ----------
-    model : Model
-    patch : Patch
-    coarse : sequence of Patch or None
-        The patch on the meshes of the error estimate. If the first one is None, there is no note on
-        the plane state.
+    face : Face
     """
+    model = face.model
     patch_model = model.patch
+    patch, *coarse = face.patches
     out = [text for text in patch.notes if nodes.is_note(text)]
     out += notes_on_tall_pieces(
         patch_model, patch.pressure.load / patch.pieces.interface.weight.sum()

@@ -23,8 +23,6 @@ from .press import solve_patch_contact
 # Largest number of cases that determine the mesh; of more cases, the most different ones are
 # selected.
 MAX_CASES = 48
-# Number of cases that are solved on meshes of their own if a patch slips partially.
-N_SINGLE_CASES = 5
 # Largest number of contact searches; each search uses columns graded to the contacts of the
 # previous one.
 MAX_SEARCHES = 4
@@ -88,14 +86,7 @@ def choose_shared_meshes(
     cases, are_all_patches = select_distinct_patches(patches)
     load_variants = chain.from_iterable(map(grids.make_load_variants, cases))
     has_partial_slip = any(patch.interface.partial_slip for patch in patches)
-    halvings = _count_extra_halvings(cases, tolerance) if has_partial_slip else {}
-    # Halvings that all cases need become refinement levels.
-    common_halvings = min(halvings.values(), default=0)
-    layout = _make_common_layout(
-        [*cases, *load_variants],
-        not (are_all_patches and is_complete),
-        {key: one - common_halvings for key, one in halvings.items()},
-    )
+    layout = _make_common_layout([*cases, *load_variants], not (are_all_patches and is_complete))
     if layout is None:
         return None
     # If the contact edges move or the patch slips partially, the initial contact does not determine
@@ -107,7 +98,6 @@ def choose_shared_meshes(
         cases,
         grids.make_grids(patch_model, layout.scale_cells(float(cell_factor))),
         tolerance,
-        grids.MIN_LEVELS + common_halvings,
     )
     meshes = name_shared_meshes([pair.meshes for pair in pairs])
     cache_condensed_pairs(cases[0], meshes, pairs)
@@ -127,7 +117,7 @@ def name_shared_meshes(levels) -> SharedMeshes:
     return SharedMeshes(tuple(levels), digest.hexdigest()[:32])
 
 
-def select_distinct_patches(patches, max_patches: int = MAX_CASES) -> tuple:
+def select_distinct_patches(patches) -> tuple:
     """Select the patches that differ most from each other, by farthest-point selection.
 
     The patches are compared by load and surface shape. The result does not depend on their order.
@@ -136,12 +126,10 @@ def select_distinct_patches(patches, max_patches: int = MAX_CASES) -> tuple:
     Parameters
     ----------
     patches : sequence of PatchModel
-    max_patches : int
-        Largest number of patches.
     """
     rows = {_load_and_shape_parameters(patch): patch for patch in patches}
     keys = sorted(rows)
-    if len(keys) <= max_patches:
+    if len(keys) <= MAX_CASES:
         return [rows[key] for key in keys], True
     numbers = np.array(keys)
     scale = np.abs(numbers).min(axis=0, where=numbers != 0, initial=np.inf)
@@ -151,7 +139,7 @@ def select_distinct_patches(patches, max_patches: int = MAX_CASES) -> tuple:
     coordinates = coordinates / np.maximum(np.ptp(coordinates, axis=0), 1e-300)
     selected = [int(np.argmin(coordinates.sum(axis=1)))]
     distances = np.full(len(keys), np.inf)
-    while len(selected) < max_patches:
+    while len(selected) < MAX_CASES:
         distances = np.minimum(
             distances, np.abs(coordinates - coordinates[selected[-1]]).max(axis=1)
         )
@@ -180,26 +168,7 @@ def _load_and_shape_parameters(patch_model) -> tuple:
     return (*(float(value or 0.0) for value in loading_numbers), *shapes, *skin)
 
 
-def _count_extra_halvings(cases: list, tolerance: float) -> dict:
-    """Solve single patches, and return by how many halvings their meshes exceed the minimum.
-
-    The keys are those of `_load_and_shape_parameters`. N_SINGLE_CASES patches are solved.
-    """
-    halvings = {}
-    for case in select_distinct_patches(cases, N_SINGLE_CASES)[0]:
-        try:
-            halvings[_load_and_shape_parameters(case)] = (
-                len(mesh_levels.solve_on_refined_meshes(case, case.mesh.tolerance or tolerance))
-                - grids.MIN_LEVELS
-            )
-        except PatchfemError:  # The error is reported when this case is run alone.
-            continue
-    return halvings
-
-
-def _make_common_layout(
-    cases: list, has_intermediate_cases: bool, halvings_by_case: dict
-) -> Layout | None:
+def _make_common_layout(cases: list, has_intermediate_cases: bool) -> Layout | None:
     """Return column layouts of the coarsest grids merged for all patches; None on failure.
 
     Parameters
@@ -207,8 +176,6 @@ def _make_common_layout(
     cases : list of PatchModel
     has_intermediate_cases : bool
         Whether the sweep contains cases between the given ones.
-    halvings_by_case : dict
-        Halvings of the cells by case, from `_count_extra_halvings`, beyond those that all cases need.
     """
     first = cases[0]
     max_cell_ratio = 1 / (grids.EDGE_CELLS[first.mesh.is_static] - 1)
@@ -220,9 +187,7 @@ def _make_common_layout(
         for case in cases:
             extent = _find_contact_extent(case, pair)
             if extent is not None:
-                n_halvings = halvings_by_case.get(_load_and_shape_parameters(case), 0)
-                case_layout = grids.make_column_layout(case, [extent])
-                layouts.append(case_layout.scale_cells(0.5**n_halvings))
+                layouts.append(grids.make_column_layout(case, [extent]))
                 largest_ratio = max(largest_ratio, extent.cell / extent.width)
         if not layouts:
             return None
@@ -294,7 +259,7 @@ def _interpolate_bands(layouts: list) -> list:
     return bands
 
 
-def _refine_until_tolerance_is_met(cases: list, bodies, tolerance: float, min_levels: int) -> list:
+def _refine_until_tolerance_is_met(cases: list, bodies, tolerance: float) -> list:
     """Refine nested meshes until all patches meet the tolerance or the mesh is too expensive.
 
     Parameters
@@ -303,8 +268,6 @@ def _refine_until_tolerance_is_met(cases: list, bodies, tolerance: float, min_le
     bodies : list
         Meshes of the pieces on the coarsest level.
     tolerance : float
-    min_levels : int
-        Smallest number of levels.
 
     Returns
     -------
@@ -315,22 +278,21 @@ def _refine_until_tolerance_is_met(cases: list, bodies, tolerance: float, min_le
     while True:
         pairs.insert(0, condense(cases[0], *bodies))
         bodies = [body.refine() for body in bodies]
-        if len(pairs) < min_levels:
+        if len(pairs) < grids.MIN_LEVELS:
             continue
         seconds = grids.predict_condensing_seconds(bodies)
         max_seconds = mesh_levels.max_condensing_seconds(cases[0], tolerance)
         is_too_expensive = bodies[0].x.size > MAX_INTERFACE_NODES or seconds > max_seconds
         # The refinement goes on as soon as one case misses the tolerance.
-        if is_too_expensive or all(
-            _max_mesh_error_ratio(case, pairs, tolerance) <= 1 for case in cases
-        ):
+        if is_too_expensive or all(_meets_tolerance(case, pairs, tolerance) for case in cases):
             return pairs
 
 
-def _max_mesh_error_ratio(patch_model, pairs: list, tolerance: float) -> float:
-    """Return the largest ratio of error to allowed error of a patch; 0 if it is not solved."""
+def _meets_tolerance(patch_model, pairs: list, tolerance: float) -> bool:
+    """Return whether a patch meets the tolerance on given condensed pieces, or cannot be solved on them."""
     try:
-        fine, *_ = mesh_levels.solve_on_pairs(patch_model, pairs, tolerance)
-        return max_mesh_error_ratio(fine.measures, tolerance)
-    except PatchfemError:
-        return 0.0
+        patches = mesh_levels.solve_on_pairs(patch_model, pairs, tolerance)
+    except PatchfemError:  # The error is reported when this case is run alone.
+        return True
+    is_within = max_mesh_error_ratio(patches[0].measures, tolerance) <= 1
+    return is_within and mesh_levels.resolves_slip_work(patch_model, patches, tolerance)

@@ -4,6 +4,7 @@ In: a `Patch`. Out: values by name, such as peak pressure, contact length and st
 peak pressure at rounded ends that the mesh does not resolve.
 """
 
+from typing import NamedTuple
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -13,7 +14,6 @@ from ...contact import edges, stiffness
 from ...contact.press import split_into_strips
 from ...elasticity.lapack import use_one_blas_thread
 from ...mesh.grid import TensorGrid
-from .edge_values import EdgeValues
 from .press import Patch
 
 # Largest ratio of the curvatures of neighbouring parabolas at which the pressure curve counts as
@@ -24,6 +24,22 @@ MIN_ROUNDING_CELLS = 4
 
 # Values of the patches in use: refinement, error estimates and notes need the same ones
 _VALUES_BY_PATCH: WeakKeyDictionary = WeakKeyDictionary()
+
+
+class EdgeValues(NamedTuple):
+    """Contact length and contact stiffnesses, which depend on the positions of the contact edges.
+
+    - length: length in contact [m]; the mean over the strips.
+    - width: distance between the outermost contact edges [m].
+    - normal, tangential: stiffnesses [N/m].
+    - rotational: stiffness [N m/rad].
+    """
+
+    length: float
+    width: float
+    normal: float
+    tangential: float
+    rotational: float
 
 
 def estimate_peak_pressure(x, sigma, node_fraction=None) -> float:

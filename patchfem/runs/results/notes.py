@@ -8,9 +8,11 @@ from math import ceil, log2
 import numpy as np
 
 from ...core import Outcome
+from ...effects import law_has_trait
 from ...formatting import format_length
 from ...friction.bonds import parameters, temperature
 from ...scene.keys.materials import MATERIALS
+from .result import Advice
 
 # Largest relative difference of the friction works from samples and from energies without a
 # warning.
@@ -66,71 +68,61 @@ def note_on_heating(model, patch, response, work: float | None = None) -> list:
     return note_on_surface_temperature(model, patch, work, float(response.time[-1]))
 
 
-def warn_of_unformed_bonds(law, speed: float) -> list:
-    """Return a list with a warning if bonds of the printed law break before they have formed.
-
-    speed: peak speed [m/s].
-    """
-    forming_ratio = parameters.growth_path_ratio(law, speed) if law.reading == "report" else 0.0
-    if forming_ratio <= MAX_FORMING_RATIO:
-        return []
-    # At this growth path, growth_path_ratio(law, speed) equals MAX_FORMING_RATIO.
-    max_growth_path = law.ratio / (
-        1 / (MAX_FORMING_RATIO * law.length) - law.rest_growth / speed**2
-    )
-    return [
-        f"at the peak speed of {speed:.3g} m/s a bond slides by {forming_ratio:.2g} of its length while it forms (limit "
-        f"{MAX_FORMING_RATIO:g}), so the law as printed in the report gives less friction than eqs. 2.18-2.21; set "
-        "friction.slip_growth = "
-        f'"{0.95e6 * max_growth_path:.2g} um", or friction.reading = "stretch"'
-    ]
-
-
-def warn_of_creep(law, outcome, measures: dict) -> list:
-    """Return a list with a warning if the mean position of a bounded motion drifts.
-
-    The drift (Dahl's creep) is a property of the law, not of the joint.
+def warn_of_bonds(model, speed: float, measures: dict, outcome: Outcome) -> list:
+    """Return warnings on a bond law whose bonds break before they form, creep, or start with an infinite traction.
 
     Parameters
     ----------
-    law
-        Bond parameters.
-    outcome : Outcome
+    model : Model
+    speed : float
+        Peak speed [m/s].
     measures : dict
         Measures by name.
+    outcome : Outcome
     """
+    if not law_has_trait(model.friction.law, "bonds"):
+        return []
+    law = model.bonds
+    warnings = []
+    # The traction of the initial bonds is infinite at first if the order is negative. Bonds that form later carry at
+    # most the fraction P(p + 1, R/eps_0) of mu_s N, with or without growth.
+    if law.order < 0 and law.initial != 0:
+        warnings.append(
+            "friction.order below 0 with friction.initial_bonds: the traction is infinite at the first instant, so "
+            "friction peaks depend on the time step; set initial_bonds = 0"
+        )
+    forming_ratio = parameters.growth_path_ratio(law, speed) if law.reading == "report" else 0.0
+    if forming_ratio > MAX_FORMING_RATIO:
+        # At this growth path, growth_path_ratio(law, speed) equals MAX_FORMING_RATIO.
+        max_growth_path = law.ratio / (
+            1 / (MAX_FORMING_RATIO * law.length) - law.rest_growth / speed**2
+        )
+        warnings.append(
+            f"at the peak speed of {speed:.3g} m/s a bond slides by {forming_ratio:.2g} of its length while it forms (limit "
+            f"{MAX_FORMING_RATIO:g}), so the law as printed in the report gives less friction than eqs. 2.18-2.21; set "
+            "friction.slip_growth = "
+            f'"{0.95e6 * max_growth_path:.2g} um", or friction.reading = "stretch"'
+        )
+    # The drift of a bounded motion (Dahl's creep) is a property of the law, not of the joint.
     drift = measures.get("drift_per_cycle")
-    if drift is None or drift.error is None or outcome not in (Outcome.STEADY, Outcome.STUCK):
-        return []
-    if law.reading != "stretch" or abs(drift.value) <= drift.error + 1e-2 * law.length:
-        return []
-    return [
-        f"the mean position creeps by {drift.value / law.length:.2g} bond lengths per cycle, because bonds damaged "
-        "in each cycle creep under a force with a nonzero mean"
-    ]
+    is_bounded = outcome in (Outcome.STEADY, Outcome.STUCK) and law.reading == "stretch"
+    if drift is None or drift.error is None or not is_bounded:
+        return warnings
+    if abs(drift.value) > drift.error + 1e-2 * law.length:
+        warnings.append(
+            f"the mean position creeps by {drift.value / law.length:.2g} bond lengths per cycle, because bonds damaged "
+            "in each cycle creep under a force with a nonzero mean"
+        )
+    return warnings
 
 
-def warn_of_unbounded_bonds(law) -> list:
-    """Return a list with a warning if the traction of the initial bonds is infinite at first.
-
-    The traction is infinite at the first instant if the order of the friction law is negative.
-    Bonds that form later carry at most the fraction P(p + 1, R/eps_0) of mu_s N, with or without
-    growth.
-    """
-    if law.order >= 0 or law.initial == 0:
-        return []
-    return [
-        "friction.order below 0 with friction.initial_bonds: the traction is infinite at the first instant, so "
-        "friction peaks depend on the time step; set initial_bonds = 0"
-    ]
-
-
-def note_on_growth(law, peak: float | None) -> list:
+def note_on_growth(model, peak: float | None) -> list:
     """Return notes on the effects of growing bonds.
 
     peak: largest ratio of friction force to mu_s N in the run; None if the load varies.
     """
-    if not law.has_growth:
+    law = model.bonds if law_has_trait(model.friction.law, "bonds") else None
+    if law is None or not law.has_growth:
         return []
     if law.reading == "report" and law.initial == 0:
         return []
@@ -176,7 +168,7 @@ def warn_of_work_check(values: dict, steps: int | None, harmonics: int | None = 
     # of the two works is of second order in the step only on average.
     halvings = 1 + ceil(log2(ratio) / 2)
     if harmonics:
-        remedy = advise_harmonics(harmonics)
+        remedy = advise_harmonics(harmonics).text
     elif steps and halvings > MAX_PROPOSED_HALVINGS:
         remedy = f"with this method {steps} steps per cycle are too few for this motion"
     elif steps:
@@ -189,7 +181,7 @@ def warn_of_work_check(values: dict, steps: int | None, harmonics: int | None = 
     ]
 
 
-def advise_harmonics(n_harmonics: int, n_law_harmonics: float = 0.0) -> str:
+def advise_harmonics(n_harmonics: int, n_law_harmonics: float = 0.0) -> Advice:
     """Return the advice to use more harmonics in the harmonic balance.
 
     At least MIN_PROPOSED_HARMONICS are proposed, because the convergence of a balance with few
@@ -197,7 +189,7 @@ def advise_harmonics(n_harmonics: int, n_law_harmonics: float = 0.0) -> str:
     """
     n_needed = min(ceil(n_law_harmonics), MAX_PROPOSED_HARMONICS)
     n_proposed = max(HARMONICS_FACTOR * n_harmonics, MIN_PROPOSED_HARMONICS, n_needed)
-    return f"set accuracy.harmonics = {n_proposed}"
+    return Advice.set_key("accuracy.harmonics", n_proposed)
 
 
 def note_on_surface_temperature(model, patch, work: float, duration: float) -> list:

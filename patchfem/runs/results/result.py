@@ -6,7 +6,7 @@ the numerical settings of the run.
 
 import re
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import NamedTuple
 
@@ -28,6 +28,50 @@ _FOLDER_OF_PATH = re.compile(
 )  # Folder of an absolute path at the start of a remark.
 
 
+class Advice(NamedTuple):
+    """What a user may do about a finding.
+
+    - text: clause with the key and its value.
+    - key: key of the scene, "" if no key helps.
+    - value: proposed value; None if the key is to be left out or changed otherwise.
+    - axis: axis of the resolution that the key refines, such as "mesh" or "steps".
+    """
+
+    text: str
+    key: str = ""
+    value: float | None = None
+    axis: str = ""
+
+    @classmethod
+    def set_key(cls, key: str, value: float, more: str = "") -> "Advice":
+        """Return the advice to set a key to a number.
+
+        Parameters
+        ----------
+        key : str
+        value : float
+        more : str
+            Words that follow the value.
+        """
+        return cls(f"set {key} = {value}{more}", key, value)
+
+
+class Finding(NamedTuple):
+    """What a run found about the accuracy of its measures.
+
+    - words: sentence without the advice.
+    - advice: Advice, or None.
+    """
+
+    words: str
+    advice: Advice | None = None
+
+    @property
+    def sentence(self) -> str:
+        """Sentence of the warning."""
+        return self.words if self.advice is None else f"{self.words}; {self.advice.text}"
+
+
 @dataclass(frozen=True, eq=False, slots=True)
 class RunInputs:
     """Inputs of a run: plan, solved patch, callbacks and whether to estimate errors.
@@ -41,6 +85,7 @@ class RunInputs:
     - estimate: whether to estimate the errors from coarser runs.
     - stiffer: rig and patch with a stiffer joint (`joint.FreeRig`), if a joint was subtracted from the
       modes; else None.
+    - faces: pressed interfaces (`interfaces.Face`), with their worn surfaces.
     """
 
     plan: object
@@ -52,6 +97,7 @@ class RunInputs:
     progress: Callable | None
     estimate: bool
     stiffer: object = None
+    faces: tuple = ()
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -67,6 +113,9 @@ class Result:
     - seconds: CPU seconds by step of the run.
     - warnings: sentences.
     - extra: engine, steps, notes and other data for the report.
+    - findings: `Finding`s on measures that miss the tolerance; `warnings` has their sentences.
+    - faces: interfaces of a rig that have a patch of their own (`interfaces.Face`), with their fields.
+    - yielding_faces: notes on surfaces that yield under the peak pressure, by Strength.
     """
 
     plan: object
@@ -79,6 +128,9 @@ class Result:
     seconds: dict
     warnings: list
     extra: dict
+    findings: tuple[Finding, ...] = ()
+    faces: tuple = ()
+    yielding_faces: dict = field(default_factory=dict)
 
     def __repr__(self) -> str:
         measures = _format_count(len(self.measures), "measure")
@@ -259,7 +311,7 @@ def collect_used_settings(result) -> dict:
         settings["quadrature"] = summed
     if (window := extra.get("window")) is not None:
         settings["window_cycles"] = int(window)
-    for face in extra.get("faces", ()):
+    for face in result.faces:
         settings[rows.add_interface_number("interface_nodes", face.number)] = int(face.patch.x.size)
     if patch is not None:
         settings["interface_nodes"] = int(patch.x.size)

@@ -10,14 +10,12 @@ from ...effects import law_has_trait
 from ...formatting import format_length, format_number, format_quantity
 from ...response.outcome import note_on_changing_drive, warn_if_ringing
 from ...structure.drive_sizes import find_min_decay_rate
-from ..patch import faces
+from ..results.interfaces import merge_sentences
 from ..results.notes import (
     note_on_groove_slope,
     note_on_growth,
     note_on_heating,
-    warn_of_creep,
-    warn_of_unbounded_bonds,
-    warn_of_unformed_bonds,
+    warn_of_bonds,
     warn_of_work_check,
 )
 from ..results.travel import warn_of_large_slide
@@ -55,9 +53,8 @@ def collect_warnings(run) -> list:
         *note_on_heating(model, patch, solution.response, book["friction"]),
     ]
     if run.has_friction:
-        warnings += warn_of_law(
-            model, run.outcome, measures, float(np.abs(solution.window.slide_rate).max())
-        )
+        speed = float(np.abs(solution.window.slide_rate).max())
+        warnings += warn_of_bonds(model, speed, measures, run.outcome)
     warnings += warn_of_created_energy(model, book, model.rig.drive.cycles)
     if (
         patch is not None
@@ -87,17 +84,18 @@ def collect_warnings(run) -> list:
         )
     if solution.message and solution.outcome is not Outcome.LEAVES_GROOVES:
         warnings.append(solution.message)
-    warnings += warn_of_large_slide(patch, solution.response.slide) if patch is not None else ()
-    if model.has_interface_patches:
-        warnings += faces.merge_interface_sentences(
-            model, lambda face: _warn_of_interface_patch(face, solution.response)
-        )
+    warnings += merge_sentences(
+        model,
+        run.inputs.faces,
+        lambda face: _warn_of_interface_patch(face, solution.response),
+    )
     return warnings
 
 
 def _warn_of_interface_patch(face, response) -> list:
-    """Return the warnings on the patch of one interface."""
-    warnings = [] if face.partial_slip else [SINGLE_POINT_WARNING]
+    """Return the warnings on the patch of one interface; `_warn_of_single_point` tells that of [contact]."""
+    is_point = face.name and not face.partial_slip
+    warnings = [SINGLE_POINT_WARNING] if is_point else []
     return [*warnings, *warn_of_large_slide(face.patch, face.slide(response))]
 
 
@@ -271,14 +269,13 @@ def _warn_of_single_point(model, patch, numerics) -> list:
 
 def _note_on_bond_growth(model, patch, solution) -> list:
     """Return the notes on bonds that grow with contact time."""
-    f = model.friction
-    if f is None or not law_has_trait(f.law, "bonds"):
+    if model.friction is None:
         return []
-    limit = f.static * first_interface_load(model, patch)
-    steady = limit > 0 and not model.rig.friction.load_varies
-    return note_on_growth(
-        model.bonds, float(np.abs(solution.response.force).max()) / limit if steady else None
-    )
+    limit = model.friction.static * first_interface_load(model, patch)
+    peak = None
+    if limit > 0 and not model.rig.friction.load_varies:
+        peak = float(np.abs(solution.response.force).max()) / limit
+    return note_on_growth(model, peak)
 
 
 def _note_on_elements(run) -> list:
@@ -321,27 +318,6 @@ def _note_on_elements_without_slip(run) -> list:
                 'that is reached from rest set accuracy.method = "auto"'
             ]
     return []
-
-
-def warn_of_law(model, outcome, measures, peak_speed: float) -> list:
-    """Return the warnings on the friction law of a run.
-
-    Parameters
-    ----------
-    model : Model
-    outcome : Outcome
-    measures : dict
-        Measures by name.
-    peak_speed : float
-        Largest sliding speed [m/s].
-    """
-    if not law_has_trait(model.friction.law, "bonds"):
-        return []
-    return [
-        *warn_of_unbounded_bonds(model.bonds),
-        *warn_of_unformed_bonds(model.bonds, peak_speed),
-        *warn_of_creep(model.bonds, outcome, measures),
-    ]
 
 
 def warn_of_created_energy(model, energies: dict, cycles: float) -> list:

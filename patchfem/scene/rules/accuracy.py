@@ -97,17 +97,47 @@ def check_settings(draft: SceneDraft, kind: str) -> None:
             )
 
 
+def list_repeated_axes(
+    kind: str, *, has_wear: bool, has_automatic_mesh: bool, has_fixed_steps: bool
+) -> tuple[str, ...]:
+    """Return the axes along which a run that misses its tolerance is repeated with twice the resolution.
+
+    A static patch is refined when it is pressed, wear has its own passes, and the steps of a rig are refined within a
+    pass.
+
+    Parameters
+    ----------
+    kind : str
+        Kind of the run.
+    has_wear : bool
+        Whether the scene has [wear].
+    has_automatic_mesh : bool
+        Whether the mesh of a patch follows from the tolerance.
+    has_fixed_steps : bool
+        Whether the scene fixes the steps per cycle.
+    """
+    if kind == "patch" or has_wear:
+        return ()
+    has_free_steps = kind == "bench" and not has_fixed_steps
+    return ("mesh",) * has_automatic_mesh + ("steps",) * has_free_steps
+
+
 def _find_reason_without_repetition(draft: SceneDraft, kind: str) -> str:
     """Return why a run is never repeated with finer meshes or more steps, "" if it may be."""
     tables = draft.tables
+    patches = [patch for _, patch in iterate_patches(draft)]
+    if list_repeated_axes(
+        kind,
+        has_wear=bool(tables.wear),
+        has_automatic_mesh=any(one.element_size is None and one.mesh is None for one in patches),
+        has_fixed_steps=bool(tables.accuracy.steps_per_cycle),
+    ):
+        return ""
     if kind == "patch" or tables.wear:
         return "of a pressed patch" if kind == "patch" else "with [wear]"
-    patches = [patch for _, patch in iterate_patches(draft)]
-    if any(patch.element_size is None and patch.mesh is None for patch in patches):
-        return ""
-    if kind != "bench":
-        return "with fixed meshes" if patches else "without a patch"
-    return "with accuracy.steps_per_cycle" if tables.accuracy.steps_per_cycle else ""
+    if kind == "bench":
+        return "with accuracy.steps_per_cycle"
+    return "with fixed meshes" if patches else "without a patch"
 
 
 def find_unused_settings(tables: Tables, kind: str) -> dict[str, str]:

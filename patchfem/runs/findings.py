@@ -1,0 +1,433 @@
+"""Findings of a run: measures that miss the tolerance, each with the advice that reduces its error.
+
+In: the measures of a run with their errors, and its pressed interfaces. Out: `Finding`s, whose sentences are warnings.
+The error of a measure is `safety * change / (ratio**order - 1)` (`response.errors`). An error that is `excess` times
+the allowed one therefore needs a resolution that is finer by the factor `excess ** (1 / order)`. Read
+`find_missed_measures` first, then ADVICE_BY_AXIS.
+"""
+
+from collections.abc import Callable, Mapping
+from math import ceil, floor, log2, log10, pi
+from types import MappingProxyType
+from typing import NamedTuple
+
+from ..effects import law_has_trait
+from ..formatting import format_number
+from ..model.gap import longest_loaded_cell
+from ..model.model import Model
+from . import refine
+from .patch import mesh_levels
+from .results import notes, patch_rows
+from .results.interfaces import Face, merge_findings
+from .results.result import Advice, Finding
+from .rig import costs, engines
+
+# Ratio of proposed to present tolerance; a tenth gives at least one more halving of the mesh.
+PROPOSED_TOLERANCE_RATIO = 0.1
+# Largest number of halvings of the time step to which the observed order is extrapolated.
+MAX_HALVINGS = 4
+# Fraction of the allowed error that the time steps may have if the other causes alone exceed it.
+MIN_STEP_ERROR_FRACTION = 0.2
+# Largest number of strips that is proposed; four times as many strips take about twenty times as
+# long.
+MAX_STRIPS = 64
+# Measures whose error is of first order in the width of the strips: the pressure peak of the outermost strip is
+# computed at its centre.
+FIRST_ORDER_MEASURES = (
+    "pressure_peak",
+    "loaded_fraction",
+)
+# Measures from samples, whose error does not depend on the number of harmonics.
+SAMPLED_MEASURES = (
+    "stick_fraction",
+    "slip_start_phase",
+)
+# Prefix of the measures of ringing, which engines without steps may not compute.
+RINGING_PREFIX = "ring_"
+STEADY_AMPLITUDE = "relative_displacement_amplitude_steady"
+USE_ERROR_ADVICE = "use the value with its stated error"
+NO_ADVICE = Advice(f"no known setting makes this value more accurate; {USE_ERROR_ADVICE}")
+ELEMENT_SIZE = "contact.element_size"
+STEPS_KEY = "accuracy.steps_per_cycle"
+# Ratio of the proposed accuracy.max_seconds to the expected CPU time, which varies by tens of per cent.
+MAX_SECONDS_MARGIN = 2.0
+
+
+class Missed(NamedTuple):
+    """Measures that miss the tolerance, and the run or the interface to which they belong.
+
+    Attributes
+    ----------
+    model : Model
+    measures : Mapping
+        All measures of the run or of the interface by name.
+    faces : tuple of Face
+        Pressed interfaces of the run, or the one to which the measures belong.
+    extra : Mapping
+        As in `Result.extra`.
+    next_seconds : float
+        CPU time [s] of all passes that would meet the tolerance, if it exceeds accuracy.max_seconds; else 0.
+    excess : Mapping
+        Ratio of error to allowed error [1] of each measure that misses the tolerance.
+    """
+
+    model: Model
+    measures: Mapping
+    faces: tuple
+    extra: Mapping = MappingProxyType({})
+    next_seconds: float = 0.0
+    excess: Mapping = MappingProxyType({})
+
+    def find_names(self) -> list[str]:
+        """Return the measures that a warning names.
+
+        These are the main measures whose error is smaller than their value; if there are none, the measure with the
+        largest ratio of error to allowed error.
+        """
+        main = [name for name in self.excess if refine.is_main(name)]
+        known = [
+            name for name in main if self.measures[name].error < abs(self.measures[name].value)
+        ]
+        others = [name for name in self.excess if not name.startswith(RINGING_PREFIX)]
+        return known or [max(others or self.excess, key=self.excess.get)]
+
+    @property
+    def worst(self) -> str:
+        """Named measure with the largest ratio of error to allowed error."""
+        return max(self.find_names(), key=self.excess.get)
+
+    def make_finding(self, advice: Advice) -> Finding:
+        """Return the finding on these measures: errors, tolerance and advice."""
+        first, *others = self.find_names()
+        words = f"{first} has an estimated error of {_format_error(self.measures[first])}"
+        words += "".join(f", {name} of {_format_error(self.measures[name])}" for name in others)
+        words += f"; the tolerance is {self.model.accuracy.tolerance:g}"
+        count = len(self.excess) - 1 - len(others)
+        if count:
+            words += f" ({count} other measure{'s' * (count > 1)} also exceed{'s' * (count < 2)} the tolerance)"
+        return Finding(words, advice)
+
+
+def find_missed_measures(run: Missed) -> list[Finding]:
+    """Return a finding on the static measures of each interface that miss the tolerance, and one on those of the motion.
+
+    Parameters
+    ----------
+    run : Missed
+        The run, without `excess`.
+    """
+    excess = {}
+    for name, measure in run.measures.items():
+        # `notes.warn_of_work_check` warns of a larger work check, with its remedy.
+        is_warned_of = name == "work_check" and (measure.value or 0.0) > notes.MAX_WORK_CHECK
+        ratio = min(measure.error_ratio(run.model.accuracy.tolerance), refine.MAX_EXCESS)
+        if ratio > 1 and not is_warned_of:
+            excess[name] = ratio
+
+    def find_on_face(face: Face) -> list[Finding]:
+        """Return the findings on one interface, whose measures have no number there."""
+        own = {}
+        missed = {}
+        for name in patch_rows.TABLE:
+            numbered = face.name_measure(name)
+            own[name] = run.measures.get(numbered)
+            if numbered in excess:
+                missed[name] = excess.pop(numbered)
+        own = {name: measure for name, measure in own.items() if measure is not None}
+        on_face = run._replace(model=face.model, measures=own, faces=(face,), excess=missed)
+        return _find_static(on_face) if missed else []
+
+    findings = merge_findings(run.model, run.faces, find_on_face)
+    if excess:
+        motion = run._replace(excess=excess)
+        findings.append(motion.make_finding(_advise_on_motion(motion)))
+    return findings
+
+
+def _format_error(measure) -> str:
+    """Format the relative error of a measure."""
+    if abs(measure.error) < abs(measure.value):
+        return f"{abs(measure.error / measure.value):.2g} of its value"
+    return f"at least its value ({measure})"
+
+
+def _find_static(missed: Missed) -> list[Finding]:
+    """Return the findings on the static measures of one interface, with the advice to split its trace."""
+    from .patch import trace_split
+
+    (face,) = missed.faces
+    findings = [missed.make_finding(_advise_on_statics(missed, face))]
+    patch = (face.static or face.patches)[0]
+    if face.model.patch.gap.profile is None:
+        return findings
+    if face.patch.points is None or missed.model.kind != "patch":
+        element = longest_loaded_cell(patch.x, patch.active)
+        findings += map(Finding, trace_split.advise_split(face.model.patch, element))
+    return findings
+
+
+def _advise_on_statics(missed: Missed, face: Face) -> Advice:
+    """Return the advice for inaccurate static measures: more strips or a finer mesh."""
+    patch_model = face.model.patch
+    strips = patch_model.interface.strips
+    peak = missed.measures.get("pressure_peak")
+    is_wear_unbounded = "worn_depth_max" in missed.find_names() and peak is not None
+    is_wear_unbounded = is_wear_unbounded and peak.value is None
+    # On a prescribed mesh, a value of zero may only show that the mesh is too coarse.
+    is_zero = max(missed.excess.values()) >= refine.MAX_EXCESS and patch_model.mesh.is_automatic
+    if is_wear_unbounded or is_zero:
+        return NO_ADVICE
+    if patch_model.mesh.file is None and strips is not None and strips.count > 1:
+        return _advise_strips(patch_model, missed.excess)
+
+    # The refinement of the meshes ends when all measures that control it meet the tolerance, or at
+    # its limit.
+    is_at_limit = missed.excess.keys() <= set(patch_rows.MESH_MEASURES)
+    name = "mesh" if missed.model.kind == "patch" else "mesh of the pressed pieces"
+    if face.static:
+        patch_model = patch_model.with_mesh(is_static=True, slip=None)
+    solved = [(patch_model, face.unworn or face.static or face.patches)]
+    advice = _advise_mesh(missed, solved, name, is_at_limit=is_at_limit)
+    return advice._replace(axis="mesh")
+
+
+def _advise_strips(patch_model, excess: Mapping) -> Advice:
+    """Return the advice to use as many strips as the tolerance requires."""
+    orders = [1 if name in FIRST_ORDER_MEASURES else 2 for name in excess]
+    ratio = max(times ** (1 / order) for times, order in zip(excess.values(), orders))
+    count = ceil(patch_model.interface.strips.count * ratio)
+    if count > MAX_STRIPS:
+        return NO_ADVICE
+    also = "" if patch_model.mesh.is_automatic else f" and leave out {ELEMENT_SIZE}"
+    return Advice.set_key("contact.strips.count", count, also)._replace(axis="strips")
+
+
+def _advise_mesh(
+    missed: Missed, solved: list, name: str = "mesh of the motion", *, is_at_limit: bool = False
+) -> Advice:
+    """Return the advice to refine the meshes of one or more interfaces.
+
+    Parameters
+    ----------
+    missed : Missed
+    solved : list
+        Pairs of a PatchModel and its patches, from fine to coarse.
+    name : str
+        Name of the mesh: static measures and motion may use different meshes.
+    is_at_limit : bool
+        Whether the mesh cannot be refined further.
+    """
+    n_nodes = max(patches[0].x.size for _, patches in solved)
+    cause = f"the {name} ({n_nodes} interface nodes) causes this error; "
+    if any(patch_model.mesh.file is not None for patch_model, _ in solved):
+        return Advice(f"{cause}split the elements of contact.mesh", "contact.mesh")
+    if not all(patch_model.mesh.is_automatic for patch_model, _ in solved):
+        return Advice(f"{cause}leave out {ELEMENT_SIZE}", ELEMENT_SIZE)
+    if missed.next_seconds:
+        limit = _round_up(MAX_SECONDS_MARGIN * missed.next_seconds)
+        text = f"{cause}set accuracy.max_seconds = {format_number(limit, 2)} for finer meshes"
+        return Advice(text, "accuracy.max_seconds", limit)
+    tolerances = []
+    if not is_at_limit:
+        tolerance = missed.model.accuracy.tolerance
+        tolerances = [_find_tolerance_for_finer_mesh(*place, tolerance) for place in solved]
+    tolerance = min(filter(None, tolerances), default=None)
+    if tolerance:
+        text = f"{cause}set accuracy.tolerance = {tolerance:.3g} for a finer mesh"
+        return Advice(text, "accuracy.tolerance", tolerance)
+
+    seconds = max(mesh_levels.predict_next_mesh_seconds(patches[0]) for _, patches in solved)
+    patch_model = solved[0][0]
+    limit = mesh_levels.max_condensing_seconds(patch_model)
+    if seconds > limit and not patch_model.mesh.n_finer:
+        cause += (
+            f"the next mesh would take about {format_number(seconds, 2)} CPU s, and at most {limit:g} CPU s are spent "
+            "on a mesh of this scene; "
+        )
+    return Advice(f"{cause}no accuracy.tolerance leads to a finer mesh; {USE_ERROR_ADVICE}")
+
+
+def _round_up(value: float) -> float:
+    """Return a value rounded up to two significant digits."""
+    unit = 10.0 ** (floor(log10(value)) - 1)
+    return unit * ceil(value / unit)
+
+
+def _find_tolerance_for_finer_mesh(patch_model, patches, tolerance: float) -> float | None:
+    """Return the tolerance at which a patch would get a finer mesh; None if there is none.
+
+    If the coarser meshes are not available, it is the tolerance for one more halving.
+    """
+    is_shared = patch_model.mesh.shared is not None
+    seconds = mesh_levels.predict_next_mesh_seconds(patches[0])
+    if is_shared and seconds > mesh_levels.max_condensing_seconds(patch_model):
+        return None
+    if is_shared or not any(patches[1:]):
+        return PROPOSED_TOLERANCE_RATIO * tolerance
+    return mesh_levels.tolerance_for_finer_mesh(
+        patch_model, patches, patch_model.mesh.tolerance or tolerance
+    )
+
+
+def _advise_on_motion(missed: Missed) -> Advice:
+    """Return the advice that reduces the error of the least accurate main measure of a motion.
+
+    The advice depends on the largest contribution to the error. A larger tolerance is never
+    advised, because it would lead to coarser steps and meshes.
+    """
+    name = missed.worst
+    axis = refine.find_axis(missed.measures[name], name)
+    advise = ADVICE_BY_AXIS.get(axis)
+    advice = None if advise is None else advise(missed)
+    if advice is not None:
+        return advice._replace(axis=axis)
+    if name == STEADY_AMPLITUDE:  # In a longer run the transient decays further.
+        text = "more drive cycles make this value more accurate; raise drive.cycles"
+        return Advice(text, "drive.cycles")
+    harmonics = missed.extra.get("harmonics")
+    if harmonics is None or name.startswith(SAMPLED_MEASURES):
+        return NO_ADVICE
+    return notes.advise_harmonics(harmonics, _count_friction_harmonics(missed))
+
+
+def _count_steps(missed: Missed) -> int | None:
+    """Return the number of steps per cycle of a run; None for an engine without steps."""
+    steps = missed.extra.get("steps_per_cycle") or missed.extra.get("steps")
+    return None if steps is None else int(steps)
+
+
+def _advise_steps(missed: Missed) -> Advice | None:
+    """Return the advice to use as many steps per cycle as the order of convergence requires."""
+    steps = _count_steps(missed)
+    if steps is None:
+        return None
+    model = missed.model
+    accuracy = model.accuracy
+    name = missed.worst
+    parts, order = missed.measures[name].causes
+    fixed = [key for key in ("method", "steps_per_cycle") if key in accuracy.model_fields_set]
+    exact = None
+    if (
+        model.kind == "rig"
+        and (accuracy.method == "march" or accuracy.steps_per_cycle is not None)
+        and not engines.HYBRID.find_unsupported_feature(model)
+    ):
+        left_out = " and ".join(f"accuracy.{key}" for key in fixed)
+        text = f"leave out {left_out}; the steps then follow from the tolerance"
+        exact = Advice(text, left_out)
+    if order is None:
+        clause = (
+            f"the results with {steps // 4}, {steps // 2} and {steps} steps per cycle show no order of convergence of "
+            f"{name}"
+        )
+        if exact:
+            return exact._replace(text=f"{clause}; {exact.text}")
+        return _advise_without_order(model, steps, clause)
+
+    # The steps may have what the other causes leave of the allowed error.
+    total = sum(parts.values())
+    allowed = total / missed.excess[name]
+    target = max(allowed - (total - parts["steps"]), MIN_STEP_ERROR_FRACTION * allowed)
+    halvings = max(1, ceil(log2(parts["steps"] / target) / order))
+    if exact and halvings > MAX_HALVINGS and not name.startswith(RINGING_PREFIX):
+        return exact
+    proposed = steps * 2 ** min(halvings, notes.MAX_PROPOSED_HALVINGS)
+    return Advice.set_key(STEPS_KEY, proposed)
+
+
+def _advise_without_order(model: Model, steps: int, clause: str) -> Advice:
+    """Return the advice for a run whose measures show no order of convergence with the steps, as the clause says.
+
+    If the scene does not prescribe the steps, they are doubled until the measures meet the tolerance.
+    """
+    if 2 * steps > costs.MAX_MARCH_STEPS:
+        return Advice(f"{clause}, so more steps may not help; {USE_ERROR_ADVICE}")
+    if model.kind == "rig" and model.accuracy.steps_per_cycle is not None:
+        text = (
+            f"{clause}; leave out {STEPS_KEY}, so that patchfem doubles the number of steps "
+            "while this reduces the errors"
+        )
+        return Advice(text, STEPS_KEY)
+    text = (
+        f"{clause}, so the effect of more steps is not known; try {STEPS_KEY} = {2 * steps}, or "
+        f"{USE_ERROR_ADVICE}"
+    )
+    return Advice(text, STEPS_KEY, 2 * steps)
+
+
+def _advise_end(missed: Missed) -> Advice:
+    """Return the advice on steps per cycle with which the run ends exactly at a sample.
+
+    At most twice as many steps are proposed, in multiples of four, so that coarser runs with half
+    and a quarter of them exist.
+    """
+    steps = _count_steps(missed)
+    cycles = missed.extra["cycles"]
+    counts = range(4 * ceil(steps / 4), 2 * steps + 4, 4)
+    best = min(counts, key=lambda count: abs(cycles * count - round(cycles * count)))
+    text = (
+        f"the run ends between two samples; set {STEPS_KEY} = {best}, so that a sample lies closer to "
+        "the end of the run"
+    )
+    return Advice(text, STEPS_KEY, best)
+
+
+def _advise_motion_mesh(missed: Missed) -> Advice | None:
+    """Return the advice to refine the meshes of the interfaces that slip part by part, or of the only patch."""
+    solved = [
+        (face.model.patch, face.unworn or face.patches)
+        for face in missed.faces
+        if face.partial_slip or missed.model.patch is not None
+    ]
+    return _advise_mesh(missed, solved) if solved else None
+
+
+def _advise_reduced_modes(missed: Missed) -> Advice:
+    """Return the advice to keep more modes of a reduced structure; the error falls with the square of their number."""
+    ratio = min(max(2.0, missed.excess[missed.worst] ** 0.5), 16.0)
+    rig = missed.model.rig
+    n_modes = min(ceil(rig.modes.omega.size * ratio), rig.structure.max_modes)
+    return Advice.set_key("structure.reduced.modes", n_modes)
+
+
+def _advise_shear_modes(missed: Missed) -> Advice | None:
+    """Return the advice to use more shear modes of the pieces; None if there are no more."""
+    n_modes = missed.extra["shear_modes"]
+    n_nodes = missed.faces[0].patch.x.size
+    if n_modes >= n_nodes:
+        return None
+    return Advice.set_key("accuracy.shear_modes", min(4 * n_modes, n_nodes))
+
+
+def _advise_bond_sum(missed: Missed) -> Advice:
+    """Return the advice to refine the sum over bonds."""
+    accuracy = missed.model.accuracy
+    fixed = [f"accuracy.{key}" for key in ("tail", "merge") if getattr(accuracy, key) is not None]
+    if fixed:
+        return Advice(" and ".join(f"leave out {key}" for key in fixed), fixed[0])
+    proposed = PROPOSED_TOLERANCE_RATIO * accuracy.tolerance
+    text = f"set accuracy.tolerance = {proposed:.3g} to refine the sum over bonds"
+    return Advice(text, "accuracy.tolerance", proposed)
+
+
+# Advice on a measure of a motion by the axis with the largest share of its error; None: the axis is at its limit.
+ADVICE_BY_AXIS: dict[str, Callable[[Missed], Advice | None]] = {
+    "steps": _advise_steps,
+    "end": _advise_end,
+    "mesh": _advise_motion_mesh,
+    "reduced": _advise_reduced_modes,
+    "modes": _advise_shear_modes,
+    "bonds": _advise_bond_sum,
+}
+
+
+def _count_friction_harmonics(missed: Missed) -> float:
+    """Return the number of harmonics that a velocity-dependent friction force needs.
+
+    It is the largest slip velocity divided by the reference speed of the law; 0 for other laws.
+    """
+    law = missed.model.friction
+    slip = missed.measures.get("slip_amplitude")
+    if law is None or slip is None or not law_has_trait(law.law, "creeps"):
+        return 0.0
+    return 2 * pi / missed.extra["period"] * slip.value / law.reference_speed

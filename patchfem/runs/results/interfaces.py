@@ -1,0 +1,116 @@
+"""Pressed interfaces of a run: the patch of [contact], or those of the interfaces of a rig.
+
+In: solved patches. Out: `Face`s, and findings that name the interfaces to which they belong.
+"""
+
+import re
+from collections.abc import Callable, Iterable
+from typing import NamedTuple
+
+import numpy as np
+
+from ...response import rows
+from .result import Finding, patch_surface
+
+
+class Face(NamedTuple):
+    """Pressed interface of a run, on several meshes.
+
+    - number: index of the interface.
+    - name: nodes of the interface as the scene writes them, "1-0"; "" for the table [contact].
+    - model: model of the run whose patch and friction law are those of this interface.
+    - patches: the solved Patch and those on coarser meshes; None for a missing one.
+    - fields: frames of the interface by name (see `Result`); None before its run.
+    - static: the patch on the meshes of its static measures, from fine to coarse; () if these are the same meshes.
+    - unworn: the patch before wear, from fine to coarse; () without wear.
+    """
+
+    number: int
+    name: str
+    model: object
+    patches: tuple
+    fields: dict | None = None
+    static: tuple = ()
+    unworn: tuple = ()
+
+    @property
+    def patch(self):
+        """Patch of the interface, solved on the finest mesh."""
+        return self.patches[0]
+
+    @property
+    def surface(self):
+        """Points at which the fields of the interface are given (`press.Surface`)."""
+        return patch_surface(self.patch, self.fields or {})
+
+    @property
+    def folder(self) -> str:
+        """Name of the subfolder of the interface in the output of a run."""
+        return self.name.replace(" (", "_").removesuffix(")")
+
+    def name_measure(self, name: str) -> str:
+        """Return the name of a measure of this interface in the run, which has its number from the second one on."""
+        return rows.add_interface_number(name, self.number) if self.number else name
+
+    @property
+    def partial_slip(self) -> str:
+        """Scene key that enables partial slip of the patch; "" if the patch slips as a whole."""
+        return self.model.patch.interface.partial_slip
+
+    def slide(self, response) -> np.ndarray:
+        """Return the relative displacement (k,) [m] of the interface in a Response."""
+        slides = response.extra.get("slides")
+        return slides[:, self.number] if self.name and slides is not None else response.slide
+
+
+def merge_sentences(model, faces: Iterable[Face], list_sentences: Callable) -> list[str]:
+    """Merge sentences that are equal for several interfaces, and name these interfaces.
+
+    Parameters
+    ----------
+    model : Model
+    faces : iterable of Face
+    list_sentences : callable
+        Function that returns the sentences on a Face.
+    """
+    findings = merge_findings(model, faces, lambda face: map(Finding, list_sentences(face)))
+    return [finding.words for finding in findings]
+
+
+def merge_findings(model, faces: Iterable[Face], list_findings: Callable) -> list[Finding]:
+    """Merge findings that are equal for several interfaces, and name these interfaces.
+
+    Scene keys are written as they occur in the scene.
+
+    Parameters
+    ----------
+    model : Model
+    faces : iterable of Face
+    list_findings : callable
+        Function that returns the findings on a Face.
+    """
+    names_by_finding: dict[Finding, list[str]] = {}
+    for face in faces:
+        for finding in list_findings(face):
+            words, advice = finding
+            if advice is not None:
+                text = replace_contact_keys(model, advice.text)
+                advice = advice._replace(text=text, key=replace_contact_keys(model, advice.key))
+            merged = Finding(replace_contact_keys(model, words), advice)
+            names_by_finding.setdefault(merged, []).append(face.name)
+    findings = []
+    for finding, names in names_by_finding.items():
+        # The table [contact] has no name.
+        place = f"interface{'s' * (len(names) > 1)} {', '.join(names)}: " if names[0] else ""
+        findings.append(finding._replace(words=place + finding.words))
+    return findings
+
+
+def replace_contact_keys(model, text: str) -> str:
+    """Replace keys of [contact] in a sentence by those of the interface in the scene.
+
+    In a model without [contact], they are keys of [structure.interface.contact].
+    """
+    if model.patch is not None:
+        return text
+    return re.sub(r"(?<![\w.])contact\.(?=[a-z])", "structure.interface.contact.", text)

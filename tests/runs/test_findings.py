@@ -1,0 +1,49 @@
+"""Findings on measures that miss the tolerance: scenes that trigger an advice, and the same scenes without it.
+
+`test_advice_of_warnings.py` tests that an advice has the promised effect.
+"""
+
+import pytest
+from scene_texts import BENCH, BLOCK, COULOMB, POINT, SHORT
+
+from patchfem import run
+
+STRIPS = {"contact.strips.count": 4, "contact.strips.roll": "1 urad"}
+LOOSE = "[accuracy]\ntolerance = 0.01\n"
+BONDS = POINT + '[friction]\nlaw = "nonlocal"\nstatic = 0.3\nbond_length = "1 um"\norder = 2\n'
+SINE = '[slide]\nkind = "sine"\namplitude = "2 um"\nfrequency = "1 Hz"\ncycles = 2\n'
+MARCH = {"accuracy.method": "march", "accuracy.steps_per_cycle": 40}
+
+# Scene, keys that cause the finding, and key and axis of its advice. Without these keys nothing misses the tolerance.
+SCENES = {
+    "elements": (BLOCK, {"contact.element_size": "0.5 mm"}, "contact.element_size", "mesh"),
+    "strips": (BLOCK + LOOSE, STRIPS, "contact.strips.count", "strips"),
+    "steps of a bench": (
+        BENCH,
+        {"accuracy.steps_per_cycle": 16},
+        "accuracy.steps_per_cycle",
+        "steps",
+    ),
+    "sum over bonds": (BONDS + SINE, {"accuracy.tail": 0.1}, "accuracy.tail", "bonds"),
+    "steps of a rig": (POINT + COULOMB + SHORT, MARCH, "accuracy", "steps"),
+}
+
+
+def misses_tolerance(result) -> bool:
+    """Return whether an error of a result exceeds the allowed one."""
+    tolerance = result.plan.model.accuracy.tolerance
+    return any(measure.error_ratio(tolerance) > 1 for measure in result.measures.values())
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_advice_of_a_finding_is_a_record(name):
+    """A scene with poor numbers has a finding whose advice names key and axis; its sentence is a warning."""
+    scene, keys, key, axis = SCENES[name]
+    result = run(scene, **keys)
+    (finding,) = result.findings
+    assert finding.sentence in result.warnings and misses_tolerance(result)
+    assert finding.advice.key.startswith(key) and finding.advice.axis == axis
+    if finding.advice.value is not None:
+        assert f"{finding.advice.key} = {finding.advice.value:g}" in finding.sentence
+    accurate = run(scene)
+    assert not accurate.findings and not misses_tolerance(accurate)
