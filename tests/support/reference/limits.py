@@ -39,7 +39,7 @@ SIZES = {  # Constant -> description of the quantity that it bounds.
     "effects.MAX_COORDINATES": "number of masses or modes that a scene lists",
     "scene.assignments.MAX_RANGE_VALUES": "number of values in one range of a sweep",
     "campaigns.sweeps.parse_request.MAX_CASES": "number of cases of a sweep",
-    "inputs.cells.MAX_BYTES": "bytes of a text file with a table",
+    "inputs.tables.MAX_BYTES": "bytes of a text file with a table",
     "inputs.records.MAX_BYTES": "bytes of a laboratory file",
     "inputs.matlab.MAX_BYTES": "bytes of a .mat file",
     "mesh.files.MAX_FILE_BYTES": "bytes of a mesh file",
