@@ -252,7 +252,8 @@ def find_yaw_key(tables: Tables) -> str:
 def find_heave_key(tables: Tables) -> str:
     """Return the key by which a mode heaves or pitches the patch, or "" if no mode does."""
     structure = TableView(tables).structure
-    places = (f"structure.{key}" for key in ("normal_at", "pitch_at") if structure[key])
+    keys = ("normal_at", "pitch_at") if structure.file else ()
+    places = (f"structure.{key}" for key in keys if structure[key])
     return next(places, "") or _find_mode_key(tables, "normal", "pitch")
 
 
