@@ -48,7 +48,6 @@ PUBLIC = {
         "TableFormat",
         "find_factors",
         "read_columns",
-        "read_lines",
         "read_text",
     ),
     "units": (
