@@ -145,6 +145,8 @@ def find_factors(table: TextTable, form: TableFormat) -> dict[str, float]:
     expected = f"{table.path}:1: a header like `{form.example}` is needed, not '{header[:80]}'"
     if len(set(names)) < len(names):
         raise PatchfemError(f"{expected} (a column is given twice)")
+
+    # A column that the format does not know is text, whose unit has no meaning.
     factors = {}
     for name, unit in zip(names, table.units):
         units = form.units.get(name)
@@ -158,6 +160,7 @@ def find_factors(table: TextTable, form: TableFormat) -> dict[str, float]:
             raise PatchfemError(
                 f"{table.path}:1: {name} [{unit}]: unknown unit; use one of {known}"
             )
+
     absent = [text.split()[0] for text in form.required if not set(text.split()) & set(names)]
     if absent:
         raise PatchfemError(f"{expected} (no column {', '.join(absent)})")
@@ -220,6 +223,8 @@ def read_columns(path, form: TableFormat) -> Columns:
             f"{path}:{len(table.lines) + 1}: {form.contents} needs at least two rows below the header, "
             f"not {len(table.lines)}"
         )
+
+    # Cells are read one by one only if there is text among them, or a cell at fault to name.
     labels = {name: [] for name in table.names if name not in factors}
     values = None if labels else _read_numbers(table, list(factors.values()))
     if values is None:
@@ -233,6 +238,7 @@ def read_columns(path, form: TableFormat) -> Columns:
                 [parse_number(place + name, row[name], factor) for name, factor in factors.items()]
             )
         values = np.array(numbers).reshape(len(numbers), len(factors))
+
     return Columns(
         {name: frozen_array(column) for name, column in zip(factors, values.T)},
         {name: tuple(texts) for name, texts in labels.items()},
