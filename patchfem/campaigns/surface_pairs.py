@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from ..core import PatchfemError
-from ..inputs.cells import TableFormat, parse_header, read_lines, split_cells
+from ..inputs.tables import TableFormat, find_factors, read_text
 from ..surface.quantity import Mean, Quantity, average_quantities
 
 COLUMNS = ("before", "after")  # columns that every table has
@@ -82,14 +82,11 @@ def read_pairs(table: Path) -> list[TableLine]:
         If it is no such table, with file and line.
     """
     path = Path(table)
-    header, *rows = read_lines(path, "the table")
-    form = TableFormat({}, COLUMNS, ",".join(COLUMNS), "the table", has_label_units=True)
-    columns, _ = parse_header(path, header, form)
+    text = read_text(path, "the table")
+    find_factors(text, TableFormat({}, COLUMNS, ",".join(COLUMNS), "the table"))
     lines: dict[tuple, TableLine] = {}
-    for number, row in enumerate(rows, 2):
-        if not row.replace(",", "").strip():
-            continue
-        cells = split_cells(path, number, row, columns)
+    for number, row in text.iterate_rows(skips_blank=True):
+        cells = dict(zip(text.names, row))
         names = tuple(cells.pop(column) for column in COLUMNS)
         direction = cells.pop("direction", "")
         if not all(names):

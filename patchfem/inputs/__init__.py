@@ -3,25 +3,17 @@
 In: paths of files. Out: arrays in SI units. An error names the file, the line where there is one, and
 what is needed instead.
 
-Tables (.csv): `cells` parses header and cells, `columns` reads columns of numbers, and four modules
-ask for the columns of one purpose: `slides` (a prescribed slide), `signals` (a drive or its spectrum),
-`loops` (force against displacement) and `measured` (responses of a rig). `units` lists all units.
+Tables (.csv, .txt): `tables` reads them all, and four modules ask for the columns of one purpose: `slides`
+(a prescribed slide), `signals` (a drive or its spectrum), `loops` (force against displacement) and `measured`
+(responses of a rig). `units` lists all units.
 Files of laboratories: `records` selects and converts channels that share one time, from any file that
 `laboratory` opens: tables, universal files (`universal`) or MATLAB files (`matlab`).
 Matrices of finite-element programs: `matrices`.
-Read `columns` first.
+Read `tables` first.
 """
 
 # Names that other folders use, by module.
 PUBLIC = {
-    "cells": (
-        "NUMBER_PATTERN",
-        "TableFormat",
-        "parse_header",
-        "read_lines",
-        "split_cells",
-    ),
-    "columns": ("read_columns",),
     "laboratory": ("read_records",),
     "loops": (
         "Loop",
@@ -51,6 +43,13 @@ PUBLIC = {
         "read_spectrum",
     ),
     "slides": ("read_slide",),
+    "tables": (
+        "NUMBER_PATTERN",
+        "TableFormat",
+        "find_factors",
+        "read_columns",
+        "read_text",
+    ),
     "units": (
         "CHANNEL_UNITS",
         "SI_UNITS",

@@ -13,7 +13,6 @@ import numpy as np
 
 from ..core import PatchfemError
 from . import matlab, universal
-from .cells import NUMBER_PATTERN, read_lines
 from .loops import EXPORTED_NAMES, find_standard_name
 from .measured import UNIVERSAL_EXTENSIONS
 from .records import (
@@ -24,6 +23,7 @@ from .records import (
     make_records,
     select_channels,
 )
+from .tables import NUMBER_PATTERN, has_decimal_comma, parse_number, read_text
 from .units import CHANNEL_UNITS, find_unit_factor
 
 EXTENSIONS = (*UNIVERSAL_EXTENSIONS, ".mat", ".csv", ".txt")
@@ -31,7 +31,6 @@ EXTENSIONS = (*UNIVERSAL_EXTENSIONS, ".mat", ".csv", ".txt")
 MOTION_CHANNELS = {"absolute_acceleration", "base_acceleration"}
 MAX_COLUMNS = 1000  # largest number of columns in a table
 MAX_LISTED_ARRAYS = 20  # largest number of arrays of a MATLAB file that an error message lists
-_HEADER_CELL_PATTERN = re.compile(r"(.*?)\s*(?:\[\s*([^\[\]]*?)\s*\]|\(\s*([^()]*?)\s*\))?", re.S)
 _COLUMN_PATTERN = re.compile(r"([\w.]+)\(:,\s*([1-9][0-9]*)\)")
 
 
@@ -94,56 +93,26 @@ def _find_quantity(name: str, names: list, exported_names: Mapping) -> str:
 
 def _read_table(path: Path, exported_names: Mapping) -> list:
     """Read the numeric columns of a table as channels; columns that contain text are left out."""
-    header, *lines = read_lines(path, "a measured table")
-    while lines and not lines[-1]:
-        lines.pop()
-    separator = max(",;\t", key=header.count)
-    heads = [_HEADER_CELL_PATTERN.fullmatch(_strip_cell(cell)) for cell in header.split(separator)]
-    names = [head[1] for head in heads]
+    table = read_text(path, "a measured table")
+    names = table.names
     is_data = any(map(NUMBER_PATTERN.fullmatch, names))
-    if len(names) > MAX_COLUMNS or len(lines) < 2 or is_data:
+    if len(names) > MAX_COLUMNS or len(table.lines) < 2 or is_data:
         raise PatchfemError(
             f"{path}:1: a header like `time [s],displacement [mm],force [N]` over at least two rows is "
-            f"needed, not '{header[:80]}'"
+            f"needed, not '{table.separator.join(names)[:80]}'"
         )
-    rows = []
-    for number, line in enumerate(lines, 2):
-        cells = [_strip_cell(cell) for cell in line.split(separator)]
-        if len(cells) != len(names):
-            raise PatchfemError(
-                f"{path}:{number}: {len(cells)} cells, but {len(names)} column names"
-            )
-        rows.append(cells)
+    columns = [name.lower().replace(" ", "_") for name in names]
     channels = []
-    columns = [name.strip().lower().replace(" ", "_") for name in names]
-    for head, column, cells in zip(heads, columns, zip(*rows)):
-        if not all(map(NUMBER_PATTERN.fullmatch, cells)):
-            _check_text_column(path, head[1], cells)
-            continue
-        unit = head[2] or head[3] or ""
-        values = np.array(cells, float)
-        channels.append(
-            Channel(head[1], "", _find_quantity(column, columns, exported_names), unit, values)
-        )
+    rows = [cells for _, cells in table.iterate_rows()]
+    for name, unit, column, cells in zip(names, table.units, columns, zip(*rows)):
+        quantity = _find_quantity(column, columns, exported_names)
+        row = next((k for k, cell in enumerate(cells) if not NUMBER_PATTERN.fullmatch(cell)), None)
+        if row is None:
+            values = np.array(cells, float)
+            channels.append(Channel(name, "", quantity, unit or "", values))
+        elif column in CHANNEL_UNITS or has_decimal_comma(cells[row]):
+            parse_number(f"{path}:{row + 2}: {name}", cells[row], 1.0)
     return channels
-
-
-def _strip_cell(cell: str) -> str:
-    """Return the text of a cell after removing the blanks and quotation marks around it."""
-    return cell.strip().strip('"').strip()
-
-
-def _check_text_column(path, name: str, cells: tuple) -> None:
-    """Raise PatchfemError if a column that should be numeric contains text."""
-    number = next(n for n, cell in enumerate(cells, 2) if not NUMBER_PATTERN.fullmatch(cell))
-    cell = cells[number - 2]
-    if NUMBER_PATTERN.fullmatch(cell.replace(",", ".", 1)):
-        raise PatchfemError(
-            f"{path}:{number}: {name}: '{cell[:40]}' has a decimal comma; export the file with "
-            "decimal points"
-        )
-    if name.strip().lower() in CHANNEL_UNITS:
-        raise PatchfemError(f"{path}:{number}: {name}: '{cell[:40]}' is not a finite number")
 
 
 def _read_matlab(path: Path, requests: list) -> Records:

@@ -7,9 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from ..core import PatchfemError
-from .cells import TableFormat
-from .columns import read_columns
-from .slides import require_increasing_time
+from .tables import TableFormat, read_columns, require_increasing_time
 from .units import FORCE_UNITS, SLIDE_UNITS
 
 LOOP_HEADER = "time [s],displacement [um],force [N]"
@@ -92,7 +90,7 @@ def read_loop(path) -> Loop:
     for quantity, names in EXPORTED_NAMES.items():
         known |= dict.fromkeys(names, known[quantity])
     required = " ".join(("displacement", *EXPORTED_NAMES["displacement"]))
-    table = TableFormat(known, (required,), LOOP_HEADER, "a measured loop", has_label_units=True)
+    table = TableFormat(known, (required,), LOOP_HEADER, "a measured loop")
     columns = read_columns(path, table)
     values = {
         find_standard_name(name, columns.values): column for name, column in columns.values.items()

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from ..exceptions import PatchfemError
 from ..scene.keys.quantities import UNIT_FACTORS
-from .cells import TableFormat, parse_header, parse_number, read_lines, split_cells
+from .tables import TableFormat, find_factors, parse_number, read_text
 
 COLUMN_UNITS = {
     "frequency": UNIT_FACTORS["frequency"],
@@ -55,23 +55,21 @@ def read_table(path: Path) -> list[MeasuredRow]:
     ending = path.suffix.lower()
     if ending in (".mat", *UNIVERSAL_EXTENSIONS) and path.is_file():
         raise _make_record_error(path)
-    header, *lines = read_lines(path, TABLE_FORMAT.contents)
-    columns = {cell.partition("[")[0].strip().lower() for cell in header.split(",")}
+    table = read_text(path, TABLE_FORMAT.contents)
+    columns = {name.lower() for name in table.names}
     if "time" in columns and "frequency" not in columns:
         raise _make_record_error(path)
-    names, factors = parse_header(path, header, TABLE_FORMAT)
-    unknown = [name for name in names if name not in (*COLUMN_UNITS, "flag")]
+    factors = find_factors(table, TABLE_FORMAT)
+    unknown = [name for name in table.names if name not in (*COLUMN_UNITS, "flag")]
     if unknown:
         raise PatchfemError(
             f"{path}:1: column '{unknown[0][:40]}' is unknown; possible columns are flag and "
             f"{', '.join(COLUMN_UNITS)}"
         )
-    rows = []
-    for number, line in enumerate(lines, 2):
-        if line.strip(", \t"):
-            cells = split_cells(path, number, line, names)
-            rows.append(_parse_row(f"{path}:{number}: ", cells, factors))
-    return rows
+    return [
+        _parse_row(f"{path}:{number}: ", dict(zip(table.names, cells)), factors)
+        for number, cells in table.iterate_rows(skips_blank=True)
+    ]
 
 
 def _make_record_error(path: Path) -> PatchfemError:

@@ -6,10 +6,8 @@ import numpy as np
 
 from ..core import PatchfemError
 from ..scene.keys.quantities import UNIT_FACTORS
-from .cells import TableFormat
-from .columns import read_columns
 from .records import select_channels
-from .slides import require_increasing_time
+from .tables import TableFormat, read_columns, require_increasing_time
 from .units import CHANNEL_UNITS, SI_UNITS
 from .universal import OrdinateType, make_channels, read_datasets
 

@@ -8,8 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from ..core import PatchfemError
-from .cells import TableFormat
-from .columns import read_columns
+from .tables import TableFormat, read_columns, require_increasing_time
 from .units import CHANNEL_UNITS
 
 COLUMN_NAMES = ("time", "displacement")
@@ -62,14 +61,3 @@ def read_slide(path) -> tuple:
     if not np.any(displacement):
         raise PatchfemError(f"{path}: displacement is 0 in every row, so nothing slides")
     return time, displacement
-
-
-def require_increasing_time(path, time: np.ndarray) -> None:
-    """Raise PatchfemError at the first row of a table whose time (k,) [s] does not rise."""
-    late = np.flatnonzero(np.diff(time) <= 0)
-    if late.size:
-        k = late[0]
-        raise PatchfemError(
-            f"{path}:{k + 3}: time {time[k + 1]:g} s is not later than the time in the row above, "
-            f"{time[k]:g} s; times must strictly rise"
-        )

@@ -4,7 +4,7 @@ import numpy as np
 from scipy import sparse
 
 from ..core import PatchfemError
-from .cells import MAX_VALUE
+from .tables import MAX_VALUE
 
 MAX_SKEW = 1e-8  # largest skew part |A - A^T| / |A| of a matrix that counts as symmetric
 SKEW_REFUSAL = "gyroscopic and follower terms are not supported"

@@ -6,6 +6,7 @@ from typing import NamedTuple
 from ..core import ModalBasis, PatchfemError
 from ..scene.rules.structure import LOCATION_KEYS, UNIVERSAL_EXTENSIONS
 from ..structure import arrays, places, universal
+from ..structure.modes import PATCH_MOTIONS
 from .file_cache import cache_by_file
 from .source import name_key
 
@@ -106,4 +107,10 @@ def _build_modes_from_arrays(
         raise PatchfemError(
             "`slide` of an interface is 0 in every mode, so nothing slides there; give the motion at the patch"
         )
+    for key in PATCH_MOTIONS if needs_interface else ():
+        if getattr(modes, key) is not None:
+            raise PatchfemError(
+                f"contains `{key}`, but the modes of such a file move the patch along x alone; list the modes in "
+                f"[[structure.mode]], which has the key {key}, or leave this array out"
+            )
     return FileModes(modes, [])

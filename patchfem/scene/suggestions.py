@@ -86,13 +86,17 @@ def describe_unknown_key(
         verb = "has" if len(owners) == 1 else "have"
         wrong_table = f"{join_words(owners, 'and')} {verb} a key of this name"
 
+    keys = list_keys(model)
     suggestion = _suggest_name(model, raw, table_key, key, sets)
     if suggestion:
         is_near = key in suggestion or _compare_names(key, suggestion) >= MIN_NAME_SIMILARITY
         advice = "" if is_near else f" {wrong_table}".rstrip()
-        return UnknownKey(f"{subject}; did you mean '{suggestion}'?{advice}", suggestion)
+        # Almost any value is a number or a text, so that without a unit only the name shows what was meant.
+        guess = keys.get(suggestion)
+        is_plain = guess is not None and guess.inner is None and guess.kind is None
+        if not (advice and is_plain):
+            return UnknownKey(f"{subject}; did you mean '{suggestion}'?{advice}", suggestion)
 
-    keys = list_keys(model)
     known = list(keys)
     if is_table:
         known = [name for name in keys if not keys[name].accepts_value] or known

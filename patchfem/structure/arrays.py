@@ -4,7 +4,8 @@
 - Modal data: omega (n,) [rad/s] or frequency (n,) [Hz]; damping, ratios (n,) or a matrix D (n, n) [1/s];
   moving_mass [kg].
 - Both: slide (n,) or (i, n); base (n,), for matrices by default ones; output (n,), by default the slide of
-  the first interface; force (n,), by default the output; normal, pitch and yaw (n,); names.
+  the first interface; force (n,), by default the output; normal, pitch and yaw (n,), which a rig with
+  friction refuses; names.
 
 Other arrays of the file are ignored.
 """

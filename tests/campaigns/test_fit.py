@@ -487,7 +487,7 @@ def test_refuses_invalid_loop_with_line_number(fit_command, text, message, tmp_p
 
 @pytest.mark.parametrize("table, message", [
     ("time [s],displacement [m]\n0,1e-6\n0.1,2e-6\n", "slide.csv:2: displacement starts at 1e-6"),
-    ("time [s],displacement [m],wobble [N]\n0,0,0\n0.1,2e-6,5\n", "slide.csv:1: a header like"),
+    ("time [s],wobble [m]\n0,0\n0.1,2e-6\n", "slide.csv:1: a header like"),
 ])  # fmt: skip
 def test_refuses_invalid_path_file_with_message_of_check(tmp_path, table, message):
     """An invalid path file is refused by `run` and `fit` with the message of `check`.

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from patchfem.core import PatchfemError
-from patchfem.inputs import TableFormat, cells, measured, read_columns
+from patchfem.inputs import TableFormat, measured, read_columns, tables
 from patchfem.mesh import files as meshes
 from patchfem.structure import arrays, universal
 
@@ -100,4 +100,4 @@ def test_refuses_huge_files_quickly(tmp_path, name, reader, expected):
     with open(path, "wb") as file:
         file.truncate(3 << 30)  # a sparse file, which takes no disk space
     error_message, peak = measure_peak_memory(lambda: reader(path))
-    assert expected in error_message and peak < 4.5 * cells.MAX_BYTES
+    assert expected in error_message and peak < 4.5 * tables.MAX_BYTES

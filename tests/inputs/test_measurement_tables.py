@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from patchfem.core import G_N, PatchfemError
-from patchfem.inputs import read_table
+from patchfem.inputs import read_slide, read_table
 from patchfem.inputs.measured import FLAG_MEANINGS
 
 TABLE_1 = Path(__file__).parents[2] / "studies" / "rig" / "table1.csv"
@@ -46,13 +46,13 @@ def test_exact_table_units_are_converted(tmp_path):
 @pytest.mark.parametrize("text, message", [
     ("", ":1: {like}, not ''"),
     ("frequency [Hz],input [lb]\n", ":1: input [lb]: unknown unit; use one of m/s^2, mm/s^2, g"),
-    ("frequency [Hz],speed [m/s]\n", ":1: {like}, not 'frequency [Hz],speed [m/s]' (columns with a unit: "),
+    ("frequency [Hz],speed [m/s]\n", ":1: {like}, not 'frequency [Hz],speed [m/s]' (no column input)"),
     ("frequency [Hz],flag\n", ":1: {like}, not 'frequency [Hz],flag' (no column input)"),
     (HEAD + "143,5,6.0,,\n143,6\n", ":3: five cells are needed, frequency, input"),
-    (HEAD + "143,5,\"6,0\",,\n", ":2: acceleration: '6,0' is not a finite number"),
+    (HEAD + "143,5,\"6,0\",,\n", ":2: acceleration: '6,0' has a decimal comma; export the file with decimal points"),
     (HEAD + "143,5,6.0,,\n143,5,6.0,,X\n", ":3: flag 'X'"),
     (HEAD + ",5,6.0,,\n", ":2: frequency and input are needed"),
-    (HEAD + "1" * 200_000 + ",5,6,,\n", ":2: frequency: '1111"),
+    (HEAD + "1" * 200_000 + ",5,6,,\n", ":2: frequency: inf in SI is outside the computable range"),
     (HEAD + "1" * 200_000 + ",\"5\",6,,\n", ":2: the quotation marks in this row cannot be read (field larger than "
                                             "field limit"),
     (HEAD + "143,-5,6,,\n", ":2: input: '-5' is below 0"),
@@ -90,3 +90,13 @@ def test_refuses_time_record_with_advice(tmp_path, header):
             PatchfemError, match=rf"records over time.*`patchfem import {file} --decay"
         ):
             read_table(file)
+
+
+@pytest.mark.parametrize("separator", [",", ";", "\t"])
+def test_exact_separators_and_brackets_of_units(tmp_path, separator):
+    """Every table may separate its cells by commas, semicolons or tabs, and write units in either brackets."""
+    path = tmp_path / "slide.csv"
+    rows = [["time (ms)", '"displacement" [um]'], ["0", "0"], ['"500"', "2"]]
+    path.write_text("\n".join(map(separator.join, rows)) + "\n")
+    time, displacement = read_slide(path)
+    assert time.tolist() == [0.0, 0.5] and displacement.tolist() == [0.0, 2e-6]

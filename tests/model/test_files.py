@@ -72,7 +72,7 @@ FAULTS = {
     "structure, no slide": (POINT + COULOMB + ARRAYS, "a.npz", make_modes(slide=[0.0, 0.0]), "structure.file",
                             "a.npz: `slide` of an interface is 0 in every mode"),
     "measured": (MEASURED, "m.csv", "frequency [Hz],output [g]\n1,1\n", "measured.file",
-                 "not 'frequency [Hz],output [g]' (columns with a unit: frequency, input"),
+                 "not 'frequency [Hz],output [g]' (no column input)"),
     "mesh": (mesh_text(), "a.msh", "$MeshFormat\nnonsense\n", "contact.mesh", "a.msh: not a readable .msh file"),
     "mesh, lying": (mesh_text(), "a.msh", "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n9999999\n1 0 0 0\n$EndNodes\n",
                     "contact.mesh", "a.msh: Nodes announces 9999999 entries"),

@@ -60,6 +60,10 @@ def test_exact_setting_suggests_key_of_file(wrong, meant):
         ),
         ("drive.yaw=1 rad/m", "[[structure.mode]] has a key of this name"),
         ("structure.law=coulomb", "[friction] has a key of this name"),
+        (
+            "friction.tolerance=1e-3",
+            "unknown key; [accuracy] has a key of this name; known here: law, static",
+        ),
         ("structure.interface.0.load=1 N", "the scene has no [[structure.interface]]"),
     ],
 )

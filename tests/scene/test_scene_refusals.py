@@ -165,7 +165,7 @@ def test_refuses_kinetic_for_laws_with_one_coefficient(law):
     """A kinetic coefficient is refused for laws that have only one coefficient of friction."""
     found = list_mistakes(BENCH, f"friction.law={law}", "friction.kinetic=0.2", "friction.bond_length=1 um",
                      "friction.reference_speed=1 mm/s")  # fmt: skip
-    assert found == [f"--set: friction.kinetic: law '{law}' has no key kinetic; laws with it are "
+    assert found == [f"--set: friction.kinetic: law '{law}' has no key kinetic; leave it out; laws with it are "
                      f"{name_laws_with_key('kinetic')}"]  # fmt: skip
 
 

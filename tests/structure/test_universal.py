@@ -3,9 +3,14 @@
 import numpy as np
 import pytest
 import pyuff
+from scene_texts import COATED, PLASTIC
 
 from patchfem.core import PatchfemError
+from patchfem.model import build
+from patchfem.scene import load, loads
 from patchfem.structure import compute_receptance, masses, places, universal
+
+IWAN = ["friction.law=iwan", "friction.stiffness=1e7 N/m", "friction.chi=-0.5", "friction.beta=0.5"]
 
 FILE_RTOL = 2e-5  # dataset 55 and the frequencies of 58 have six digits
 RIG = masses.build_basis(
@@ -234,3 +239,76 @@ def test_refuses_invalid_universal_file(tmp_path, content):
     (tmp_path / "a.uff").write_bytes(content)
     with pytest.raises(PatchfemError, match=r"cannot be read|no dataset 55"):
         universal.read_universal(tmp_path / "a.uff")
+
+
+HEAVING_RIG = (
+    COATED
+    + PLASTIC
+    + """
+[structure]
+file = "a.uff"
+moving_mass = "0.5 kg"
+slide_at = "12:+y"
+normal_at = "13:+y"
+[drive]
+kind = "base"
+frequency = "143 Hz"
+acceleration = "5 g"
+cycles = 20
+"""
+)
+
+
+def test_exact_heave_of_modes_from_file_changes_the_load(tmp_path):
+    """The motion at `normal_at` changes the load as that of listed modes does, and is refused where theirs is."""
+    write_universal(tmp_path / "a.uff", normal_modes())
+    (tmp_path / "a.toml").write_text(HEAVING_RIG)
+    from_file = build(load(tmp_path / "a.toml"))
+    rig = from_file.rig
+    assert rig.friction.load_varies and rig.modes.normal.any()
+
+    tables = [
+        f'[[structure.mode]]\nname = "{k}"\nfrequency = "{float(rig.structure.frequencies[k])!r} Hz"\n'
+        + "".join(
+            f"{key} = {float(values[k])!r}\n"
+            for key, values in (
+                ("damping", rig.modes.zeta),
+                ("slide", rig.modes.slide),
+                ("base", rig.modes.base),
+                ("output", rig.modes.output),
+                ("normal", rig.modes.normal),
+            )
+        )
+        for k in range(len(rig.modes.omega))
+    ]
+    head, _, drive = HEAVING_RIG.partition('file = "a.uff"\n')
+    mass, _, drive = drive.partition('slide_at = "12:+y"\nnormal_at = "13:+y"\n')
+    listed = build(loads(head + mass + "".join(tables) + drive))
+    assert listed.motion == from_file.motion and listed.rig.friction.load_varies
+    np.testing.assert_allclose(listed.rig.modes.normal, rig.modes.normal)
+
+    with pytest.raises(
+        PatchfemError, match=r"friction\.law: law 'iwan' with a mode's normal is not"
+    ):
+        load(tmp_path / "a.toml", IWAN)
+
+
+def test_refuses_heave_in_array_file_beside_friction(tmp_path):
+    """An array `normal`, which no engine reads, is refused beside friction and ignored without it."""
+    np.savez(
+        tmp_path / "a.npz",
+        frequency=[143.0],
+        damping=[0.01],
+        slide=[1.0],
+        base=[1.0],
+        normal=[0.1],
+    )
+    text = HEAVING_RIG.replace("a.uff", "a.npz")
+    text = text.replace('slide_at = "12:+y"\nnormal_at = "13:+y"\n', "")
+    (tmp_path / "a.toml").write_text(text)
+    with pytest.raises(
+        PatchfemError, match=r"a\.toml:\d+: structure\.file: .* contains `normal`, but"
+    ):
+        build(load(tmp_path / "a.toml"))
+    (tmp_path / "linear.toml").write_text(text[text.index("[structure]") :])
+    assert build(load(tmp_path / "linear.toml")).kind == "linear"

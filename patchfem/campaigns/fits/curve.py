@@ -18,8 +18,7 @@ from ...core import PatchfemError, frozen_array
 from ...formatting import format_length, format_number
 from ...identify.least_squares import Fit, Problem
 from ...identify.space import make_space_filling_points
-from ...inputs.cells import TableFormat
-from ...inputs.columns import read_columns
+from ...inputs.tables import TableFormat, read_columns
 from ...inputs.units import RATIO_UNITS
 from ...model.model import Model
 from ...model.source import locate_errors
@@ -161,7 +160,7 @@ def read_damping_curve(path) -> MeasuredCurve:
         for prefix in ("decay_", ""):
             units |= dict.fromkeys((f"{prefix}{name}", f"{prefix}{name}_error"), unit)
     required = tuple(f"{name} decay_{name}" for name in UNITS)
-    form = TableFormat(units, required, HEADER, "a decay", has_label_units=True)
+    form = TableFormat(units, required, HEADER, "a decay")
     table = read_columns(path, form)
     columns = {name.removeprefix("decay_"): column for name, column in table.values.items()}
     methods = table.labels.get("method", ("decay",))

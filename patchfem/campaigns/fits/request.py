@@ -6,8 +6,8 @@ from pathlib import Path
 from typing import NamedTuple
 
 from ...core import PatchfemError
-from ...inputs.cells import read_lines
 from ...inputs.measured import COLUMN_UNITS, TABLE_FORMAT
+from ...inputs.tables import read_text
 from ...model.model import build
 from ...scene.scene import Scene
 from ..rows.checkpoint import SearchCheckpoint
@@ -178,16 +178,15 @@ def choose_kind(scene: Scene, to: str) -> str:
     path = Path(to)
     if path.suffix.lower() != ".csv" or not path.is_file():
         return "rows"
-    head = read_lines(path, "a measured table")[0]
-    names = (cell.partition("[")[0].strip().lower() for cell in head.split(","))
-    columns = {name.removeprefix("decay_") for name in names}
+    names = read_text(path, "a measured table").names
+    columns = {name.lower().removeprefix("decay_") for name in names}
     if columns & (UNITS.keys() - COLUMN_UNITS.keys()):
         return "curve"
     if columns & {*COLUMN_UNITS, "time"}:
         return "rows"
     raise PatchfemError(
         f"{path}:1: a header like `{HEADER}` (of a mode, against its amplitude) or `{TABLE_FORMAT.example}` "
-        f"(response to a sine) is needed, not '{head.strip()[:80]}'"
+        f"(response to a sine) is needed, not '{','.join(names)[:80]}'"
     )
 
 

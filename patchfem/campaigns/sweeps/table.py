@@ -11,7 +11,7 @@ from collections import Counter
 from pathlib import Path
 
 from ...disk.open_with_timeout import open_for_reading
-from ...inputs.cells import NUMBER_PATTERN
+from ...inputs.tables import NUMBER_PATTERN
 from ...scene.assignments import Axis, make_axis
 from ...scene.suggestions import require_key
 from .cases import Cases

@@ -8,8 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...contact import contact_sets
-from ...core import PatchfemError
-from ...effects import describe_unsupported, law_has_trait, needs_bond_list
+from ...effects import law_has_trait, needs_bond_list
 from ...friction.laws import coulomb
 from ...friction.laws.elastic_plastic import parallel_element
 from ...friction.laws.stretch import points_element
@@ -57,11 +56,6 @@ def make_contact(model: Model, numerics: Numerics, patch) -> contacts.Contact:
     numerics : Numerics
     patch : Patch or None
         None under [normal].
-
-    Raises
-    ------
-    PatchfemError
-        If the law cannot be combined with the load or with other interfaces.
     """
     rig = model.rig
     rows = rig.modes.interfaces
@@ -230,35 +224,17 @@ def _compute_shear_modes(patch, law, n_modes: int | None, model) -> tuple:
 
 
 def _make_varying_contact(model: Model, numerics: Numerics, patch, row) -> contacts.Contact:
-    """Return the points of an interface whose load changes with the motion, or over time.
-
-    Raises
-    ------
-    PatchfemError
-        If law, load and patch cannot be combined.
-    """
+    """Return the points of an interface whose load changes with the motion, or over time."""
     f = model.friction
     modes = model.rig.modes
     law = f
     bond_sum = None
     if law_has_trait(f.law, "bonds"):
         law = model.bonds
-        if needs_bond_list(f) and law.reading != "report":
-            raise PatchfemError(
-                describe_unsupported(
-                    "friction: a changing normal load together with reading = 'stretch' and an order other than 1",
-                    "recursion",
-                )
-            )
         if needs_bond_list(f):
             choice = choose_bond_summation(model, numerics)
             bond_sum = contacts.BondSum(law, choice.reach(f.order), choice.merge)
     if patch is None:
-        if any(part is not None and np.any(part) for part in (modes.normal, modes.pitch)):
-            raise PatchfemError(
-                "structure.mode.normal: with [normal] the contact is a single point, which cannot move normal to the "
-                "contact (`normal`) or rotate (`pitch`); use [contact] in place of [normal]"
-            )
         preload = float(model.point.evaluate(np.zeros(1))[0])
         return contacts.make_pressed_contact(
             law, preload, row, bond_sum=bond_sum, load=model.point.evaluate
@@ -297,22 +273,7 @@ def make_contact_sets(patch, spring: float = 0.0) -> "contact_sets.ContactSets":
     patch : Patch
     spring : float
         Rotational stiffness of the holder [N m/rad], 0 for a rigid one.
-
-    Raises
-    ------
-    PatchfemError
-        For a nonlinear asperity layer, for strips and for a patch that carries no load.
     """
-    if patch.has_smooth_skin:
-        raise PatchfemError(
-            describe_unsupported(
-                "contact.asperities.law: a nonlinear law under a normal load that changes", "linear"
-            )
-        )
-    if patch.strips is not None:
-        raise PatchfemError(
-            describe_unsupported("[contact.strips] with a normal load that changes", "either")
-        )
     force = patch.pressure.sigma_n * patch.pieces.interface.weight
     compliance = patch.pieces.normal
     if spring > 0:
@@ -341,15 +302,8 @@ def choose_shear_modes(model: Model, patch, law, force, measure, count: int | No
     Raises
     ------
     PatchfemError
-        If the law has no elastic range, or the patch is unstable.
+        If the patch is unstable.
     """
-    if getattr(law, "law", "bonds") in ("coulomb", "tanh"):
-        raise PatchfemError(
-            describe_unsupported(
-                "friction.law: this law together with [contact.shear] and a normal load that changes",
-                "stiff",
-            )
-        )
     compliance = patch.slip_compliance
     length = getattr(law, "length", None) or law.bond_length
     # An unstable patch could jump without a change of the drive, so it is rejected as under a constant load.

@@ -249,11 +249,18 @@ def find_yaw_key(tables: Tables) -> str:
     return _find_mode_key(tables, "yaw")
 
 
+def find_heave_key(tables: Tables) -> str:
+    """Return the key by which a mode heaves or pitches the patch, or "" if no mode does."""
+    structure = TableView(tables).structure
+    keys = ("normal_at", "pitch_at") if structure.file else ()
+    places = (f"structure.{key}" for key in keys if structure[key])
+    return next(places, "") or _find_mode_key(tables, "normal", "pitch")
+
+
 def find_load_change_key(tables: Tables) -> str:
     """Return the key that makes the load of a rig vary, or "" if the load is constant."""
-    if TableView(tables).normal.amplitude:
-        return "normal.amplitude"
-    return _find_mode_key(tables, "normal", "pitch")
+    is_varied = TableView(tables).normal.amplitude
+    return "normal.amplitude" if is_varied else find_heave_key(tables)
 
 
 def _find_mode_key(tables: Tables, *names: str) -> str:
@@ -267,7 +274,8 @@ def _find_mode_key(tables: Tables, *names: str) -> str:
 
 def describe_load_change(key: str) -> str:
     """Return the cause of a changing load, such as normal.amplitude or "a mode's pitch"."""
-    return key if key == "normal.amplitude" else f"a mode's {key.rpartition('.')[2]}"
+    motion = key.rpartition(".")[2].removesuffix("_at")
+    return key if key == "normal.amplitude" else f"a mode's {motion}"
 
 
 def _find_obstacle(method: str, motion: MotionFeatures) -> str:

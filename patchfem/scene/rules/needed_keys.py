@@ -53,7 +53,9 @@ def check_needed_keys(draft: SceneDraft) -> None:
             reason = choices.unused[key]
             if key in REFUSED_KEYS:
                 laws = name_laws_with_key(key)
-                table.add_mistake(key, f"{reason} has no key {key}; laws with it are {laws}")
+                table.add_mistake(
+                    key, f"{reason} has no key {key}; leave it out; laws with it are {laws}"
+                )
             else:
                 table.add_remark(key, f"has no meaning for {reason} and is not used")
 

@@ -31,6 +31,7 @@ from .methods import (
     check_method,
     describe_load_change,
     find_climbed_grooves,
+    find_heave_key,
     find_yaw_key,
     list_lower_shapes,
 )
@@ -74,6 +75,7 @@ class Joint(TableFacts):
         self.patch_key = f"{table_key}.contact" if self.is_interface else "contact"
         self.load_change_description = describe_load_change(self.load_change)
         self.grooves = find_climbed_grooves(draft.tables)
+        self.heave_key = find_heave_key(draft.tables)
         self.yaw = find_yaw_key(draft.tables)
         self.instrument_key = find_instrument_key(draft)
         self.wave = find_waveform(draft.tables.drive)
@@ -198,9 +200,7 @@ FEATURES = {
     ),
     "sensor apart from the output": Feature(lambda j: j.instrument_key, "{instrument_key}"),
     # the load
-    "mode with heave or pitch": Feature(
-        lambda j: j.load_change.startswith("structure"), "{load_change}"
-    ),
+    "mode with heave or pitch": Feature(lambda j: j.heave_key, "{heave_key}"),
     "changing load": Feature(
         lambda j: j.kind == "rig" and j.load_change, "{load_change}", "{load_change_description}"
     ),
@@ -345,7 +345,7 @@ COMBINATIONS = {
     "leave out [wear] or describe a single interface by [friction] and [normal]": (
         "wear, structure.interface",
     ),
-    "leave out [wear] or {load_change}": ("wear, mode with heave or pitch",),
+    "leave out [wear] or {heave_key}": ("wear, mode with heave or pitch",),
     "leave out [wear] or use law 'coulomb'": ("wear, law of an averaged pressure",),
     "a [normal] contact has no area, so its wear has no depth: use [contact]": (
         "wear, grooves, load on a point",
@@ -439,9 +439,9 @@ def _check_modes(joint: Joint) -> None:
             "`yaw` rotates the patch about its normal; add [contact.strips], whose strips slide independently",
         )
     is_point = not joint.is_interface and not joint.contact
-    if is_point and joint.load_change.startswith("structure"):
+    if is_point and joint.heave_key:
         joint.draft.add_mistake(
-            joint.load_change,
+            joint.heave_key,
             "a single contact point cannot heave or pitch: use [contact] in place of [normal]",
         )
 

@@ -11,7 +11,7 @@ from itertools import chain
 from typing import NamedTuple
 
 from ...core import PatchfemError
-from ...inputs.cells import NUMBER_PATTERN
+from ...inputs.tables import NUMBER_PATTERN
 from .spellings import HEADER_EXAMPLE, MISSING, NO_UNIT, ROLES, parse_length_unit, shorten
 
 MAX_LINE = 1000  # largest number of characters of a line in which names of columns are sought

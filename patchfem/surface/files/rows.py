@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...core import PatchfemError
-from ...inputs.cells import NUMBER_PATTERN
+from ...inputs.tables import NUMBER_PATTERN
 from .header import COMMENT, split_cells
 from .spellings import MISSING, shorten
 

@@ -39,7 +39,7 @@ SIZES = {  # Constant -> description of the quantity that it bounds.
     "effects.MAX_COORDINATES": "number of masses or modes that a scene lists",
     "scene.assignments.MAX_RANGE_VALUES": "number of values in one range of a sweep",
     "campaigns.sweeps.parse_request.MAX_CASES": "number of cases of a sweep",
-    "inputs.cells.MAX_BYTES": "bytes of a text file with a table",
+    "inputs.tables.MAX_BYTES": "bytes of a text file with a table",
     "inputs.records.MAX_BYTES": "bytes of a laboratory file",
     "inputs.matlab.MAX_BYTES": "bytes of a .mat file",
     "mesh.files.MAX_FILE_BYTES": "bytes of a mesh file",
@@ -121,7 +121,7 @@ infinite; any computed value of this peak would depend on the mesh.
 
 ADVICE = {  # Property of a joint in the advice of a row -> its meaning.
     "{compliance}": "what lets the patch slip part by part",
-    "{load_change}": "the heave and the pitch of the modes",
+    "{heave_key}": "the heave and the pitch of the modes",
     "{joints_advice}": "use a law that supports several interfaces",
     "{grooves_advice}": "use a law that supports grooves",
 }
@@ -138,7 +138,8 @@ MEANINGS = {  # Feature of a combination that is neither a key nor a law -> its 
     "drive other than a sine": "`drive.waveform` other than `sine`, unless `drive.kind` is `free`",
     "levels or sweep in time": "`drive.waveform` is `levels` or `sweep`, and `accuracy.method` is not `harmonic`",
     "sensor apart from the output": "`accelerometer` or `gauge` of a `[[structure.mode]]` differs from its `output`",
-    "mode with heave or pitch": "`normal` or `pitch` of a `[[structure.mode]]` is not 0",
+    "mode with heave or pitch": "`normal` or `pitch` of a `[[structure.mode]]` is not 0, or `structure.normal_at` or "
+    "`structure.pitch_at` is given",
     "changing load": "in a rig: `normal.amplitude`, or a mode with heave or pitch",
     "mode with yaw": "`yaw` of a `[[structure.mode]]` is not 0",
     "kinetic below static": "law that sticks rigidly, with `kinetic` less than `static`",

@@ -1,0 +1,274 @@
+"""Tables whose header states the units of their columns: the only reader of .csv and .txt files of numbers.
+
+Commas, semicolons or tabs separate the cells, whichever the header has most of, and a unit stands in brackets behind
+the name of its column: ``time [s]`` or ``time (s)``. NumPy is imported only for columns of numbers, because `patchfem
+check` reads tables of measured responses.
+"""
+
+from __future__ import annotations
+
+import csv
+import re
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple
+
+from ..exceptions import Missing, PatchfemError
+from .units import normalize_unit
+
+if TYPE_CHECKING:
+    import numpy as np
+
+MAX_BYTES = 64 * 2**20  # largest size of a text file in bytes
+MAX_VALUE = 1e50  # largest value in SI; the keys of a scene have the same limit
+NUMBER_PATTERN = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
+_HEAD_PATTERN = re.compile(r"(.*?)\s*(?:\[\s*([^\[\]]*?)\s*\]|\(\s*([^()]*?)\s*\))?", re.S)
+_NUMBER_WORDS = ("no", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine")
+
+
+class TableFormat(NamedTuple):
+    """Columns that a table may have, and the words for them in error messages.
+
+    units: column of numbers -> unit -> factor to SI; the unit "" stands for a column without a unit.
+    required: columns that must be there; "displacement slide" accepts either name.
+    example: header of such a table. contents: what the file is, such as "a drive". remedy: end of the
+    message if there is no file.
+    """
+
+    units: Mapping
+    required: tuple
+    example: str
+    contents: str
+    remedy: str = ""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Columns:
+    """Columns of a table; row i is on line i + 2 of the file, because the header is on line 1.
+
+    values: column -> (k,) in SI; labels: column that is not known as a number -> k strings; rows: k.
+    """
+
+    values: dict
+    labels: dict
+    rows: int
+
+
+class TextTable(NamedTuple):
+    """Text of a table.
+
+    names, units: name and unit of each column; the unit is None if there is none. separator: sign between the
+    cells. lines: lines below the header, without blank ones at the end.
+    """
+
+    path: Path
+    names: list[str]
+    units: list[str | None]
+    separator: str
+    lines: list[str]
+
+    def iterate_rows(self, *, skips_blank: bool = False) -> Iterator[tuple[int, list[str]]]:
+        """Yield the number of each line, from 2 on, and its cells; an error names a line with too few or too many."""
+        for number, line in enumerate(self.lines, 2):
+            if skips_blank and not line.strip(f"{self.separator} \t"):
+                continue
+            cells = split_cells(f"{self.path}:{number}", line, self.separator)
+            if len(cells) != len(self.names):
+                count = len(self.names)
+                words = _NUMBER_WORDS[count] if count < len(_NUMBER_WORDS) else count
+                columns = " and ".join(filter(None, (", ".join(self.names[:-1]), self.names[-1])))
+                raise PatchfemError(
+                    f"{self.path}:{number}: {words} cells are needed, {columns}, not '{line.strip()[:80]}'"
+                )
+            yield number, cells
+
+
+def read_lines(path: Path, contents: str, remedy: str = "") -> list[str]:
+    """Read the lines of a text file; the last one is empty if the file ends with a line break.
+
+    Parameters
+    ----------
+    path : Path
+    contents, remedy : str
+        Words of the error messages, as in `TableFormat`.
+
+    Raises
+    ------
+    Missing
+        If there is no file.
+    PatchfemError
+        If the file cannot be read or is too large.
+    """
+    try:
+        if path.stat().st_size > MAX_BYTES:
+            raise PatchfemError(
+                f"{path}: more than {MAX_BYTES >> 20} MiB of text; leave out some rows of {contents}"
+            )
+        return path.read_text("utf-8-sig").split("\n")
+    except FileNotFoundError:
+        raise Missing(f"{path}: there is no such file{remedy}") from None
+    except (OSError, UnicodeDecodeError, ValueError) as error:
+        raise PatchfemError(f"{path}: {contents} cannot be read ({error})") from None
+
+
+def split_cells(location: str, line: str, separator: str) -> list[str]:
+    """Split a line into its cells, which may stand in quotation marks; a PatchfemError begins with `location`."""
+    try:
+        rows = csv.reader([line], delimiter=separator, skipinitialspace=True)
+        cells = next(rows) if '"' in line else line.split(separator)
+    except csv.Error as error:
+        raise PatchfemError(
+            f"{location}: the quotation marks in this row cannot be read ({error})"
+        ) from None
+    return [cell.strip() for cell in cells]
+
+
+def read_text(path: Path, contents: str, remedy: str = "") -> TextTable:
+    """Read a table whose columns may have any names; parameters and errors as in `read_lines`."""
+    header, *lines = read_lines(path, contents, remedy)
+    while lines and not lines[-1].strip():
+        lines.pop()
+    separator = max(",;\t", key=header.count)
+    cells = split_cells(f"{path}:1", header, separator)
+    heads = [_HEAD_PATTERN.fullmatch(cell).groups() for cell in cells]
+    units = [unit if other is None else other for _, unit, other in heads]
+    return TextTable(path, [name for name, *_ in heads], units, separator, lines)
+
+
+def find_factors(table: TextTable, form: TableFormat) -> dict[str, float]:
+    """Return the factor to SI of each column of numbers; raise PatchfemError if the header is not that of a format."""
+    names = table.names
+    header = table.separator.join(
+        name if unit is None else f"{name} [{unit}]" for name, unit in zip(names, table.units)
+    )
+    expected = f"{table.path}:1: a header like `{form.example}` is needed, not '{header[:80]}'"
+    if len(set(names)) < len(names):
+        raise PatchfemError(f"{expected} (a column is given twice)")
+
+    # A column that the format does not know is text, whose unit has no meaning.
+    factors = {}
+    for name, unit in zip(names, table.units):
+        units = form.units.get(name)
+        if units is None:
+            continue
+        if unit is None and "" not in units:
+            raise PatchfemError(f"{expected} ({name} without a unit)")
+        factors[name] = units.get(normalize_unit(unit or ""))
+        if factors[name] is None:
+            known = ", ".join(filter(None, units))
+            raise PatchfemError(
+                f"{table.path}:1: {name} [{unit}]: unknown unit; use one of {known}"
+            )
+
+    absent = [text.split()[0] for text in form.required if not set(text.split()) & set(names)]
+    if absent:
+        raise PatchfemError(f"{expected} (no column {', '.join(absent)})")
+    return factors
+
+
+def has_decimal_comma(cell: str) -> bool:
+    """Return whether the text of a cell is a number with a comma in place of the decimal point."""
+    return "," in cell and bool(NUMBER_PATTERN.fullmatch(cell.replace(",", ".", 1)))
+
+
+def parse_number(location: str, cell: str, factor: float) -> float:
+    """Convert the text of a cell to a number in SI.
+
+    Parameters
+    ----------
+    location : str
+        Beginning of the error message, such as ``a.csv:3: force``.
+    cell : str
+    factor : float
+        Factor to SI.
+
+    Raises
+    ------
+    PatchfemError
+        If the cell is not a finite number, or larger than `MAX_VALUE`.
+    """
+    if not NUMBER_PATTERN.fullmatch(cell):
+        reason = "is not a finite number"
+        if has_decimal_comma(cell):
+            reason = "has a decimal comma; export the file with decimal points"
+        raise PatchfemError(f"{location}: '{cell[:80]}' {reason}")
+    value = float(cell) * factor
+    if abs(value) > MAX_VALUE:
+        raise PatchfemError(
+            f"{location}: {value:g} in SI is outside the computable range; at most {MAX_VALUE:g} is possible"
+        )
+    return value
+
+
+def read_columns(path, form: TableFormat) -> Columns:
+    """Read a table of numbers; columns that ``form.units`` does not know are kept as text.
+
+    Raises
+    ------
+    Missing
+        If there is no file.
+    PatchfemError
+        If the file is not such a table; the message names the line.
+    """
+    import numpy as np
+
+    from ..core import frozen_array
+
+    path = Path(path)
+    table = read_text(path, form.contents, form.remedy)
+    factors = find_factors(table, form)
+    if len(table.lines) < 2:
+        raise PatchfemError(
+            f"{path}:{len(table.lines) + 1}: {form.contents} needs at least two rows below the header, "
+            f"not {len(table.lines)}"
+        )
+
+    # Cells are read one by one only if there is text among them, or a cell at fault to name.
+    labels = {name: [] for name in table.names if name not in factors}
+    values = None if labels else _read_numbers(table, list(factors.values()))
+    if values is None:
+        numbers = []
+        for number, cells in table.iterate_rows():
+            row = dict(zip(table.names, cells))
+            for name, texts in labels.items():
+                texts.append(row[name])
+            place = f"{path}:{number}: "
+            numbers.append(
+                [parse_number(place + name, row[name], factor) for name, factor in factors.items()]
+            )
+        values = np.array(numbers).reshape(len(numbers), len(factors))
+
+    return Columns(
+        {name: frozen_array(column) for name, column in zip(factors, values.T)},
+        {name: tuple(texts) for name, texts in labels.items()},
+        len(values),
+    )
+
+
+def _read_numbers(table: TextTable, factors: list[float]) -> np.ndarray | None:
+    """Return rows that contain only numbers, in SI; None if a cell is not a number, or out of range.
+
+    NumPy's reader takes a tenth of the time of `parse_number`, but does not say which cell is wrong.
+    """
+    import numpy as np
+
+    try:
+        values = np.loadtxt(table.lines, delimiter=table.separator, comments=None, ndmin=2)
+    except ValueError:
+        return None
+    if values.shape != (len(table.lines), len(factors)):  # NumPy leaves out blank lines
+        return None
+    values = values * factors
+    return values if (np.abs(values) <= MAX_VALUE).all() else None
+
+
+def require_increasing_time(path, time: np.ndarray) -> None:
+    """Raise PatchfemError at the first row of a table whose time (k,) [s] does not rise."""
+    is_late = time[1:] <= time[:-1]
+    if is_late.any():
+        k = int(is_late.argmax())
+        raise PatchfemError(
+            f"{path}:{k + 3}: time {time[k + 1]:g} s is not later than the time in the row above, "
+            f"{time[k]:g} s; times must strictly rise"
+        )
