@@ -84,9 +84,7 @@ def compute_measures(
 
     # Measures of the first interface alone.
     row = records.faces[:, window, 0]
-    # A rigid interface that reverses without stick does not start to slip.
-    is_stuck = values["stick_fraction"] > 0
-    values["slip_start_phase"] = np.where(is_stuck, _mean_phase(row), np.nan)
+    values["slip_start_phase"] = _mean_phase(row)
     if (rigs.faces[:, 0, Face.SWING] != 0).any() or (rigs.faces[:, 0, Face.STIFFNESS] != 0).any():
         values["normal_load_least"] = row[:, Window.MIN_LOAD]
         values["normal_load_peak"] = row[:, Window.MAX_LOAD]

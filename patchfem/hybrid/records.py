@@ -274,8 +274,8 @@ class Window(IntEnum):
     """Columns of `Record.faces`.
 
     Extremes of force, slip, slide and load; time stuck and open [s]; number of slip starts with the sums of cosine and
-    sine of twice their phases; whether the interface sticks (1) or slips (-1) at last; friction work [J]; first
-    harmonics of slide and force.
+    sine of twice their phases; duration of the stick at the end [s], -1 of an interface that slips there; friction work
+    [J]; first harmonics of slide and force.
     """
 
     MIN_FORCE = 0

@@ -39,6 +39,7 @@ WEIGHTS = np.array([9.0, 49.0, 64.0, 49.0, 9.0]) / 180
 LAST_PROBES = 5  # row of `State.probes` of the last evaluation
 N_PARABOLAS = 6  # steps of the search for an extreme
 NEAR_EXTREME = 0.2  # extremes of a step that are further from those of the window are not located
+MIN_STICK = 1e-9  # duration of the shortest stick, relative to the period
 SAME_SLIDE_TOL = 1e-12  # relative difference of slides before and after an event
 
 
@@ -380,8 +381,11 @@ def add_stick(rig, state, fraction, i, row):
     """
     column = Probe.FACES + Probe.COUNT * i + Probe.SLIPPING
     h = state.clock[Clock.LENGTH]
+    # A reversal without stick is a stick of a duration of round-off, after which slip does not start.
+    shortest = MIN_STICK * rig.settings[Setting.PERIOD]
     sticks = state.probes[0, column] < 0
-    if row[Window.STICKS] > 0 and not sticks:
+    duration = max(row[Window.STICKS], 0.0)
+    if duration > shortest and not sticks:
         add_start(rig, state.clock, state.clock[Clock.TIME], row)
     for node in range(1, N_NODES):
         left = fraction * NODES[node - 1]
@@ -390,11 +394,13 @@ def add_stick(rig, state, fraction, i, row):
         root = right if sticks else left
         if sticks_after != sticks:
             root = find_probe_root(rig, state, column, left, right)
-            if sticks:
-                add_start(rig, state.clock, state.clock[Clock.TIME] + root * h, row)
-        row[Window.STUCK] += h * ((root - left) if sticks else (right - root) * sticks_after)
+        part = h * ((root - left) if sticks else (right - root) * sticks_after)
+        row[Window.STUCK] += part
+        duration = part + (duration if sticks else 0.0)
+        if sticks and not sticks_after and duration > shortest:
+            add_start(rig, state.clock, state.clock[Clock.TIME] + root * h, row)
         sticks = sticks_after
-    row[Window.STICKS] = 1.0 if sticks else -1.0
+    row[Window.STICKS] = duration if sticks else -1.0
 
 
 @njit(**NJIT_KERNEL)

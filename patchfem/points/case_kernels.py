@@ -786,6 +786,10 @@ def end_cycle(now, seen, history):
     history[3] = now[Now.SIN]
     change = now[Now.MAX] - now[Now.MIN]
     seen[Seen.RANGE] += change
+    if now[Now.SLIDE] == now[Now.MAX] and now[Now.VELOCITY] > 0:
+        seen[Seen.FORCE_AT_MAX] = nan  # the slide still grows: no reversal
+    if now[Now.SLIDE] == now[Now.MIN] and now[Now.VELOCITY] < 0:
+        seen[Seen.FORCE_AT_MIN] = nan
     secant = (seen[Seen.FORCE_AT_MAX] - seen[Seen.FORCE_AT_MIN]) / change
     if change > 0 and secant == secant:
         seen[Seen.SECANT] += secant

@@ -35,6 +35,19 @@ def test_block_without_stops_after_200_cycles():
     assert np.isnan(motion.values["slip_start_phase"])
 
 
+def test_slip_starts_where_static_friction_balances_drive_and_spring():
+    """A block that rests once in a cycle and turns without rest on the other side: only the rest has a start of slip."""
+    static = 0.48566
+    case = make_oscillator(coulomb(1.0, 2 / 3), load=static, zeta=0.02235, omega=0.58032, cycles=60)
+    motion = runs.run_case(case)
+    assert 0.01 < motion.values["stick_fraction"] < 0.02
+    rest = motion.events[-3].slide
+    assert motion.events[-2].slide == rest
+    # At the release, drive and spring push with sin(phase) + rest against static friction.
+    phase = motion.values["slip_start_phase"]
+    assert np.sin(phase) + rest == pytest.approx(-static, abs=1e-7)
+
+
 def test_free_block_stops_after_six_half_cycles():
     """Eq. 3.11: a release from 11.5 F/k rests at -0.5 F/k at the time 6 pi, exactly."""
     case = make_oscillator(

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from point_cases import LAWS, MANY, compare_answers, draw_points
+from point_cases import LAWS, MANY, SCENE, compare_answers, draw_points
 from scene_runs import load_scene
 from scene_texts import (
     BENCH,
@@ -102,6 +102,22 @@ def test_always_95_of_100_measures_lie_within_both_errors(law):
     assert (results.outcome == singles.outcome).all() and not results.notes
     rows = [row for case_rows in compare_answers(results, singles) for row in case_rows]
     assert np.mean([row.holds for row in rows]) >= 0.95
+
+
+def test_always_ringing_and_secant_of_sticking_contact_agree_with_single_run():
+    """Sliders of a sticking contact slip a little, and the extremes of its ringing may lie at the ends of cycles."""
+    sets = {
+        "normal.load": "6.52443 N", "friction.stiffness": "60926 N/m", "friction.chi": "-0.653",
+        "friction.beta": "3", "structure.mode.axial.damping": "0.00678", "drive.frequency": "368.146 Hz",
+        "drive.acceleration": "10.82 m/s^2",
+    }  # fmt: skip
+    model = pf.build(pf.load(SCENE.format(law=LAWS["iwan"]), **sets))
+    marched = lumped.solve([model])
+    single = one_by_one.solve([model])
+    assert marched.numerics[0]["engine"] == lumped.ENGINE
+    for name in ("ring_frequency", "ring_damping", "secant_stiffness"):
+        errors = marched.errors[name][0] + single.errors[name][0]
+        assert abs(marched.values[name][0] - single.values[name][0]) <= errors, name
 
 
 # Changes after which a rig is not one mode with one point under a sine, or has no motion.

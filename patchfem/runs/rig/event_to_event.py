@@ -454,6 +454,7 @@ class LumpedEvaluator(RunEvaluator):
                 self.model.rig.modes,
                 drive,
                 run.log,
+                self.stick_tolerance,
                 repeats=run.repeats,
             )
         mode = select_strongest(vibration, "acceleration")
