@@ -374,7 +374,7 @@ def _make_points(contact: Contact, n_nodes: int) -> Points:
         shapes,
         stiffness,
         shear,
-        np.repeat([one.is_spring for one in contact.point_sets], counts),
+        np.repeat(np.array([one.is_spring for one in contact.point_sets], bool), counts),
         place,
         np.zeros((2, 0)) if contact.pressure is None else np.array(contact.pressure, float),
     )
