@@ -12,7 +12,7 @@ import xarray
 from patchfem.core import G_N, Response
 
 PAGE = (adding.PACKAGE / "ADDING.md").read_text("utf-8")
-SHORT_CYCLES = 60  # a motion that is steady, and takes less than two seconds without compiled code
+SHORT_CYCLES = 200  # a motion that is steady, and takes less than two seconds without compiled code
 WAVED = """\
 [contact]
 length = "12.7 mm"
