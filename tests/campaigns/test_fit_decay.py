@@ -2,7 +2,6 @@
 
 import json
 
-import decay_fits
 import numpy as np
 import pytest
 import xarray as xr
@@ -241,10 +240,3 @@ def test_refuses_fewer_values_than_parameters(tmp_path):
         curves.fit_curve(
             pf.load(IWAN), path, [f"{key}={low}..{high}" for key, (low, high) in free.items()]
         )
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("seed", range(8000, 8030))
-def test_fit_reaches_minimum_chi_square_near_true_parameters(seed, tmp_path):
-    """The chi-square of a fit to a noisy synthetic decay is within 1 % of the minimum near the truth."""
-    assert all(row.holds for row in decay_fits.compare_fit(seed, tmp_path)["rows"])
