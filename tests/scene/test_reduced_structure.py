@@ -30,7 +30,7 @@ bond_length = "1 um"
 kind = "base"
 frequency = "100 Hz"
 acceleration = "5 g"
-cycles = 10
+cycles = 4
 """
 WHOLE = SCENE[: SCENE.index("[structure.reduced]")].replace(
     "output_mass = 2", 'file = "whole.npz"'
