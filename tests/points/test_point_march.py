@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from patchfem.compiled.machine import ArgumentConverter
+from patchfem import compiled
 from patchfem.core import InitialState, ModalBasis, SineDrive
 from patchfem.points import laws
 from patchfem.points.contacts import Contact, PointSet
@@ -48,7 +48,8 @@ def test_exact_rig_without_friction_shares_compiled_code():
     point = PointSet([laws.make_coulomb(1.0, 1.0, LIMIT)], np.ones(1))
     contacts = Contact([]), Contact([point], LIMIT)
     systems = [March(make_modes(), DRIVE, contact, 10).system for contact in contacts]
-    assert len({ArgumentConverter().convert(system)[0] for system in systems}) == 1
+    converter = compiled.machine.ArgumentConverter()
+    assert len({converter.convert(system)[0] for system in systems}) == 1
 
 
 def test_exact_release_of_a_coulomb_block():
