@@ -5,9 +5,8 @@ import pytest
 
 from patchfem import compiled
 from patchfem.core import InitialState, ModalBasis, SineDrive
-from patchfem.points import laws
+from patchfem.points import March, laws, march
 from patchfem.points.contacts import Contact, PointSet
-from patchfem.points.time_march import March, march
 
 OMEGA = 2 * np.pi * 143.0
 LIMIT = 40.0
