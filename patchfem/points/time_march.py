@@ -309,7 +309,7 @@ def make_system(
     # Springs and slips refer to the displacement at rest; rigid points slip from the start where their ports move.
     slides = (rows @ state[0, :n])[points.port]
     points.values[Point.TOTAL, : slides.size] = slides
-    is_spring = points.is_spring.astype(bool)
+    is_spring = points.is_spring
     for memory in (points.memory, points.trial):
         memory[0, is_spring] = slides[is_spring]
     velocity = np.sign(rows @ state[0, n:])[points.port] * (points.numbers[0] == Law.COULOMB)
@@ -374,7 +374,7 @@ def _make_points(contact: Contact, n_nodes: int) -> Points:
         shapes,
         stiffness,
         shear,
-        np.repeat([one.is_spring for one in contact.point_sets], counts),
+        np.repeat([one.is_spring for one in contact.point_sets], counts).astype(bool),
         place,
         np.zeros((2, 0)) if contact.pressure is None else np.array(contact.pressure, float),
     )

@@ -2,7 +2,6 @@
 
 import json
 
-import decay_fits
 import numpy as np
 import pytest
 import xarray as xr
@@ -48,7 +47,7 @@ def write_decay(path, text: str, noise: float = 0.0, seed: int = 0, amplitudes=A
 
 def test_band_of_the_fitted_curve_contains_the_truth_beyond_the_data(tmp_path):
     """The 95 % band of a curve that is fitted to noisy data contains the true curve at three times the amplitudes."""
-    path = write_decay(tmp_path / "decay.csv", IWAN, 0.03, 5, np.geomspace(2e-7, 1e-5, 9))
+    path = write_decay(tmp_path / "decay.csv", IWAN, 0.03, 5, np.geomspace(2e-7, 1e-5, 6))
     result = pf.fit(START, to=path, free=FREE, starts=1, out=tmp_path / "out")
     with xr.open_dataset(tmp_path / "out/result.nc") as data:
         amplitude = data.curve_amplitude.values
@@ -110,12 +109,13 @@ def test_exact_overdamped_trials_are_skipped(tmp_path):
         result["method"] == "balance" and result["rms"]["damping"] < 1e-4 and result["failures"] > 0
     )
     assert result["values"]["friction.reference_speed"]["value"] == pytest.approx(0.3, rel=1e-5)
+    static = {"friction.static": (10.0, 20.0)}
     with pytest.raises(
         PatchfemError,
         match=r"no curve of frequency and damping.*balance: the mode does not oscillate.*"
         r"leave out the rows with the largest damping",
     ):
-        pf.fit(FLUID, to=path, free={"friction.static": (10.0, 20.0)}, out=tmp_path / "none")
+        pf.fit(FLUID, to=path, free=static, starts=1, out=tmp_path / "none")
 
 
 @pytest.mark.parametrize("gaps", [("quasi-static",), ("balance",), ("balance", "quasi-static")])
@@ -279,10 +279,3 @@ def test_refuses_fewer_values_than_parameters(tmp_path):
         curves.fit_curve(
             pf.load(IWAN), path, [f"{key}={low}..{high}" for key, (low, high) in free.items()]
         )
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("seed", range(8000, 8030))
-def test_fit_reaches_minimum_chi_square_near_true_parameters(seed, tmp_path):
-    """The chi-square of a fit to a noisy synthetic decay is within 1 % of the minimum near the truth."""
-    assert all(row.holds for row in decay_fits.compare_fit(seed, tmp_path)["rows"])

@@ -16,6 +16,7 @@ from patchfem.contact import (
     RESIDUAL_TOL,
     StripCompliance,
     patch_problem,
+    solve_by_gradients,
 )
 from patchfem.contact.active_set import solve_primal_dual
 from patchfem.contact.gaps import crown, tilt
@@ -223,6 +224,19 @@ def test_exact_cycling_sets_are_solved_by_gradients():
     state = press_to_approach(make_pair(x, CYCLE), gap + 8e-9, 8e-9)
     (expected,) = solve_by_enumeration(CYCLE, x, gap)
     assert nodal_forces(make_pair(x, CYCLE), state) == pytest.approx(expected, rel=1e-12)
+
+
+@pytest.mark.parametrize("moment, spring", [(None, 0.0), (1.5e-3, 0.0), (1.5e-3, 300.0)])
+def test_exact_gradients_agree_with_enumeration(moment, spring):
+    """Conjugate gradients find the forces to 1e-5 of the load with a prescribed, a free and a restrained rotation."""
+    x = np.linspace(-1e-3, 1e-3, 7)
+    c = 1e-9 * (np.exp(-np.abs(x[:, None] - x) / 1e-3) + 0.2 * np.eye(7))
+    gap = 1e-9 * np.array([3.0, 0.4, 2.1, 0.0, 3.5, 1.2, 2.8])
+    problem = patch_problem(x, gap, 5.0, moment, spring)
+    force, n_iterations = solve_by_gradients(StripCompliance(c), problem)
+    expected = solve_by_enumeration(c, x, gap, 5.0, moment, spring)[0]
+    assert force == pytest.approx(expected, abs=5e-5)
+    assert n_iterations < 300 and 2 < np.count_nonzero(expected) < 7
 
 
 # ---- random gaps on random compliances

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from scipy.stats import t as student
 
 from patchfem.core import Missing, NotConverged, Outcome, PatchfemError
-from patchfem.identify import Problem, describe_fit
+from patchfem.identify import Problem, describe_fit, least_squares
 from patchfem.identify.least_squares import Search
 from patchfem.identify.space import make_search_space
 
@@ -275,3 +275,14 @@ def test_exact_counts_contain_every_evaluation():
     failures = fit.counts.failures + second.counts.failures
     assert failures == sum(values[0] > 4 for values in calls) > 0
     assert second.counts.reason == "too large"
+
+
+def test_exact_descent_begins_at_bound_beside_failures():
+    """A descent from a bound finds its minimum where the model fails a thousandth of the range inside."""
+
+    def residual(values):
+        return np.where(values > 5e-4, np.nan, values - 2e-4)
+
+    model = least_squares.UnitCubeResidual(residual, make_search_space([0.0], [1.0]))
+    found = least_squares.descend(model, [0.0], [0])
+    assert found.is_converged and found.u == pytest.approx([2e-4], abs=1e-9)

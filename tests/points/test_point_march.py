@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
+from patchfem import compiled
 from patchfem.core import InitialState, ModalBasis, SineDrive
-from patchfem.points import laws
+from patchfem.points import March, laws, march
 from patchfem.points.contacts import Contact, PointSet
-from patchfem.points.time_march import march
 
 OMEGA = 2 * np.pi * 143.0
 LIMIT = 40.0
@@ -40,6 +40,15 @@ def test_coulomb_block_at_resonance():
     ledger = motion.ledger
     gap = ledger["work_in"] - ledger["viscous"] - ledger["booked"] - ledger["stored"]
     assert abs(gap) <= 1e-6 * ledger["power"]
+
+
+def test_exact_rig_without_friction_shares_compiled_code():
+    """The arrays of a march without points have the types of those with points: other types are compiled anew."""
+    point = PointSet([laws.make_coulomb(1.0, 1.0, LIMIT)], np.ones(1))
+    contacts = Contact([]), Contact([point], LIMIT)
+    systems = [March(make_modes(), DRIVE, contact, 10).system for contact in contacts]
+    converter = compiled.machine.ArgumentConverter()
+    assert len({converter.convert(system)[0] for system in systems}) == 1
 
 
 def test_exact_release_of_a_coulomb_block():

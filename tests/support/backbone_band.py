@@ -30,7 +30,6 @@ from typing import NamedTuple
 import numba
 import numpy as np
 from campaigns import Row
-from decay_fits import make_sliders
 
 import patchfem as pf
 from patchfem.campaigns.backbone.curves import compute_backbone
@@ -43,6 +42,8 @@ STEPS = {"iwan": 1000}  # Steps per cycle of the drive; laws not named here need
 MOST_STEPS = 4000
 MAX_CYCLES = 1500
 BLOCK = 25  # Cycles between two checks of whether the motion repeats.
+N_SLIDERS = 400  # sliders of a power-law joint
+BETA = 0.5  # factor beta of its law
 REPEATS = 1e-4  # Expected further change, relative to the response, at which the march ends.
 
 
@@ -58,6 +59,15 @@ class Joint(NamedTuple):
     load: float
     static: float
     numbers: dict
+
+
+def make_sliders(stiffness: float, force: float, chi: float) -> tuple:
+    """Return stiffness (s,) [N/m] and slip force (s,) [N] of the sliders of a power-law joint (Segalman 2005)."""
+    max_displacement = force * (1 + BETA) / (stiffness * (BETA + (chi + 1) / (chi + 2)))
+    edges = np.linspace(0, 1, N_SLIDERS + 1) ** (1 / (1 + chi / 2))
+    k = np.append(np.diff(edges ** (chi + 1)), BETA) / (1 + BETA)
+    moment = np.append((chi + 1) / (chi + 2) * np.diff(edges ** (chi + 2)), BETA) / (1 + BETA)
+    return stiffness * k, stiffness * max_displacement * moment
 
 
 class SteadyPoint(NamedTuple):
@@ -136,7 +146,7 @@ def law_parameters(joint: Joint) -> tuple:
     limit = joint.static * joint.load
     numbers = joint.numbers
     if joint.law == "iwan":
-        return make_sliders("iwan", numbers["stiffness"], limit, numbers["chi"])
+        return make_sliders(numbers["stiffness"], limit, numbers["chi"])
     if joint.law == "elastic-plastic":
         return np.array([limit / numbers["bond_length"]]), np.array([limit])
     if joint.law == "bouc-wen":

@@ -42,7 +42,6 @@ KINDS = {  # Name on the command line -> module and function.
     "wear": ("wear_scenes", "compare_bench"),
     "predicted-wear": ("predicted_pairs", "compare_pair"),
     "hybrid-rigs": ("hybrid_campaign", "compare_rig"),
-    "decay-fits": ("decay_fits", "compare_fit"),
     "made-fits": ("made_fits", "compare_fit"),
     "trace-pairs": ("surface_pairs", "compare_traces"),
     "scan-pairs": ("surface_pairs", "compare_scans"),

@@ -30,7 +30,7 @@ TESTS = HERE.parent
 RECORDED = TESTS / "recorded"
 sys.path[:0] = [str(HERE), str(TESTS)] if __name__ == "__main__" else []
 
-import same_answers  # noqa: E402
+import recorded_scenes  # noqa: E402
 import scene_texts  # noqa: E402
 from surface_pairs import KINDS, draw_pair, write_traces  # noqa: E402
 
@@ -75,7 +75,7 @@ def run_group(name: str, folder: Path) -> dict:
     out = {}
     known = set(folder.rglob("*"))
     for command in group["commands"]:
-        answer = same_answers.run_command(*shlex.split(command))
+        answer = recorded_scenes.run_command(*shlex.split(command))
         out[command] = {"code": answer["code"], "stdout": answer["out"], "stderr": answer["err"]}
         written = sorted(set(folder.rglob("*")) - known)
         known.update(written)
@@ -107,11 +107,11 @@ def list_other_cases(written: list) -> set:
 
 
 def run_scene(name: str, folder: Path) -> dict:
-    """Run a scene of same_answers.py in an empty folder; return its results."""
-    text, sets = same_answers.collect_scenes()[name]
+    """Run a scene of recorded_scenes.py in an empty folder; return its results."""
+    text, sets = recorded_scenes.collect_scenes()[name]
     (folder / "scenes").mkdir()
     os.chdir(folder / "scenes")
-    same_answers.write_input_files(Path())
+    recorded_scenes.write_input_files(Path())
     Path(f"{name}.toml").write_text(text, "utf-8")
     words = [f"{name}.toml", *(word for assignment in sets for word in ("--set", assignment))]
     commands = {  # The plan comes last: it depends on whether all code is compiled.
@@ -120,9 +120,9 @@ def run_scene(name: str, folder: Path) -> dict:
         "plan": ["plan", *words, "--json"],
         "cite": ["cite", *words],
     }
-    answers = {verb: same_answers.run_command(*command) for verb, command in commands.items()}
+    answers = {verb: recorded_scenes.run_command(*command) for verb, command in commands.items()}
     (folder / f"{name}.json").write_text(json.dumps(answers), "utf-8")
-    results = same_answers.read_results(folder, name)
+    results = recorded_scenes.read_results(folder, name)
     results = {key: describe_value(value) for key, value in results.items() if "@" not in key}
     page = folder / name / "report.html"
     if page.is_file():
@@ -166,11 +166,11 @@ def describe_file(path: Path, name: str) -> dict:
     """Return the contents of a file as {key: value}; only the name for a file of an unknown kind."""
     if path.suffix == ".json":
         out = {}
-        same_answers.flatten(name, json.loads(path.read_text("utf-8")), out)
+        recorded_scenes.flatten(name, json.loads(path.read_text("utf-8")), out)
     elif path.suffix in (".html", ".svg"):
         out = describe_page(path.read_text("utf-8"), name)
     elif path.suffix in (".nc", ".vtkhdf", ".h5"):
-        arrays = same_answers.read_arrays(path, name)
+        arrays = recorded_scenes.read_arrays(path, name)
         out = {key: value for key, value in arrays.items() if "@" not in key}
     elif path.suffix == ".csv":
         out = describe_table(path.read_text("utf-8"), name)
@@ -270,7 +270,7 @@ def describe_value(value: object) -> object:
 
 def clean(results: dict, folder: Path) -> dict:
     """Return results without unstable keys, and with placeholders for folder, version, hashes, times and sizes."""
-    version = same_answers.run_command("--version")["out"].split()[-1]
+    version = recorded_scenes.run_command("--version")["out"].split()[-1]
     out = {}
     for key, value in results.items():
         if UNSTABLE_KEYS.search(key):

@@ -135,6 +135,19 @@ def test_exact_uniform_pressure_reduces_to_coulomb():
         )
 
 
+def test_exact_average_follows_changed_pressure():
+    """Under a second pressure a law has the traction of one that has never seen the first; the averages are kept."""
+    nodes = np.linspace(0, 10, 11)
+    even = np.ones(11)
+    rising = np.linspace(1, 2, 11)
+    used, fresh = Convolution(0.3, 0.5, 1.0, nodes), Convolution(0.3, 0.5, 1.0, nodes)
+    before = used.step(used.initial_state(even), 1.0, even, even, 1.0).mean
+    one, other = (
+        law.step(law.initial_state(rising), 1.0, rising, rising, 1.0).mean for law in (used, fresh)
+    )
+    assert np.array_equal(one, other) and one[-1] > 1.5 * before[-1]
+
+
 def test_exact_traction_persists_at_rest():
     """The traction persists at rest, and a falling pressure reduces it to the friction limit without dissipation."""
     law = Convolution(0.3, 1.0)

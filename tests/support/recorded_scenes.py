@@ -1,15 +1,5 @@
-"""Run eighty scenes with two states of the package and compare all results.
+"""The scenes whose results are recorded: those of studies/ and the README, of recorded/scenes.toml, and random ones."""
 
-    python tests/same_answers.py run DIR [--only k/n] [--scenes OTHER]
-    python tests/same_answers.py compare DIR_A DIR_B [--within 1e-10]
-
-The scenes are those of studies/ and of the README, those of same_answers.toml and some drawn by chance. `run` writes
-them into DIR/scenes, or takes those of an earlier folder OTHER, and gives each to the command line of the importable
-package: what `check` and `plan` say, and the results folder of `run`. `compare` sets all of it side by side, but for
-seconds, versions, the HTML page and what the attributes of the netCDF file repeat. 0.0 and -0.0 are equal.
-"""
-
-import argparse
 import contextlib
 import io
 import json
@@ -21,45 +11,20 @@ import sys
 import tomllib
 from pathlib import Path
 from string import Template
-from time import perf_counter
 
-os.environ.setdefault(
-    "OPENBLAS_NUM_THREADS", "1"
-)  # set before NumPy is imported: one thread adds in a fixed order
+# NumPy reads this when it is imported: one thread adds in a fixed order.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import h5py
 import numpy as np
 
-ROOT = Path(__file__).resolve().parent.parent
-WRITTEN = tomllib.loads(Path(__file__).with_suffix(".toml").read_text("utf-8"))
+ROOT = Path(__file__).resolve().parents[2]
+WRITTEN = tomllib.loads((ROOT / "tests/recorded/scenes.toml").read_text("utf-8"))
 COUNT = 80
 # Attributes of the netCDF file that repeat other contents or differ between files.
 REPEATED = (
     "source scene scene_sha256 summary versions CLASS NAME DIMENSION_LIST REFERENCE_LIST".split()
 )
-
-
-def main() -> None:
-    """Run the command line; the exit code is 1 if a result differs."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    verbs = parser.add_subparsers(dest="verb", required=True)
-    runs = verbs.add_parser("run")
-    pair = verbs.add_parser("compare")
-    runs.add_argument("folder", type=Path)
-    runs.add_argument(
-        "--only", default="1/1", metavar="k/n", help="the k-th of n shares of the scenes"
-    )
-    runs.add_argument("--scenes", type=Path, help="take the scenes of this earlier folder")
-    pair.add_argument("folders", type=Path, nargs=2)
-    pair.add_argument(
-        "--within", type=float, default=0.0, help="largest relative change that passes"
-    )
-    arguments = parser.parse_args()
-    sys.exit(
-        run_scenes(arguments.folder, arguments.only, arguments.scenes)
-        if arguments.verb == "run"
-        else compare_folders(*arguments.folders, arguments.within)
-    )
 
 
 def collect_scenes() -> dict:
@@ -81,7 +46,7 @@ def collect_scenes() -> dict:
 
 
 def random_line(draw: random.Random) -> str:
-    """Return a random line in the format of same_answers.toml."""
+    """Return a random line in the format of recorded/scenes.toml."""
     letters = draw.choice(["NFSQ", "CFSQ", "NFMDQ", "CFMDQ"])
     words = [
         draw.choice(["friction.law=coulomb", "friction.law=elastic-plastic", "$BONDS"]),
@@ -152,41 +117,8 @@ def write_input_files(folder: Path) -> None:
     )
 
 
-def run_scenes(folder: Path, only: str, other: Path | None) -> int:
-    """Run the k-th of n parts of the scenes in sequence in this process."""
-    place, (k, n) = folder.resolve() / "scenes", map(int, only.split("/"))
-    place.mkdir(parents=True, exist_ok=True)
-    if other is not None:
-        shutil.copytree(other / "scenes", place, dirs_exist_ok=True)
-    else:
-        write_input_files(place)
-        for name, (text, _) in (made := collect_scenes()).items():
-            (place / f"{name}.toml").write_text(text, "utf-8")
-        (place / "sets.json").write_text(
-            json.dumps({name: sets for name, (_, sets) in made.items()}, indent=1)
-        )
-    os.chdir(place)
-    begin = perf_counter()
-    listed = [*json.loads(Path("sets.json").read_text("utf-8")).items()][k - 1 :: n]
-    for name, sets in listed:
-        start = perf_counter()
-        words = [f"{name}.toml", *(word for one in sets for word in ("--set", one))]
-        answer = {
-            "check": run_command("check", *words),
-            "plan": run_command("plan", *words, "--json"),
-            "run": run_command("run", *words, "-o", f"../{name}", "-q", "--fresh"),
-        }
-        answer["seconds"] = round(perf_counter() - start, 3)
-        Path(f"../{name}.json").write_text(json.dumps(answer, indent=1), "utf-8")
-        print(f"{name:<14} exit {answer['run']['code']} {answer['seconds']:7.2f} s")
-    print(
-        f"{len(listed)} scenes in {perf_counter() - begin:.0f} s by {sys.modules['patchfem'].__path__[0]}"
-    )
-    return 0
-
-
 def run_command(*words: str) -> dict:
-    """Return exit code and stdout of a command; stdout is empty for `run_scenes`, stderr is kept after a failure."""
+    """Return exit code and stdout of a command; stdout is empty for `run`, stderr is kept after a failure."""
     from patchfem.__main__ import main as patchfem
 
     out = io.StringIO()
@@ -206,25 +138,6 @@ def run_command(*words: str) -> dict:
         "out": "" if words[0] == "run" else out.getvalue(),
         "err": err.getvalue() if code else "",
     }
-
-
-def compare_folders(a: Path, b: Path, within: float) -> int:
-    """Print one line per difference and the total; return 1 if a scene differs."""
-    names = sorted({path.stem for folder in (a, b) for path in folder.glob("*.json")})
-    differ = 0
-    for one, two, name in ((read_results(a, name), read_results(b, name), name) for name in names):
-        changed = {
-            key: value for key in one | two if (value := relative_change(key, one, two)) > within
-        }
-        for key, value in sorted(changed.items()):
-            texts = [" ".join(str(found.get(key, "absent")).split()) for found in (one, two)]
-            # start of the excerpt: 30 characters before the first difference
-            at = max(0, next((k for k, (p, q) in enumerate(zip(*texts)) if p != q), 0) - 30)
-            excerpts = " | ".join(text[at : at + 90] for text in texts)
-            print(f"{name}: {key}: {excerpts if value == np.inf else f'{value:.2e}'}")
-        differ += bool(changed)
-    print(f"{len(names)} scenes, {len(names) - differ} identical, {differ} differ")
-    return 1 if differ or not names else 0
 
 
 def read_results(folder: Path, name: str) -> dict:
@@ -265,30 +178,3 @@ def flatten(at: str, value: object, out: dict) -> None:
     for key, item in value.items() if isinstance(value, dict) else ():
         if key not in ("seconds", "patchfem"):
             flatten(f"{at}.{key}", item, out)
-
-
-def relative_change(key: str, one: dict, two: dict) -> float:
-    """Return the largest relative change of a result: 0 if equal, infinite if not comparable."""
-    x, y = (np.asarray(found.get(key, "absent")) for found in (one, two))
-    if x.dtype != y.dtype or x.shape != y.shape:
-        return np.inf
-    if np.array_equal(x, y, equal_nan=x.dtype.kind == "f"):
-        return 0.0
-    if x.dtype.kind not in "fiu" or not np.array_equal(
-        x[~(kept := np.isfinite(x))], y[~kept], equal_nan=True
-    ):
-        return np.inf
-    x = x[kept].astype(float)
-    y = y[kept].astype(float)
-    stem = key.rpartition(".")[0]
-    scale = np.abs(x).max()
-    if stem.startswith("summary.measures."):
-        relative = stem.endswith(
-            ("energy_balance", "work_check")
-        )  # these measures are relative already
-        scale = max(abs(one[f"{stem}.value"] or 0.0), one[f"{stem}.floor"], float(relative))
-    return float(np.abs(x - y).max() / scale) if scale > 0 and np.isfinite(y).all() else np.inf
-
-
-if __name__ == "__main__":
-    main()
