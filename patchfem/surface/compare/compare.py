@@ -35,8 +35,7 @@ from .records import (
     name_quantity,
     name_unknown,
 )
-from .section import average_section
-from .statistics import TINY, find_mirror_finish, remove_long_waves
+from .statistics import find_mirror_finish, remove_long_waves
 from .track import find_spans, get_margin, measure_track
 from .verdict import find_sure_loss, judge_change, limit_wear
 
@@ -239,7 +238,6 @@ def _measure(
         # The area of a single track is that of the common part.
         whole = bounds if len(spans) == 1 else None
         tracks = tuple(measure_track(depths, span, whole) for span in spans)
-        tracks = tracks if is_trace else average_section(depths)
     bend = _get_bend(aligned)
     code, possible = _doubt(code, depths, spans, tracks, (area, grown, bend))
     tracks = tracks if code.startswith("worn") else ()
@@ -283,17 +281,14 @@ def _get_bend(aligned: Aligned) -> float:
     """Return the height [m] of the subtracted parabola of traces, 0 without one."""
     if aligned.reason or aligned.model.n_axes > 1:
         return 0.0
-    return float(aligned.fit.state[-1])
+    return float(aligned.fit.state[-2])
 
 
 def _describe_place(aligned: Aligned) -> Placement:
     """Return shift, turn and datum with the errors that follow from the unworn heights."""
     model = aligned.model
     fit = aligned.fit
-    weighted = fit.jacobian[fit.unworn] / fit.noise[fit.unworn, None]
-    scale = np.sqrt((weighted**2).mean(axis=0)) + TINY
-    covariance = np.linalg.pinv((weighted / scale).T @ (weighted / scale), rcond=1e-10)
-    errors = np.sqrt(np.diag(covariance)) / scale
+    errors = fit.errors
     state = fit.state
     if model.n_axes == 1:
         half = float(model.own.lengths[0]) / 2
@@ -311,7 +306,7 @@ def _describe_place(aligned: Aligned) -> Placement:
     place = aligned.place
     if np.isfinite(place.significance):
         values["significance"] = name_quantity("significance", place.significance, None, None)
-    return Placement(values, "x" if place.mirrored else "", place.inverted)
+    return Placement(values, "x" if place.mirrored else "")
 
 
 def _collect_findings(
@@ -352,7 +347,6 @@ def _collect_findings(
         (is_placed, "hidden_even_wear", {"limit": None}),
         (np.isfinite(significance), "sure_place" if is_sure else "likely_place", place),
         (placement.mirrored, "mirrored", {}),
-        (placement.turned, "turned", {}),
         (gain not in (None, 1.0), "other_gain", {"gain": gain}),
         (
             is_longer,
@@ -432,13 +426,13 @@ def _doubt(
 
 
 def _has_grown_at_ends(depths: DepthMap) -> bool:
-    """Return whether material grew along two opposite ends or borders, which a scar between them resembles."""
+    """Return whether material grew along an end or a border, which a scar over the rest resembles."""
     axes = set(range(depths.depth.ndim))
     for axis in axes:
         others = tuple(axes - {axis})
         counts = depths.inside.sum(axis=others)
         grown = depths.grown.sum(axis=others)[counts > 0] / counts[counts > 0]
-        if min(grown[:END_SAMPLES].max(), grown[-END_SAMPLES:].max()) > MIN_GROWN_LINE:
+        if max(grown[:END_SAMPLES].max(), grown[-END_SAMPLES:].max()) > MIN_GROWN_LINE:
             return True
     return False
 

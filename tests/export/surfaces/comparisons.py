@@ -75,7 +75,6 @@ VERDICTS = {
 }
 FINDINGS = {
     "mirrored": {},
-    "turned": {},
     "sure_place": {"significance": 57.3, "sure": 12.0},
     "likely_place": {"significance": 7.3, "sure": 12.0},
     "no_old_surface_left": {"from": 1e-3, "to": 2e-3},
@@ -164,18 +163,12 @@ def compare_scans(shape: tuple[int, int] = (900, 500)) -> Comparison:
         for z, name in ((heights, "before"), (heights - depth, "after"))
     ]
     place = name_all({"shift_x": (5 * UM, UM), "shift_y": (-3 * UM, UM), "rotation": (1e-4, 1e-5)})
-    sizes = TRACK_NAMES | {
-        "length": (1e-3, 1e-5),
-        "volume": (2e-13, 1e-15),
-        "direction": (1.57, 0.01),
-    }
     worn = depth > 0
     return Comparison(
         before=scans[0],
         after=scans[1],
         verdict=Finding("worn", {"basis": "place"}),
         values=name_all(SCAN_VALUES) | {"hidden_wear": name_unknown("hidden_wear", "not_hidden")},
-        tracks=(Track(name_all(sizes), section=(x, depth[0], 0 * x + 2e-8), n_sections=y.size),),
         evidence=Evidence(
             placement=Placement(place, mirrored="x"),
             curves=DepthMap(
