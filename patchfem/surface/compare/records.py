@@ -94,25 +94,6 @@ class Placement:
 
 
 @dataclass(frozen=True, eq=False)
-class Datum:
-    """Unworn heights from which the depth is measured.
-
-    - unworn: fraction of the heights on which the fit rests.
-    - noise: median standard deviation of the depth of an unworn height [m].
-    - bend: height of the parabola that was subtracted, over the common length [m].
-    - correlation: number of neighbouring samples that share an error.
-    - detection_limit: mean depth [m] from which on a track over the middle third is found; None if
-      unknown.
-    """
-
-    unworn: float
-    noise: float
-    bend: float
-    correlation: float
-    detection_limit: float | None = None
-
-
-@dataclass(frozen=True, eq=False)
 class Track:
     """Single worn track of a trace.
 
@@ -128,7 +109,7 @@ class Track:
 class Evidence:
     """What the numbers of a comparison rest on; None where there is no common place.
 
-    - placement, datum: how the second surface was laid on the first.
+    - placement: how the second surface was laid on the first.
     - curves: depths and heights of the aligned surfaces.
     - roughness: {"inside", "outside": {"before", "after", "ratio": {"Ra", "Rq", "slope": Quantity}}}
       of the track, with the ratio after/before; {} without a track. `cutoff` [m] is that of these values.
@@ -136,7 +117,6 @@ class Evidence:
     """
 
     placement: Placement | None = None
-    datum: Datum | None = None
     curves: DepthMap | None = None
     roughness: dict[str, dict[str, dict[str, Quantity]]] = field(default_factory=dict)
     cutoff: float | None = None
@@ -152,7 +132,7 @@ class Comparison:
     - values: quantities by name, a missing value with the code of its reason.
     - tracks: worn tracks of traces, the longest one first.
     - findings: what else a reader must know.
-    - evidence: placement, datum, curves and roughness.
+    - evidence: placement, curves and roughness.
     - direction: "x", "y" or "".
     """
 

@@ -5,7 +5,6 @@ import numpy as np
 from patchfem.surface.areal import Areal
 from patchfem.surface.compare.records import (
     Comparison,
-    Datum,
     DepthMap,
     Evidence,
     Finding,
@@ -134,7 +133,6 @@ def compare_traces(code: str = "worn", findings: dict | None = None, has_place=T
         }
         evidence = Evidence(
             placement=Placement(place),
-            datum=Datum(0.75, 10e-9, 0.0, 2.0, 5e-9),
             curves=DepthMap(x, before, before - depth, depth, noise, ~worn, worn, 0 * x > 1),
             roughness=roughness,
             cutoff=8e-5,
