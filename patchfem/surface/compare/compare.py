@@ -278,7 +278,8 @@ def _get_bend(aligned: Aligned) -> float:
 
 def _describe_place(aligned: Aligned) -> Placement:
     """Return shift, turn and datum with the errors that follow from the unworn heights."""
-    state, errors = aligned.fit.state, aligned.fit.errors
+    state = aligned.fit.state
+    errors = aligned.fit.errors
     placed = dict(zip(("shift_y", "shift_x", "rotation", "offset"), zip(state, errors)))
     if aligned.model.n_axes == 1:
         half = float(aligned.model.own.lengths[0]) / 2
