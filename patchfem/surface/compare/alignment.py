@@ -193,11 +193,13 @@ def _fit_gain(model: Model, fit: Fit, digit: float) -> tuple[Fit, float]:
     last = fit.state.size - 1
     scaled = fit_unworn(model, fit.state, [*fit.free, last], digit)
     change = float(scaled.state[-1])
+
     # The noise of the first surface, half of that of the depth, lowers a regression on its waves.
     dilution = np.median(scaled.noise**2) / 2 / (scaled.jacobian[:, -1].var() + TINY)
     # Neighbouring heights share errors such as a drift, and waves.
     influence = (scaled.jacobian[:, -1] * scaled.depth)[scaled.unworn]
     error = float(np.hypot(dilution, scaled.errors[-1] * np.sqrt(estimate_correlation(influence))))
+
     is_clear = max(MIN_GAIN_DEVIATIONS * error, MIN_GAIN_CHANGE) < abs(change) < MAX_GAIN_CHANGE
     is_quieter = np.median(scaled.noise) < np.median(fit.noise)
     if is_clear and is_quieter and scaled.n_changed <= MAX_MORE_CHANGED * fit.n_changed:

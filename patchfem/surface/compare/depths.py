@@ -94,6 +94,8 @@ def make_section(x, heights, sigma: float, worn, grown=None) -> DepthMap:
     noise = np.full(depth.size, sigma)
     grown = np.zeros(depth.size, bool) if grown is None else grown
     unworn = (np.abs(depth) < UNWORN_LIMIT * sigma) & ~worn & ~grown
+
+    # The errors are those of the unworn heights about their line.
     base = np.array([np.ones(depth.size), np.linspace(-1, 1, depth.size)])
     errors = estimate_errors(depth, noise, unworn, base)
     return DepthMap(
