@@ -28,8 +28,6 @@ AVERAGED_QUANTITIES = (
     "track_area_gross",
     "track_area_net",
     "track_pile_up",
-    "track_length",
-    "track_volume",
     "amplitude_ratio",
     "slope_ratio",
 )

@@ -533,13 +533,6 @@ COMPARE = (
         caption="After wear, aligned with the first surface; white: not measured.",
     ),
     Chart(
-        "Mean section of the track",
-        "section_place",
-        ("section_depth",),
-        labels=("place across the track", "worn depth"),
-        caption="Mean of all sections across the track. Band: one standard deviation of the sections.",
-    ),
-    Chart(
         "Computed and measured wear",
         "x_patch",
         ("measured_depth", "computed_depth"),
@@ -667,12 +660,6 @@ CURVES: dict[str, dict[str, dict[str, str] | Stack | Rows | Entries]] = {
             "gap_before": "gap_before",
             "gap_after": "gap_after",
             "depth": "depth",
-        },
-        "section.csv": {
-            "place": "section_place",
-            "depth": "section_depth",
-            "low": "section_depth_low",
-            "high": "section_depth_high",
         },
         "predicted.csv": {
             "x_patch": "x_patch",

@@ -136,8 +136,6 @@ def make_answer(comparison: Comparison) -> Answer:
     if sentences.is_known(comparison.values.get("worn_depth_mean")):
         region = sentences.describe_region(comparison).removeprefix("the ")
         answer.details["worn_depth_mean"]["over"] = region
-    if track is not None and track.section is not None:
-        answer.details["track"]["sections"] = track.n_sections
     return answer
 
 
@@ -202,8 +200,6 @@ def _describe_place(comparison: Comparison) -> dict:
     values = comparison.values if placement is None else comparison.values | placement.values
     registration = to_json({name: values[name] for name in names if name in values})
     registration["mirrored"] = bool(placement and placement.mirrored)
-    if comparison.is_areal:
-        registration["turned"] = bool(placement and placement.turned)
     basis = placement.basis if placement is not None else ""
     return {"reference": basis or None, "registration": registration}
 
@@ -262,16 +258,11 @@ def _make_data(comparison: Comparison) -> dict[str, Variable]:
 
 
 def _make_tracks(tracks: tuple[Track, ...]) -> dict[str, Variable]:
-    """Return the known ends of the tracks, and the mean section of the longest one of a scan."""
+    """Return the known ends of the tracks of traces."""
     if not tracks:
         return {}
     ends = [track.values[name].value for track in tracks for name in ("from", "to")]
-    data = make_variables("track_end", track_end=np.array(ends, float))
-    if tracks[0].section is not None:
-        places, depth, scatter = tracks[0].section
-        data |= make_variables("section_place", section_place=places)
-        data |= band("section_place", "section_depth", depth, scatter)
-    return data
+    return make_variables("track_end", track_end=np.array(ends, float))
 
 
 def _make_separate(comparison: Comparison) -> dict[str, Variable]:

@@ -106,9 +106,7 @@ def _measure_depth(comparison: Comparison) -> MeasuredDepth:
     datum_error = (area.high - area.low) / (2 * SIDE) / float(np.ptp(x))
     track = comparison.track
     width = None if track is None or any(track.cut) else track.values["width"].value
-    correlation = (
-        1.0 if comparison.evidence.datum is None else comparison.evidence.datum.correlation
-    )
+    correlation = curves.errors.correlation
     return MeasuredDepth(
         x, curves.depth[known], curves.noise[known], correlation, datum_error, width
     )

@@ -21,7 +21,7 @@ VERDICTS = {
     "no_wear": "No wear is shown: the mean worn depth over {region} is at most {at_most}.",
     "grown": "Material grew: {grown} stand above the first surface, {lost} are lost; deposits, or files in the wrong order.",
     "worn_and_grown": "Worn depth {mean}, the mean over {region}, and material grew: {lost} lost, {grown} grown.",
-    "growth_at_ends": "Either a scar of {scar_depth} over nearly all of the surface, or {growth_height} of material that "
+    "growth_at_ends": "Either a scar of {scar_depth} over the rest of the surface, or {growth_height} of material that "
     "grew at the ends: both are possible.",
     "scar_or_bow": "Either a scar over all of the surface, up to {scar_depth} deep on average, or a bent datum of the "
     "instrument: both are possible.",
@@ -86,7 +86,6 @@ NOTES = {
     "deposits": "{amount} of material lie above the first surface: deposits or pile-up.",
     "mirrored": "The second surface was measured in the opposite direction; it was mirrored, so that its x counts from "
     "the other end.",
-    "turned": "The second scan is a replica: its heights were turned upside down.",
     "other_length": "Lengths in the second trace are {scale} ({low} to {high}) times those in the first.",
 }
 NO_LIMIT = "any amount"  # stands for a missing number
@@ -234,9 +233,8 @@ def _describe_track(track: Track) -> str:
         end = track.values[name]
         if is_known(end) and not track.cut[side]:
             places[side] = format_rounded(end.value, "m", digits=5)
-    where = "of the second trace" if track.section is None else "across it"
     width, depth = (format_value(name, track.values[name]) for name in ("width", "depth_mean"))
-    return f"a track from {places[0]} to {places[1]} {where} is {width} wide and {depth} deep on average"
+    return f"a track from {places[0]} to {places[1]} of the second trace is {width} wide and {depth} deep on average"
 
 
 def describe_waves(ratio: Quantity | None) -> list[str]:

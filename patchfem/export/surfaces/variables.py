@@ -16,7 +16,6 @@ TEXTS = {
     "before_map": "height before wear, or gap of the unloaded surfaces",
     "after_map": "height after wear, or gap of the unloaded surfaces",
     "depth_map": "worn depth: before less after",
-    "section_depth": "mean worn depth across the track",
     "material_ratio": "material ratio",
     "gap_before": "gap of the unloaded surfaces before wear",
     "gap_after": "gap of the unloaded surfaces, wear included",

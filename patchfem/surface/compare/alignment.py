@@ -7,15 +7,14 @@ import numpy as np
 from .depth_map import UNWORN_LIMIT
 from .fit import Fit, evaluate, fit_unworn
 from .model import Model
-from .place import Place, change_second, find_place, order
+from .place import Place, find_place, order
 from .raster import MIN_HEIGHTS, Raster, fill_gaps
 from .statistics import (
-    WAVES_PER_SIDE,
-    estimate_gain,
+    TINY,
+    estimate_correlation,
     find_mirror_finish,
     find_mode,
     remove_long_waves,
-    smooth,
 )
 
 MAX_FIT_POINTS = (
@@ -40,8 +39,8 @@ MIN_AGREEING = 0.05  # fraction of heights that agree, in addition to that
 N_OTHER_PLACES = 15  # number of other places that show how many heights agree by chance
 MIN_NOISE = 1e-15  # smallest standard deviation of a depth [m]; flat surfaces have none
 EVEN_DEVIATION = 1 / np.sqrt(12)  # standard deviation of a uniform error of one digit
-MAX_GAINS = 8  # number of gains in turn; heights that agree show only a part of a large one
 MAX_GAIN_ERROR = 0.01  # standard deviation of the gain of two calibrated measurements
+MAX_GAIN_CHANGE = 0.3  # largest change of the gain of an instrument
 MIN_GAIN_CHANGE = 0.003  # smallest change of the gain that is corrected
 MIN_GAIN_DEVIATIONS = 5.0  # the same in standard deviations
 # Changed heights with a gain relative to those without it; less noise shows more.
@@ -52,8 +51,8 @@ MAX_MORE_CHANGED = 1.1
 class Aligned:
     """Two surfaces after alignment, or the code of the reason why they cannot be compared.
 
-    - gain: factor by which the heights of the second surface were divided.
-    - gain_error: standard deviation of the gain, as far as the valleys show it.
+    - gain: factor by which the heights of the second surface were divided; 1 if no other one shows.
+    - gain_error: standard deviation of the gain, as far as the unworn heights show it.
     """
 
     reason: str = ""
@@ -89,27 +88,8 @@ def align(
     digit = EVEN_DEVIATION * float(np.hypot(_find_digit(first.z), _find_digit(second.z)))
     digit = max(digit, MIN_NOISE)
     fit = _fit_datum(model, state, digit, is_straight=is_straight)
-
-    # Heights that agree show only a part of a large gain, so gains are measured in turn until none is left.
-    uncalibrated = model, fit
-    total = 1.0
-    for _ in range(MAX_GAINS):
-        gain, error = _measure_gain(model, fit)
-        if abs(gain - 1) <= max(MIN_GAIN_DEVIATIONS * error, MIN_GAIN_CHANGE):
-            break
-        total *= gain
-        scaled_model = _make_model(first, _calibrate(second, total), _move(place, fit.state))
-        scaled = _fit_datum(scaled_model, scaled_model.start, digit, is_straight=is_straight)
-        is_quieter = np.median(scaled.noise) < np.median(fit.noise)
-        if not is_quieter or scaled.n_changed > MAX_MORE_CHANGED * fit.n_changed:
-            model, fit = uncalibrated
-            total = 1.0
-            break
-        model = scaled_model
-        fit = scaled
-    if total == 1.0:
-        error = np.hypot(error, gain - 1)
-    aligned = Aligned("", model, fit, place, total, float(min(error, MAX_GAIN_ERROR)))
+    fit, gain_error = _fit_gain(model, fit, digit)
+    aligned = Aligned("", model, fit, place, 1 + float(fit.state[-1]), gain_error)
 
     if shift is None and not _is_same_place(aligned):
         return replace(aligned, reason=_find_reason(first, second))
@@ -125,8 +105,7 @@ def _find_reason(first: Raster, second: Raster) -> str:
 
 def _make_model(first: Raster, second: Raster, place: Place, stride: int = 0) -> Model | None:
     """Return the model at a place, on part of the points by default; None if the surfaces hardly overlap."""
-    changed = change_second(second, mirrored=place.mirrored, inverted=place.inverted)
-    own, other = order(first, changed)
+    own, other = order(first, second.mirror() if place.mirrored else second)
     if not stride:
         stride = int(np.ceil((own.z.size / MAX_FIT_POINTS) ** (1 / own.z.ndim)))
     model = Model(own, other, place, stride)
@@ -136,50 +115,38 @@ def _make_model(first: Raster, second: Raster, place: Place, stride: int = 0) ->
 
 def _use_all_points(aligned: Aligned, first: Raster, second: Raster, digit: float) -> Aligned:
     """Return the depths at all points, if the place was fitted to a part of them."""
-    state = aligned.fit.state
-    if aligned.model.own.z.shape == order(first, second)[0].z.shape:
+    fit = aligned.fit
+    model = aligned.model
+    if model.own.z.shape == order(first, second)[0].z.shape:
         return aligned
-    place = _move(aligned.place, state)
-    model = _make_model(first, _calibrate(second, aligned.gain), place, stride=1)
-    fit = evaluate(model, state, aligned.fit.jacobian.shape[1], digit)
-    return replace(aligned, model=model, fit=fit, place=place)
-
-
-def _calibrate(second: Raster, gain: float) -> Raster:
-    """Divide the heights about their mean by a gain."""
-    mean = np.nanmean(second.z)
-    return second._replace(z=mean + (second.z - mean) / gain)
-
-
-def _move(place: Place, state) -> Place:
-    """Return the place of a state."""
-    n_axes = place.shift.size
-    return place._replace(shift=state[:n_axes], turn=float(state[n_axes]))
+    place = aligned.place._replace(
+        shift=fit.state[: model.n_axes], turn=float(fit.state[model.n_axes])
+    )
+    model = _make_model(first, second, place, stride=1)
+    return replace(
+        aligned, model=model, fit=evaluate(model, fit.state, fit.free, digit), place=place
+    )
 
 
 def _is_same_place(aligned: Aligned) -> bool:
     """Return whether the surfaces have a place in common: by its significance, or by the heights that agree."""
     model = aligned.model
     fit = aligned.fit
-    first, second = (remove_long_waves(fill_gaps(model.draw(z))) for z in _get_heights(model, fit))
+    own = model.own.z[model.known]
+    heights = (own, own - model.sign * fit.depth)
+    waves = [remove_long_waves(fill_gaps(model.draw(z))) for z in heights]
     noise = float(np.median(fit.noise))
     is_stretched = model.n_axes == 1 and abs(fit.state[1]) > MAX_STRETCH
-    if is_stretched or noise > second[model.known].std():
+    if is_stretched or noise > min(z[model.known].std() for z in waves):
         return False
     significance = aligned.place.significance
     if significance > SURE_SIGNIFICANCE:
         return True
-    chance = _estimate_chance(first, second, noise)
+    chance = _estimate_chance(*waves, noise)
     agreeing = fit.unworn.mean()
     if significance > LIKELY_SIGNIFICANCE and agreeing - chance > MIN_EXCESS * (1 - chance):
         return True
     return agreeing > MIN_AGREEMENT * chance + MIN_AGREEING
-
-
-def _get_heights(model: Model, fit: Fit) -> tuple[np.ndarray, np.ndarray]:
-    """Return the heights (n,) [m] of the first and the second surface at the known points."""
-    own = model.own.z[model.known]
-    return (own, own - fit.depth) if model.sign > 0 else (own + fit.depth, own)
 
 
 def _estimate_chance(first, second, noise: float) -> float:
@@ -203,7 +170,7 @@ def _fit_datum(model: Model, state, digit: float, *, is_straight: bool) -> Fit:
         if best is not None and is_straight:
             break
         start = model.find_datum(state, n_terms)
-        fit = fit_unworn(model, start, model.n_axes + 1 + n_terms, digit)
+        fit = fit_unworn(model, start, list(range(model.n_axes + 1 + n_terms)), digit)
         if best is None or _is_bent(best, fit):
             best = fit
     return best
@@ -218,25 +185,26 @@ def _is_bent(straight: Fit, bent: Fit) -> bool:
     return bool((gain < BEND_GAIN or bent.n_changed < straight.n_changed / 2) and not has_grown)
 
 
-def _measure_gain(model: Model, fit: Fit) -> tuple[float, float]:
-    """Return the ratio of the depths of valleys, second to first surface, and its error.
+def _fit_gain(model: Model, fit: Fit, digit: float) -> tuple[Fit, float]:
+    """Fit the gain of the instrument too, and keep it if it is clear; return the error of the gain as well.
 
-    Tops may be worn, which an error of the gain resembles, so they do not count.
+    Worn tops are lower than before, as with a smaller gain, but then fewer heights agree.
     """
-    # The mean surface is that of the unworn heights, so that a track does not bend it.
-    deviations = np.array(model.own.z.shape) / WAVES_PER_SIDE
-    weight = model.draw(fit.unworn.astype(float), 0.0)
-    total = np.maximum(smooth(weight, deviations), 1e-12)
-    heights = []
-    for z in _get_heights(model, fit):
-        z = model.draw(z - np.median(z), 0.0)
-        waves = z - smooth(weight * z, deviations) / total
-        heights.append(waves[model.known])
-    first, second = heights
-    noise = float(np.median(fit.noise))
-    use = (np.abs(fit.depth) < 4 * UNWORN_LIMIT * noise) & (first + second < 0)
-    use &= ~fit.worn & ~fit.grown
-    return estimate_gain(first[use], second[use], noise)
+    last = fit.state.size - 1
+    scaled = fit_unworn(model, fit.state, [*fit.free, last], digit)
+    change = float(scaled.state[-1])
+
+    # The noise of the first surface, half of that of the depth, lowers a regression on its waves.
+    dilution = np.median(scaled.noise**2) / 2 / (scaled.jacobian[:, -1].var() + TINY)
+    # Neighbouring heights share errors such as a drift, and waves.
+    influence = (scaled.jacobian[:, -1] * scaled.depth)[scaled.unworn]
+    error = float(np.hypot(dilution, scaled.errors[-1] * np.sqrt(estimate_correlation(influence))))
+
+    is_clear = max(MIN_GAIN_DEVIATIONS * error, MIN_GAIN_CHANGE) < abs(change) < MAX_GAIN_CHANGE
+    is_quieter = np.median(scaled.noise) < np.median(fit.noise)
+    if is_clear and is_quieter and scaled.n_changed <= MAX_MORE_CHANGED * fit.n_changed:
+        return scaled, min(error, MAX_GAIN_ERROR)
+    return fit, min(float(np.hypot(error, change)), MAX_GAIN_ERROR)
 
 
 def _find_digit(z) -> float:

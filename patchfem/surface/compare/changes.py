@@ -13,7 +13,10 @@ from .statistics import (
 )
 
 WINDOWS = {1: (1, 4, 16, 64), 2: (1, 3, 9, 25)}  # sides of the windows whose mean depth is tested
-MIN_SIDE = 4  # side of the smallest changed part; a smaller one may be an error of interpolation
+MIN_SIDE = (
+    4  # side of the smallest changed part of scans; a smaller one may be an error of interpolation
+)
+MIN_RUN = 9  # the same of traces, where an error of interpolation at a kink spreads over 7 samples and one on each side
 MIN_SPOT_SIDE = {1: 1, 2: 3}  # the same of points that are changed alone
 MAX_PULL = {1: 4.0, 2: 8.0}  # standard deviations to which a single depth counts in a mean
 # Fraction of the means above or below zero that are unchanged at least.
@@ -69,7 +72,7 @@ def find_changed(depth, noise) -> np.ndarray:
     places = np.flatnonzero(known)
     shallow = find_shallow_track(np.clip(depth, -pull * noise, pull * noise)[known])
     changed[places[shallow.samples]] = True
-    return ndimage.binary_opening(ndimage.binary_dilation(changed), np.ones(MIN_SIDE + 2)) & known
+    return ndimage.binary_opening(ndimage.binary_dilation(changed), np.ones(MIN_RUN)) & known
 
 
 class Boxes(NamedTuple):

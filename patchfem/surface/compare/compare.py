@@ -26,7 +26,6 @@ from .flanks import find_flanked_track
 from .raster import Raster, clean_surface, fill_gaps, make_raster
 from .records import (
     Comparison,
-    Datum,
     Evidence,
     Finding,
     Placement,
@@ -35,8 +34,7 @@ from .records import (
     name_quantity,
     name_unknown,
 )
-from .section import average_section
-from .statistics import TINY, find_mirror_finish, remove_long_waves
+from .statistics import find_mirror_finish, remove_long_waves
 from .track import find_spans, get_margin, measure_track
 from .verdict import find_sure_loss, judge_change, limit_wear
 
@@ -239,7 +237,6 @@ def _measure(
         # The area of a single track is that of the common part.
         whole = bounds if len(spans) == 1 else None
         tracks = tuple(measure_track(depths, span, whole) for span in spans)
-        tracks = tracks if is_trace else average_section(depths)
     bend = _get_bend(aligned)
     code, possible = _doubt(code, depths, spans, tracks, (area, grown, bend))
     tracks = tracks if code.startswith("worn") else ()
@@ -262,20 +259,13 @@ def _measure(
         if is_trace and is_placed:
             regions, cutoff = waves.measure_roughness(depths, spans)
     limit = find_detection_limit(depths.depth, depths.noise) if is_placed else None
-    datum = Datum(
-        unworn=float(depths.unworn[depths.inside & ~depths.missing].mean()),
-        noise=depths.noise_level,
-        bend=bend,
-        correlation=depths.errors.correlation,
-        detection_limit=limit,
-    )
     numbers = {"lost": area, "grown": grown, "basis": placement.basis}
     numbers |= limit_wear(bounds[2] / depths.size, limit) | possible
     if not is_trace:
         numbers["side"] = find_largest_window(depths.depth.shape)
     verdict = Finding(code, numbers)
-    evidence = Evidence(placement, datum, depths, regions, cutoff)
-    findings = _collect_findings(verdict, evidence, spans, tracks, rasters)
+    evidence = Evidence(placement, depths, regions, cutoff)
+    findings = _collect_findings(verdict, evidence, bend, tracks, rasters)
     return Comparison(*surfaces, verdict, values, tracks, findings, evidence)
 
 
@@ -283,43 +273,35 @@ def _get_bend(aligned: Aligned) -> float:
     """Return the height [m] of the subtracted parabola of traces, 0 without one."""
     if aligned.reason or aligned.model.n_axes > 1:
         return 0.0
-    return float(aligned.fit.state[-1])
+    return float(aligned.fit.state[-2])
 
 
 def _describe_place(aligned: Aligned) -> Placement:
     """Return shift, turn and datum with the errors that follow from the unworn heights."""
-    model = aligned.model
-    fit = aligned.fit
-    weighted = fit.jacobian[fit.unworn] / fit.noise[fit.unworn, None]
-    scale = np.sqrt((weighted**2).mean(axis=0)) + TINY
-    covariance = np.linalg.pinv((weighted / scale).T @ (weighted / scale), rcond=1e-10)
-    errors = np.sqrt(np.diag(covariance)) / scale
-    state = fit.state
-    if model.n_axes == 1:
-        half = float(model.own.lengths[0]) / 2
+    state = aligned.fit.state
+    errors = aligned.fit.errors
+    placed = dict(zip(("shift_y", "shift_x", "rotation", "offset"), zip(state, errors)))
+    if aligned.model.n_axes == 1:
+        half = float(aligned.model.own.lengths[0]) / 2
         placed = {
             "shift": (-state[0], errors[0]),
             "scale": (1 / (1 + state[1]), errors[1]),
             "tilt": (state[3] / half, errors[3] / half),
             "offset": (state[2], errors[2]),
         }
-    else:
-        order = ("shift_y", "shift_x", "rotation", "offset")
-        placed = dict(zip(order, zip(state, errors)))
     placed["gain"] = (aligned.gain, aligned.gain_error)
     values = {name: name_estimate(name, *estimate) for name, estimate in placed.items()}
     place = aligned.place
     if np.isfinite(place.significance):
         values["significance"] = name_quantity("significance", place.significance, None, None)
-    return Placement(values, "x" if place.mirrored else "", place.inverted)
+    return Placement(values, "x" if place.mirrored else "")
 
 
 def _collect_findings(
-    verdict: Finding, evidence: Evidence, spans: list, tracks: tuple[Track, ...], rasters: tuple
+    verdict: Finding, evidence: Evidence, bend: float, tracks: tuple[Track, ...], rasters: tuple
 ) -> tuple[Finding, ...]:
     """Return what a reader must know of the place, the datum, the gain and the tracks."""
     placement = evidence.placement
-    datum = evidence.datum
     depths = evidence.curves
     is_placed = placement.basis == "place"
     gain = placement.values["gain"].value
@@ -328,9 +310,9 @@ def _collect_findings(
     if is_placed and scale is not None:
         is_longer = not scale.low - MIN_OTHER_LENGTH < 1 < scale.high + MIN_OTHER_LENGTH
     # A scar is deepest in the middle of its parabola, wear of both ends at its ends.
-    bow = abs(datum.bend)
-    bow_area = bow * (2 if datum.bend > 0 else 1) / 3 * float(np.ptp(depths.x))
-    has_tops = bool(tracks and spans) and _is_broken(depths, spans[0], MIN_TOPS_FRACTION)
+    bow = abs(bend)
+    bow_area = bow * (2 if bend > 0 else 1) / 3 * float(np.ptp(depths.x))
+    has_tops = bool(tracks) and _is_broken(depths, find_spans(depths)[0], MIN_TOPS_FRACTION)
     grown = verdict.numbers["grown"]
     has_deposits = (
         verdict.code.startswith("worn") and grown > MIN_DEPOSITS * verdict.numbers["lost"]
@@ -352,7 +334,6 @@ def _collect_findings(
         (is_placed, "hidden_even_wear", {"limit": None}),
         (np.isfinite(significance), "sure_place" if is_sure else "likely_place", place),
         (placement.mirrored, "mirrored", {}),
-        (placement.turned, "turned", {}),
         (gain not in (None, 1.0), "other_gain", {"gain": gain}),
         (
             is_longer,
@@ -432,13 +413,13 @@ def _doubt(
 
 
 def _has_grown_at_ends(depths: DepthMap) -> bool:
-    """Return whether material grew along two opposite ends or borders, which a scar between them resembles."""
+    """Return whether material grew along an end or a border, which a scar over the rest resembles."""
     axes = set(range(depths.depth.ndim))
     for axis in axes:
         others = tuple(axes - {axis})
         counts = depths.inside.sum(axis=others)
         grown = depths.grown.sum(axis=others)[counts > 0] / counts[counts > 0]
-        if min(grown[:END_SAMPLES].max(), grown[-END_SAMPLES:].max()) > MIN_GROWN_LINE:
+        if max(grown[:END_SAMPLES].max(), grown[-END_SAMPLES:].max()) > MIN_GROWN_LINE:
             return True
     return False
 
@@ -501,9 +482,9 @@ def _compare_waves(
         return _name_unknowns(RATIO_NAMES, "other_step")
     else:
         lines = [np.moveaxis(fill_gaps(raster.z), axis, -1) for raster in rasters]
-    datum = result.evidence.datum
-    # A mirror finish has no datum, but the noise of each surface is known.
-    noise = np.sqrt(2) * result.verdict.numbers.get("noise", 0.0) if datum is None else datum.noise
+    # A mirror finish has no depths, but the noise of each surface is known.
+    noise = np.sqrt(2) * result.verdict.numbers.get("noise", 0.0)
+    noise = noise if depths is None else depths.noise_level
     ends = []
     if depths is not None and depths.y is None:
         places = [track.values[name].value for track in result.tracks for name in ("from", "to")]

@@ -1,17 +1,17 @@
 """Depths of aligned surfaces, their errors from the means of unworn tiles, and the largest depth."""
 
-from itertools import pairwise, product
+from itertools import product
 
 import numpy as np
 from scipy import ndimage, special
 
 from ..quantity import SIDE, Quantity
-from .depth_map import MODEL_ERROR, SCATTER_FACTOR, DepthErrors, DepthMap
+from .depth_map import MODEL_ERROR, SCATTER_FACTOR, UNWORN_LIMIT, DepthErrors, DepthMap
 from .fit import Fit
 from .model import Model
 from .raster import fill_gaps
 from .records import name_quantity
-from .statistics import estimate_correlation
+from .statistics import estimate_correlation, find_box, split_tiles, subtract_plane
 
 N_TILES = {1: 40, 2: 8}  # number of tiles along each side, whose means show the errors of the datum
 MIN_TILES = 6  # smallest number of tiles that show these errors
@@ -35,7 +35,12 @@ def make_depths(model: Model, fit: Fit, gain_error: float = 0.0) -> DepthMap:
     gain_error : float, optional
         Standard deviation of the gain of the instrument.
     """
-    box = tuple(slice(place.min(), place.max() + 1) for place in np.nonzero(model.common))
+    box = find_box(model.common)
+    terms = [
+        k - model.n_axes - 1
+        for k in fit.free
+        if model.n_axes < k <= model.n_axes + len(model.datum)
+    ]
     depth = fill_gaps(model.draw(fit.depth))[box]
     noise = model.draw(fit.noise)[box]
     noise = np.where(np.isnan(noise), np.median(fit.noise), noise)
@@ -43,12 +48,11 @@ def make_depths(model: Model, fit: Fit, gain_error: float = 0.0) -> DepthMap:
         name: model.draw(getattr(fit, name), False)[box] for name in ("unworn", "worn", "grown")
     }
     first = fill_gaps(model.own.z)[box]
-    first = first if model.sign > 0 else first + depth
-
-    base = model.datum[(slice(fit.jacobian.shape[1] - model.n_axes - 1), *box)]
-    columns = base[: 1 + model.n_axes].reshape(1 + model.n_axes, -1).T
-    trend = columns @ np.linalg.lstsq(columns, first.ravel(), rcond=None)[0]
-    before = first - trend.reshape(first.shape)
+    if model.n_axes == 1:
+        # The own heights are those of the second trace, with its gain.
+        first = first / (1 + fit.state[-1]) + depth
+    base = model.datum[(terms, *box)]
+    before = subtract_plane(first, base[: 1 + model.n_axes])
     errors = estimate_errors(depth, noise, masks["unworn"], base)
     correlation = 1.0
     if model.n_axes == 1:
@@ -72,6 +76,44 @@ def make_depths(model: Model, fit: Fit, gain_error: float = 0.0) -> DepthMap:
     )
 
 
+def make_section(x, heights, sigma: float, worn, grown=None) -> DepthMap:
+    """Return the depths of a section about a straight datum.
+
+    Parameters
+    ----------
+    x : (n,) array [m]
+    heights : pair of (n,) arrays [m]
+        Before and after wear.
+    sigma : float
+        Noise of every depth [m].
+    worn, grown : (n,) bool array
+        No height has grown by default.
+    """
+    before, after = heights
+    depth = before - after
+    noise = np.full(depth.size, sigma)
+    grown = np.zeros(depth.size, bool) if grown is None else grown
+    unworn = (np.abs(depth) < UNWORN_LIMIT * sigma) & ~worn & ~grown
+
+    # The errors are those of the unworn heights about their line.
+    base = np.array([np.ones(depth.size), np.linspace(-1, 1, depth.size)])
+    errors = estimate_errors(depth, noise, unworn, base)
+    return DepthMap(
+        x=x,
+        before=before,
+        after=after,
+        depth=depth,
+        noise=noise,
+        unworn=unworn,
+        worn=worn,
+        grown=grown,
+        inside=np.ones(depth.size, bool),
+        missing=np.zeros(depth.size, bool),
+        cell=float(np.diff(x).mean()),
+        errors=errors._replace(correlation=estimate_correlation(depth[unworn])),
+    )
+
+
 def estimate_errors(depth, noise, unworn, base) -> DepthErrors:
     """Estimate the errors of sums of depths from the means of unworn heights in tiles about the datum.
 
@@ -86,10 +128,8 @@ def estimate_errors(depth, noise, unworn, base) -> DepthErrors:
     base : (k, n) or (k, m, n) array
         Functions of which the datum is a combination.
     """
-    edges = [np.linspace(0, count, N_TILES[depth.ndim] + 1).astype(int) for count in depth.shape]
     tiles = []
-    for sides in product(*map(pairwise, edges)):
-        tile = tuple(slice(*side) for side in sides)
+    for tile in split_tiles(depth.shape, N_TILES[depth.ndim]):
         use = unworn[tile]
         if use.sum() >= MIN_TILE_HEIGHTS:
             parts = [values[tile][use].mean() for values in (depth, *base)]
@@ -101,23 +141,24 @@ def estimate_errors(depth, noise, unworn, base) -> DepthErrors:
     variance = float(np.median(noise) ** 2 * depth.size / N_TILES[depth.ndim] ** depth.ndim)
     freedom = MIN_FREEDOM
     drift = 0.0
+    shared = 1.0
     if counts.size >= MIN_TILES:
         fitted = np.linalg.lstsq(centers, means * root, rcond=None)[0]
         residual = means * root - centers @ fitted
         # A slow drift makes neighbouring tiles share their errors, so that fewer of them are independent.
-        correlation = estimate_correlation(residual)
-        freedom = max(counts.size / correlation - len(base), MIN_FREEDOM)
+        shared = estimate_correlation(residual)
+        freedom = max(counts.size / shared - len(base), MIN_FREEDOM)
         student = special.stdtrit(freedom, 0.975) / SIDE
         scatter = residual @ residual / (counts.size - len(base))
         drift = float(np.sqrt(scatter / counts.mean()))
-        variance = float(scatter * correlation * student**2)
+        variance = float(scatter * shared * student**2)
     inverse = np.linalg.pinv(centers.T @ centers, rcond=1e-10, hermitian=True)
 
     def compute_variance(part) -> float:
         moments = base[:, part].sum(axis=1)
         return variance * float(moments @ inverse @ moments + part.sum())
 
-    return DepthErrors(compute_variance, drift, freedom)
+    return DepthErrors(compute_variance, drift, freedom, shared)
 
 
 def measure_largest(depths: DepthMap) -> tuple[Quantity, np.ndarray]:

@@ -26,13 +26,14 @@ MIN_NOISE_FRACTION = 0.3
 class Fit:
     """Depths of a second surface, placed on the first one.
 
-    - state: parameters of the model, of which the first `n_free` were fitted.
+    - state: parameters of the model; free: indices (j,) of those that were fitted.
     - depth, noise: (n,) [m], the noise as standard deviation of an unworn depth.
     - unworn, worn, grown: masks (n,).
-    - jacobian: derivative (n, n_free) of the depth by each fitted parameter.
+    - jacobian: derivative (n, j) of the depth by each fitted parameter.
     """
 
     state: np.ndarray
+    free: list[int]
     depth: np.ndarray
     noise: np.ndarray
     unworn: np.ndarray
@@ -45,17 +46,25 @@ class Fit:
         """Number of worn and grown heights."""
         return int((self.worn | self.grown).sum())
 
+    @property
+    def errors(self) -> np.ndarray:
+        """Standard deviations (j,) of the fitted parameters that the noise of the unworn heights gives."""
+        weighted = self.jacobian[self.unworn] / self.noise[self.unworn, None]
+        scale = np.sqrt((weighted**2).mean(axis=0)) + TINY
+        weighted = weighted / scale
+        return np.sqrt(np.diag(np.linalg.pinv(weighted.T @ weighted, rcond=1e-10))) / scale
 
-def fit_unworn(model: Model, state, n_free: int, digit: float) -> Fit:
-    """Fit the first parameters to the unworn heights, alternating with the choice of the worn ones.
+
+def fit_unworn(model: Model, state, free: list[int], digit: float) -> Fit:
+    """Fit some parameters to the unworn heights, alternating with the choice of the worn ones.
 
     Parameters
     ----------
     model : Model
     state : (k,) array
         Start.
-    n_free : int
-        Number of fitted parameters.
+    free : list of int
+        Indices of the fitted parameters.
     digit : float
         Standard deviation [m] due to the printed digits of the heights; the noise is at least this.
     """
@@ -65,28 +74,28 @@ def fit_unworn(model: Model, state, n_free: int, digit: float) -> Fit:
         for _ in range(MAX_STEPS):
             depth = model.compute_depth(state)
             sigma = max(estimate_one_sided_scale(depth[~worn]), digit)
-            jacobian = model.compute_jacobian(state)[:, :n_free]
+            jacobian = model.compute_jacobian(state)[:, free]
             change = solve_biweight_step(depth, jacobian, sigma, worn)
             state = state.copy()
-            state[:n_free] += change
+            state[free] += change
             if np.abs(jacobian @ change).max() < STEP_TOL * sigma:
                 break
-        fit = evaluate(model, state, n_free, digit, worn)
+        fit = evaluate(model, state, free, digit, worn)
         if (fit.worn == worn).all() or (~fit.worn).sum() < MIN_UNWORN:
             break
         worn = fit.worn
     return fit
 
 
-def evaluate(model: Model, state, n_free: int, digit: float, worn=None) -> Fit:
+def evaluate(model: Model, state, free: list[int], digit: float, worn=None) -> Fit:
     """Return the depths at a state, their noise, and the changed heights.
 
     Parameters
     ----------
     model : Model
     state : (k,) array
-    n_free : int
-        Number of fitted parameters.
+    free : list of int
+        Indices of the fitted parameters.
     digit : float
         Smallest standard deviation of a depth [m].
     worn : (n,) bool array, optional
@@ -100,7 +109,7 @@ def evaluate(model: Model, state, n_free: int, digit: float, worn=None) -> Fit:
     worn = model.find_changed(depth, noise)
     unworn = (np.abs(depth) < UNWORN_LIMIT * noise) & ~worn
     grown = model.find_changed(-depth, noise) & ~worn
-    return Fit(state, depth, noise, unworn, worn, grown, jacobian[:, :n_free])
+    return Fit(state, free, depth, noise, unworn, worn, grown, jacobian[:, free])
 
 
 def estimate_noise(depth, terms, sigma: float, worn) -> np.ndarray:

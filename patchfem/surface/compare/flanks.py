@@ -4,106 +4,76 @@ It serves where both traces have no heights in common: the track left nothing of
 the first trace was measured at another place and shows the roughness only.
 """
 
+from dataclasses import replace
+
 import numpy as np
 
+from ..profile import find_runs
 from .changes import MIN_TRACK_PARTS, N_PARTS, make_boxes
-from .depth_map import DepthErrors, DepthMap
+from .depth_map import DepthMap
+from .depths import make_section
 from .raster import Raster, fill_gaps
-from .statistics import estimate_correlation, solve_biweight_step
+from .statistics import subtract_plane
 
-N_SURROGATES = 100  # number of random traces with the spectrum of the first one
-# Height of a track relative to the largest one in all random traces, above which it is not chance.
+N_TRACES = 50  # number of starts, and of random phases, of the first trace that show its roughness
+# Height of a track relative to the largest one in all these traces, above which it is not chance.
 MIN_CLEARANCE = 1.2
 FLANK_PARTS = 6  # smallest number of parts of each flank
 MIN_PART_SAMPLES = 4  # smallest number of samples of a part
-SPECTRUM_ERROR = 1.4  # widens the errors, because the spectrum of one trace is an estimate itself
 
 
 def find_flanked_track(first: Raster, second: Raster) -> DepthMap | None:
     """Find a track between flanks in the second trace; None if its roughness explains what is seen.
 
-    A line with a box is fitted to means of parts. The box is a track if it is deeper than in all random
-    traces with the spectrum of the first one (phases drawn, Theiler 1992), and if the flanks are no
-    rougher than theirs. The errors are those of the same estimate in the random traces.
+    A line with a box is fitted to means of 60 parts. The box is a track if it is deeper than in the first trace from 50
+    starts and with 50 random phases (Theiler 1992), and if the flanks are no rougher than this trace.
     """
     z = fill_gaps(second.z)
-    if min(z.size, first.z.size) < MIN_PART_SAMPLES * N_PARTS:
+    step = float(second.steps[0])
+    count = int(first.lengths[0] / step)
+    if min(z.size, count) < MIN_PART_SAMPLES * N_PARTS:
         return None
-    traces = _draw_traces(first, second)
-    boxes = make_boxes(1, FLANK_PARTS, MIN_TRACK_PARTS)
+    rough = np.interp(step * np.arange(count), first.axes[0] - first.origin[0], fill_gaps(first.z))
+    rough = subtract_plane(rough, np.array([np.ones(count), np.linspace(-1, 1, count)]))
+    # Pits and plateaus are no random waves, so other starts of the trace count as well as other phases of its waves.
+    random = np.random.default_rng(0)
+    waves = np.fft.rfft(rough)
+    traces = []
+    for start in np.arange(N_TRACES) * count // N_TRACES:
+        phases = np.exp(2j * np.pi * random.random(waves.size))
+        traces.append(np.resize(np.roll(rough, start), z.size))
+        traces.append(np.resize(np.fft.irfft(np.abs(waves) * phases, count), z.size))
+
     edges = np.linspace(0, z.size, N_PARTS + 1).astype(int)
-    heights = -(boxes.shapes @ _average_parts(z[None], edges).T)[:, 0]
-    chance = np.abs(boxes.shapes @ _average_parts(traces, edges).T).max()
+    means, *others = np.add.reduceat([z, *traces], edges[:-1], axis=1) / np.diff(edges)
+    boxes = make_boxes(1, FLANK_PARTS, MIN_TRACK_PARTS)
+    heights = -boxes.shapes @ means
     best = int(np.argmax(heights))
-    if heights[best] <= MIN_CLEARANCE * chance:
+    if heights[best] <= MIN_CLEARANCE * np.abs(boxes.shapes @ np.array(others).T).max():
         return None
 
     # The flanks keep a part of distance from the box, whose ends are known to one part.
     start, stop = boxes.spans[best]
-    beside = np.ones(z.size, bool)
-    beside[edges[max(start - 1, 0)] : edges[min(stop + 1, N_PARTS)]] = False
-    depth = _subtract_line(z, beside)
-    errors = np.array([_subtract_line(trace, beside) for trace in traces])
-    roughness = np.median(np.abs(errors[:, beside]), axis=1)
+    is_flank = np.ones(N_PARTS, bool)
+    is_flank[start - 1 : stop + 1] = False
+    # Pile-up on the flanks does not move the line of repeated medians.
+    from scipy import stats
+
+    centers = (edges[1:] + edges[:-1] - 1) / 2
+    line = stats.siegelslopes(means[is_flank], centers[is_flank])
+    depth = np.polyval(line[:2], np.arange(z.size)) - z
+    beside = np.repeat(is_flank, np.diff(edges))
+    roughness = np.median(np.abs(np.array(traces)[:, beside]), axis=1)
     if np.median(np.abs(depth[beside])) > MIN_CLEARANCE * roughness.max():
         return None
+
     # A round track reaches beyond the best box, up to where the means of parts are those of flanks.
-    means = _average_parts(depth[None], edges)[0]
-    scatter = _average_parts(errors, edges).std()
-    while start > 1 and means[start - 1] > scatter:
-        start -= 1
-    while stop < N_PARTS - 1 and means[stop] > scatter:
-        stop += 1
+    is_low = np.polyval(line[:2], centers) - means > np.std(others)
+    is_low[start:stop] = True
+    is_low[[0, -1]] = False
+    start, stop = next(run for run in find_runs(is_low) if run[0] <= start <= run[1])
     worn = np.zeros(z.size, bool)
-    worn[edges[start] : edges[stop]] = True
-    missing = np.isnan(second.z)
-    return DepthMap(
-        x=second.axes[0],
-        before=0.0 * depth,
-        after=-depth,
-        depth=depth,
-        noise=np.full(z.size, float(errors[:, beside].std())),
-        unworn=beside,
-        worn=worn,
-        grown=np.zeros(z.size, bool),
-        inside=np.ones(z.size, bool),
-        missing=missing,
-        cell=float(second.steps[0]),
-        errors=DepthErrors(
-            variance=lambda part: SPECTRUM_ERROR**2 * float(np.var(errors[:, part].sum(axis=1))),
-            correlation=estimate_correlation(traces[0]),
-        ),
-    )
-
-
-def _draw_traces(first: Raster, second: Raster) -> np.ndarray:
-    """Draw random traces (k, n) [m] with the spectrum of the first trace at the samples of the second."""
-    random = np.random.default_rng(0)
-    step = float(second.steps[0])
-    count = max(int(first.lengths[0] / step), 2)
-    x = step * np.arange(count)
-    z = np.interp(x, first.axes[0] - first.origin[0], fill_gaps(first.z))
-    z = z - np.polyval(np.polyfit(x, z, 1), x)
-    size = np.abs(np.fft.rfft(z * np.hanning(count))) * np.sqrt(8 / 3)
-    phases = random.uniform(0, 2 * np.pi, (N_SURROGATES, size.size))
-    drawn = np.fft.irfft(size * np.exp(1j * phases), count)
-    # Pits and plateaus are not random waves, so half of the traces are the first one from other starts.
-    for k in range(0, N_SURROGATES, 2):
-        drawn[k] = np.roll(z, k * count // N_SURROGATES)[:: 1 if k % 4 else -1]
-    repeats = -(-second.z.size // count)
-    return np.tile(drawn, repeats)[:, : second.z.size]
-
-
-def _average_parts(z, edges) -> np.ndarray:
-    return np.add.reduceat(z, edges[:-1], axis=1) / np.diff(edges)
-
-
-def _subtract_line(z, beside) -> np.ndarray:
-    """Return the depths (n,) below the line through the flanks; pile-up beside the track gets no weight."""
-    base = np.column_stack((np.ones(z.size), np.linspace(-1, 1, z.size)))
-    line = np.linalg.lstsq(base[beside], z[beside], rcond=None)[0]
-    for _ in range(10):
-        residual = z[beside] - base[beside] @ line
-        sigma = max(1.4826 * float(np.median(np.abs(residual))), 1e-15)
-        line = line + solve_biweight_step(residual, -base[beside], sigma)
-    return base @ line - z
+    worn[edges[start] : edges[stop + 1]] = True
+    sigma = float(depth[beside].std())
+    section = make_section(second.axes[0], (0.0 * depth, -depth), sigma, worn)
+    return replace(section, missing=np.isnan(second.z))

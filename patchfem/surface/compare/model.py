@@ -2,11 +2,13 @@
 
 A point p of the own surface, which is the second trace or the first scan, lies at c + M (p - c) + shift on the other
 one, with the own middle c; M stretches a trace or rotates a scan. The depth there is z1 + datum - z2, with a straight or
-parabolic datum of traces and a plane of scans. The state is [shift (d), turn, datum (k)], axes in the order y, x.
+parabolic datum of traces and a plane of scans. With another gain 1 + e of the instrument, it is (z1 + e z1 + datum -
+z2)/(1 + e), with the waves of z1 about its plane in the term e z1. The state is [shift (d), turn, datum (k), e], axes in
+the order y, x.
 """
 
 from functools import cached_property
-from itertools import combinations, pairwise, product
+from itertools import combinations
 
 import numpy as np
 from scipy import ndimage
@@ -15,7 +17,14 @@ from ..profile import robust_deviation
 from .changes import find_changed
 from .place import Place, make_matrix
 from .raster import Raster, fill_gaps
-from .statistics import find_mode, smooth, solve_biweight_step
+from .statistics import (
+    find_box,
+    find_mode,
+    smooth,
+    solve_biweight_step,
+    split_tiles,
+    subtract_plane,
+)
 
 BORDER_SAMPLES = 3  # distance from the border of a surface from which on its spline is accurate
 MIN_KNOWN_WEIGHT = 0.99  # weight of measured neighbours of a point whose height is known
@@ -26,7 +35,7 @@ PLACE_WAVES = {1: 100, 2: 20}
 MIN_WAVE_SAMPLES = 10.0  # smallest such deviation of traces, in samples
 # Deviations of the Gaussians that smooth both surfaces in turn.
 REFINE_WIDTHS = (16, 8, 4, 3, 2, 1, 0, 0, 0)
-N_DATUMS = 300  # number of datums that are improved by concentration steps
+N_DATUMS = 150  # number of datums that are improved by concentration steps
 MAX_DATUMS = 3000  # number of datums through modes of tiles that are compared
 MAX_DATUM_SAMPLES = 2000  # number of heights from which the datum is found
 MIN_TILE_HEIGHTS = 4  # smallest number of known heights in a tile
@@ -44,7 +53,7 @@ class Model:
 
     def __init__(self, own: Raster, other: Raster, place: Place, stride: int = 1):
         """Choose the common points at a place, of each `stride`-th own point."""
-        every = (slice(None, None, stride),) * own.z.ndim
+        every = (..., *(slice(None, None, stride),) * own.z.ndim)
         self.own = Raster(own.z[every], own.origin, own.steps * stride)
         self.n_axes = own.z.ndim
         # Heights are known along the own surface: the depth is own minus other for scans, the reverse for traces.
@@ -57,15 +66,20 @@ class Model:
         ]
         self.bend = ndimage.maximum_filter(np.abs(ndimage.laplace(filled)), KINK_SAMPLES)
 
-        grid = np.array(np.meshgrid(*self.own.axes, indexing="ij"))
         self.middle = self._shape(own.middle)
-        self.points = grid - self.middle
-        unit = self.points / self._shape(own.lengths / 2)
-        columns = [np.ones(unit.shape[1:]), *unit[::-1]]
-        if self.n_axes == 1:
-            columns.append(unit[0] ** 2)
-        self.datum = np.array(columns)
-        self.start = np.concatenate((place.shift, [place.turn], np.zeros(len(columns))))
+        points = np.array(np.meshgrid(*own.axes, indexing="ij")) - self.middle
+        unit = points / self._shape(own.lengths / 2)
+        columns = np.array([np.ones(own.z.shape), *unit[::-1]])
+        bend = unit**2 if self.n_axes == 1 else unit[:0]
+        self.points = points[every]
+        self.datum = np.concatenate((columns, bend))[every]
+        # The gain belongs to the first surface, as a track of the second one would be its own gain.
+        if self.n_axes > 1:
+            self.waves = subtract_plane(fill_gaps(own.z), columns)[every[1:]]
+        else:
+            line = np.array([np.ones(filled.size), np.linspace(-1, 1, filled.size)])
+            self.waves = ndimage.spline_filter(subtract_plane(filled, line))
+        self.start = np.concatenate((place.shift, [place.turn], np.zeros(len(self.datum) + 1)))
         self.keep_common(self.start)
 
     def _shape(self, values) -> np.ndarray:
@@ -92,8 +106,15 @@ class Model:
         pixels = self._map_pixels(state)[:, self.known]
         # The coefficients of a spline are those of a mirrored border.
         other = ndimage.map_coordinates(self.spline, pixels, prefilter=False, mode="mirror")
-        datum = state[self.n_axes + 1 :] @ self.datum[:, self.known]
-        return self.sign * (self.own.z[self.known] - other) + datum
+        datum = state[self.n_axes + 1 : -1] @ self.datum[:, self.known]
+        depth = self.sign * (self.own.z[self.known] - other) + datum
+        return (depth + state[-1] * self._get_waves(pixels)) / (1 + state[-1])
+
+    def _get_waves(self, pixels) -> np.ndarray:
+        """Return the heights (n,) of the first surface about its plane at the known points."""
+        if self.n_axes > 1:
+            return self.waves[self.known]
+        return ndimage.map_coordinates(self.waves, pixels, prefilter=False, mode="mirror")
 
     def compute_jacobian(self, state) -> np.ndarray:
         """Return the derivative (n, d + 1 + k) of the depth by the state."""
@@ -111,8 +132,8 @@ class Model:
         else:
             further = np.eye(1)
         moved = (slopes * (further @ self.points[:, self.known])).sum(axis=0)
-        columns = np.vstack((-self.sign * slopes, -self.sign * moved, self.datum[:, self.known]))
-        return columns.T
+        place = -self.sign * np.vstack((slopes, moved))
+        return np.vstack((place, self.datum[:, self.known], self._get_waves(pixels))).T
 
     def compute_noise_terms(self, state, jacobian) -> np.ndarray:
         """Return terms (n, 3) of the variance: of the instrument, of positions on slopes, at kinks."""
@@ -161,16 +182,9 @@ class Model:
 
     def find_datum(self, state, n_terms: int) -> np.ndarray:
         """Return the state with the datum of some terms on which the unworn heights lie."""
-        numbers = self.draw(np.arange(self.known.sum()), -1)
-        edges = []
-        for indices in np.nonzero(self.known):
-            count = N_TILES[self.n_axes] + 1
-            edges.append(np.linspace(indices.min(), indices.max() + 1, count).astype(int))
-        tiles = []
-        for sides in product(*map(pairwise, edges)):
-            tile = numbers[tuple(slice(*side) for side in sides)]
-            tiles.append(tile[tile >= 0])
-        tiles = [tile for tile in tiles if tile.size >= MIN_TILE_HEIGHTS]
+        numbers = self.draw(np.arange(self.known.sum()), -1)[find_box(self.known)]
+        parts = [numbers[part] for part in split_tiles(numbers.shape, N_TILES[self.n_axes])]
+        tiles = [part[part >= 0] for part in parts if (part >= 0).sum() >= MIN_TILE_HEIGHTS]
         ends = [tiles[0], tiles[-1]] if self.n_axes == 1 else []
         state = state.copy()
         base = self.datum[:n_terms, self.known].T
@@ -206,7 +220,9 @@ def find_datum(base, depth, tiles: list, ends: list) -> np.ndarray:
     thin = np.arange(0, depth.size, max(depth.size // MAX_DATUM_SAMPLES, 1))
     few_base = base[thin]
     few = depth[thin]
-    datums = datums[np.argsort(_scale_datums(datums, few_base, few))[:N_DATUMS]]
+    # A quarter of the heights shows which datums are worth improving.
+    scales = _scale_datums(datums, few_base[::4], few[::4])
+    datums = datums[np.argsort(scales)[:N_DATUMS]]
     for _ in range(2):
         residual = np.abs(few + datums @ few_base.T)
         nearest = np.argpartition(residual, few.size // 5, axis=1)[:, : few.size // 5]

@@ -13,11 +13,6 @@ from .statistics import TINY, remove_long_waves, smooth
 # By number of axes: errors of length of a trace, and rotations of a scan [rad], the same turned by 180 degrees too.
 ANGLES = np.radians(np.arange(-6, 6.1, 0.5))
 TURNS = {1: np.linspace(-0.01, 0.01, 11), 2: np.concatenate((ANGLES, ANGLES + np.pi))}
-# How the second surface may have been measured: against the direction of x, as a replica with inverted heights.
-VARIANTS = {
-    1: ((False, False), (True, False)),
-    2: ((False, False), (True, False), (False, True), (True, True)),
-}
 MAX_PIXELS = {1: 4000, 2: 96}  # points along the longer side of the images that are correlated
 IMAGE_WAVES = {
     1: 40,
@@ -25,20 +20,19 @@ IMAGE_WAVES = {
 }  # side of an image relative to the deviation of the Gaussian of its long waves
 BORDER_FRACTION = 0.1  # part of a trace that falls to zero at its ends before it is whitened
 MIN_OVERLAP = 0.33  # smallest common part relative to the smaller image
-# Significance of a place beyond which no mirrored or inverted scan is tried.
+# Significance of a place beyond which no mirrored scan is tried.
 CLEAR_SIGNIFICANCE = 9.0
 
 
 class Place(NamedTuple):
     """Place of the second surface: shift (d,) [m] and turn of the map from own to other points (`model`).
 
-    mirrored, inverted: how the second surface was measured. significance: of the correlation.
+    mirrored: whether the second surface was measured against the direction of x. significance: of the correlation.
     """
 
     shift: np.ndarray
     turn: float
     mirrored: bool = False
-    inverted: bool = False
     significance: float = np.inf
 
 
@@ -49,20 +43,6 @@ def make_matrix(turn: float, n_axes: int) -> np.ndarray:
     cos = np.cos(turn)
     sin = np.sin(turn)
     return np.array([[cos, sin], [-sin, cos]])
-
-
-def change_second(second: Raster, *, mirrored: bool, inverted: bool) -> Raster:
-    """Undo a mirrored measurement and a replica.
-
-    Parameters
-    ----------
-    second : Raster
-        As it was measured.
-    mirrored, inverted : bool
-        Whether it was measured against the direction of x, and with inverted heights.
-    """
-    second = second.mirror() if mirrored else second
-    return second._replace(z=-second.z) if inverted else second
 
 
 def order(first: Raster, second: Raster) -> tuple[Raster, Raster]:
@@ -80,11 +60,10 @@ def find_place(first: Raster, second: Raster) -> Place:
     finest = min(first.steps.min(), second.steps.min())
     pixel = max(finest, longest / MAX_PIXELS[n_axes])
     best = Place(np.zeros(n_axes), 0.0, significance=-np.inf)
-    for mirrored, inverted in VARIANTS[n_axes]:
-        changed = change_second(second, mirrored=mirrored, inverted=inverted)
-        own, other = order(first, changed)
-        images = [_make_images(surface, pixel) for surface in (own, other)]
-        for turn, (image, other_image) in product(TURNS[n_axes], zip(*images)):
+    for mirrored in (False, True):
+        own, other = order(first, second.mirror() if mirrored else second)
+        images = zip(*(_make_images(surface, pixel) for surface in (own, other)))
+        for (image, other_image), turn in product(images, TURNS[n_axes]):
             matrix = make_matrix(turn, n_axes)
             center = (np.array(other_image.shape) - 1) / 2
             offset = center - matrix @ center
@@ -99,8 +78,7 @@ def find_place(first: Raster, second: Raster) -> Place:
             # The middle of the own surface lies at this point of the turned image.
             at = (own.middle - own.origin) / pixel - lag
             place = other.origin + pixel * (center + matrix @ (at - center))
-            found = (float(turn), mirrored, inverted, float(significance[peak]))
-            best = Place(place - own.middle, *found)
+            best = Place(place - own.middle, float(turn), mirrored, float(significance[peak]))
         if best.significance > CLEAR_SIGNIFICANCE and n_axes > 1:
             break
     return best

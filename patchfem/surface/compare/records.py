@@ -57,17 +57,14 @@ DEFINITIONS = {
     "shift_x": ("m", "x of a feature in the second scan minus its x in the first"),
     "shift_y": ("m", "y of a feature in the second scan minus its y in the first"),
     "rotation": ("rad", "rotation of the second scan about the middle of the first, anticlockwise"),
-    "from": ("m", "x in the second trace, or place across the track in a scan, at which it begins"),
-    "to": ("m", "x in the second trace, or place across the track in a scan, at which it ends"),
+    "from": ("m", "x in the second trace at which the track begins"),
+    "to": ("m", "x in the second trace at which the track ends"),
     "width": ("m", "width of the track"),
     "depth_mean": ("m", "lost area divided by width"),
     "depth_floor": ("m", "mean depth of the deepest fifth of the width"),
     "area_gross": ("m2", "area lost in the track"),
     "pile_up": ("m2", "area above the first trace within one width of the track on both sides"),
     "area_net": ("m2", "lost area less pile-up"),
-    "length": ("m", "length of the track in the common part of the scans"),
-    "volume": ("m3", "area lost in the mean section times the length of the track"),
-    "direction": ("rad", "direction of the track from the x axis, anticlockwise"),
     "Ra": ("m", "mean of the absolute heights of the roughness profile"),
     "Rq": ("m", "root mean square of the heights of the roughness profile"),
     "slope": ("m m-1", "root mean square slope of the roughness profile"),
@@ -87,57 +84,32 @@ class Placement:
 
     - values: shift, tilt, scale of a trace; shift_x, shift_y, rotation of a scan; significance unless the place was given.
     - mirrored: whether the second surface was mirrored, along "x" (traces) or "x", "y" (scans); "".
-    - turned: whether the heights of a scan were inverted (a replica).
     - basis: "place" if heights are compared at the same place, "flanks" if the depth is measured
       below the unworn flanks of the second trace alone, "" if there is no reference.
     """
 
     values: dict[str, Quantity]
     mirrored: str = ""
-    turned: bool = False
     basis: str = "place"
 
 
 @dataclass(frozen=True, eq=False)
-class Datum:
-    """Unworn heights from which the depth is measured.
-
-    - unworn: fraction of the heights on which the fit rests.
-    - noise: median standard deviation of the depth of an unworn height [m].
-    - bend: height of the parabola that was subtracted, over the common length [m].
-    - correlation: number of neighbouring samples that share an error.
-    - detection_limit: mean depth [m] from which on a track over the middle third is found; None if
-      unknown.
-    """
-
-    unworn: float
-    noise: float
-    bend: float
-    correlation: float
-    detection_limit: float | None = None
-
-
-@dataclass(frozen=True, eq=False)
 class Track:
-    """Single worn track.
+    """Single worn track of a trace.
 
-    - values: from, to, width, depth_mean, depth_floor, area_gross, area_net, pile_up;
-      of a scan direction, length and volume too.
+    - values: from, to, width, depth_mean, depth_floor, area_gross, area_net, pile_up.
     - cut: whether the track leaves the common part at its beginning, and at its end.
-    - section: places (k,), mean depth (k,) and scatter (k,) of the sections of a scan [m].
     """
 
     values: dict[str, Quantity]
     cut: tuple[bool, bool] = (False, False)
-    section: tuple[np.ndarray, np.ndarray, np.ndarray] | None = None
-    n_sections: int = 1
 
 
 @dataclass(frozen=True, eq=False)
 class Evidence:
     """What the numbers of a comparison rest on; None where there is no common place.
 
-    - placement, datum: how the second surface was laid on the first.
+    - placement: how the second surface was laid on the first.
     - curves: depths and heights of the aligned surfaces.
     - roughness: {"inside", "outside": {"before", "after", "ratio": {"Ra", "Rq", "slope": Quantity}}}
       of the track, with the ratio after/before; {} without a track. `cutoff` [m] is that of these values.
@@ -145,7 +117,6 @@ class Evidence:
     """
 
     placement: Placement | None = None
-    datum: Datum | None = None
     curves: DepthMap | None = None
     roughness: dict[str, dict[str, dict[str, Quantity]]] = field(default_factory=dict)
     cutoff: float | None = None
@@ -159,9 +130,9 @@ class Comparison:
     - before, after: the surfaces as read.
     - verdict: `Finding` with one of the codes of `compare`.
     - values: quantities by name, a missing value with the code of its reason.
-    - tracks: worn tracks, the longest one first.
+    - tracks: worn tracks of traces, the longest one first.
     - findings: what else a reader must know.
-    - evidence: placement, datum, curves and roughness.
+    - evidence: placement, curves and roughness.
     - direction: "x", "y" or "".
     """
 

@@ -1,7 +1,9 @@
 """Robust statistics of depths, of which some are worn: scale, mode, correlation, thresholds."""
 
+from itertools import pairwise, product
+
 import numpy as np
-from scipy import fft, special
+from scipy import fft, ndimage, special
 
 from ..profile import robust_deviation
 
@@ -15,7 +17,6 @@ TRUNCATED_VARIANCE = 0.911
 TINY = 1e-300  # keeps divisions by zero noise finite
 WAVES_PER_SIDE = 40  # side of a surface relative to the deviation of the Gaussian of its long waves
 MAX_FINISH = 1.5  # short waves relative to the noise, below which no place can be found
-MIN_GAIN_HEIGHTS = 40  # smallest number of heights that show the gain of the instrument
 
 
 def estimate_one_sided_scale(depth, fraction: float = 0.5) -> float:
@@ -115,19 +116,18 @@ def find_mirror_finish(surfaces) -> dict[str, float]:
     return {}
 
 
-def estimate_gain(first, second, noise: float) -> tuple[float, float]:
-    """Return the ratio of heights (n,) of two surfaces, second to first one, and its error; (1, inf) for too few.
+def split_tiles(shape: tuple[int, ...], count: int) -> list[tuple[slice, ...]]:
+    """Return the slices of the tiles into which an array of a shape is cut, `count` along each axis."""
+    edges = [np.linspace(0, size, count + 1).astype(int) for size in shape]
+    return [tuple(slice(*side) for side in sides) for sides in product(*map(pairwise, edges))]
 
-    The noise [m] of the first surface, half of the variance of a depth, lowers a regression on its heights.
-    """
-    if first.size < MIN_GAIN_HEIGHTS:
-        return 1.0, np.inf
-    first = first - first.mean()
-    second = second - second.mean()
-    power = first @ first - first.size * noise**2 / 2
-    if not power > 0:
-        return 1.0, np.inf
-    gain = float(first @ second / power)
-    blocks = np.array_split(np.arange(first.size), 10)
-    influence = [first[b] @ (second[b] - gain * first[b]) for b in blocks]
-    return gain, float(np.sqrt(10) * np.std(influence) / power)
+
+def find_box(mask) -> tuple[slice, ...]:
+    """Return the slices of the smallest box that contains all true points of a mask."""
+    return ndimage.find_objects(mask.astype(np.int8))[0]
+
+
+def subtract_plane(z, columns) -> np.ndarray:
+    """Subtract the least-squares combination of columns (k, ...) from heights z (...)."""
+    base = columns.reshape(len(columns), -1).T
+    return z - (base @ np.linalg.lstsq(base, z.ravel(), rcond=None)[0]).reshape(z.shape)

@@ -171,7 +171,7 @@ def measure_track(
     Parameters
     ----------
     depths : DepthMap
-        Of a trace or a mean section.
+        Of a trace.
     span : tuple of int
         First and last worn sample.
     lost : tuple of float, optional

@@ -5,7 +5,6 @@ import numpy as np
 from patchfem.surface.areal import Areal
 from patchfem.surface.compare.records import (
     Comparison,
-    Datum,
     DepthMap,
     Evidence,
     Finding,
@@ -75,7 +74,6 @@ VERDICTS = {
 }
 FINDINGS = {
     "mirrored": {},
-    "turned": {},
     "sure_place": {"significance": 57.3, "sure": 12.0},
     "likely_place": {"significance": 7.3, "sure": 12.0},
     "no_old_surface_left": {"from": 1e-3, "to": 2e-3},
@@ -135,7 +133,6 @@ def compare_traces(code: str = "worn", findings: dict | None = None, has_place=T
         }
         evidence = Evidence(
             placement=Placement(place),
-            datum=Datum(0.75, 10e-9, 0.0, 2.0, 5e-9),
             curves=DepthMap(x, before, before - depth, depth, noise, ~worn, worn, 0 * x > 1),
             roughness=roughness,
             cutoff=8e-5,
@@ -164,18 +161,12 @@ def compare_scans(shape: tuple[int, int] = (900, 500)) -> Comparison:
         for z, name in ((heights, "before"), (heights - depth, "after"))
     ]
     place = name_all({"shift_x": (5 * UM, UM), "shift_y": (-3 * UM, UM), "rotation": (1e-4, 1e-5)})
-    sizes = TRACK_NAMES | {
-        "length": (1e-3, 1e-5),
-        "volume": (2e-13, 1e-15),
-        "direction": (1.57, 0.01),
-    }
     worn = depth > 0
     return Comparison(
         before=scans[0],
         after=scans[1],
         verdict=Finding("worn", {"basis": "place"}),
         values=name_all(SCAN_VALUES) | {"hidden_wear": name_unknown("hidden_wear", "not_hidden")},
-        tracks=(Track(name_all(sizes), section=(x, depth[0], 0 * x + 2e-8), n_sections=y.size),),
         evidence=Evidence(
             placement=Placement(place, mirrored="x"),
             curves=DepthMap(

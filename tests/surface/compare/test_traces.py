@@ -201,6 +201,24 @@ def test_always_scar_over_ninety_percent_may_be_growth_at_ends():
     assert found.verdict.numbers["growth_height"] == pytest.approx(UM, rel=0.1)
 
 
+def test_always_wear_to_an_end_over_most_of_the_trace_may_be_growth_at_the_other_end():
+    """A step of 1 um that leaves 20 % of the trace higher is a scar over the rest, or growth at the beginning."""
+    worn = np.zeros(4000)
+    worn[800:] = UM
+    found = compare_surfaces(*make_pair(worn))
+    assert found.verdict.code == "growth_at_ends"
+    assert found.verdict.numbers["scar_depth"] == pytest.approx(UM, rel=0.1)
+
+
+def test_exact_deep_narrow_groove_in_a_smooth_surface():
+    """A groove of 20 um and 200 um width in a surface of .1 um rms has its area, measured at the same place."""
+    worn = make_parabola(20 * UM, 1900, 2100)
+    found = compare_surfaces(*make_pair(worn, 11, surface=draw_surface(11, rms=0.1 * UM)))
+    assert found.verdict.code == "worn" and found.evidence.placement.basis == "place"
+    area = found.values["worn_area"]
+    assert area.low <= worn.sum() * UM <= area.high
+
+
 def test_always_scar_like_a_parabola_may_be_a_bow():
     """A parabola of 2 um over 90 % of the trace is no wear of nanometres; a straight datum is no bow.
 
