@@ -220,8 +220,8 @@ def format_length(length: float, digits: int = 4) -> str:
     """Format a length [m] for a message, such as "200 um" or "12.7 mm"."""
     for unit, size in (("m", 1.0), ("mm", 1e-3), ("um", 1e-6)):
         if abs(length) >= size * (1 - 1e-9):
-            return f"{length / size:.{digits}g} {unit}"
-    return f"{length / 1e-9:.{digits}g} nm" if length else "0 um"
+            return f"{format_number(length / size, digits)} {unit}"
+    return f"{format_number(length / 1e-9, digits)} nm" if length else "0 um"
 
 
 def rewrite_powers_of_ten(text: str) -> str:

@@ -3,7 +3,7 @@
 import numpy as np
 
 from ...effects import law_has_trait
-from ...formatting import format_length, format_quantity
+from ...formatting import format_length, format_number, format_quantity
 from ...runs.patch import faces
 from .joint import MIN_AMPLITUDE_FACTOR, JointMode
 from .records import ROUND_OFF_ERROR, Backbone, Curve, match_amplitudes
@@ -204,9 +204,15 @@ def describe_band_width(backbone: Backbone) -> str:
     content = "the numerical error"
     if any(match_amplitudes(curve, other)[0].size for other in others):
         content += " and the difference of the two methods"
+    # as many digits as show the width of the band
+    digits = int(np.clip(2 - np.log10(max(damping[k], 1e-6)), 3, 6))
+    low, high, best = (
+        format_number(float(value[k]), digits)
+        for value in (band.damping_low, band.damping_high, curve.damping)
+    )
     return (
         f"Its band is {content}; it is widest at {format_length(curve.amplitude[k], 3)}, where the damping ratio is "
-        f"{band.damping_low[k]:.3g} to {band.damping_high[k]:.3g} beside {curve.damping[k]:.3g}, and the frequency is "
+        f"{low} to {high} beside {best}, and the frequency is "
         f"within {100 * frequency.max():.2g} % everywhere."
     )
 
@@ -231,7 +237,7 @@ def describe_static_curve(curves: dict[str, Curve]) -> list[str]:
         agrees &= np.abs(getattr(static, name) - value) <= limit
 
     # the range ends at the first amplitude at which they differ
-    tolerance = f"{100 * AGREEMENT:g} %"
+    tolerance = f"{100 * AGREEMENT:g} % and both errors"
     if agrees.all():
         return [
             f"The quasi-static curve holds within {tolerance} at all amplitudes of both curves."

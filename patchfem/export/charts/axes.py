@@ -15,6 +15,9 @@ from .table import CHARTS
 
 LINE_STYLES = ("-", "--", ":", "-.")
 PICTURE_ENDINGS = (".png", ".svg", ".pdf")
+PICTURE_CHARTS = {
+    "backbone": 3
+}  # charts of a picture where one is not enough: frequency, damping, force
 
 # Marker and face of each symbol of a point; "" is the colour of the curve.
 MARKERS = {"circle": ("o", ""), "circle-open": ("o", "none"), "x": ("x", "")}
@@ -172,7 +175,7 @@ def _to_svg(figure) -> str:
 
 
 def write_plot(answer: Answer, path) -> None:
-    """Write the first chart of an answer as .png, .svg or .pdf.
+    """Write the first chart of an answer, or the first ones of PICTURE_CHARTS, as .png, .svg or .pdf.
 
     Raises
     ------
@@ -186,7 +189,7 @@ def write_plot(answer: Answer, path) -> None:
     panels = make_panels({"": answer}, CHARTS[answer.kind])
     if not panels:
         raise PatchfemError(f"{path}: this answer has no chart")
-    write_picture(panels[:1], path)
+    write_picture(panels[: PICTURE_CHARTS.get(answer.kind, 1)], path)
 
 
 def draw_charts(answer: Answer, titles: tuple[str, ...], axes=None, verb: str = "plot"):
