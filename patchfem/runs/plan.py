@@ -35,7 +35,7 @@ SKIPPING_NOTE = (
 )
 GROUPS = {  # Definition and SI unit of each group.
     "D": (
-        "D: friction limit (static, if there are two) divided by the largest force of the drive",
+        "D: friction limit (static, if there are two) divided by the largest force of the drive, both on the first mode",
         "1",
     ),
     "D_kinetic": ("D with the kinetic friction limit", "1"),

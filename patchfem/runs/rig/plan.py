@@ -182,8 +182,8 @@ def _count_march_sizes(model: Model, numerics, n_points: int) -> RunSizes:
 def compute_dimensionless_groups(model: Model) -> dict:
     """Return a dict of the dimensionless groups of the motion of a rig.
 
-    - D: ratio of the static friction limit to the largest force of the drive, D of (2.3) at
-      resonance.
+    - D: ratio of the static friction limit to the largest force of the drive, both as they act on
+      the first mode, D of (2.3) at resonance.
     - D_kinetic: the same ratio with the kinetic limit, if it differs.
     - knee [m s-2], or knee_force [N] for a drive by force: largest drive at which friction alone
       bounds the motion of a sliding block at resonance.
@@ -197,13 +197,14 @@ def compute_dimensionless_groups(model: Model) -> dict:
     limit = sum(static for static, _ in limits)
     kinetic = sum(sliding for _, sliding in limits)
     drive_force = drive.force or rig.first_mode.mass * find_max_acceleration(drive.signal)
+    participation = _find_participation_ratio(rig)
     if drive_force > 0:
-        sizes["D"] = limit / drive_force
+        sizes["D"] = participation * limit / drive_force
         if kinetic != limit:
-            sizes["D_kinetic"] = kinetic / drive_force
+            sizes["D_kinetic"] = participation * kinetic / drive_force
     ratio = rig.first_mode.frequency * drive.signal.period if drive.frequency else inf
     if abs(ratio - 1) < 0.2:
-        bound = 4 / pi * kinetic * _find_participation_ratio(rig)
+        bound = 4 / pi * kinetic * participation
         sizes |= {"knee_force": bound} if drive.force else {"knee": bound / rig.first_mode.mass}
     if f is not None and f.bond_length and f.stiffness is None and drive.signal.moving:
         sizes["drive_amplitude_over_bond_length"] = (
@@ -272,7 +273,6 @@ def describe_stick(rig, sizes: dict, chain: dict) -> list:
         or rig.drive.kind == "free"
     ):
         return []
-    friction_ratio *= _find_participation_ratio(rig)
     limit = MIN_STIFF_LINK_RATIO * rig.first_mode.stiffness
     links = {name: link for name, link in chain.items() if not isinstance(link, str)}
     compliant_links = [name for name, link in links.items() if name != "mode" and link < limit]
@@ -285,7 +285,7 @@ def describe_stick(rig, sizes: dict, chain: dict) -> list:
     if friction_ratio >= 1:
         return [f"D = {friction_ratio:.3g} >= 1: friction should hold the block, so that it sticks"]
     if "D_kinetic" in sizes:  # The kinetic friction limit acts while the block slides.
-        sliding = sizes["D_kinetic"] * _find_participation_ratio(rig)
+        sliding = sizes["D_kinetic"]
         return [
             f"D = {friction_ratio:.3g} is below 1, so that the block slips; "
             f"with the kinetic coefficient {_describe_sliding(sliding)}"
