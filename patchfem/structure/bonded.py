@@ -96,7 +96,7 @@ def remove_springs(basis: ModalBasis, stiffness, damping: float = 0.0) -> ModalB
 
 
 def _advise_on_slides(omega, joint) -> str:
-    """Return advice by which factor to multiply `slide` of all modes so that a joint can be removed.
+    """Return advice by which factor to multiply `slide` of all modes or their mass so that a joint can be removed.
 
     joint: (n, n) stiffness of the joint over the mass [rad2 s-2]; "" if no factor suffices.
     """
@@ -105,7 +105,11 @@ def _advise_on_slides(omega, joint) -> str:
     factor = float(np.linalg.eigvalsh(joint / np.outer(omega, omega))[-1]) ** -0.5
     exponent = np.floor(np.log10(factor)) - 1
     rounded = np.floor(factor / 10**exponent) * 10**exponent
-    return f"; `slide` of the modes is too large: multiply `slide` of every mode by {rounded:.2g} or less"
+    mass = np.ceil(rounded**-2)
+    return (
+        "; `slide` of the modes is too large or `moving_mass` too small: multiply `slide` of every mode by "
+        f"{rounded:.2g} or less, or check whether the mass is {mass:.2g} times as large"
+    )
 
 
 def _change_coordinates(basis: ModalBasis, omega, shapes, damper) -> ModalBasis:
