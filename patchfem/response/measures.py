@@ -19,6 +19,7 @@ MIN_ENERGY_GAP = 1e-18  # Smallest significant difference of energies [J].
 # Round-off error of the friction work, relative to the energy that is exchanged and stored in the
 # run.
 WORK_ROUND_OFF = 1e-10
+FRACTION_TOL = 1e-9  # Round-off of a fraction of a step.
 MIN_SLIDE_RANGE = 1e-15  # Largest range of the relative displacement [m] of an interface at rest.
 # Largest ratio of neighbouring second differences at which a curve counts as smooth.
 MAX_SMOOTH_RATIO = 4.0
@@ -363,17 +364,26 @@ def find_reversal_steps(time, position, rate) -> StepReversals:
     StepReversals
     """
     step = np.diff(time)
-    k = np.flatnonzero(rate[:-1] * rate[1:] < 0)
-    p = rate[k] * step[k]
-    q = rate[k + 1] * step[k]
-    rise = position[k + 1] - position[k]
+    # Two samples at the same time, at a jump of the force, have no cubic between them. The cubic is scaled by its larger
+    # slope, so that squares of tiny motions do not vanish.
+    slopes = np.maximum(np.abs(rate[:-1]), np.abs(rate[1:])) * step
+    k = np.flatnonzero((rate[:-1] * rate[1:] < 0) & (slopes > 0))
+    p = rate[k] * step[k] / slopes[k]
+    q = rate[k + 1] * step[k] / slopes[k]
+    rise = (position[k + 1] - position[k]) / slopes[k]
     quadratic = 3 * rise - 2 * p - q
     cubic = p + q - 2 * rise
-    # The slope is zero where p + 2 quadratic s + 3 cubic s^2 = 0; this form of the root avoids
-    # cancellation if the cubic is nearly a parabola.
+    # The slope is zero where p + 2 quadratic s + 3 cubic s^2 = 0. Neither root cancels if the cubic is nearly a parabola, or
+    # if one slope is round-off beside the other.
     root = np.sqrt(np.maximum(quadratic**2 - 3 * cubic * p, 0.0))
-    s = np.clip(-p / (quadratic - np.sign(p) * root), 0.0, 1.0)
-    return StepReversals(k, s, position[k] + s * (p + s * (quadratic + s * cubic)))
+    scaled_root = -(quadratic + np.copysign(root, quadratic))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        first = p / scaled_root
+        second = scaled_root / (3 * cubic)
+    is_first = np.abs(first - 0.5) <= 0.5 + FRACTION_TOL
+    s = np.clip(np.where(is_first, first, second), 0.0, 1.0)
+    height = slopes[k] * s * (p + s * (quadratic + s * cubic))
+    return StepReversals(k, s, position[k] + height)
 
 
 def measure_half_range(time, position, rate) -> float:

@@ -206,10 +206,8 @@ def describe_band_width(backbone: Backbone) -> str:
         content += " and the difference of the two methods"
     # as many digits as show the width of the band
     digits = int(np.clip(2 - np.log10(max(damping[k], 1e-6)), 3, 6))
-    low, high, best = (
-        format_number(float(value[k]), digits)
-        for value in (band.damping_low, band.damping_high, curve.damping)
-    )
+    ends = np.array([band.damping_low, band.damping_high, curve.damping])[:, k].tolist()
+    low, high, best = (format_number(value, digits) for value in ends)
     return (
         f"Its band is {content}; it is widest at {format_length(curve.amplitude[k], 3)}, where the damping ratio is "
         f"{low} to {high} beside {best}, and the frequency is "
