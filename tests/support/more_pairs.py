@@ -266,6 +266,18 @@ def draw_sliding(seed: int, count: int) -> Iterator[WornPair]:
         )
 
 
+def print_generator(draw, score, seed: int, count: int) -> list[dict]:
+    """Print the scores of a generator's pairs, and each pair with a fault; return the rows."""
+    rows = [score(pair) for pair in draw(seed, count)]
+    print(format_scores(draw.__name__, rows), flush=True)
+    for index, row in enumerate(rows):
+        faults = [name for name in INTERVALS if row.get(name) is False]
+        faults += [word for word in ("false", "refused", "missed", "doubt") if row.get(word)]
+        if faults:
+            print("  ", index, row["name"], "|", row["code"], "|", " ".join(faults), flush=True)
+    return rows
+
+
 def print_scores(seed: int, count: int, folder: str = "") -> None:
     """Print the scores of all generators, and each pair with a fault; folder: of the older generators."""
     generators = [
@@ -279,14 +291,7 @@ def print_scores(seed: int, count: int, folder: str = "") -> None:
         generators += [(draw, older.score_pair) for draw in draws]
     every = []
     for draw, score in generators:
-        rows = [score(pair) for pair in draw(seed, count)]
-        every += rows
-        print(format_scores(draw.__name__, rows), flush=True)
-        for row in rows:
-            faults = [name for name in INTERVALS if row.get(name) is False]
-            faults += [word for word in ("false", "refused", "missed", "doubt") if row.get(word)]
-            if faults:
-                print("  ", row["name"], "|", row["code"], "|", " ".join(faults), flush=True)
+        every += print_generator(draw, score, seed, count)
     print(format_scores("all", every))
 
 
