@@ -443,7 +443,7 @@ class MeasureDefinition(NamedTuple):
     friction_scale: Callable | None = None
 
     def has(self, flag: str) -> bool:
-        """Return whether the measure belongs to a set."""
+        """Return whether a flag is among those of the measure."""
         return flag in self.flags.split()
 
 

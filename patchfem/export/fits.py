@@ -314,11 +314,9 @@ def describe_curve_fit(fit: FittedCurve) -> Parts:
         }
         curve[f"curve_{name}"] = (fit.beyond[k + 1], unit)
         curve[f"curve_{name}_error"] = (fit.beyond[k + 3], unit)
-    assumed = (
-        " The errors of the measured values are their scatter around the fit."
-        if measured.assumed.any()
-        else ""
-    )
+    assumed = ""
+    if measured.assumed.any():
+        assumed = " The errors of the measured values are their scatter around the fit."
     percent = {name: f"{100 * value:.2g} %" for name, value in rms.items()}
     return Parts(
         residual=f"At {n_rows} amplitudes the residual is {percent['frequency']} rms of the frequency and "

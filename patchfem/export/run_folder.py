@@ -113,7 +113,12 @@ def is_complete(run_plan, target: Path) -> bool:
 def write_results(result: Result, folder: Path, case: dict[str, str] | None = None) -> WrittenRun:
     """Write all files of a run, except its page, into an existing folder.
 
-    `case` has the swept keys with their values if the run is a case of a sweep.
+    Parameters
+    ----------
+    result : Result
+    folder : Path
+    case : dict, optional
+        Swept keys with their values as written, if the run is a case of a sweep.
     """
     start_time = perf_counter()
     notes = result.extra.setdefault("notes", [])

@@ -326,7 +326,7 @@ def _convert_to_displacement(half_cycles: HalfCycles, order: int) -> HalfCycles:
     log_sizes = np.log(half_cycles.size)
     decrements = fit_slopes(log_sizes, half_cycles.size_noise / half_cycles.size)
     omega = _extend_to_ends(np.hypot(np.pi, decrements.slope) / half_periods.slope)
-    # half of the 95 % interval of the half period is about its standard deviation
+    # The half-width of a 95 % interval is about two standard deviations.
     omega_noise = order * _extend_to_ends(half_periods.error / half_periods.slope) / 2
     size = half_cycles.size / omega**order
     relative_noise = np.hypot(half_cycles.size_noise / half_cycles.size, omega_noise)

@@ -111,6 +111,7 @@ def _read_table(path: Path, exported_names: Mapping) -> list:
             values = np.array(cells, float)
             channels.append(Channel(name, "", quantity, unit or "", values))
         elif column in CHANNEL_UNITS or has_decimal_comma(cells[row]):
+            # This cell is no number, and the error says why.
             parse_number(f"{path}:{row + 2}: {name}", cells[row], 1.0)
     return channels
 

@@ -66,10 +66,10 @@ def read_table(path: Path) -> list[MeasuredRow]:
             f"{path}:1: column '{unknown[0][:40]}' is unknown; possible columns are flag and "
             f"{', '.join(COLUMN_UNITS)}"
         )
-    return [
-        _parse_row(f"{path}:{number}: ", dict(zip(table.names, cells)), factors)
-        for number, cells in table.iterate_rows(skips_blank=True)
-    ]
+    rows = []
+    for number, cells in table.iterate_rows(skips_blank=True):
+        rows.append(_parse_row(f"{path}:{number}: ", dict(zip(table.names, cells)), factors))
+    return rows
 
 
 def _make_record_error(path: Path) -> PatchfemError:

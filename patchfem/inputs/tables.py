@@ -113,7 +113,21 @@ def read_lines(path: Path, contents: str, remedy: str = "") -> list[str]:
 
 
 def split_cells(location: str, line: str, separator: str) -> list[str]:
-    """Split a line into its cells, which may stand in quotation marks; a PatchfemError begins with `location`."""
+    """Split a line into its cells, which may stand in quotation marks.
+
+    Parameters
+    ----------
+    location : str
+        Beginning of the error message, such as ``a.csv:3``.
+    line : str
+    separator : str
+        Sign between the cells.
+
+    Raises
+    ------
+    PatchfemError
+        If a quotation mark is not closed.
+    """
     try:
         rows = csv.reader([line], delimiter=separator, skipinitialspace=True)
         cells = next(rows) if '"' in line else line.split(separator)
@@ -125,7 +139,21 @@ def split_cells(location: str, line: str, separator: str) -> list[str]:
 
 
 def read_text(path: Path, contents: str, remedy: str = "") -> TextTable:
-    """Read a table whose columns may have any names; parameters and errors as in `read_lines`."""
+    """Read a table whose columns may have any names.
+
+    Parameters
+    ----------
+    path : Path
+    contents, remedy : str
+        Words of the error messages, as in `TableFormat`.
+
+    Raises
+    ------
+    Missing
+        If there is no file.
+    PatchfemError
+        If the file cannot be read or is too large.
+    """
     header, *lines = read_lines(path, contents, remedy)
     while lines and not lines[-1].strip():
         lines.pop()
@@ -139,9 +167,10 @@ def read_text(path: Path, contents: str, remedy: str = "") -> TextTable:
 def find_factors(table: TextTable, form: TableFormat) -> dict[str, float]:
     """Return the factor to SI of each column of numbers; raise PatchfemError if the header is not that of a format."""
     names = table.names
-    header = table.separator.join(
-        name if unit is None else f"{name} [{unit}]" for name, unit in zip(names, table.units)
-    )
+    heads = []
+    for name, unit in zip(names, table.units):
+        heads.append(name if unit is None else f"{name} [{unit}]")
+    header = table.separator.join(heads)
     expected = f"{table.path}:1: a header like `{form.example}` is needed, not '{header[:80]}'"
     if len(set(names)) < len(names):
         raise PatchfemError(f"{expected} (a column is given twice)")

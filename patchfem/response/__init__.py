@@ -82,6 +82,9 @@ PUBLIC = {
     "outcome": (
         "AMPLITUDE_ROUND_OFF",
         "OPEN_LOOP",
+        "describe_ringing",
+        "find_ringing",
+        "is_ringing_visible",
         "note_on_changing_drive",
         "check_piece_length",
         "classify_periodic",
@@ -91,12 +94,10 @@ PUBLIC = {
         "is_still_changing",
         "judge_outcome",
         "remove_errors",
-        "warn_if_ringing",
     ),
     "reasons": (
         "CHANGE_NOT_RESOLVED_REASON",
         "MAX_OTHER_MODES_FRACTION",
-        "STEADY_AMPLITUDE",
         "STICKS_AT_REVERSAL_REASON",
         "find_missing",
         "find_missing_drift",
@@ -114,6 +115,8 @@ PUBLIC = {
         "select_strongest",
     ),
     "rows": (
+        "AMPLITUDE",
+        "STEADY_AMPLITUDE",
         "INTERNAL_VALUES",
         "LastCycles",
         "ROWS_NEEDING_RUN",

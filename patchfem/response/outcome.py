@@ -9,10 +9,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..core import Measure, Outcome
+from ..core import Measure, Outcome, compute_allowed_error
 from ..structure import drive_sizes
 from . import stationary
-from .rows import AMPLITUDE
+from .rows import AMPLITUDE, STEADY_AMPLITUDE
 from .settling import (
     CLASSES,
     GROWS_CLASS,
@@ -85,9 +85,8 @@ def judge_outcome(
         and is_still_loading(solution.window, drive.period, tolerance)
     ):
         return Outcome.TRANSIENT, {}
-    is_ringing = not level_cycles and bool(
-        warn_if_ringing(solution, measures, (tolerance, min_decay_rate), drive, 0.0)
-    )
+    limits = (tolerance, min_decay_rate)
+    is_ringing = not level_cycles and find_ringing(solution, measures, limits, drive) > 0
     if solution.outcome is not None and not is_ringing:
         return solution.outcome, {}
     if hasattr(drive, "band"):
@@ -141,7 +140,7 @@ def judge_outcome(
         return outcome, {}
     total = steady_estimate_error(steady, error, base.value, base.error or 0.0)
     measure = Measure(float(steady), "m", float(total), base.floor)
-    return outcome, {"relative_displacement_amplitude_steady": measure}
+    return outcome, {STEADY_AMPLITUDE: measure}
 
 
 def is_drifting(drift, error, amplitude, tolerance, floor) -> np.ndarray:
@@ -340,11 +339,8 @@ def check_piece_length(
     return outcome
 
 
-def warn_if_ringing(solution, measures: dict, limits: tuple, drive, cycles: float) -> list:
-    """Return a list with a warning if the amplitude still decays while the interface sticks.
-
-    The warning contains the remaining change of the amplitude, and the number of cycles after which a free
-    motion of the slowest mode is below the tolerance.
+def find_ringing(solution, measures: dict, limits: tuple, drive) -> float:
+    """Return the free vibration [m] of a rig whose interfaces stick under a periodic drive; 0 if none is visible.
 
     Parameters
     ----------
@@ -354,20 +350,29 @@ def warn_if_ringing(solution, measures: dict, limits: tuple, drive, cycles: floa
     limits : tuple
         Tolerance, and decay rate of the slowest mode [1/s].
     drive
-    cycles : float
-        Number of cycles of the run.
     """
     tolerance, min_decay_rate = limits
     amplitude = measures[AMPLITUDE]
     if solution.outcome is not Outcome.STUCK or solution.extremes is None:
-        return []
+        return 0.0
     if not drive_sizes.is_periodic(drive) or not amplitude.value:
-        return []
+        return 0.0
     window = max(1, round((solution.window.time[-1] - solution.window.time[0]) / drive.period))
     decay = min_decay_rate * drive.period
-    free_vibration = float(remaining_ringing(np.asarray(solution.extremes), window, decay))
-    sizes = (amplitude.value, amplitude.floor + (amplitude.error or 0.0))
-    return warn_of_ringing(free_vibration, sizes, (tolerance, decay), cycles)
+    ringing = float(remaining_ringing(np.asarray(solution.extremes), window, decay))
+    sizes = (amplitude.value, amplitude.error or 0.0, amplitude.floor)
+    return ringing if is_ringing_visible(ringing, *sizes, tolerance) else 0.0
+
+
+def is_ringing_visible(ringing, amplitude, error, floor, tolerance):
+    """Return whether a free vibration exceeds what the tolerance and the numerical error of the amplitude allow.
+
+    Parameters
+    ----------
+    ringing, amplitude, error, floor, tolerance : float or (n,)
+        Free vibration, amplitude with its error and floor [m], and relative tolerance.
+    """
+    return ringing > compute_allowed_error(tolerance, amplitude, floor) + error
 
 
 def remaining_ringing(extremes, window: int, decay):
@@ -391,39 +396,32 @@ def remaining_ringing(extremes, window: int, decay):
     return np.maximum(free_motion, np.abs(amplitudes[..., -1] - amplitudes[..., -2]))
 
 
-def warn_of_ringing(free_vibration: float, sizes: tuple, limits: tuple, cycles: float) -> list:
-    """Return a list with a warning if the free vibration during stick is large.
-
-    A change of the amplitude below its numerical error does not show a free vibration.
+def describe_ringing(ratio: float, limits: tuple, cycles: float) -> str:
+    """Return a warning that a sticking interface still vibrates freely, with the cycles after which this has decayed.
 
     Parameters
     ----------
-    free_vibration : float
-        Visible part of the amplitude that is free vibration [m], see `remaining_ringing`.
-    sizes : tuple
-        Amplitude, and its floor plus its numerical error [m].
+    ratio : float
+        Free vibration relative to the amplitude.
     limits : tuple
         Tolerance, and logarithmic decay of the slowest mode over a cycle [1].
     cycles : float
         Number of cycles of the run.
     """
-    amplitude, floor = sizes
     tolerance, decay = limits
-    if not free_vibration > tolerance * amplitude + floor:
-        return []
     # The free vibration of a run from rest begins as large as the steady motion and decays at least as fast as
     # the slowest mode. A beat that is longer than the run hides part of it in the amplitudes of the cycles.
-    ratio = max(free_vibration / amplitude, np.exp(-max(decay, 0.0) * cycles))
+    ratio = max(ratio, np.exp(-max(decay, 0.0) * cycles))
     more_cycles = np.log(ratio / tolerance) / decay if decay > 0 else np.inf
     advice = 'set accuracy.method = "harmonic" for the steady motion'
     if more_cycles < MAX_PROPOSED_CYCLES:
         proposed = float(f"{cycles + CYCLES_SAFETY_FACTOR * more_cycles:.2g}")
         advice = f"set drive.cycles = {proposed:g}"
-    return [
+    return (
         f"the interface sticks, but the amplitude has not settled: by up to {100 * ratio:.2g} % (limit "
         f"{100 * tolerance:g} %) it is free vibration that will decay, so "
         f"relative_displacement_amplitude and loop_area are those of a transient; {advice}"
-    ]
+    )
 
 
 def note_on_changing_drive(outcome: Outcome, drive) -> list:

@@ -11,7 +11,7 @@ import numpy as np
 from ..core import Measure, Outcome
 from ..formatting import format_number
 from ..structure import drive_sizes
-from .rows import TABLE
+from .rows import STEADY_AMPLITUDE, TABLE
 
 ACCELERATIONS = ("absolute_acceleration_fundamental", "acceleration_distortion")
 # Largest contribution of other modes to the relative displacement, as a fraction, at which the
@@ -37,7 +37,6 @@ CHANGE_NOT_RESOLVED_REASON = (
     "the motion changes in such a way that the run does not show what it settles to: "
     "a longer run does"
 )
-STEADY_AMPLITUDE = "relative_displacement_amplitude_steady"
 OPEN_LOOP_REASON = (
     "the friction loop does not close: during the last cycles the stored energy changes by more than friction "
     "dissipates; the energy dissipated in the whole run is given by energy_dissipated"

@@ -261,6 +261,7 @@ def _random_rows(
 
 
 AMPLITUDE = "relative_displacement_amplitude"  # measure on which a run is refined
+STEADY_AMPLITUDE = "relative_displacement_amplitude_steady"  # the same, extrapolated
 # Measures that only single runs compute. If there are any, a sweep computes the cases of a rig one by one,
 # because batches compute only the measures of this package.
 SINGLE_RUN_ROWS: tuple[MeasureDefinition, ...] = ()

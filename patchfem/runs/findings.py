@@ -15,6 +15,7 @@ from ..effects import law_has_trait
 from ..formatting import format_number
 from ..model.gap import longest_loaded_cell
 from ..model.model import Model
+from ..response import rows
 from . import refine
 from .patch import mesh_levels
 from .results import notes, patch_rows
@@ -44,7 +45,6 @@ SAMPLED_MEASURES = (
 )
 # Prefix of the measures of ringing, which engines without steps may not compute.
 RINGING_PREFIX = "ring_"
-STEADY_AMPLITUDE = "relative_displacement_amplitude_steady"
 USE_ERROR_ADVICE = "use the value with its stated error"
 NO_ADVICE = Advice(f"no known setting makes this value more accurate; {USE_ERROR_ADVICE}")
 ELEMENT_SIZE = "contact.element_size"
@@ -281,7 +281,7 @@ def _advise_on_motion(missed: Missed) -> Advice:
     advice = None if advise is None else advise(missed)
     if advice is not None:
         return advice._replace(axis=axis)
-    if name == STEADY_AMPLITUDE:  # In a longer run the transient decays further.
+    if name == rows.STEADY_AMPLITUDE:  # In a longer run the transient decays further.
         text = "more drive cycles make this value more accurate; raise drive.cycles"
         return Advice(text, "drive.cycles")
     harmonics = missed.extra.get("harmonics")

@@ -112,7 +112,7 @@ def bound_errors(measures: dict, before: dict) -> dict:
 
 
 def _is_on_points(result, name: str) -> bool:
-    """Return whether a measure may be that on the points of a profile, which do not depend on the mesh."""
+    """Return whether a static measure is computed at the points of a profile, so that the mesh has no effect on it."""
     return name in PATCH_TABLE and result.patch is not None and result.patch.points is not None
 
 

@@ -223,7 +223,8 @@ def _press_interfaces(model: Model, *, estimate: bool) -> tuple[Face, ...]:
     tolerance = model.accuracy.tolerance
     patches = mesh_levels.solve_with_coarser(model.patch, tolerance, estimate)
     static = ()
-    if model.kind == "bench" and not _is_open(patches[0]):
+    # After wear the static measures are those of the worn patch.
+    if model.kind == "bench" and model.wear is None and not _is_open(patches[0]):
         static = mesh_levels.solve_on_static_meshes(model.patch, tolerance, estimate)
     return (Face(0, "", model, patches, static=static),)
 

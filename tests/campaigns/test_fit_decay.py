@@ -7,7 +7,14 @@ import pytest
 import xarray as xr
 from command_line import run_cli
 from page_data import find_accessibility_errors
-from scene_texts import DRIVE, KILOGRAM, POINT, make_friction_table, make_shaken_block
+from scene_texts import (
+    DRIVE,
+    ELASTIC_JOINT,
+    KILOGRAM,
+    POINT,
+    make_friction_table,
+    make_shaken_block,
+)
 
 import patchfem as pf
 from patchfem.campaigns.fits import curve as curves
@@ -209,21 +216,7 @@ def test_scatter_replaces_errors_that_a_table_does_not_give(tmp_path):
 
     The assumed errors, of which that of the frequency is 60 times too small, gave twice the friction coefficient.
     """
-    joint = """
-[normal]
-load = "40 N"
-[friction]
-law = "elastic-plastic"
-static = 0.27
-stiffness = "2.5e5 N/m"
-[structure]
-moving_mass = "1.3 kg"
-[[structure.mode]]
-name = "bending"
-frequency = "195 Hz"
-damping = "0.2 %"
-slide = 1.0
-"""
+    joint = ELASTIC_JOINT.replace("0.3", "0.27").replace("2e5", "2.5e5")
     amplitudes = np.geomspace(5e-6, 5e-4, 12)
     true = pf.backbone(joint, amplitudes=amplitudes, method="balance")
     noise = 1 + 0.03 * np.random.default_rng(8).standard_normal((2, 12))

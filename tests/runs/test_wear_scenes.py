@@ -58,6 +58,21 @@ def test_exact_worn_volume_is_coefficient_times_load_times_path():
     )
 
 
+def test_static_measures_after_wear_are_those_of_the_worn_patch():
+    """After wear the pressure peak is that of the worn field within 1 %, with pieces that are rigid and elastic in shear.
+
+    With [contact.shear] a bench stated the peak of the unworn patch, which is 2.7 times as high.
+    """
+    free = TILTED.replace('element_size = "0.5 mm"\n', "")
+    for scene in (free, free + SHEAR):
+        result = run_text(scene + COULOMB + SINE + WEAR + LARGE_TOLERANCE)
+        largest = result.fields["normal_stress"][-1].max()
+        assert result.measures["pressure_peak"].value == pytest.approx(largest, rel=1e-2)
+        x = result.patch.x
+        loaded = np.ptp(x[result.fields["normal_stress"][-1] > 0]) / np.ptp(x)
+        assert result.measures["contact_fraction"].value == pytest.approx(loaded, rel=5e-2)
+
+
 @pytest.mark.parametrize("motion", [SINE, STRUCTURE], ids=["bench", "rig"])
 def test_exact_point_contact_wear_agrees_with_archard(motion):
     """The worn volume of a point contact is kappa N 4 A n, on a bench and in a rig."""

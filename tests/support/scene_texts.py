@@ -111,6 +111,22 @@ static = 0.2
 bond_length = "20 um"
 load = "40 N"
 """
+# A mode of 195 Hz whose elastic-plastic joint begins to slip at a slide of 60 um.
+ELASTIC_JOINT = """\
+[normal]
+load = "40 N"
+[friction]
+law = "elastic-plastic"
+static = 0.3
+stiffness = "2e5 N/m"
+[structure]
+moving_mass = "1.3 kg"
+[[structure.mode]]
+name = "bending"
+frequency = "195 Hz"
+damping = "0.2 %"
+slide = 1.0
+"""
 FORCED = '[drive]\nkind = "force"\nmass = 2\nforce = "30 N"\nfrequency = "90 Hz"\ncycles = 25\n'
 SWEEP = (
     '[drive]\nkind = "base"\nwaveform = "sweep"\nacceleration = "3 g"\nfrom = "120 Hz"\nto = "150 Hz"\n'

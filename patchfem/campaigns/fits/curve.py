@@ -40,8 +40,9 @@ UNITS = {
     "damping": RATIO_UNITS,
 }
 HEADER = "amplitude [um],frequency [Hz],damping [%]"
-# First errors, relative to the value, of a table without columns of errors; their scatter replaces them.
-DEFAULT_ERRORS = {"frequency": 5e-2, "damping": 5e-2}
+FITTED_NAMES = ("frequency", "damping")  # rows of the values of a measured curve
+# First error, relative to the value, of a quantity without a column of errors; the scatter replaces it.
+FIRST_ERROR = 5e-2
 MAX_REWEIGHTINGS = 8  # largest number of fits in which the scatter replaces the errors
 SAME_ERROR = 0.1  # relative change of an error at which it is known
 # Smallest relative standard deviation of a value, which keeps its weight finite.
@@ -105,14 +106,15 @@ class MeasuredCurve(NamedTuple):
 
     def describe_assumed_errors(self) -> str:
         """Return a sentence about the errors that the table does not give; "" if it gives all."""
-        percent = 200 * np.median(self.error / np.abs(self.value), axis=1)
-        parts = [
-            f"{format_number(float(percent[row]), 2)} % of each {name} (no column {name}_error)"
-            for row, name in enumerate(DEFAULT_ERRORS)
-            if self.assumed[row]
-        ]
-        if not parts:
+        if not self.assumed.any():
             return ""
+        # The half-width of a 95 % interval is two standard deviations.
+        percent = 100 * np.median(2 * self.error / np.abs(self.value), axis=1)
+        parts = []
+        for row in np.flatnonzero(self.assumed):
+            name = FITTED_NAMES[row]
+            size = format_number(float(percent[row]), 2)
+            parts.append(f"{size} % of each {name} (no column {name}_error)")
         return f"errors of the measured values, from their scatter around the fit: {' and '.join(parts)}"
 
 
@@ -174,11 +176,11 @@ def read_damping_curve(path) -> MeasuredCurve:
     value = np.array([columns["frequency"], columns["damping"]])
     error = np.zeros_like(value)
     assumed = np.zeros(2, bool)
-    for row, (name, fraction) in enumerate(DEFAULT_ERRORS.items()):
+    for row, name in enumerate(FITTED_NAMES):
         if f"{name}_error" in columns:
             error[row] = columns[f"{name}_error"]
         else:
-            error[row] = fraction * np.abs(value[row])
+            error[row] = FIRST_ERROR * np.abs(value[row])
             assumed[row] = True
     if (error < 0).any():
         raise PatchfemError(

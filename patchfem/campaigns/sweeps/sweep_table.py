@@ -15,9 +15,8 @@ from ...core import Outcome, compute_allowed_error
 from ...runs.batch.case_results import FAILED_OUTCOME, CaseResults
 from .cases import Cases
 
-MAX_TRUSTED_ERROR = (
-    0.5  # largest error of a value that counts for statements, relative to the value
-)
+# Largest error, relative to the value, of a value that counts for statements.
+MAX_TRUSTED_ERROR = 0.5
 # Outcomes of cases whose motion no longer changes.
 FINAL_OUTCOMES = (Outcome.STEADY, Outcome.STUCK, Outcome.DONE, Outcome.NO_CONTACT)
 

@@ -15,9 +15,8 @@ from .table import CHARTS
 
 LINE_STYLES = ("-", "--", ":", "-.")
 PICTURE_ENDINGS = (".png", ".svg", ".pdf")
-PICTURE_CHARTS = {
-    "backbone": 3
-}  # charts of a picture where one is not enough: frequency, damping, force
+# Number of charts of a picture, 1 for all other kinds of answers. A backbone needs frequency, damping and force.
+PICTURE_CHARTS = {"backbone": 3}
 
 # Marker and face of each symbol of a point; "" is the colour of the curve.
 MARKERS = {"circle": ("o", ""), "circle-open": ("o", "none"), "x": ("x", "")}
@@ -175,7 +174,7 @@ def _to_svg(figure) -> str:
 
 
 def write_plot(answer: Answer, path) -> None:
-    """Write the first chart of an answer, or the first ones of PICTURE_CHARTS, as .png, .svg or .pdf.
+    """Write the first chart of an answer, and of a backbone all three charts, as .png, .svg or .pdf.
 
     Raises
     ------

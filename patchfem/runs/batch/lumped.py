@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...core import Measure, Outcome, Response, SineDrive, compute_allowed_error
+from ...core import Measure, Outcome, Response, SineDrive
 from ...effects import law_has_trait, needs_bond_list
 from ...model.model import Model
 from ...model.similar_models import SimilarModels, collect_columns
@@ -26,21 +26,28 @@ from ...response.errors import convergence_errors, total_error
 from ...response.outcome import (
     AMPLITUDE_ROUND_OFF,
     classify_periodic,
+    describe_ringing,
     is_drifting,
+    is_ringing_visible,
     is_still_changing,
     is_still_loading,
     remaining_ringing,
     steady_estimate_error,
-    warn_of_ringing,
 )
 from ...response.reasons import (
     CHANGE_NOT_RESOLVED_REASON,
-    STEADY_AMPLITUDE,
     STICKS_AT_REVERSAL_REASON,
     find_missing,
 )
 from ...response.ringing import MIN_PERIODS, MIN_REFINED_FRACTION
-from ...response.rows import AMPLITUDE, INTERNAL_VALUES, TABLE, error_floor, larger_term
+from ...response.rows import (
+    AMPLITUDE,
+    INTERNAL_VALUES,
+    STEADY_AMPLITUDE,
+    TABLE,
+    error_floor,
+    larger_term,
+)
 from ...response.run_events import measure_ringing_in_sticks
 from ...response.settling import (
     CLASSES,
@@ -318,12 +325,17 @@ def make_results(
         Outcome.STUCK if stuck else CLASSES[number] for number, stuck in zip(classes, is_stuck)
     ]
     results.outcome[:] = list(map(str, outcomes))
-    ringing = _find_ringing(cases, scales, refined)
-    allowed = compute_allowed_error(
-        scales.tolerance, values[AMPLITUDE], find_floor(AMPLITUDE, values, scales)
-    )
-    is_ringing = is_stuck & (ringing > allowed + errors[AMPLITUDE])
+    # An interface that sticks while the rig still vibrates freely has not settled.
+    decay = scales.decay * 2 * np.pi / cases.parameters[:, Number.OMEGA]
+    ringing = remaining_ringing(refined.march.extremes, window, decay)
+    sizes = (values[AMPLITUDE], errors[AMPLITUDE], find_floor(AMPLITUDE, values, scales))
+    is_ringing = is_stuck & is_ringing_visible(ringing, *sizes, scales.tolerance)
     results.outcome[is_ringing] = str(Outcome.TRANSIENT)
+    for case in np.flatnonzero(is_ringing).tolist():
+        ratio = float(ringing[case] / values[AMPLITUDE][case])
+        limits = float(scales.tolerance[case]), float(decay[case])
+        count = int(cases.parameters[case, Number.CYCLES])
+        results.warnings[case] = [describe_ringing(ratio, limits, count)]
 
     # The steady amplitude is a measure if the motion still changes.
     is_transient = results.outcome == str(Outcome.TRANSIENT)
@@ -441,7 +453,7 @@ def add_ringing(
     results: CaseResults,
     is_done: np.ndarray,
 ) -> np.ndarray:
-    """Add the free vibration during stick, and the warning about it; return the cases (n,) in which it is not resolved.
+    """Add the free vibration during stick; return the cases (n,) in which it is not resolved.
 
     While an elastic interface sticks for longer than a period of the free vibration, a transient rings. It is fitted as
     in a single run to the samples of another march, whose steps resolve it, and of one with half of the steps.
@@ -488,7 +500,6 @@ def add_ringing(
                 definition = TABLE[name]
                 measure = Measure(fine[name], definition.unit, error, definition.floor)
                 results.fill(case, {name: measure})
-    _warn_of_ringing(cases, scales, refined, results)
 
     # The force of an interface that sticks may still increase.
     is_loading &= results.outcome == str(Outcome.STUCK)
@@ -510,29 +521,6 @@ def _make_window(modes, drive, samples, steps: int) -> Response:
     )  # fmt: skip
 
 
-def _find_ringing(cases: Cases, scales: Scales, refined: Refined) -> np.ndarray:
-    """Return the part (n,) of the amplitudes [m] that is free vibration if the interface sticks."""
-    decay = scales.decay * 2 * np.pi / cases.parameters[:, Number.OMEGA]
-    return remaining_ringing(refined.march.extremes, int(cases.parameters[0, Number.WINDOW]), decay)
-
-
-def _warn_of_ringing(cases: Cases, scales: Scales, refined: Refined, results: CaseResults) -> None:
-    """Warn where the amplitude of a sticking interface still decays."""
-    decay = scales.decay * 2 * np.pi / cases.parameters[:, Number.OMEGA]
-    ringing = _find_ringing(cases, scales, refined)
-    is_stuck = results.values["slip_amplitude"] <= _stick_tolerance(cases, scales)
-    is_ringing = is_stuck & (results.outcome == str(Outcome.TRANSIENT))
-    for case in np.flatnonzero(is_ringing).tolist():
-        amplitude, error, floor = (
-            float(column[AMPLITUDE][case])
-            for column in (results.values, results.errors, results.floors)
-        )
-        limits = float(scales.tolerance[case]), float(decay[case])
-        count = int(cases.parameters[case, Number.CYCLES])
-        if texts := warn_of_ringing(ringing[case], (amplitude, floor + error), limits, count):
-            results.warnings[case] = [*results.warnings.get(case, ()), *texts]
-
-
 def _insert_texts(models: Sequence[Model], results: CaseResults) -> None:
     """Store the warnings and notes that follow from the models."""
     first = models[0]
@@ -542,7 +530,8 @@ def _insert_texts(models: Sequence[Model], results: CaseResults) -> None:
         if warnings := [*model.source.remarks, *model.rig.structure.notes]:
             model = models[case] if is_similar else model
             warnings = [*model.source.remarks, *model.rig.structure.notes]
-            results.warnings[case] = shorten_file_names(warnings, model.source.path)
+            texts = shorten_file_names(warnings, model.source.path)
+            results.warnings[case] = [*texts, *results.warnings.get(case, ())]
     if law_has_trait(first.friction.law, "creeps"):
         speeds = collect_columns(models, lambda model: (model.friction.reference_speed,))[0]
         for case, speed in enumerate(speeds.tolist()):

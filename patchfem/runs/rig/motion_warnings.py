@@ -8,7 +8,8 @@ import numpy as np
 from ...core import Outcome
 from ...effects import law_has_trait
 from ...formatting import format_length, format_number, format_quantity
-from ...response.outcome import note_on_changing_drive, warn_if_ringing
+from ...response.outcome import describe_ringing, find_ringing, note_on_changing_drive
+from ...response.rows import AMPLITUDE
 from ...structure.drive_sizes import find_min_decay_rate
 from ..results.interfaces import merge_sentences
 from ..results.notes import (
@@ -75,13 +76,13 @@ def collect_warnings(run) -> list:
         *solution.notes,
     ]
     if not model.rig.drive.levels.amplitudes:
-        warnings += warn_if_ringing(
-            solution,
-            measures,
-            (model.accuracy.tolerance, find_min_decay_rate(model.rig.modes)),
-            run.drive,
-            run.numerics.cycles,
-        )
+        tolerance = model.accuracy.tolerance
+        rate = find_min_decay_rate(model.rig.modes)
+        ringing = find_ringing(solution, measures, (tolerance, rate), run.drive)
+        if ringing:
+            limits = (tolerance, rate * run.drive.period)
+            ratio = ringing / measures[AMPLITUDE].value
+            warnings.append(describe_ringing(ratio, limits, run.numerics.cycles))
     if solution.message and solution.outcome is not Outcome.LEAVES_GROOVES:
         warnings.append(solution.message)
     warnings += merge_sentences(

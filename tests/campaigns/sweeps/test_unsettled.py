@@ -1,29 +1,12 @@
 """Cases of sweeps that stick but still vibrate freely, and cases with large errors."""
 
 import numpy as np
+from scene_texts import ELASTIC_JOINT
 
 import patchfem as pf
 
-JOINT = """
-[normal]
-load = "40 N"
-[friction]
-law = "elastic-plastic"
-static = 0.3
-stiffness = "2e5 N/m"
-[structure]
-moving_mass = "1.3 kg"
-[[structure.mode]]
-name = "bending"
-frequency = "195 Hz"
-damping = "0.2 %"
-slide = 1.0
-[drive]
-kind = "force"
-force = "1 N"
-frequency = "220 Hz"
-cycles = 100
-"""
+DRIVE = '[drive]\nkind = "force"\nforce = "1 N"\nfrequency = "220 Hz"\ncycles = 100\n'
+JOINT = ELASTIC_JOINT + DRIVE
 
 
 def find_steady_amplitude(force: float, frequency: float) -> float:
