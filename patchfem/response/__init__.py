@@ -147,9 +147,9 @@ PUBLIC = {
     "spectrum": (
         "friction_harmonic",
         "motion_harmonic",
-        "odd_harmonics",
+        "find_acceleration_harmonics",
         "read_instrument",
-        "harmonic_measures",
+        "make_acceleration_measures",
     ),
     "stationary": (
         "compute_spectra",

@@ -30,7 +30,7 @@ from .measures import (
     compute_slip_measures,
     energy_balance,
 )
-from .spectrum import MIN_HARMONIC, harmonic_measures, odd_harmonics
+from .spectrum import MIN_HARMONIC, find_acceleration_harmonics, make_acceleration_measures
 
 
 @dataclass(frozen=True, eq=False)
@@ -162,7 +162,7 @@ class LastCycles:
         """
         if not (self.is_sine and self.has_full_cycle):
             return {}
-        return harmonic_measures(*odd_harmonics(self.window, self.drive))
+        return make_acceleration_measures(*find_acceleration_harmonics(self.window, self.drive))
 
     @cached_property
     def final_energies(self) -> dict:

@@ -131,7 +131,7 @@ def absolute_harmonic(window, drive, n: int) -> complex:
     return harmonic + _drive_harmonic(segment) if n == 1 and drive.moving else harmonic
 
 
-def odd_harmonics(window, drive) -> tuple[float, float]:
+def find_acceleration_harmonics(window, drive) -> tuple[float, float]:
     """Return the magnitudes [m s-2] of the first and third harmonic of the absolute acceleration.
 
     window: Response over complete cycles of a drive that ends as a sinusoid.
@@ -142,7 +142,7 @@ def odd_harmonics(window, drive) -> tuple[float, float]:
     )
 
 
-def harmonic_measures(first_harmonic: float, third_harmonic: float) -> dict:
+def make_acceleration_measures(first_harmonic: float, third_harmonic: float) -> dict:
     """Return fundamental [m s-2] and distortion [1] of the acceleration as a dict.
 
     The distortion is None if the output does not move.

@@ -59,16 +59,16 @@ def test_exact_distortion_includes_base_acceleration(moving):
     v = -3 / OMEGA * np.cos(OMEGA * t) - 0.5 / (3 * OMEGA) * np.cos(3 * OMEGA * t)
     zero = np.zeros(t.size)
     window = Response(t, zero[:, None], zero[:, None], zero, zero, y, v, zero, zero, zero, zero)
-    first, third = spectrum.odd_harmonics(window, SineDrive(2.0, OMEGA, moving))
+    first, third = spectrum.find_acceleration_harmonics(window, SineDrive(2.0, OMEGA, moving))
     assert first == pytest.approx(5 if moving else 3, rel=1e-7) and third == pytest.approx(
         0.5, rel=1e-7
     )
-    found = spectrum.harmonic_measures(first, third)
+    found = spectrum.make_acceleration_measures(first, third)
     assert found == {
         "absolute_acceleration_fundamental": first,
         "acceleration_distortion": third / first,
     }
-    assert spectrum.harmonic_measures(1e-16, 1e-17)["acceleration_distortion"] is None
+    assert spectrum.make_acceleration_measures(1e-16, 1e-17)["acceleration_distortion"] is None
 
 
 SCENE = """\

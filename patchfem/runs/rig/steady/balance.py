@@ -24,7 +24,7 @@ from ....formatting import format_length, format_quantity
 from ....response.errors import finer_errors
 from ....response.measures import compute_peak
 from ....response.rows import AMPLITUDE
-from ....response.spectrum import harmonic_measures, odd_harmonics
+from ....response.spectrum import find_acceleration_harmonics, make_acceleration_measures
 from ..evaluation import RunEvaluator, compute_sampled_work, compute_work_check
 from ..interface import make_single_law
 from ..solution import Solution, compute_sampled_loop
@@ -298,7 +298,7 @@ class BalanceFinder:
         values = {
             COLUMN_MEASURES["amplitude"]: motion.amplitude(self._measured_row),
             COLUMN_MEASURES["acceleration_peak"]: compute_peak(response.acceleration),
-            **harmonic_measures(*odd_harmonics(response, drive)),
+            **make_acceleration_measures(*find_acceleration_harmonics(response, drive)),
         }
         return {name: value for name, value in values.items() if value is not None}
 

@@ -16,7 +16,7 @@ from ....hybrid import cases, periodic
 from ....hybrid import runs as hybrid_runs
 from ....hybrid.laws import is_rigid
 from ....hybrid.records import Clock, Status, Whole, Window
-from ....response.spectrum import harmonic_measures
+from ....response.spectrum import make_acceleration_measures
 from ....structure.response import compute_receptance
 from ..event_to_event import LumpedEvaluator
 from ..hybrid_laws import make_joints
@@ -282,7 +282,7 @@ class ShootingFinder(TracedCurve):
         values = {
             COLUMN_MEASURES["amplitude"]: drive.acceleration * float(abs(at_gauge)),
             COLUMN_MEASURES["acceleration_peak"]: acceleration,
-            **harmonic_measures(acceleration, 0.0),
+            **make_acceleration_measures(acceleration, 0.0),
         }
         values = {name: value for name, value in values.items() if value is not None}
         multiplier = float(np.exp(self._max_growth_rate * drive.period))
