@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from sweep_tables import make_table
 
+from patchfem.campaigns.sweeps.changes import find_range
 from patchfem.campaigns.sweeps.limits import find_limits
 
 KEY = "contact.tilt.angle"
@@ -69,3 +70,14 @@ def test_exact_smallest_limit_over_second_key():
     assert find_limits(make_table({"drive.frequency": TILT}, {"loop_area": LINE})) == []
     random = make_table({KEY: TILT}, {"loop_area": LINE}, is_random=True)
     assert find_limits(random) == []
+
+
+def test_values_that_miss_the_tolerance_count_with_their_errors():
+    """A known value of 10 % error counts for the largest change and for a limit; one of 60 % error counts for neither."""
+    loop_areas = np.array([1.0, 0.99, 0.5, 0.1])
+    keys = {"contact.load": [1.0, 2.0, 3.0, 4.0]}
+    errors = np.array([1e-4, 1e-3, 0.05, 0.06])
+    table = make_table(keys, {"loop_area": loop_areas}, errors=errors)
+    assert find_range(table, "loop_area")[0][1:3] == (2, 0)
+    (limit,) = find_limits(table)
+    assert limit.low == 2.0 and limit.high == 3.0
