@@ -8,19 +8,20 @@ which only a few are sides, so comparing a motion with the sides is faster than 
 from typing import NamedTuple
 
 import numpy as np
-from numba.core.options import DefaultOptions
 
+from ..compiled.flags_kernels import NJIT_NO_REFCOUNT
 from ..compiled.jit import njit
 from .set_arrays import MAX_POLYGON_SIDES, REFERENCE_OPENING
 
-NJIT_NO_REFCOUNT = {"_nrt": False} if hasattr(DefaultOptions, "_nrt") else {}
-ROUND_OFF = 1e-13  # rounding error of a force or gap, relative to the largest of its terms
+CONDITION_ROUND_OFF = (
+    1e-13  # rounding error of a force or gap, relative to the largest of its terms
+)
 # Half width of the box in which polygons are computed, in the units of `polygon_units`
 BOX_HALF_WIDTH = 100.0
 
 
 class HalfPlane(NamedTuple):
-    """Half plane of rigid displacements (d, t) that is bounded by a contact condition."""
+    """Half plane of rigid displacements (d, t) with constant + by_d d + by_t t >= 0: a contact condition of a node."""
 
     constant: float
     by_d: float
@@ -51,8 +52,8 @@ def write_limits(sets, slot):
         if in_contact[i]:
             term = abs(constant[i]) + abs(by_d[i]) * unit_d + abs(by_t[i]) * unit_t
             largest = max(largest, term)
-    sets.polygons.limits[slot, 0] = -4 * ROUND_OFF * largest
-    sets.polygons.limits[slot, 1] = -4 * ROUND_OFF * unit_d
+    sets.polygons.limits[slot, 0] = -4 * CONDITION_ROUND_OFF * largest
+    sets.polygons.limits[slot, 1] = -4 * CONDITION_ROUND_OFF * unit_d
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
@@ -62,12 +63,14 @@ def half_plane_value(half_plane, d, t):
     Parameters
     ----------
     half_plane : HalfPlane
+        Coefficients of the function.
     d, t : float
         Rigid displacement in the units of the half plane.
 
     Returns
     -------
     float
+        Force [N] or gap [m] above its limit.
     """
     return half_plane.constant + half_plane.by_d * d + half_plane.by_t * t
 
@@ -86,6 +89,7 @@ def clip_polygon(old, new, n_corners, half_plane, node):
     n_corners : int
         Number of corners before.
     half_plane : HalfPlane
+        Half plane that is kept, in the units of the corners.
     node : int
         Node whose contact condition is the half plane.
 
@@ -101,6 +105,8 @@ def clip_polygon(old, new, n_corners, half_plane, node):
         b = half_plane_value(half_plane, old[0, follower], old[1, follower])
         if n_new + 2 > new.shape[1]:
             return -1
+
+        # A corner inside stays; where an edge crosses the line, the crossing is a new corner
         if a >= 0:
             for r in range(3):
                 new[r, n_new] = old[r, k]
@@ -128,6 +134,8 @@ def write_polygon(sets, slot):
     in_contact = sets.stored.in_contact[slot]
     n_nodes = in_contact.size
     write_limits(sets, slot)
+
+    # The box, whose sides belong to no node
     polygons.n_sides[slot] = 0
     old = polygons.corners[0]
     new = polygons.corners[1]
@@ -136,12 +144,16 @@ def write_polygon(sets, slot):
         old[0, k] = BOX_HALF_WIDTH * (-1 if k in (0, 3) else 1)
         old[1, k] = BOX_HALF_WIDTH * (-1 if k < 2 else 1)
         old[2, k] = -1.0
+
+    # The first round clips by the nodes at the ends of the contact, the second one by the others
     for step in range(2 * n_nodes):
         i = step % n_nodes
         is_end = i == 0 or i == n_nodes - 1
         is_end = is_end or in_contact[i] != in_contact[i - 1] or in_contact[i] != in_contact[i + 1]
         if is_end != (step < n_nodes):
             continue
+
+        # The condition of the node; it cuts nothing if all corners meet it
         limit = polygons.limits[slot, 0 if in_contact[i] else 1]
         half_plane = HalfPlane(
             unknowns[0, i] - limit, unknowns[1, i] * unit_d, unknowns[2, i] * unit_t
@@ -155,6 +167,8 @@ def write_polygon(sets, slot):
         if n_corners <= 0:
             return
         old, new = new, old
+
+    # The nodes that are sides, without the sides of the box
     n_sides = 0
     for k in range(n_corners):
         if old[2, k] >= 0:
@@ -173,6 +187,7 @@ def is_in_box(sets, d, t):
     Parameters
     ----------
     sets : set_arrays.SetArrays
+        Preloaded interface with its stored contact sets.
     d, t : float
         Displacement [m] and rotation [rad].
 
@@ -191,6 +206,7 @@ def side_margin(sets, slot, side, d, t):
     Parameters
     ----------
     sets : set_arrays.SetArrays
+        Preloaded interface with its stored contact sets.
     slot : int
         Slot of the set.
     side : int
@@ -218,6 +234,7 @@ def is_inside(sets, slot, d, t):
     Parameters
     ----------
     sets : set_arrays.SetArrays
+        Preloaded interface with its stored contact sets.
     slot : int
         Slot of the set.
     d, t : float
@@ -243,6 +260,7 @@ def find_exit(sets, slot, d, t, dd, dt):
     Parameters
     ----------
     sets : set_arrays.SetArrays
+        Preloaded interface with its stored contact sets.
     slot : int
         Slot of the set.
     d, t : float

@@ -7,8 +7,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..compiled.flags_kernels import NJIT_NO_REFCOUNT
 from ..compiled.jit import njit
-from .polygon_kernels import NJIT_NO_REFCOUNT, find_exit, is_inside
+from .polygon_kernels import find_exit, is_inside
 from .press_kernels import (
     FASTMATH_MINIMUM,
     ContactBounds,
@@ -16,6 +17,7 @@ from .press_kernels import (
     compute_energy,
     find_set,
 )
+from .set_arrays import EnergyTerm, PathMean
 
 # Distance beyond a border at which the next set is determined, as a fraction of the increment; it
 # is larger than rounding errors
@@ -36,10 +38,13 @@ def find_first_violation(sets, slot, motion, change, bounds):
     Parameters
     ----------
     sets : set_arrays.SetArrays
+        Preloaded interface with its stored contact sets.
     slot : int
+        Slot of the contact set.
     motion, change : HolderMotion
         Heave and rotation at which the increment begins, and the increment.
     bounds : press_kernels.ContactBounds
+        Force and gap below which a node violates its condition.
 
     Returns
     -------
@@ -69,6 +74,7 @@ def cross_side(sets, slot, side, d, t):
     Parameters
     ----------
     sets : set_arrays.SetArrays
+        Preloaded interface with its stored contact sets.
     slot : int
         Slot of the set before the side.
     side : int
@@ -102,8 +108,11 @@ def find_border(sets, slot, start, motion, change):
     Parameters
     ----------
     sets : set_arrays.SetArrays
+        Preloaded interface with its stored contact sets.
     slot : int
+        Slot of the contact set.
     start : float
+        Fraction of the increment from which the set holds.
     motion, change : HolderMotion
         Heave and rotation at which the increment begins, and the increment.
 
@@ -118,6 +127,8 @@ def find_border(sets, slot, start, motion, change):
     end_t = motion.rotation + change.rotation
     if is_inside(sets, slot, end_d, end_t):
         return 1.0, -1
+
+    # The side of the polygon through which the remainder of the increment leaves it
     start_motion = HolderMotion(
         motion.heave + start * change.heave, motion.rotation + start * change.rotation
     )
@@ -129,6 +140,8 @@ def find_border(sets, slot, start, motion, change):
     )
     if side >= 0:
         return min(start + max(fraction, 0.0) * remainder, 1.0), side
+
+    # Without a polygon all nodes are checked, under the wider of the bounds at both ends
     holds, end_bounds = check_contact_conditions(sets, slot, end_d, end_t)
     if holds:
         return 1.0, -1
@@ -151,13 +164,13 @@ def path_mean(sets, slot, heave, rotation, heave_change, rotation_change, out):
     Parameters
     ----------
     sets : set_arrays.SetArrays
+        Preloaded interface with its stored contact sets.
     slot : int
         Slot of the set at the beginning.
     heave, rotation, heave_change, rotation_change : float
         Heave [m] and rotation [rad] at the beginning, and their increments.
     out : (9,) ndarray
-        Written: mean slopes (2,), energy, slopes at the end (2,), derivatives of the mean by the
-        increment (2, 2).
+        Written, in the order of `PathMean`.
 
     Returns
     -------
@@ -169,6 +182,7 @@ def path_mean(sets, slot, heave, rotation, heave_change, rotation_change, out):
     out[:] = 0.0
     start = 0.0
     border_step = BORDER_STEP
+
     # The number of sets is limited, because rounding errors may make a path return to the same
     # sets.
     for _ in range(20 * sets.x.size + 100):
@@ -179,26 +193,34 @@ def path_mean(sets, slot, heave, rotation, heave_change, rotation_change, out):
         at_end = compute_energy(
             sets, slot, heave + end * heave_change, rotation + end * rotation_change
         )
+
+        # The slopes are linear on a set, so the trapezoidal rule is exact. Their derivatives by the increment are the
+        # second derivatives of the energy, times the integral of the fraction; d is minus the heave.
         coefficients = sets.stored.energy[slot]
         half_length = 0.5 * (end - start)
         first_moment = 0.5 * (end * end - start * start)
-        out[0] += half_length * (at_start.heave_slope + at_end.heave_slope)
-        out[1] += half_length * (at_start.rotation_slope + at_end.rotation_slope)
-        out[5] += first_moment * coefficients[3]
-        out[6] -= first_moment * coefficients[4]
-        out[8] += first_moment * coefficients[5]
+        heave_slopes = at_start.heave_slope + at_end.heave_slope
+        rotation_slopes = at_start.rotation_slope + at_end.rotation_slope
+        out[PathMean.HEAVE] += half_length * heave_slopes
+        out[PathMean.ROTATION] += half_length * rotation_slopes
+        out[PathMean.HEAVE_BY_HEAVE] += first_moment * coefficients[EnergyTerm.BY_DD]
+        out[PathMean.HEAVE_BY_ROTATION] -= first_moment * coefficients[EnergyTerm.BY_DT]
+        out[PathMean.ROTATION_BY_ROTATION] += first_moment * coefficients[EnergyTerm.BY_TT]
         start = end
         if start >= 1.0:
-            out[2] = at_end.value
-            out[3] = at_end.heave_slope
-            out[4] = at_end.rotation_slope
-            out[7] = out[6]
+            out[PathMean.END_ENERGY] = at_end.value
+            out[PathMean.END_HEAVE] = at_end.heave_slope
+            out[PathMean.END_ROTATION] = at_end.rotation_slope
+            out[PathMean.ROTATION_BY_HEAVE] = out[PathMean.HEAVE_BY_ROTATION]
             return slot
+
+        # The set beyond the border
         beyond = min(start + border_step, 1.0)
         d = -(heave + beyond * heave_change)
         next_slot = cross_side(sets, slot, side, d, rotation + beyond * rotation_change)
         if next_slot < 0:
             return next_slot
+
         # If the search beyond the border returns the same set, it is repeated farther beyond it.
         if next_slot == slot:
             border_step *= 10

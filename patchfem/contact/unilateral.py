@@ -35,9 +35,8 @@ INDEFINITE_MESSAGE = (
     "contact.element_size, bring the stiffnesses of coating and substrate closer together, or check the "
     "cells of contact.mesh"
 )
-MIN_TOTAL_FORCE = (
-    1e-200  # smallest total force [N] in a divisor; it keeps residuals of open pieces finite
-)
+# Smallest total force [N] in a divisor; it keeps residuals of open pieces finite
+MIN_TOTAL_FORCE = 1e-200
 
 
 class ContactSolution(NamedTuple):
@@ -65,16 +64,19 @@ class ContactSolution(NamedTuple):
         return -float(self.motion[1]) if self.motion.size > 1 else 0.0
 
 
-def _solve_by_fallbacks(compliance, problem: ContactProblem, max_iterations: int) -> tuple:
+def _solve_by_fallbacks(
+    compliance, problem: ContactProblem, max_iterations: int
+) -> tuple[SetSolution, int]:
     """Solve a contact problem by slower methods if the primal-dual method does not converge.
 
-    Returns the SetSolution and the number of iterations. The methods are, in turn: primal-dual from all nodes,
-    primal-dual from the result of conjugate gradients, and primal.
+    The methods are, in turn: primal-dual from all nodes, primal-dual from the result of conjugate gradients, and primal,
+    which always ends. The number of iterations is that of all methods.
     """
     every_node = np.ones(problem.gap.size, bool)
     solution, n_first = solve_primal_dual(compliance, problem, every_node, max_iterations)
     if solution is not None and relative_violation(solution) <= RESIDUAL_TOL:
         return solution, n_first
+
     force, n_second = conjugate_gradients.solve_by_gradients(compliance, problem)
     # Smaller forces are remainders that the gradient steps have not yet removed.
     is_loaded = force > 1e-9 * force.max()
@@ -100,6 +102,8 @@ def _solve_on_one_node(compliance, problem: ContactProblem, rest_rotation: float
     node = int(np.argmin(np.abs(position - moment / load)))
     if abs(position[node] - moment / load) > 1e-15 * np.ptp(position):
         return None
+
+    # Opening of the other nodes without rotation, and the rotation at which each of them would touch
     force = np.zeros(gap.size)
     force[node] = load
     displacement = compliance.product(force)
@@ -108,10 +112,13 @@ def _solve_on_one_node(compliance, problem: ContactProblem, rest_rotation: float
     noise = OPENING_NOISE * (np.abs(gap) + abs(displacement[node]))
     with np.errstate(divide="ignore", invalid="ignore"):
         bound = (height + noise) / arm
+
+    # The rotations that leave all other nodes open
     lower = bound[arm < 0].max(initial=-np.inf)
     upper = bound[arm > 0].min(initial=np.inf)
     if not lower <= upper:
         return None
+
     rotation = -rest_rotation if lower <= -rest_rotation <= upper else (lower + upper) / 2
     approach = gap[node] - rotation * position[node] + displacement[node]
     return SetSolution(
@@ -138,6 +145,7 @@ def solve(
     Parameters
     ----------
     compliance : StripCompliance
+        C, positive definite.
     problem : ContactProblem
         Without a free rotation, its gap [m] is measured from a point near the contact: an offset costs digits.
     start : (n,) bool ndarray, optional
@@ -156,6 +164,7 @@ def solve(
     LinAlgError
         If the compliance is not positive definite.
     """
+    # The gap is measured from the rest position of a rigid piece, which may close it by far more than the pieces deform
     rest_motion = np.zeros(problem.target.size)
     if rest_motion.size > 1:
         rest_motion = find_rest_motion(problem)
@@ -163,11 +172,14 @@ def solve(
             gap=problem.gap - problem.motions @ rest_motion,
             target=problem.target - problem.springs * rest_motion,
         )
+
+    # A patch that may rotate freely can rest on a single node, whose set does not determine the rotation
     solution = None
     n_iterations = 0
     is_patch = problem.gap.size == len(compliance.common)
     if is_patch and problem.min_nodes == 2:
         solution = _solve_on_one_node(compliance, problem, rest_motion[1])
+
     if solution is None:
         if start is None or np.count_nonzero(start) < problem.min_nodes:
             start = guess_contact_set(compliance, problem)
@@ -182,7 +194,7 @@ def solve(
 
 def compute_residuals(
     compliance: StripCompliance, problem: ContactProblem, solution: ContactSolution
-) -> dict:
+) -> dict[str, float]:
     """Compute the relative residuals of the contact conditions for a solution.
 
     An opening is relative to the sum of the magnitudes of its terms at the same node, so a spike of the gap elsewhere
@@ -191,8 +203,11 @@ def compute_residuals(
     Parameters
     ----------
     compliance : StripCompliance
+        C of the problem.
     problem : ContactProblem
+        Gap [m], motions and loads as they were given.
     solution : ContactSolution
+        Forces and motion that are checked.
 
     Returns
     -------
@@ -216,7 +231,7 @@ def compute_residuals(
     )
 
 
-def compute_balances(problem: ContactProblem, solution) -> dict:
+def compute_balances(problem: ContactProblem, solution) -> dict[str, float]:
     """Compute the relative residuals of the balance of load and moments.
 
     A moment is relative to the load times the length over which its axis varies, plus the moment of the spring.
@@ -224,7 +239,9 @@ def compute_balances(problem: ContactProblem, solution) -> dict:
     Parameters
     ----------
     problem : ContactProblem
+        Motions, loads and springs.
     solution : ContactSolution or AsperitySolution
+        Forces and motion that are checked.
 
     Returns
     -------
@@ -256,6 +273,7 @@ def explain_singular_set(c: np.ndarray, problem: ContactProblem) -> str:
     c : (m, m) ndarray
         Compliance of the pieces [m/N].
     problem : ContactProblem
+        Problem whose equations are singular.
     """
     try:
         factorise(np.array(c, order="C"))
@@ -281,6 +299,7 @@ def refuse_residuals(residuals, tolerance: float, place: str = "contact", remedy
     residuals : mapping
         Relative residuals by name.
     tolerance : float
+        Largest residual that is accepted.
     place : str
         Beginning of the message.
     remedy : str

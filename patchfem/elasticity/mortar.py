@@ -64,6 +64,7 @@ def join_pieces(lower: PieceInterface, upper: PieceInterface) -> Mortar:
     Parameters
     ----------
     lower, upper : PieceInterface
+        Interface nodes and compliances of both pieces.
 
     Returns
     -------

@@ -10,7 +10,9 @@ import numpy as np
 CELL_MERGES = tuple((4, first_cell) for first_cell in range(4))
 
 
-def join_cells(count: int, first: int, stiffness, yield_displacement) -> tuple:
+def join_cells(
+    count: int, first: int, stiffness, yield_displacement
+) -> tuple[np.ndarray, np.ndarray]:
     """Return the stiffness [N/m] and yield displacement [m] of joined elements.
 
     Parameters

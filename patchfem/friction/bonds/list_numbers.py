@@ -47,6 +47,7 @@ def law_numbers(law: Bonds, reach: float, merge: float, half_width: float = 0.0)
     Parameters
     ----------
     law : Bonds
+        Parameters of the bonds.
     reach : float
         Cut-off in bond lengths of path; for reading="stretch" in units of damage.
     merge : float
@@ -58,6 +59,7 @@ def law_numbers(law: Bonds, reach: float, merge: float, half_width: float = 0.0)
     Returns
     -------
     (8,) array
+        In the order of `LAW`, in SI units.
     """
     numbers = np.zeros(len(LawNumbers._fields))
     numbers[LAW.order] = law.order
@@ -78,12 +80,14 @@ def make_status(capacity: int, count: int | None = None) -> np.ndarray:
     Parameters
     ----------
     capacity : int
+        Number of columns of each list.
     count : int, optional
         Number of lists that follow each other in an array.
 
     Returns
     -------
     (14,) array, or (count, 14) array
+        In the order of `STATUS`, with the relative pressure 1.
     """
     status = np.zeros((count or 1, len(ListStatus._fields)))
     start = capacity * np.arange(count or 1)
@@ -119,12 +123,16 @@ def list_capacity(law: Bonds, reach: float, merge: float) -> int:
     Parameters
     ----------
     law : Bonds
-    reach, merge : float
-        As in `law_numbers`.
+        Parameters of the bonds.
+    reach : float
+        Cut-off in bond lengths of path; for reading="stretch" in units of damage.
+    merge : float
+        Largest width of a joined strip of age 0 in bond lengths; 0 joins nothing.
 
     Returns
     -------
     int
+        Number of strips; a run that needs more enlarges its lists (`enlarge_lists`).
     """
     step = MAX_STRIPS_PER_LENGTH * ceil(min(reach, MAX_DAMAGE)) + N_WORK_STRIPS
     if merge > 0:

@@ -1,6 +1,7 @@
 """Compiled list of strips of bonds (eq. 2.17): increment of a point, joined strips, and change of its load.
 
-Arguments are those of `list_kernels`.
+`bonds` is a `list_rows_kernels.BondList`, which these functions change. `before` and `after` are `PathValues` at the ends
+of an increment, and k is the column of a strip.
 """
 
 from math import exp
@@ -25,7 +26,7 @@ from .list_sum_kernels import PathValues, interpolate_value
 
 # Largest exponent of the scaled values before they are rescaled; exp(709) is the largest
 # floating-point number
-MAX_EXPONENT = 300.0
+MAX_SCALE_EXPONENT = 300.0
 # Number of strips, in addition to a fifth of the list, by which the list grows before it is merged
 # again
 MIN_STRIPS_BETWEEN_MERGES = 12
@@ -72,12 +73,16 @@ def list_step(increment, bonds, v0, v1, dt):
         0.0,
     )
     after = find_path(1.0, increment, bonds, v0, v1, dt)
+
+    # The path state moves first, because the values of the new strips refer to its damage or growth
     now[PATH.displacement] = after.displacement
     now[PATH.path] = after.path
     now[PATH.damage] = after.damage
     now[PATH.growth] = after.growth
     now[PATH.length] = after.length
     _move_reference(bonds)
+
+    # Without pressure no bonds form, but those that exist still grow old
     has_room = True
     if increment != 0:
         if status[STATUS.pressure] > 0:
@@ -116,7 +121,7 @@ def _move_reference(bonds):
     now = bonds.now
     is_stretch = bonds.law[LAW.form] == FORM_STRETCH
     age = now[PATH.damage] if is_stretch else now[PATH.growth]
-    if age - now[PATH.reference] < MAX_EXPONENT:
+    if age - now[PATH.reference] < MAX_SCALE_EXPONENT:
         return
     factor = exp(now[PATH.reference] - age)
     for k in range(int(bonds.status[STATUS.head]), int(bonds.status[STATUS.end])):
@@ -133,6 +138,8 @@ def _append_strips(increment, before, after, bonds):
     law = bonds.law
     path = abs(increment)
     damage = after.damage - before.damage
+
+    # Bonds of reading="report" fill one strip; other forms need several strips if the increment is long
     division = divide(path, after.middle_length, after.growth - before.growth, law)
     status[STATUS.n_extra] += division.count - 1
     if not _make_room(int(division.count), bonds):
@@ -141,6 +148,8 @@ def _append_strips(increment, before, after, bonds):
     new = int(status[STATUS.end])
     if strips.shape[0] == N_ROWS:
         strips[STRIP.pressure, new] = status[STATUS.pressure]
+
+    # Strips follow each other from old to young, so that the head of the list is the oldest one
     for piece in range(int(division.count) - 1, -1, -1):
         k = int(status[STATUS.end])
         low = find_end(piece, division)
@@ -154,6 +163,8 @@ def _append_strips(increment, before, after, bonds):
         strips[STRIP.covered, k] = (high - low) * path
         for i in range(STRIP.pressure, strips.shape[0]):
             strips[i, k] = strips[i, new]
+
+        # The values at the Gauss points depend on the form of the sum
         if law[LAW.form] == FORM_STRETCH:
             _write_weights((high - low) * damage, after.middle_length, bonds, k)
         elif law[LAW.form] == FORM_GROWING:
@@ -167,7 +178,7 @@ def _append_strips(increment, before, after, bonds):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def _make_room(count, bonds):
-    """Make room for further strips at the end of a list, by moving it to its first column; return whether there is room."""
+    """Move a list to its first column if further strips do not fit at its end; return whether they fit."""
     strips = bonds.bondlist
     status = bonds.status
     # The column after the last strip is that of new bonds
@@ -364,6 +375,9 @@ def release(before, after, point, bonds):
         return 0.0
     if after > before:
         return bonds.law[LAW.initial] * (after - before)
+
+    # The density of the bonds falls in proportion to the pressure. Those that formed last have the least stretch, so
+    # their loss changes the force least.
     _release_last_formed(_total_density(point, bonds) * (1 - after / before), point, bonds)
     carried = abs(total(STRIP.present_force, point, bonds))
     if carried <= after:

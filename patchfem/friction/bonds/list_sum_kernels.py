@@ -78,12 +78,14 @@ def sum_strips(after, bonds):
     after : PathValues
         State of the path for which the sum is taken.
     bonds : BondList
+        Its rows `STRIP.force` and `STRIP.energy` receive the sums.
     """
     law = bonds.law
     form = law[LAW.form]
     if form == FORM_REPORT:
         _sum_report(after, bonds)
         return
+
     strips = bonds.bondlist
     scale = _value_scale(after, bonds)
     # A bond of reading="stretch" stores f u/(p + 1), because its force is proportional to |u|^p
@@ -93,6 +95,8 @@ def sum_strips(after, bonds):
     if form == FORM_STRETCH:
         force_factor *= scale
         energy_factor = force_factor / (p + 1)
+
+    # All strips by two Gauss points in a loop without branches, then those again for which this is not exact enough
     if form == FORM_STRETCH:
         _sum_gauss_stretch(after, force_factor, energy_factor, bonds)
     else:
@@ -162,16 +166,21 @@ def _sum_gauss_growing(after, scale, factor, bonds):
     is_whole = p == 0.0 or p == 1.0 or p == 2.0
     min_length = MIN_LENGTH_RATIO * after.length
     for k in range(uint64(bonds.status[STATUS.head]), uint64(bonds.status[STATUS.end])):
+        # Stretch u and path R of the bonds at both Gauss points
         end = strips[STRIP.end, k]
         step = end - strips[STRIP.start, k]
         u_1 = after.displacement - end + GAUSS_POINT_1 * step
         u_2 = after.displacement - end + GAUSS_POINT_2 * step
         covered = strips[STRIP.covered, k]
         path = after.path - strips[STRIP.path, k]
+
+        # Their length: that of mature bonds, less what the time since they formed leaves of the difference (eq. 2.10)
         length_1 = max(after.length - scale * strips[STRIP.value_1, k], min_length)
         length_2 = max(after.length - scale * strips[STRIP.value_2, k], min_length)
         x_1 = max(path + GAUSS_POINT_1 * covered, MIN_POSITIVE) / length_1
         x_2 = max(path + GAUSS_POINT_2 * covered, MIN_POSITIVE) / length_2
+
+        # Eq. 2.17 as printed: (R/eps)^p exp(-R/eps) along u/|u|
         if is_whole:
             force_1 = whole_power(x_1, p) * fast_exp(-x_1)
             force_2 = whole_power(x_2, p) * fast_exp(-x_2)
@@ -212,9 +221,13 @@ def _integrate_strip(after, scale, bonds, k):
     start = strips[STRIP.start, k]
     end = strips[STRIP.end, k]
     is_stretch = bonds.law[LAW.form] == FORM_STRETCH
+
+    # The power |u|^p is not smooth at u = 0, so a strip that contains it is divided there
     zero_position = 0.0
     if end != start:
         zero_position = min(max((end - after.displacement) / (end - start), 0.0), 1.0)
+
+    # The density exp(damage) is close to linear on a piece along which the damage is small
     n_pieces = 1
     if is_stretch:
         ratio = max(strips[STRIP.value_1, k], MIN_POSITIVE) / max(
@@ -275,6 +288,8 @@ def _integrate_growing_piece(after, scale, bonds, k, low, high):
     covered = strips[STRIP.covered, k]
     path = max(after.path - strips[STRIP.path, k], 0.0)
     step = strips[STRIP.end, k] - strips[STRIP.start, k]
+
+    # Bonds that grew along the strip have a last length near 0
     last = _bond_length(0.0, after, scale, value_1, value_2)
     first = _bond_length(1.0, after, scale, value_1, value_2)
     is_steep = p < 2 and p != np.floor(p) and last > MIN_RESTING_RATIO * first
@@ -296,6 +311,8 @@ def _integrate_growing_piece(after, scale, bonds, k, low, high):
         else:
             density *= power(distance / length, p)
         density *= 0.5 * width * covered
+
+        # u keeps its sign on the piece, so the sign of either point serves
         sign = np.copysign(1.0, u)
         if point == 0:
             force_1 = density
@@ -303,6 +320,7 @@ def _integrate_growing_piece(after, scale, bonds, k, low, high):
         else:
             force_2 = density
             energy_2 = density * abs(u)
+
     r_low = path + low * covered
     r_high = path + high * covered
     force = _average_power(r_low, r_high, force_1, force_2, steep_power).force
@@ -335,6 +353,8 @@ def _average_power(u_low, u_high, weight_1, weight_2, p):
     BondSum
     """
     width = u_high - u_low
+
+    # Far from u = 0 the power is smooth, and the difference of powers below would cancel
     if abs(u_low + u_high) > FAR_RATIO * abs(width):
         u_1 = u_low + GAUSS_POINT_1 * width
         u_2 = u_low + GAUSS_POINT_2 * width
@@ -416,6 +436,7 @@ def sum_initial(after, bonds):
     after : PathValues
         State of the path for which the sum is taken.
     bonds : BondList
+        Its law has the density, the width and the cut-off of the initial bonds.
 
     Returns
     -------
@@ -433,12 +454,16 @@ def sum_initial(after, bonds):
     if weight == 0 or after.path == 0 or is_at_place or is_old:
         return BondSum(0.0, 0.0)
 
+    # (|u|/eps_0)^p exp(-damage) for reading="stretch", (R/eps_0)^p exp(-R/eps_0) for reading="report"
     stretch_power = 0.0
     if law[LAW.form] == FORM_STRETCH:
         stretch_power = p
         weight *= fast_exp(-after.damage) / power(eps0, p)
     else:
         weight *= power(max(after.path / eps0, MIN_POSITIVE), p) * fast_exp(-after.path / eps0)
+
+    # The bonds are unstretched at displacements from -half_width to half_width. The energy that they would store at
+    # displacement 0 is subtracted, so that a contact that has not moved stores nothing.
     low = displacement - half_width
     high = displacement + half_width
     total = _average_power(low, high, 0.5 * weight, 0.5 * weight, stretch_power)
@@ -450,15 +475,17 @@ def sum_initial(after, bonds):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def average_initial(increment, bonds):
-    """Return the exact mean force of the initial bonds over an increment for unit pressure and reading="report".
+    """Return the mean force of the initial bonds over an increment for unit pressure and reading="report".
 
-    The force jumps at displacement 0, or changes its sign over the width over which the bonds are distributed.
+    The force jumps at displacement 0, for which the mean is exact, or rises from -phi to phi over the width over which
+    the bonds are distributed; there phi is replaced by its mean over the width.
 
     Parameters
     ----------
     increment : float
         Increment [m] from the present state.
     bonds : BondList
+        Its law has the density, the width and the cut-off of the initial bonds.
 
     Returns
     -------
@@ -485,6 +512,9 @@ def average_initial(increment, bonds):
     at_exit = at_entry
     if to_exit > to_entry:
         at_exit = _sum_youngest((path + to_exit) / eps0, bonds).force
+
+    # The force is -phi before the entry and phi beyond the exit; the integral of phi(R/eps_0) over each part is a
+    # difference of P(p + 1, R/eps_0)
     total = _sum_youngest((path + size) / eps0, bonds).force - at_exit - (at_entry - at_start)
     if to_exit > to_entry:
         middle = along + 0.5 * (to_entry + to_exit)
@@ -501,6 +531,7 @@ def sum_formed(path, eps, bonds):
     path, eps : float
         Length of the increment and bond length [m].
     bonds : BondList
+        Its law has the order p and the bond length eps_0.
 
     Returns
     -------
@@ -524,6 +555,7 @@ def average_formed(increment, eps, bonds):
     increment, eps : float
         Increment and bond length [m].
     bonds : BondList
+        Its law has the order p and the bond length eps_0.
 
     Returns
     -------
