@@ -37,7 +37,7 @@ LAYER_TOL = 1e-12
 # Largest pressure that an unloaded node may reach in one step, relative to the mean pressure
 MAX_PRESSURE_RISE = 0.01
 # Smallest depth [m] in a divisor; it keeps the residual of a flat gap finite
-MIN_DEPTH = 1e-150
+MIN_GAP_DEPTH = 1e-150
 
 
 class AsperityProblem(NamedTuple):
@@ -368,7 +368,7 @@ def compute_law_residuals(
     """
     force = solution.force
     opening = solution.separation
-    depth = np.ptp(problem.gap) + np.abs(opening - problem.gap).max() + MIN_DEPTH
+    depth = np.ptp(problem.gap) + np.abs(opening - problem.gap).max() + MIN_GAP_DEPTH
     largest = max(force.max(), np.exp(MIN_LOG_PRESSURE))
     mismatch = np.abs(force - area * asperities.pressure(opening))
     mismatch -= area * np.exp(MIN_LOG_PRESSURE)

@@ -13,9 +13,8 @@ from ..compiled.flags_kernels import NJIT_NO_REFCOUNT
 from ..compiled.jit import njit
 from .set_arrays import MAX_POLYGON_SIDES, REFERENCE_OPENING
 
-CONDITION_ROUND_OFF = (
-    1e-13  # rounding error of a force or gap, relative to the largest of its terms
-)
+# Rounding error of a force or gap, relative to the largest of its terms
+CONDITION_ROUND_OFF = 1e-13
 # Half width of the box in which polygons are computed, in the units of `polygon_units`
 BOX_HALF_WIDTH = 100.0
 

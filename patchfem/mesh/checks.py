@@ -15,7 +15,7 @@ from .pieces import PieceMesh, find_edges, freeze_piece, signed_areas
 
 # Largest slope of a rounded edge within the interface; the normal and the vertical gap then differ
 # by half a percent
-MAX_SLOPE = 0.1
+MAX_ROUNDED_SLOPE = 0.1
 # Names of the tags of the cells of both pieces, with their numbers in mesh files
 CELL_TAGS = {"upper_substrate": 1, "upper_coating": 2, "lower_substrate": 3, "lower_coating": 4}
 # Names of the tags of the edges on the interfaces and the far faces of both pieces, with these numbers
@@ -264,13 +264,13 @@ def _check_interface(points, nodes, side: str) -> None:
 
     # A rounded edge is convex, and its slope is limited; some node must lie at y = 0
     slope = np.diff(y) / np.maximum(cells, 1e-300)
-    is_wrong = np.append(np.abs(slope) > MAX_SLOPE, np.abs(y).min() > tolerance)
+    is_wrong = np.append(np.abs(slope) > MAX_ROUNDED_SLOPE, np.abs(y).min() > tolerance)
     is_wrong[1:-1] |= np.diff(slope) < -1e-6 - 4 * tolerance / max(cells.min(), tolerance)
     if is_wrong.any():
         node = int(np.argmax(is_wrong))
         raise PatchfemError(
             f"{name} is not the straight line y = 0 (rounded edges may reach a slope of "
-            f"{MAX_SLOPE:g}): the node at x = {x[node]:.6g} m lies {abs(y[node]):.6g} m away "
+            f"{MAX_ROUNDED_SLOPE:g}): the node at x = {x[node]:.6g} m lies {abs(y[node]):.6g} m away "
             "from this line; give the shape of a surface by [contact.crown] or [contact.tilt]"
         )
 

@@ -238,21 +238,8 @@ def jenkins_set(tangential: np.ndarray, limit: np.ndarray, local_length: float =
         raise PatchfemError("contact.shear: the friction limit is 0 at every point of the contact")
     points = np.flatnonzero(limit > 0)
     force = limit[points]
-    no_nodes = np.zeros(0, np.int64)
-
-    # Rigid pieces in series with one spring slip at all nodes together.
     if local_length == 0 and np.ptp(tangential) == 0:
-        stiffness = 1 / tangential[0, 0]
-        return JenkinsSet(
-            frozen_array([stiffness]),
-            frozen_array([force.sum() / stiffness]),
-            frozen_array(points, np.int64),
-            frozen_array(force),
-            no_nodes,
-            np.zeros((0, 0)),
-            no_nodes,
-            0,
-        )
+        return _make_single_element(1 / tangential[0, 0], points, force)
 
     # One thread is used because, on a loaded machine, waiting for a second one turns 5 ms into 270
     # ms.
@@ -275,6 +262,21 @@ def jenkins_set(tangential: np.ndarray, limit: np.ndarray, local_length: float =
         sequence.cholesky_factor,
         starts,
         n_reluctant,
+    )
+
+
+def _make_single_element(stiffness: float, points, force) -> JenkinsSet:
+    """Return the element of rigid pieces in series with one spring [N/m], which slip at all nodes together."""
+    no_nodes = np.zeros(0, np.int64)
+    return JenkinsSet(
+        frozen_array([stiffness]),
+        frozen_array([force.sum() / stiffness]),
+        frozen_array(points, np.int64),
+        frozen_array(force),
+        no_nodes,
+        np.zeros((0, 0)),
+        no_nodes,
+        0,
     )
 
 

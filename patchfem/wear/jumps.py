@@ -13,13 +13,13 @@ MIN_RETRY_RATIO = 0.2
 JUMP_SAFETY = 0.9  # safety factor on the length of a jump that would just meet the tolerance
 FIRST_JUMP_FRACTION = 1e-3  # length of the first automatic jump as a fraction of all cycles
 MIN_JUMP_FRACTION = 1e-9  # smallest length of a jump as a fraction of all cycles
-METHOD_ORDER = 2  # order of the method of `depth.solve_jump`
+JUMP_ORDER = 2  # order of the method of `depth.solve_jump`
 # Ratio of the difference between a jump and its two halves to the error of the halves
-RICHARDSON_DIVISOR = 2**METHOD_ORDER - 1
+RICHARDSON_DIVISOR = 2**JUMP_ORDER - 1
 # Smallest ratio of error to tolerance from which the length of the next jump is computed
 MIN_ERROR_RATIO = 1e-9
 # Smallest depth [m] in a divisor; it keeps quotients finite before anything is worn
-MIN_DEPTH = 1e-300
+MIN_WORN_DEPTH = 1e-300
 # Smallest wear of a jump, relative to the worn depth, with which the error of its slip path is
 # compared; a jump with less wear hardly changes the depth
 SHAKEDOWN_WEAR_RATIO = 1e-3
@@ -155,11 +155,11 @@ def take_jump(
             after, error = _correct_path(problem, state, after, error, length, tolerance)
             if is_forced or error <= 1:
                 break
-        length *= max(MIN_RETRY_RATIO, JUMP_SAFETY * error ** (-1 / (METHOD_ORDER + 1)))
+        length *= max(MIN_RETRY_RATIO, JUMP_SAFETY * error ** (-1 / (JUMP_ORDER + 1)))
 
     # The error of a method of order p falls with the power p + 1 of the length
     growth = min(
-        MAX_JUMP_GROWTH, JUMP_SAFETY * max(error, MIN_ERROR_RATIO) ** (-1 / (METHOD_ORDER + 1))
+        MAX_JUMP_GROWTH, JUMP_SAFETY * max(error, MIN_ERROR_RATIO) ** (-1 / (JUMP_ORDER + 1))
     )
     cycle = end if length == remaining else after.cycle
     return replace(after, cycle=cycle, length=length * growth)
@@ -190,7 +190,7 @@ def _correct_path(
         trend=(path - state.path) / length,
         path_error=state.path_error + path_error,
     )
-    return corrected, max(error, path_error / max(tolerance * scale, MIN_DEPTH))
+    return corrected, max(error, path_error / max(tolerance * scale, MIN_WORN_DEPTH))
 
 
 def _take_halves(
@@ -216,7 +216,7 @@ def _take_halves(
     )
 
     # Richardson's estimate of the error of the halves, relative to the tolerance
-    depth_limit = tolerance * max(float(depth.max()), MIN_DEPTH)
+    depth_limit = tolerance * max(float(depth.max()), MIN_WORN_DEPTH)
     depth_error = float(np.abs(depth - coarse).max()) / RICHARDSON_DIVISOR / depth_limit
     load = float(force.sum())
     if load <= 0:

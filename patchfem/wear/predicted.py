@@ -20,9 +20,8 @@ from ..surface.quantity import LEVEL, SIDE, Quantity
 N_BINS = 100  # number of bins along the patch, in which the noise of single heights averages out
 N_RATIOS = 90  # number of trial coefficients in the search
 MAX_PLACES = 24  # largest number of positions that are refined in addition to the best one
-MIN_PATCH_OVERLAP = (
-    0.25  # smallest fraction of the patch on the traces for which its position is known
-)
+# Smallest fraction of the patch on the traces for which its position is known
+MIN_PATCH_OVERLAP = 0.25
 # Part of half the patch beyond its ends, whose unworn depths show where the wear ends
 END_MARGIN = 0.1
 # Largest coefficient relative to that of the run for which the shape is known

@@ -31,7 +31,7 @@ from .list_rows_kernels import (
     STRIP,
 )
 from .list_sum_kernels import (
-    MIN_LENGTH_RATIO,
+    MIN_BOND_RATIO,
     MIN_POSITIVE,
     BondSum,
     PathValues,
@@ -227,7 +227,7 @@ def _formed_growing_force(path, after, bonds):
         for point in range(2):
             # New bonds start at length 0 and relax to the target of eq. 2.10
             fraction = low + width * (GAUSS_POINT_1 if point == 0 else GAUSS_POINT_2)
-            length = max(-target * expm1(-fraction * growth), MIN_LENGTH_RATIO * after.length)
+            length = max(-target * expm1(-fraction * growth), MIN_BOND_RATIO * after.length)
             x = fraction * path / length
             result += width * power(x, law[LAW.order]) * fast_exp(-x)
     return result * law[LAW.inverse_gamma] * path / (2 * law[LAW.length])
@@ -390,15 +390,24 @@ def list_mean(increment, bonds, v0, dt):
     end_weight = gain + share * loss / 6
     if end_weight != 0:
         _add_to_mean(end_weight, row, bonds)
-
-    # A closed form replaces the rule, but not for the new bonds of reading="report": their steep force at the start of
-    # the increment cancels that of the strip before
-    if is_stretch:
-        new = int(bonds.status[STATUS.end])
-        strips[STRIP.mean, new] = average_formed(increment, after.middle_length, bonds)
-    else:
-        strips[STRIP.mean, first] = average_initial(increment, bonds)
+    _write_exact_means(increment, after.middle_length, bonds)
     return total(STRIP.mean, 0, bonds)
+
+
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
+def _write_exact_means(increment, eps, bonds):
+    """Replace the mean force of a rule by a closed form where there is one.
+
+    There is none for the new bonds of reading="report": their steep force at the start of the increment cancels that of
+    the strip before. eps: bond length [m] in the middle of the increment.
+    """
+    strips = bonds.bondlist
+    if bonds.law[LAW.form] == FORM_STRETCH:
+        new = int(bonds.status[STATUS.end])
+        strips[STRIP.mean, new] = average_formed(increment, eps, bonds)
+    else:
+        first = int(bonds.status[STATUS.room_start])
+        strips[STRIP.mean, first] = average_initial(increment, bonds)
 
 
 @njit(**NJIT_KERNEL)

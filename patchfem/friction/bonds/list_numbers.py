@@ -17,9 +17,8 @@ from .list_rows_kernels import (
 from .parameters import Bonds
 
 MAX_DAMAGE = 745.0  # damage from which exp(-damage) underflows to zero
-MAX_STRIPS_PER_LENGTH = (
-    4  # number of strips per bond length of the cut-off for which there is memory
-)
+# Number of strips per bond length of the cut-off for which there is memory
+MAX_STRIPS_PER_LENGTH = 4
 N_WORK_STRIPS = 64  # number of strips of workspace in addition to those of an increment
 UNMERGED_CAPACITY = 20_000  # initial capacity, in strips, of a list whose strips are not merged
 

@@ -1,4 +1,4 @@
-"""Named indices of the arrays of bonds (eq. 2.17): lists of strips, moments and growth; and the forms of the sum.
+"""Named indices of the arrays of a list of strips of bonds (eq. 2.17), and the forms of the sum.
 
 A strip holds the bonds that formed on one straight increment, or on several increments in one direction that were joined.
 Inside a strip a position is the fraction of its length from its end. Two values per strip hold at its Gauss points:
@@ -43,7 +43,7 @@ class BondList(NamedTuple):
     - status: (14,) see `ListStatus`
     - law: (8,) parameters, see `LawNumbers`
     - table: (k,) values of P(p + 1, x), see `list_math_kernels.bond_gammainc`
-    - growth: (5,) parameters of eq. 2.10, see `GrowthNumbers`
+    - growth: (5,) parameters of eq. 2.10, see `point_rows_kernels.GrowthNumbers`
     """
 
     bondlist: np.ndarray
@@ -121,31 +121,6 @@ class LawNumbers(NamedTuple):
     half_width: int = 7
 
 
-class GrowthNumbers(NamedTuple):
-    """Indices of the parameters of eq. 2.10 in the array of `parameters.growth_numbers`.
-
-    - rest_growth: a_s [m s-2], below 0 for a constant bond length
-    - slip_growth: l_k [m]
-    - rest_speed: lower limit v_h [m/s] of the speed
-    - rest_length, slip_length: lengths eps_0 and eps_k [m] to which bonds grow at rest and in a long slip
-    """
-
-    rest_growth: int = 0
-    slip_growth: int = 1
-    rest_speed: int = 2
-    rest_length: int = 3
-    slip_length: int = 4
-
-
-class MomentRows(NamedTuple):
-    """Rows of the moments of the bonds of points (`point_kernels`): m [Pa], z [Pa m], s2 [Pa m2], bond length [m]."""
-
-    m: int = 0
-    z: int = 1
-    s2: int = 2
-    length: int = 3
-
-
 class PathRows(NamedTuple):
     """Indices of the path state of a bond list.
 
@@ -197,7 +172,5 @@ class ListStatus(NamedTuple):
 
 STRIP = StripRows()
 LAW = LawNumbers()
-GROWTH = GrowthNumbers()
-MOMENT = MomentRows()
 PATH = PathRows()
 STATUS = ListStatus()

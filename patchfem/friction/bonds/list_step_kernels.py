@@ -34,9 +34,9 @@ MIN_STRIPS_BETWEEN_MERGES = 12
 MAX_START_LENGTH_RATIO = 1e-8
 MAX_GROWTH_SPAN = 0.1  # largest range of the growth J within a joined strip of growing bonds
 # Largest relative decrease of the bond length from the first to the last bond of a joined strip
-MAX_SHORTENING = 0.1
+MAX_BOND_SHORTENING = 0.1
 # Largest age in bond lengths at which the merge width still grows; the limit keeps it finite
-MAX_AGE = 200.0
+MAX_MERGE_AGE = 200.0
 
 
 # ---- increment of the list
@@ -257,7 +257,7 @@ def _merge_strips(bonds):
     last = head
     for k in range(head + 1, int(status[STATUS.end])):
         age = (bonds.now[PATH.path] - strips[STRIP.path, k]) / law[LAW.length]
-        width = law[LAW.merge_width] * law[LAW.length] * exp(min(age / 3, MAX_AGE))
+        width = law[LAW.merge_width] * law[LAW.length] * exp(min(age / 3, MAX_MERGE_AGE))
         is_narrow = strips[STRIP.covered, last] + strips[STRIP.covered, k] <= width
         if is_narrow and _join_strips(bonds, last, k):
             continue
@@ -338,7 +338,7 @@ def _have_similar_lengths(bonds, i, k):
     old = scale * interpolate_value(1.0, strips[STRIP.value_1, i], strips[STRIP.value_2, i])
     if young <= MAX_START_LENGTH_RATIO * mature:
         return True
-    return young <= exp(MAX_GROWTH_SPAN) * old and mature - young >= (1 - MAX_SHORTENING) * (
+    return young <= exp(MAX_GROWTH_SPAN) * old and mature - young >= (1 - MAX_BOND_SHORTENING) * (
         mature - old
     )
 

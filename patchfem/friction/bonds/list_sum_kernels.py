@@ -33,7 +33,7 @@ from .list_rows_kernels import (
 # Largest displacement, relative to the path, at which the initial bonds count as unstressed
 UNSTRESSED_TOL = 1e-14
 # Smallest length of a growing bond relative to that of mature bonds; it keeps R/length finite
-MIN_LENGTH_RATIO = 1e-9
+MIN_BOND_RATIO = 1e-9
 PATH_ROUND_OFF = 1e-15  # largest difference of two equal paths, relative to the whole path
 MIN_POSITIVE = 1e-300  # smallest path [m] or value whose logarithm is taken
 # Distance of u = 0 from the middle of a strip, in half lengths of the strip, from which two Gauss points suffice
@@ -46,7 +46,7 @@ MIN_RESTING_RATIO = 0.05
 # Largest damage along a piece, and largest number of pieces; with them the linear density of a piece changes the force
 # by less than 2e-6 of the friction limit
 MAX_PIECE_DAMAGE = 0.07
-MAX_PIECES = 4
+MAX_STRIP_PIECES = 4
 # Ratio of u to the length of a piece from which two Gauss points are more exact than a difference of powers
 FAR_RATIO = 30.0
 
@@ -164,7 +164,7 @@ def _sum_gauss_growing(after, scale, factor, bonds):
     strips = bonds.bondlist
     p = bonds.law[LAW.order]
     is_whole = p == 0.0 or p == 1.0 or p == 2.0
-    min_length = MIN_LENGTH_RATIO * after.length
+    min_length = MIN_BOND_RATIO * after.length
     for k in range(uint64(bonds.status[STATUS.head]), uint64(bonds.status[STATUS.end])):
         # Stretch u and path R of the bonds at both Gauss points
         end = strips[STRIP.end, k]
@@ -234,7 +234,7 @@ def _integrate_strip(after, scale, bonds, k):
             strips[STRIP.value_2, k], MIN_POSITIVE
         )
         damage = fast_log(ratio) / (GAUSS_POINT_2 - GAUSS_POINT_1)
-        n_pieces = min(max(ceil(abs(damage) / MAX_PIECE_DAMAGE), 1), MAX_PIECES)
+        n_pieces = min(max(ceil(abs(damage) / MAX_PIECE_DAMAGE), 1), MAX_STRIP_PIECES)
 
     force = 0.0
     energy = 0.0
@@ -332,7 +332,7 @@ def _integrate_growing_piece(after, scale, bonds, k, low, high):
 def _bond_length(fraction, after, scale, value_1, value_2):
     """Return the length [m] of growing bonds at a position within a strip."""
     start = interpolate_value(fraction, value_1, value_2)
-    return max(after.length - scale * start, MIN_LENGTH_RATIO * after.length)
+    return max(after.length - scale * start, MIN_BOND_RATIO * after.length)
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)

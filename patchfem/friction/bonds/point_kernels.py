@@ -25,7 +25,7 @@ import numpy as np
 
 from ...compiled.flags_kernels import FASTMATH_FLAGS, NJIT_NO_REFCOUNT
 from ...compiled.jit import njit
-from .list_rows_kernels import GROWTH
+from .point_rows_kernels import GROWTH
 
 # Largest path in bond lengths for which the power series are exact to round-off
 MAX_SHORT_PATH = 0.5

@@ -19,12 +19,12 @@ from .list_numbers import (
     make_path_state,
     make_status,
 )
-from .list_rows_kernels import MOMENT, N_ROWS, STATUS, STRIP, BondList
+from .list_rows_kernels import N_ROWS, STATUS, STRIP, BondList
 from .parameters import Bonds, growth_numbers
+from .point_rows_kernels import MOMENT
 
-N_FIRST_STRIPS = (
-    32  # number of columns of a list before any motion; it is doubled when the list is full
-)
+# Number of columns of a list before any motion; it is doubled when the list is full
+N_FIRST_STRIPS = 32
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,9 +10,10 @@ from typing import NamedTuple
 from ...compiled.flags_kernels import NJIT_NO_REFCOUNT
 from ...compiled.jit import njit
 from . import list_kernels, list_step_kernels
-from .list_rows_kernels import LAW, MOMENT, STATUS, STRIP, BondList
+from .list_rows_kernels import LAW, STATUS, STRIP, BondList
 from .list_sum_kernels import MIN_POSITIVE
 from .point_kernels import bond_mean, bond_step, grow, press_point
+from .point_rows_kernels import MOMENT
 
 
 class PointReading(NamedTuple):
@@ -161,7 +162,7 @@ def advance_moments(moments, increment, before, after, dt, growth, out):
     before, after : (m,) array
         Pressures at the ends [Pa].
     growth : (5,) array
-        Parameters of eq. 2.10, in the order of `list_rows_kernels.GROWTH`.
+        Parameters of eq. 2.10, in the order of `point_rows_kernels.GROWTH`.
     out : (2, m) array
         Receives the path-mean of z [Pa m] and half the integral of s2 dR/eps, of which mu_s/eps_0 are traction and
         dissipated energy.
