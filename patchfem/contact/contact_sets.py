@@ -71,8 +71,8 @@ class ContactSets:
 
         max_bytes: size of the contact sets that can be stored [bytes].
         """
-        # One set takes 25 m + 400 bytes: unknowns, nodes, polygon and names.
-        n_slots = int(max(16, min(max_bytes / (25 * self.x.size + 400), MAX_SLOTS)))
+        # One set takes 25 m + 80 bytes: unknowns, nodes, energy and names.
+        n_slots = int(max(16, min(max_bytes / (25 * self.x.size + 80), MAX_SLOTS)))
         return make_set_arrays(
             self.c,
             self.x,

@@ -16,7 +16,6 @@ from typing import NamedTuple
 
 from ..compiled.flags_kernels import FASTMATH_FLAGS, NJIT_NO_REFCOUNT
 from ..compiled.jit import njit
-from .polygon_kernels import CONDITION_ROUND_OFF, is_inside, write_polygon
 from .set_arrays import (
     N_BUILT,
     N_PIVOTS,
@@ -35,6 +34,8 @@ FASTMATH_MINIMUM = FASTMATH_FLAGS | {"nnan", "nsz"}
 # Largest number of sets for which all violating nodes are exchanged at once; beyond it the
 # exchanges may cycle
 N_BLOCK_EXCHANGES = 12
+# Rounding error of a force or gap, relative to the largest of its terms
+CONDITION_ROUND_OFF = 1e-13
 # Largest relative residual for which the tableau is not recomputed; one refinement then reduces it
 # to rounding errors
 MAX_TABLEAU_RESIDUAL = 1e-8
@@ -117,76 +118,60 @@ def reset_tableau(sets):
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def multiply_three(line, columns):
-    """Return the products of a row (m,) with three vectors (3, m)."""
-    s0 = 0.0
-    s1 = 0.0
-    s2 = 0.0
-    for j in range(columns.shape[1]):
-        s0 += line[j] * columns[0, j]
-        s1 += line[j] * columns[1, j]
-        s2 += line[j] * columns[2, j]
-    return s0, s1, s2
+def _multiply(line, vector):
+    """Return the product of a row, up to its first m entries, with a vector (m,)."""
+    total = 0.0
+    for j in range(vector.size):
+        total += line[j] * vector[j]
+    return total
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def refine_rows(sets):
-    """Improve the last columns of the tableau by a step of iterative refinement.
+def refine_column(sets, column):
+    """Improve the column of 1, d or t of the tableau (0, 1 or 2) by a step of iterative refinement.
 
-    Returns the largest relative residual of a column before the step.
+    Returns the residual before the step, relative to the largest term.
     """
     n_nodes = sets.x.size
     values = sets.tableau.values
     in_contact = sets.tableau.in_contact
     forces = sets.tableau.forces
     residuals = sets.tableau.residuals
-
-    # Forces of the set per (1, d, t)
     for i in range(n_nodes):
-        for r in range(3):
-            forces[r, i] = values[i, n_nodes + r] if in_contact[i] else 0.0
-            residuals[r, i] = 0.0
+        forces[i] = values[i, n_nodes + column] if in_contact[i] else 0.0
+        residuals[i] = 0.0
 
-    # Openings of all nodes under these forces. They vanish in contact, up to the residual, and are the unknowns of the
-    # other nodes. A residual is relative to the largest term of its column.
-    scale0 = 0.0
-    scale1 = 1.0
-    scale2 = 0.0
-    error0 = 0.0
-    error1 = 0.0
-    error2 = 0.0
+    # Openings of all nodes under the forces of the set, w = opening - d + x t + C f. They vanish in contact, up to the
+    # residual, and are the unknowns of the other nodes.
+    scale = 0.0
+    error = 0.0
     for i in range(n_nodes):
-        s0, s1, s2 = multiply_three(sets.compliance[i], forces)
-        scale0 = max(scale0, abs(s0), abs(sets.opening[i]))
-        scale1 = max(scale1, abs(s1))
-        scale2 = max(scale2, abs(s2), abs(sets.x[i]))
-        s0 += sets.opening[i]
-        s1 -= 1.0
-        s2 += sets.x[i]
-
+        given = sets.opening[i]
+        if column > 0:
+            given = -1.0 if column == 1 else sets.x[i]
+        displacement = _multiply(sets.compliance[i], forces)
+        scale = max(scale, abs(displacement), abs(given))
         if in_contact[i]:
-            error0 = max(error0, abs(s0))
-            error1 = max(error1, abs(s1))
-            error2 = max(error2, abs(s2))
-            residuals[0, i] = s0
-            residuals[1, i] = s1
-            residuals[2, i] = s2
+            residuals[i] = displacement + given
+            error = max(error, abs(residuals[i]))
         else:
-            values[i, n_nodes] = s0
-            values[i, n_nodes + 1] = s1
-            values[i, n_nodes + 2] = s2
+            values[i, n_nodes + column] = displacement + given
 
-    # The tableau multiplies the residuals as the inverse of the equations, to the accuracy that it has kept
-    error0 = error0 / scale0 if scale0 > 0 else 0.0
-    error2 = error2 / scale2 if scale2 > 0 else 0.0
-    largest = max(error0, error1 / scale1, error2)
-    if largest > MIN_TABLEAU_RESIDUAL:
+    # The tableau multiplies residuals as the inverse of the equations does, to the accuracy that it has kept
+    residual = error / scale if scale > 0 else 0.0
+    if residual > MIN_TABLEAU_RESIDUAL:
         for i in range(n_nodes):
-            s0, s1, s2 = multiply_three(values[i], residuals)
-            values[i, n_nodes] -= s0
-            values[i, n_nodes + 1] -= s1
-            values[i, n_nodes + 2] -= s2
-    return largest
+            values[i, n_nodes + column] -= _multiply(values[i], residuals)
+    return residual
+
+
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
+def _lost_digits(sets):
+    """Refine the columns of the tableau; return whether it had lost more digits than a step restores."""
+    residual = 0.0
+    for column in range(3):
+        residual = max(residual, refine_column(sets, column))
+    return residual > MAX_TABLEAU_RESIDUAL
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
@@ -214,7 +199,7 @@ def take_slot(sets):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def store_set(sets, name):
-    """Store the contact set of the tableau with its energy and polygon; return its slot."""
+    """Store the contact set of the tableau with its energy; return its slot."""
     stored = sets.stored
     values = sets.tableau.values
     n_nodes = sets.x.size
@@ -250,7 +235,6 @@ def store_set(sets, name):
     bucket = name & (stored.heads.size - 1)
     stored.links[slot] = stored.heads[bucket]
     stored.heads[bucket] = slot
-    write_polygon(sets, slot)
     return slot
 
 
@@ -271,9 +255,9 @@ def build_set(sets, name):
     If the tableau has lost its digits, it is computed anew and pivoted once more. The slot is -1 if the compliance is not
     positive definite on the set. Cost: m^2 multiplications for each node that is exchanged. name: name of the set.
     """
-    if not pivot_to_target(sets) or refine_rows(sets) > MAX_TABLEAU_RESIDUAL:
+    if not pivot_to_target(sets) or _lost_digits(sets):
         reset_tableau(sets)
-        if not pivot_to_target(sets) or refine_rows(sets) > MAX_TABLEAU_RESIDUAL:
+        if not pivot_to_target(sets) or _lost_digits(sets):
             return -1
     return store_set(sets, name)
 
@@ -400,8 +384,6 @@ def find_set(sets, slot, d, t):
         Slot of the contact set, -1 if none is found.
     """
     for count in range(N_BLOCK_EXCHANGES + 10 * sets.x.size):
-        if is_inside(sets, slot, d, t):
-            return slot
         holds, bounds = check_contact_conditions(sets, slot, d, t)
         if holds:
             return slot

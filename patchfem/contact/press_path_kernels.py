@@ -9,7 +9,6 @@ import numpy as np
 
 from ..compiled.flags_kernels import NJIT_NO_REFCOUNT
 from ..compiled.jit import njit
-from .polygon_kernels import find_exit, is_inside
 from .press_kernels import (
     FASTMATH_MINIMUM,
     ContactBounds,
@@ -66,42 +65,6 @@ def find_first_violation(sets, slot, motion, change, bounds):
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def cross_side(sets, slot, side, d, t):
-    """Find the neighbouring contact set beyond a side of a polygon.
-
-    The set is stored with the side, so the next crossing needs no search.
-
-    Parameters
-    ----------
-    sets : set_arrays.SetArrays
-        Preloaded interface with its stored contact sets.
-    slot : int
-        Slot of the set before the side.
-    side : int
-        Side of its polygon, -1 if the side is not known.
-    d, t : float
-        Displacement [m] and rotation [rad] just beyond the side.
-
-    Returns
-    -------
-    int
-        Slot of the set beyond the side, -1 if none is found.
-    """
-    if side < 0:
-        return find_set(sets, slot, d, t)
-    stored = sets.stored
-    polygons = sets.polygons
-    next_slot = polygons.neighbours[slot, side]
-    name = stored.names[slot] ^ stored.node_names[polygons.nodes[slot, side]]
-    if next_slot >= 0 and stored.names[next_slot] == name and is_inside(sets, next_slot, d, t):
-        return next_slot
-    next_slot = find_set(sets, slot, d, t)
-    if next_slot >= 0 and stored.names[next_slot] == name and next_slot != slot:
-        polygons.neighbours[slot, side] = next_slot
-    return next_slot
-
-
-@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def find_border(sets, slot, start, motion, change):
     """Find the fraction of an increment at which a contact set ceases to be valid.
 
@@ -118,40 +81,28 @@ def find_border(sets, slot, start, motion, change):
 
     Returns
     -------
-    end : float
+    float
         Fraction of the increment, 1 if the set holds up to its end.
-    side : int
-        Side of the polygon of the set, -1 if it is not known.
     """
     end_d = -(motion.heave + change.heave)
     end_t = motion.rotation + change.rotation
-    if is_inside(sets, slot, end_d, end_t):
-        return 1.0, -1
+    holds, end_bounds = check_contact_conditions(sets, slot, end_d, end_t)
+    if holds:
+        return 1.0
 
-    # The side of the polygon through which the remainder of the increment leaves it
+    # The rounding errors along the increment are bounded by those at both of its ends
     start_motion = HolderMotion(
         motion.heave + start * change.heave, motion.rotation + start * change.rotation
     )
-    d = -start_motion.heave
-    t = start_motion.rotation
-    remainder = 1 - start
-    fraction, side = find_exit(
-        sets, slot, d, t, -remainder * change.heave, remainder * change.rotation
+    _, start_bounds = check_contact_conditions(
+        sets, slot, -start_motion.heave, start_motion.rotation
     )
-    if side >= 0:
-        return min(start + max(fraction, 0.0) * remainder, 1.0), side
-
-    # Without a polygon all nodes are checked, under the wider of the bounds at both ends
-    holds, end_bounds = check_contact_conditions(sets, slot, end_d, end_t)
-    if holds:
-        return 1.0, -1
-    _, start_bounds = check_contact_conditions(sets, slot, d, t)
     bounds = ContactBounds(
         min(end_bounds.min_force, start_bounds.min_force),
         min(end_bounds.min_gap, start_bounds.min_gap),
     )
     fraction = find_first_violation(sets, slot, start_motion, change, bounds)
-    return min(start + max(fraction, 0.0), 1.0), -1
+    return min(start + max(fraction, 0.0), 1.0)
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
@@ -186,7 +137,7 @@ def path_mean(sets, slot, heave, rotation, heave_change, rotation_change, out):
     # The number of sets is limited, because rounding errors may make a path return to the same
     # sets.
     for _ in range(20 * sets.x.size + 100):
-        end, side = find_border(sets, slot, start, motion, change)
+        end = find_border(sets, slot, start, motion, change)
         at_start = compute_energy(
             sets, slot, heave + start * heave_change, rotation + start * rotation_change
         )
@@ -217,7 +168,7 @@ def path_mean(sets, slot, heave, rotation, heave_change, rotation_change, out):
         # The set beyond the border
         beyond = min(start + border_step, 1.0)
         d = -(heave + beyond * heave_change)
-        next_slot = cross_side(sets, slot, side, d, rotation + beyond * rotation_change)
+        next_slot = find_set(sets, slot, d, rotation + beyond * rotation_change)
         if next_slot < 0:
             return next_slot
 

@@ -1,6 +1,6 @@
 """Records of arrays in which the compiled search stores contact sets.
 
-`press_kernels` searches for contact sets and `polygon_kernels` computes where each holds.
+`press_kernels` searches for contact sets, and `press_path_kernels` follows a motion from set to set.
 """
 
 from enum import IntEnum
@@ -8,8 +8,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-# Largest number of sides of a stored polygon; sets with more sides are checked node by node
-MAX_POLYGON_SIDES = 16
 REFERENCE_LOAD = 0  # index into `SetArrays.reference` of the load of the reference state [N]
 # Index into `SetArrays.reference` of the moment of the reference state about x = 0 [N m]
 REFERENCE_MOMENT = 1
@@ -61,7 +59,7 @@ class Tableau(NamedTuple):
     - values (m, m + 3): T, then the columns R of 1, d and t.
     - in_contact (m,): nodes of the set to which it is pivoted.
     - target (m,): nodes of the set that is searched for.
-    - row (m + 3,), forces (3, m) and residuals (3, m): workspaces.
+    - row (m + 3,), forces (m,) and residuals (m,): workspaces.
     """
 
     values: np.ndarray
@@ -93,30 +91,13 @@ class StoredSets(NamedTuple):
     links: np.ndarray
 
 
-class Polygons(NamedTuple):
-    """Polygons of rigid displacements for which the stored contact sets are valid.
-
-    - n_sides (k,): number of sides; 0 without a polygon, and then all nodes have to be checked.
-    - nodes (k, MAX_POLYGON_SIDES): node of each side.
-    - neighbours (k, MAX_POLYGON_SIDES): slot of the set beyond each side, or -1.
-    - limits (k, 2): force [N] and gap [m] below which a node fails.
-    - corners (2, 3, 4 MAX_POLYGON_SIDES): workspace.
-    """
-
-    n_sides: np.ndarray
-    nodes: np.ndarray
-    neighbours: np.ndarray
-    limits: np.ndarray
-    corners: np.ndarray
-
-
 class SetArrays(NamedTuple):
     """Arrays for a preloaded interface, for its stored contact sets and for the search for them.
 
     - compliance (m, m) [m/N]; x (m,) [m].
     - opening (m,): openings of the reference state without forces [m].
     - reference (4,): properties of the reference state, from `REFERENCE_LOAD` to `REFERENCE_OPENING`.
-    - tableau, stored, polygons: see there.
+    - tableau, stored: see there.
     - counters (5,): from `N_STORED` to `N_RESETS`.
     """
 
@@ -126,7 +107,6 @@ class SetArrays(NamedTuple):
     reference: np.ndarray
     tableau: Tableau
     stored: StoredSets
-    polygons: Polygons
     counters: np.ndarray
 
 
@@ -160,8 +140,8 @@ def make_set_arrays(compliance, x, opening, reference, in_contact, n_slots: int)
         in_contact=np.zeros(m, bool),
         target=in_contact.copy(),
         row=np.zeros(m + 3),
-        forces=np.zeros((3, m)),
-        residuals=np.zeros((3, m)),
+        forces=np.zeros(m),
+        residuals=np.zeros(m),
     )
 
     # The heads of the hash chains are a power of 2 above the number of slots, so that a chain has one set on average
@@ -175,13 +155,6 @@ def make_set_arrays(compliance, x, opening, reference, in_contact, n_slots: int)
         links=np.zeros(n_slots, np.int64),
     )
 
-    polygons = Polygons(
-        n_sides=np.zeros(n_slots, np.int64),
-        nodes=np.zeros((n_slots, MAX_POLYGON_SIDES), np.int64),
-        neighbours=np.zeros((n_slots, MAX_POLYGON_SIDES), np.int64),
-        limits=np.zeros((n_slots, 2)),
-        corners=np.zeros((2, 3, 4 * MAX_POLYGON_SIDES)),
-    )
     return SetArrays(
         compliance.copy(),
         x.copy(),
@@ -189,7 +162,6 @@ def make_set_arrays(compliance, x, opening, reference, in_contact, n_slots: int)
         np.array(reference, float),
         tableau,
         stored,
-        polygons,
         np.zeros(5, np.int64),
     )
 

@@ -118,11 +118,11 @@ def _value_scale(after, bonds):
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def _suits_gauss(after, bonds, k, p, form):
+def _suits_gauss(after, bonds, column, p, form):
     """Return whether two Gauss points sum a strip exactly enough."""
     strips = bonds.bondlist
-    start = strips[STRIP.start, k]
-    end = strips[STRIP.end, k]
+    start = strips[STRIP.start, column]
+    end = strips[STRIP.end, column]
     distance = abs(2 * after.displacement - start - end)
     if form == FORM_STRETCH:
         if p == 1.0 or p == 3.0:
@@ -130,7 +130,9 @@ def _suits_gauss(after, bonds, k, p, form):
         reach = KINK_REACH if p == 0.0 or p == 2.0 else SINGULAR_REACH
         return distance > reach * abs(end - start)
     is_steep = p < 2 and p != np.floor(p)
-    is_young = after.path - strips[STRIP.path, k] <= STEEP_REACH * strips[STRIP.covered, k]
+    is_young = (
+        after.path - strips[STRIP.path, column] <= STEEP_REACH * strips[STRIP.covered, column]
+    )
     return distance > KINK_REACH * abs(end - start) and not (is_steep and is_young)
 
 
@@ -215,11 +217,11 @@ def interpolate_value(fraction, value_1, value_2):
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def _integrate_strip(after, scale, bonds, k):
+def _integrate_strip(after, scale, bonds, column):
     """Integrate a strip on each side of u = 0, in pieces of linear density."""
     strips = bonds.bondlist
-    start = strips[STRIP.start, k]
-    end = strips[STRIP.end, k]
+    start = strips[STRIP.start, column]
+    end = strips[STRIP.end, column]
     is_stretch = bonds.law[LAW.form] == FORM_STRETCH
 
     # The power |u|^p is not smooth at u = 0, so a strip that contains it is divided there
@@ -230,8 +232,8 @@ def _integrate_strip(after, scale, bonds, k):
     # The density exp(damage) is close to linear on a piece along which the damage is small
     n_pieces = 1
     if is_stretch:
-        ratio = max(strips[STRIP.value_1, k], MIN_POSITIVE) / max(
-            strips[STRIP.value_2, k], MIN_POSITIVE
+        ratio = max(strips[STRIP.value_1, column], MIN_POSITIVE) / max(
+            strips[STRIP.value_2, column], MIN_POSITIVE
         )
         damage = fast_log(ratio) / (GAUSS_POINT_2 - GAUSS_POINT_1)
         n_pieces = min(max(ceil(abs(damage) / MAX_PIECE_DAMAGE), 1), MAX_STRIP_PIECES)
@@ -247,35 +249,35 @@ def _integrate_strip(after, scale, bonds, k):
             piece_low = low + (high - low) * piece / n_pieces
             piece_high = low + (high - low) * (piece + 1) / n_pieces
             if is_stretch:
-                part = _integrate_stretch_piece(after, bonds, k, piece_low, piece_high)
+                part = _integrate_stretch_piece(after, bonds, column, piece_low, piece_high)
             else:
-                part = _integrate_growing_piece(after, scale, bonds, k, piece_low, piece_high)
+                part = _integrate_growing_piece(after, scale, bonds, column, piece_low, piece_high)
             force += part.force
             energy += part.energy
     return BondSum(force, energy)
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def _integrate_stretch_piece(after, bonds, k, low, high):
+def _integrate_stretch_piece(after, bonds, column, low, high):
     """Integrate c |u|^p sgn u, and this times |u|, between two positions of a strip of weight c."""
     strips = bonds.bondlist
-    value_1 = strips[STRIP.value_1, k]
-    value_2 = strips[STRIP.value_2, k]
+    value_1 = strips[STRIP.value_1, column]
+    value_2 = strips[STRIP.value_2, column]
     width = high - low
     weight_1 = value_1
     weight_2 = value_2
     if width < 1:
         weight_1 = width * interpolate_value(low + GAUSS_POINT_1 * width, value_1, value_2)
         weight_2 = width * interpolate_value(low + GAUSS_POINT_2 * width, value_1, value_2)
-    step = strips[STRIP.end, k] - strips[STRIP.start, k]
-    u_low = after.displacement - strips[STRIP.end, k] + low * step
-    u_high = after.displacement - strips[STRIP.end, k] + high * step
+    step = strips[STRIP.end, column] - strips[STRIP.start, column]
+    u_low = after.displacement - strips[STRIP.end, column] + low * step
+    u_high = after.displacement - strips[STRIP.end, column] + high * step
     p = bonds.law[LAW.order]
     return _average_power(u_low, u_high, weight_1, weight_2, p)
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def _integrate_growing_piece(after, scale, bonds, k, low, high):
+def _integrate_growing_piece(after, scale, bonds, column, low, high):
     """Integrate (R/eps)^p exp(-R/eps) sgn u, and this times |u|, between two positions of a strip on one side of u = 0.
 
     Young bonds that grew along the strip have a length proportional to R, so (R/eps)^p is smooth. Where they grew at
@@ -283,11 +285,11 @@ def _integrate_growing_piece(after, scale, bonds, k, low, high):
     """
     strips = bonds.bondlist
     p = bonds.law[LAW.order]
-    value_1 = strips[STRIP.value_1, k]
-    value_2 = strips[STRIP.value_2, k]
-    covered = strips[STRIP.covered, k]
-    path = max(after.path - strips[STRIP.path, k], 0.0)
-    step = strips[STRIP.end, k] - strips[STRIP.start, k]
+    value_1 = strips[STRIP.value_1, column]
+    value_2 = strips[STRIP.value_2, column]
+    covered = strips[STRIP.covered, column]
+    path = max(after.path - strips[STRIP.path, column], 0.0)
+    step = strips[STRIP.end, column] - strips[STRIP.start, column]
 
     # Bonds that grew along the strip have a last length near 0
     last = _bond_length(0.0, after, scale, value_1, value_2)
@@ -304,7 +306,7 @@ def _integrate_growing_piece(after, scale, bonds, k, low, high):
         fraction = low + (GAUSS_POINT_1 if point == 0 else GAUSS_POINT_2) * width
         length = _bond_length(fraction, after, scale, value_1, value_2)
         distance = max(path + fraction * covered, MIN_POSITIVE)
-        u = after.displacement - strips[STRIP.end, k] + fraction * step
+        u = after.displacement - strips[STRIP.end, column] + fraction * step
         density = fast_exp(-distance / length)
         if is_steep:
             density *= power(1 / length, p)

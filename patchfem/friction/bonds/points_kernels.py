@@ -25,22 +25,27 @@ class PointReading(NamedTuple):
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def point_list(lists, j):
-    """Return the arrays of the list of point j of a `BondLists` as views."""
+def point_list(lists, point):
+    """Return the arrays of the list of a point of a `BondLists` as views."""
     return BondList(
-        lists.bondlist, lists.nows[j], lists.statuses[j], lists.law, lists.table, lists.growth
+        lists.bondlist,
+        lists.nows[point],
+        lists.statuses[point],
+        lists.law,
+        lists.table,
+        lists.growth,
     )
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def read(lists, j, load):
-    """Return force, energy and stretch of point j.
+def read(lists, point, load):
+    """Return force, energy and stretch of a point.
 
     Parameters
     ----------
     lists : BondLists
         Lists of all points, summed in their present state.
-    j : int
+    point : int
         Number of the point.
     load : float
         Present load [N].
@@ -49,8 +54,8 @@ def read(lists, j, load):
     -------
     PointReading
     """
-    force = lists.statuses[j, STATUS.force]
-    energy = lists.statuses[j, STATUS.energy] - lists.statuses[j, STATUS.owed]
+    force = lists.statuses[point, STATUS.force]
+    energy = lists.statuses[point, STATUS.energy] - lists.statuses[point, STATUS.owed]
     stretch = force * lists.law[LAW.length] / load if load > 0 else 0.0
     return PointReading(force, energy, stretch)
 
