@@ -80,14 +80,12 @@ class SetSolution(NamedTuple):
     - scale (n,): Sum of the magnitudes of the terms of each opening [m], to which its rounding error is
       compared.
     - motion (r,): Approach [m] and rotations [rad] q.
-    - stiffness: dN/d(approach) at fixed rotations [N/m]; 0 without free motions.
     """
 
     force: np.ndarray
     opening: np.ndarray
     scale: np.ndarray
     motion: np.ndarray
-    stiffness: float
 
 
 def solve_on_set(
@@ -186,7 +184,6 @@ def solve_on_set(
         opening=opening,
         scale=np.abs(problem.gap) + np.abs(motion) @ np.abs(motions) + np.abs(displacement).max(),
         motion=transform @ motion,
-        stiffness=float(stiffness[0]) if n_motions else 0.0,
     )
 
 

@@ -307,7 +307,7 @@ def _holder_problem(layout: StripLayout, gap, holder: Holder) -> ContactProblem:
 def _press_bare(compliance: StripCompliance, problem: ContactProblem) -> ContactSolution:
     """Solve strips that have no asperity layer, or a linear one that the compliance contains."""
     if not problem.target.size and problem.gap.min() >= 0:
-        return ContactSolution(np.zeros(problem.gap.size), np.zeros(0), 0.0, 0)
+        return ContactSolution(np.zeros(problem.gap.size), np.zeros(0), 0)
     warm_start = compliance.warm_start
     start = None
     if warm_start is not None and warm_start.contact_set is not None:

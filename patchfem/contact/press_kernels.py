@@ -18,8 +18,6 @@ from ..compiled.flags_kernels import FASTMATH_FLAGS, NJIT_NO_REFCOUNT
 from ..compiled.jit import njit
 from .set_arrays import (
     N_BUILT,
-    N_PIVOTS,
-    N_RESETS,
     N_STORED,
     NEXT_SLOT,
     REFERENCE_ENERGY,
@@ -98,7 +96,6 @@ def pivot(sets, k):
         values[k, j] = -row[j]
     values[k, k] = 1 / diagonal
     sets.tableau.in_contact[k] = not sets.tableau.in_contact[k]
-    sets.counters[N_PIVOTS] += 1
     return True
 
 
@@ -114,7 +111,6 @@ def reset_tableau(sets):
         values[i, n_nodes + 1] = -1.0
         values[i, n_nodes + 2] = sets.x[i]
         sets.tableau.in_contact[i] = False
-    sets.counters[N_RESETS] += 1
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)

@@ -18,9 +18,6 @@ REFERENCE_OPENING = 3
 N_STORED = 0  # index into `SetArrays.counters` of the number of stored sets
 NEXT_SLOT = 1  # index into `SetArrays.counters` of the slot of the next set
 N_BUILT = 2  # index into `SetArrays.counters` of the number of sets computed so far
-N_PIVOTS = 3  # index into `SetArrays.counters` of the number of pivots so far
-# Index into `SetArrays.counters` of the number of times that the tableau was recomputed
-N_RESETS = 4
 
 
 class EnergyTerm(IntEnum):
@@ -98,7 +95,7 @@ class SetArrays(NamedTuple):
     - opening (m,): openings of the reference state without forces [m].
     - reference (4,): properties of the reference state, from `REFERENCE_LOAD` to `REFERENCE_OPENING`.
     - tableau, stored: see there.
-    - counters (5,): from `N_STORED` to `N_RESETS`.
+    - counters (3,): from `N_STORED` to `N_BUILT`.
     """
 
     compliance: np.ndarray
@@ -144,7 +141,7 @@ def make_set_arrays(compliance, x, opening, reference, in_contact, n_slots: int)
         residuals=np.zeros(m),
     )
 
-    # The heads of the hash chains are a power of 2 above the number of slots, so that a chain has one set on average
+    # The heads of the hash chains are a power of 2 above the number of slots, so that a chain has at most one set on average
     stored = StoredSets(
         in_contact=np.zeros((n_slots, m), bool),
         unknowns=np.zeros((n_slots, 3, m)),
@@ -162,7 +159,7 @@ def make_set_arrays(compliance, x, opening, reference, in_contact, n_slots: int)
         np.array(reference, float),
         tableau,
         stored,
-        np.zeros(5, np.int64),
+        np.zeros(3, np.int64),
     )
 
 

@@ -40,28 +40,16 @@ MIN_TOTAL_FORCE = 1e-200
 
 
 class ContactSolution(NamedTuple):
-    """Solution of a contact problem: nodal forces, holder motion and stiffness.
+    """Solution of a contact problem: nodal forces and motion of the holder.
 
     - force (n,): Nodal forces [N], > 0 on the contact set and 0 elsewhere.
     - motion (r,): Approach [m] and rotations [rad] q; the rotation about y is -theta.
-    - stiffness: dN/d(approach) at fixed rotations [N/m], 0 under a prescribed approach.
     - n_iterations: Number of contact sets tried.
     """
 
     force: np.ndarray
     motion: np.ndarray
-    stiffness: float
     n_iterations: int
-
-    @property
-    def closing(self) -> float:
-        """Approach [m] in addition to the gap of the problem, or 0 if the approach is prescribed."""
-        return float(self.motion[0]) if self.motion.size else 0.0
-
-    @property
-    def theta(self) -> float:
-        """Rotation [rad] about y in addition to the one that the gap of a patch contains."""
-        return -float(self.motion[1]) if self.motion.size > 1 else 0.0
 
 
 def _solve_by_fallbacks(
@@ -126,7 +114,6 @@ def _solve_on_one_node(compliance, problem: ContactProblem, rest_rotation: float
         opening=height - rotation * arm,
         scale=np.abs(height) + abs(displacement[node]) + np.abs(rotation * arm),
         motion=np.array([approach, rotation]),
-        stiffness=float(load / displacement[node]),
     )
 
 
@@ -187,9 +174,7 @@ def solve(
         if solution is None or not relative_violation(solution) <= RESIDUAL_TOL:
             solution, n_more = _solve_by_fallbacks(compliance, problem, max_iterations)
             n_iterations += n_more
-    return ContactSolution(
-        solution.force, solution.motion + rest_motion, solution.stiffness, n_iterations
-    )
+    return ContactSolution(solution.force, solution.motion + rest_motion, n_iterations)
 
 
 def compute_residuals(

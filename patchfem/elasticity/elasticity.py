@@ -132,7 +132,7 @@ def compute_stiffness(points, cells, element: Element, lam, mu) -> np.ndarray:
     weighted_along = along * weights[..., None]
     weighted_inward = inward * weights[..., None]
 
-    # With B of a node as gradients along x (a) and inward (b): (lam + 2 mu) a a + mu b b and so on, summed over points
+    # Integrals of the products of the gradients of two nodes, by which the stiffness is (lam + 2 mu) xx + mu yy along x
     xx = weighted_along.swapaxes(1, 2) @ along
     yy = weighted_inward.swapaxes(1, 2) @ inward
     xy = weighted_along.swapaxes(1, 2) @ inward

@@ -63,7 +63,6 @@ class JenkinsSet:
     - cholesky_factor (a, a): lower Cholesky factor of the compliance in that order; empty for rigid pieces in series
       with one spring
     - starts (t,): position of the first node of each element, in the order of yielding
-    - n_reluctant: number of nodes whose force has the wrong sign before any node yields
     """
 
     stiffness: np.ndarray
@@ -73,7 +72,6 @@ class JenkinsSet:
     order: np.ndarray
     cholesky_factor: np.ndarray
     starts: np.ndarray
-    n_reluctant: int
 
     @cached_property
     def point_yields(self) -> np.ndarray:
@@ -247,7 +245,7 @@ def jenkins_set(tangential: np.ndarray, limit: np.ndarray, local_length: float =
         c = tangential[np.ix_(points, points)]
         if local_length:
             c = c + np.diag(local_length / force)
-        sequence, yield_displacements, n_reluctant = _find_order(c, force)
+        sequence, yield_displacements = _find_order(c, force)
 
     # Nodes that yield together form one element, whose stiffness is the force rate that all nodes lose by its yield
     starts = np.flatnonzero(
@@ -261,7 +259,6 @@ def jenkins_set(tangential: np.ndarray, limit: np.ndarray, local_length: float =
         sequence.order,
         sequence.cholesky_factor,
         starts,
-        n_reluctant,
     )
 
 
@@ -276,7 +273,6 @@ def _make_single_element(stiffness: float, points, force) -> JenkinsSet:
         no_nodes,
         np.zeros((0, 0)),
         no_nodes,
-        0,
     )
 
 
@@ -311,12 +307,10 @@ class _YieldOrder(NamedTuple):
 
     - sequence: yields in this order
     - displacements (n,): increasing yield displacements [m]
-    - n_reluctant: number of nodes whose force has the wrong sign before any node yields
     """
 
     sequence: _YieldSequence
     displacements: np.ndarray
-    n_reluctant: int
 
 
 def _find_order(c: np.ndarray, force: np.ndarray) -> _YieldOrder:
@@ -340,7 +334,7 @@ def _find_order(c: np.ndarray, force: np.ndarray) -> _YieldOrder:
     else:
         sequence = _yield_sequence(c, force, _eliminate_points(c, force))
     increasing = np.maximum.accumulate(sequence.displacements[::-1])
-    return _YieldOrder(sequence, increasing, int((rate <= 0).sum()))
+    return _YieldOrder(sequence, increasing)
 
 
 def _divide_or_inf(numerator: np.ndarray, denominator: np.ndarray) -> np.ndarray:

@@ -320,8 +320,8 @@ def list_mean_and_slope(increment, bonds, v0, dt):
     """
     mean = list_mean(increment, bonds, v0, dt)
 
-    # The mean is (1/dq) int F dq, so its derivative is (F - mean)/dq. At rest the force differs between both
-    # directions; the slope there is half the change of the force over an increment to either side.
+    # The mean is (1/dq) int F dq, so its derivative is (F - mean)/dq. Near 0 it is F'/2, here from the forces at a tiny
+    # increment to either side, because the slopes of both directions differ.
     small = SLOPE_INCREMENT_RATIO * bonds.law[LAW.length]
     if abs(increment) > small:
         return MeanForce(mean, (total(STRIP.force, 0, bonds) - mean) / increment)
@@ -360,7 +360,8 @@ def list_mean(increment, bonds, v0, dt):
     strips = bonds.bondlist
     first = int(bonds.status[STATUS.room_start])
 
-    # The energy balance per increment: loss, the energy mean times dR/eps, and the gain in stored energy
+    # Energy balance divided by the increment: damage dissipates the fraction dR/eps of the mean energy, and the stored
+    # energy rises from its present value to that at the end
     is_stretch = bonds.law[LAW.form] == FORM_STRETCH
     has_balance = is_stretch and _needs_energy_balance(increment, bonds)
     row = STRIP.energy if has_balance else STRIP.force
