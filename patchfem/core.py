@@ -406,6 +406,7 @@ def compute_allowed_error(tolerance, value, floor):
     Returns
     -------
     float or array
+        Error in the unit of the value.
     """
     return tolerance * abs(value) + floor
 

@@ -99,7 +99,8 @@ def transfer_matrix(x, piece_x) -> np.ndarray:
 
     Returns
     -------
-    (m, n) ndarray [1]
+    (m, n) ndarray
+        T [1], whose rows sum to 1.
     """
     cuts = np.union1d(x, piece_x)
     left = cuts[:-1]

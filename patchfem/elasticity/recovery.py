@@ -259,7 +259,9 @@ class StressError:
         Returns
         -------
         by_cell : (frames, t) ndarray
+            Errors of the cells [1].
         in_piece : (frames,) ndarray
+            Errors of the piece [1].
         """
         total = self.error.sum(axis=1)
         norm = np.zeros(total.size)

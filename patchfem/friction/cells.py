@@ -28,6 +28,7 @@ def join_cells(
     Returns
     -------
     stiffness, yield_displacement : ndarray
+        Of the joined elements [N/m], [m], in increasing order of the yield displacement.
     """
     n_last = stiffness.size % 2
     begins = np.r_[0, np.arange(first, stiffness.size - n_last, count)]

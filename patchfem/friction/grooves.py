@@ -129,6 +129,7 @@ class Grooves:
         Returns
         -------
         float or array
+            Ratio [1].
         """
         slope = self.slope(q)
         phi = np.asarray(direction) * friction
@@ -168,6 +169,7 @@ class Grooves:
         Returns
         -------
         float or array
+            Energy per vertical force [J/N].
         """
         q0 = np.asarray(q0, float)
         q1 = np.asarray(q1, float)

@@ -52,7 +52,8 @@ class End:
 
         Returns
         -------
-        (k,) ndarray [m]
+        (k,) ndarray
+            Depth [m], 0 on the flat face.
         """
         end_distance = np.maximum(np.abs(np.asarray(x, float)) - (length / 2 - self.size), 0.0)
         if self.kind == "chamfer":

@@ -226,7 +226,8 @@ def graded_rows(
 
     Returns
     -------
-    (ny,) ndarray [m]
+    (ny,) ndarray
+        Heights [m], the smallest first.
     """
     start = min(start, total / min_rows)
     n_rows = max(min_rows, ceil(log(1 + total * (growth - 1) / start) / log(growth) - 1e-9))

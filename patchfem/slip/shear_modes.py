@@ -631,6 +631,7 @@ def gauss_rule(x: np.ndarray, weight: np.ndarray, count: int) -> tuple[np.ndarra
     Returns
     -------
     positions, weights : (count,) ndarray
+        In the units of `x` and `weight`.
     """
     scaled = 2 * (x - x.mean()) / np.ptp(x)
     total = weight.sum()

@@ -154,6 +154,7 @@ def enlarge_lists(bondlist, statuses, capacity: int) -> np.ndarray:
     Returns
     -------
     (r, m capacity) array
+        Strips of all lists, each from its new first column on.
     """
     enlarged = np.zeros((len(bondlist), capacity * len(statuses)))
     for j, status in enumerate(statuses):

@@ -108,5 +108,6 @@ def surface_temperature_rise(
     Returns
     -------
     float
+        Temperature rise [K].
     """
     return 2 * flux * sqrt(time / (pi * conductivity * heat_capacity))
