@@ -759,8 +759,9 @@ def wedge_on_linear_foundation(rotation, load, length, width, stiffness) -> Wedg
     """
     tilt = abs(rotation)
     closed_side = -np.sign(rotation)
+    opening_tilt = wedge_opening_tilt(load, length, width, stiffness)
     mean = load / (length * width)
-    if tilt <= wedge_opening_tilt(load, length, width, stiffness):
+    if tilt <= opening_tilt:
         difference = stiffness * tilt * length / 2
         centre = closed_side * difference * length / (6 * mean)
         return WedgeContact(1.0, centre, max(mean - difference, 0.0), mean + difference)
