@@ -167,6 +167,13 @@ class ContactState:
     residuals: MappingProxyType
 
 
+class StuckMode(NamedTuple):
+    """Natural mode with stuck interfaces: circular frequency [rad/s], and shape (n,) that is 1 at one coordinate."""
+
+    omega: float | None
+    shape: np.ndarray
+
+
 @dataclass(frozen=True, eq=False, slots=True)
 class ModalBasis:
     """Modal coordinates of a rig (natural modes or masses) with a common modal mass.
@@ -194,7 +201,7 @@ class ModalBasis:
       whose acceleration is measured.
     """
 
-    names: tuple
+    names: tuple[str, ...]
     omega: np.ndarray
     zeta: np.ndarray
     slide: np.ndarray
@@ -219,7 +226,7 @@ class ModalBasis:
         """Damping matrix D (n, n) [1/s]."""
         return np.diag(2 * self.zeta * self.omega) if self.damping is None else self.damping
 
-    def compute_stuck_mode(self, rows, stiffness, number: int) -> tuple:
+    def compute_stuck_mode(self, rows, stiffness, number: int) -> StuckMode:
         """Return the natural mode with stuck interfaces that corresponds to a modal coordinate.
 
         Stuck interfaces act as springs. The modes with springs are assigned to the coordinates one to one by the overlap
@@ -236,19 +243,18 @@ class ModalBasis:
 
         Returns
         -------
-        omega : float or None
-            Circular frequency [rad/s]; None if a stiffness is infinite.
-        shape : (n,) array
-            Mode shape, normalised to 1 at the coordinate.
+        StuckMode
+            Its circular frequency is None if a stiffness is infinite.
         """
         if not np.isfinite(stiffness).all():
-            return None, np.eye(self.omega.size)[number]
+            return StuckMode(None, np.eye(self.omega.size)[number])
         values, vectors = np.linalg.eigh(
             np.diag(self.omega**2) + rows.T * stiffness @ rows / self.mass
         )
         lower = (1 - _STIFFENING_ROUND_OFF) * self.omega**2
         k = _assign_modes(lower, values, np.abs(vectors))[number]
-        return float(np.sqrt(max(values[k], 0.0))), vectors[:, k] / vectors[number, k]
+        omega = float(np.sqrt(max(values[k], 0.0)))
+        return StuckMode(omega, vectors[:, k] / vectors[number, k])
 
 
 def _assign_modes(lower, values, overlap) -> np.ndarray:
@@ -322,7 +328,7 @@ class SineDrive:
         return 2 * np.pi / self.omega
 
     @property
-    def segments(self) -> tuple:
+    def segments(self) -> tuple[DriveSegment, ...]:
         """Closed form of the drive as a tuple of DriveSegment."""
         return (DriveSegment(0.0, 0.0, self.acceleration, self.omega),)
 
@@ -338,7 +344,7 @@ class ErrorCauses(NamedTuple):
     - order: observed order of convergence with the time step; None if it is unknown.
     """
 
-    parts: dict
+    parts: dict[str, float]
     order: float | None = None
 
 
@@ -393,12 +399,14 @@ def compute_allowed_error(tolerance, value, floor):
     tolerance : float or array
         Relative tolerance.
     value : float or array
+        Value of the measure [SI].
     floor : float or array
         Absolute floor, in the unit of the value.
 
     Returns
     -------
     float or array
+        Error in the unit of the value.
     """
     return tolerance * abs(value) + floor
 
@@ -475,7 +483,7 @@ class Response:
     base_acceleration: np.ndarray
     force: np.ndarray
     slip: np.ndarray
-    extra: dict = field(default_factory=dict)
+    extra: dict[str, np.ndarray] = field(default_factory=dict)
 
     def select(self, samples) -> "Response":
         """Return the response at selected samples.
@@ -524,6 +532,6 @@ class IntegratedMeasures:
       largest relative displacement of each cycle.
     """
 
-    values: dict = field(default_factory=dict)
-    loops: tuple = ()
-    reversals: tuple = ()
+    values: dict[str, float | None] = field(default_factory=dict)
+    loops: tuple[InterfaceLoop, ...] = ()
+    reversals: tuple[tuple[tuple[float, float], ...], ...] = ()

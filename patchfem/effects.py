@@ -57,7 +57,7 @@ class Effect(NamedTuple):
 
     module: str
     equations: str
-    keys: tuple = ("", "")
+    keys: tuple[str, str] = ("", "")
     supports: str = ""
     traits: str = ""
     phrase: str = ""
@@ -77,7 +77,7 @@ class Waveform(NamedTuple):
     """
 
     name: str = ""
-    keys: tuple = ("", "")
+    keys: tuple[str, str] = ("", "")
     traits: str = ""
     phrase: str = ""
 
@@ -90,7 +90,7 @@ class Waveform(NamedTuple):
         return trait in self.traits.split()
 
     @property
-    def required_keys(self) -> list:
+    def required_keys(self) -> list[str]:
         """Keys of the table [drive] that the waveform requires."""
         return self.keys[0].split()
 
@@ -139,14 +139,16 @@ GROOVE_EQUATION = (
 _DRIVE_SIZE_KEYS = "acceleration|displacement force"
 
 
-def _make_law(module: str, equations: str, keys: tuple, supports: str, traits: str = "") -> Effect:
+def _make_law(
+    module: str, equations: str, keys: tuple[str, str], supports: str, traits: str = ""
+) -> Effect:
     """Return the effect of a friction law, whose module is in patchfem.friction."""
     return Effect(f"patchfem.friction.{module}", equations, keys, supports, traits)
 
 
 def _make_waveform(
     equations: str,
-    keys: tuple,
+    keys: tuple[str, str],
     traits: str = "",
     phrase: str = "",
     module: str = "patchfem.structure.drives",
@@ -388,7 +390,7 @@ def import_effect(name: str):
     return import_module(EFFECTS[name].module)
 
 
-def list_absent_effects(names) -> list:
+def list_absent_effects(names) -> list[str]:
     """Return all effects except those in `names`, in the order of EFFECTS.
 
     Raises
@@ -405,7 +407,7 @@ def list_absent_effects(names) -> list:
     return [name for name in EFFECTS if name not in present]
 
 
-def list_displayed_absent_effects(names, engine: str | None) -> list:
+def list_displayed_absent_effects(names, engine: str | None) -> list[str]:
     """Return the absent effects without the method that the program selected automatically."""
     return [name for name in names if name != f"accuracy.method={engine}"]
 

@@ -10,6 +10,7 @@ import re
 from itertools import pairwise
 from math import isfinite, log10
 
+DisplayUnit = tuple[str, float]  # name of a unit, and number of these in one SI unit
 MAX_SIGNIFICANT_DIGITS = 7  # largest number of significant digits of a value
 DIGITS_WITHOUT_ERROR = 6  # number of significant digits of a value without a known error
 MIN_PLAIN_POWER = -4  # smallest power of ten of a number without an exponent
@@ -40,7 +41,7 @@ _POWER_PATTERN = re.compile(
 )
 
 
-def choose_unit(ladder: tuple, size: float) -> tuple:
+def choose_unit(ladder: tuple[DisplayUnit, ...], size: float) -> DisplayUnit:
     """Choose the unit in which a number has few digits before and after the decimal point.
 
     Parameters
@@ -52,9 +53,8 @@ def choose_unit(ladder: tuple, size: float) -> tuple:
 
     Returns
     -------
-    tuple
-        Name and scale of the smallest unit in which the number is less than 1000, or less than 0.001 in the next larger
-        unit.
+    DisplayUnit
+        The smallest unit in which the number is less than 1000, or less than 0.001 in the next larger unit.
     """
     for (name, scale), (_, next_scale) in pairwise(ladder):
         if abs(size) * scale < 1000 or abs(size) * next_scale < 1e-3:
@@ -62,7 +62,7 @@ def choose_unit(ladder: tuple, size: float) -> tuple:
     return ladder[-1]
 
 
-def choose_axis_unit(values, unit: str) -> tuple:
+def choose_axis_unit(values, unit: str) -> DisplayUnit:
     """Return the unit (name, scale) of an axis with given values [SI].
 
     `unit` is the SI unit of the values, a key of UNIT_LADDERS.
@@ -85,7 +85,9 @@ def needs_log_scale(values) -> bool:
     return bool(positive.size and positive.max() > 1e3 * positive.min() and not np.any(values < 0))
 
 
-def round_to_error(value: float | None, error: float | None = None, floor: float = 0.0) -> tuple:
+def round_to_error(
+    value: float | None, error: float | None = None, floor: float = 0.0
+) -> tuple[str, str]:
     """Format a value and its error so that both end at the second digit of the error.
 
     Parameters
@@ -112,6 +114,8 @@ def round_to_error(value: float | None, error: float | None = None, floor: float
         return format_number(value, DIGITS_WITHOUT_ERROR), "" if error is None else f"{error:g}"
     if value == 0:
         return "0", format_number(error, 2) if error else ""
+
+    # The last displayed digit is the second significant one of the error, unless the value would have too many digits
     value_power = math.floor(log10(abs(value)))
     last_power = _find_second_digit_power(error)
     if last_power < value_power - MAX_SIGNIFICANT_DIGITS + 1:  # all displayed digits are exact
@@ -122,6 +126,8 @@ def round_to_error(value: float | None, error: float | None = None, floor: float
         return format_number(round(value, -first_exact_power), MAX_SIGNIFICANT_DIGITS), ""
     if _is_written_without_exponent(value_power) or _is_written_without_exponent(last_power + 1):
         return _format_to_digit(value, error, last_power)
+
+    # One power of ten for both
     power = max(value_power, last_power + 1)
     mantissas = _format_to_digit(value / 10.0**power, error / 10.0**power, last_power - power)
     return tuple(f"{text}e{power}" for text in mantissas)
@@ -140,7 +146,7 @@ def format_number(value: float, digits: int) -> str:
     return text.rstrip("0").rstrip(".") if "." in text else text
 
 
-def choose_display_unit(value: float, unit: str, error: float | None = None) -> tuple:
+def choose_display_unit(value: float, unit: str, error: float | None = None) -> DisplayUnit:
     """Return the unit (name, scale) for the display of a value [SI] with its error.
 
     The name is "" for a value without a unit.
@@ -160,8 +166,12 @@ def format_value(
 
     Parameters
     ----------
-    value, error, floor : float or None
-        As in `round_to_error` [SI].
+    value : float or None
+        Value [SI]; None is formatted as a dash.
+    error : float or None
+        Numerical error (half-width) [SI]; None if it is unknown.
+    floor : float
+        Absolute floor of the measure [SI]; a smaller value is displayed as 0.
     unit : str
         SI unit; "1" for none.
 
@@ -248,7 +258,7 @@ def _find_second_digit_power(error: float) -> int:
     return int(f"{error:.1e}".split("e")[1]) - 1 if error else ZERO_ERROR_POWER
 
 
-def _format_to_digit(value: float, error: float, last_power: int) -> tuple:
+def _format_to_digit(value: float, error: float, last_power: int) -> tuple[str, str]:
     """Format a value and its error to a common last digit.
 
     `last_power` is the power of ten of the last digit. A value that is rounded to 0 has no sign.

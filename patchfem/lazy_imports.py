@@ -35,7 +35,7 @@ class LazyModule(ModuleType):
         delattr(import_module(self.__name__), name)
 
 
-def make_getattr(folder: str, path: list):
+def make_getattr(folder: str, path: list[str]):
     """Return a module-level `__getattr__` for a folder, which makes the imports of its modules lazy.
 
     Parameters

@@ -158,7 +158,7 @@ def _check_offset(offset, half) -> None:
         )
 
 
-def punch_contact(half, offset=0.0) -> tuple:
+def punch_contact(half, offset=0.0) -> tuple[float, float]:
     """Return the contact of a flat rigid punch under a load beside its middle.
 
     The whole punch touches while |e| <= b/2. Beyond it a length 4 (b - |e|) touches, up to the loaded corner.
@@ -374,7 +374,7 @@ def rounded_punch_pressure(x, line_load, flat, radius, modulus):
     return np.where(np.abs(x) < half, p, 0.0)[()]
 
 
-def rounded_corner_contact(intensity, radius, modulus) -> tuple:
+def rounded_corner_contact(intensity, radius, modulus) -> tuple[float, float]:
     """Return the extent and the peak of the contact on a small rounded edge.
 
     Away from the edge the pressure is K/sqrt(r), with r from the end of the flat part. This is the limit of
@@ -759,8 +759,9 @@ def wedge_on_linear_foundation(rotation, load, length, width, stiffness) -> Wedg
     """
     tilt = abs(rotation)
     closed_side = -np.sign(rotation)
+    opening_tilt = wedge_opening_tilt(load, length, width, stiffness)
     mean = load / (length * width)
-    if tilt <= wedge_opening_tilt(load, length, width, stiffness):
+    if tilt <= opening_tilt:
         difference = stiffness * tilt * length / 2
         centre = closed_side * difference * length / (6 * mean)
         return WedgeContact(1.0, centre, max(mean - difference, 0.0), mean + difference)
@@ -769,7 +770,7 @@ def wedge_on_linear_foundation(rotation, load, length, width, stiffness) -> Wedg
     return WedgeContact(fraction, centre, 0.0, 2 * mean / fraction)
 
 
-def wedge_on_asperities(rotation, length, decay) -> tuple:
+def wedge_on_asperities(rotation, length, decay) -> tuple[np.ndarray, np.ndarray]:
     """Return the contact of a tilted rigid pad on a layer of asperities, p ~ exp(-gap/u_0).
 
     With B = |theta| L/u_0 the ratio is (1 - e^-B)/B, and the centre lies L (1/2 - 1/B + 1/(e^B - 1)) towards the closed
@@ -848,10 +849,14 @@ def wedge_loop_area(amplitude, friction, tangential_stiffness, area, min_pressur
             "'min_pressure' must lie between 0 and 'max_pressure', got "
             f"{min_pressure} and {max_pressure}"
         )
+
+    # Displacements u_1 and u_2 at which the first and the last strip slip
     amplitude = np.asarray(amplitude, float)
     low = friction * min_pressure / tangential_stiffness
     high = friction * max_pressure / tangential_stiffness
     slip = np.clip(amplitude, low, high)
+
+    # Fraction of the strips that slip, and the mean of u (U - u) over them
     if high > low:
         fraction = (slip - low) / (high - low)
     else:

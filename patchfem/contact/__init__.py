@@ -10,8 +10,8 @@ asperities (`asperity_laws`, `asperity_layer`): `unilateral` solves by the metho
 of `conjugate_gradients`, and checks the solution; `strip_compliance` holds C. `edges` and `stiffness` derive quantities
 of a contact set. Read `gaps`, `press`, `unilateral` and `active_set` first.
 
-`contact_sets` and the kernels solve again and again while the holder moves (`press_kernels`, `polygon_kernels`,
-`press_path_kernels`), and `half_space` serves rows of thousands of points.
+`contact_sets` and the kernels solve again and again while the holder moves (`press_kernels`, `press_path_kernels`), and
+`half_space` serves rows of thousands of points.
 """
 
 # Names that other folders use, by module
@@ -70,8 +70,5 @@ PUBLIC = {
         "StripCompliance",
         "WarmStart",
     ),
-    "unilateral": (
-        "INDEFINITE_MESSAGE",
-        "RESIDUAL_TOL",
-    ),
+    "unilateral": ("INDEFINITE_MESSAGE",),
 }

@@ -80,14 +80,12 @@ class SetSolution(NamedTuple):
     - scale (n,): Sum of the magnitudes of the terms of each opening [m], to which its rounding error is
       compared.
     - motion (r,): Approach [m] and rotations [rad] q.
-    - stiffness: dN/d(approach) at fixed rotations [N/m]; 0 without free motions.
     """
 
     force: np.ndarray
     opening: np.ndarray
     scale: np.ndarray
     motion: np.ndarray
-    stiffness: float
 
 
 def solve_on_set(
@@ -101,7 +99,9 @@ def solve_on_set(
     Parameters
     ----------
     compliance : StripCompliance
+        C, positive definite on the active nodes.
     problem : ContactProblem
+        Gap [m], motions and loads of the n nodes.
     active : (n,) bool ndarray
         Nodes with opening 0; the others carry no force.
     n_refinements : int
@@ -120,6 +120,7 @@ def solve_on_set(
     nodes = slice(index.size)
     n_motions = problem.target.size
     gap = problem.gap[index]
+
     # The smallest gap is subtracted first, because the approach may be far smaller than the gaps.
     offset = gap.min() if n_motions else 0.0
     # There is one right-hand side for the gap and one for each motion. The first columns are the gap
@@ -132,10 +133,13 @@ def solve_on_set(
     rows[:, index.size :] = np.eye(n_motions)
     rows[1:] -= (rows[1:, :1] + rows[1:, index.size - 1 : index.size]) / 2 * rows[:1]
     solve_block = compliance.solver(active)
+
     # The solution holds the forces that these motions cause in the nodes, then in the springs.
     solution = right_sides.copy()
     solution[:, nodes] = solve_block(right_sides[:, nodes].T).T
     solution[:, index.size :] *= problem.springs
+
+    # Modified Gram-Schmidt: each motion is freed of the part that the motions before it cause, in the norm of C^-1
     forces = solution[1:]
     stiffness = np.empty(n_motions)
     for k in range(n_motions):
@@ -150,7 +154,7 @@ def solve_on_set(
     motions = transform.T @ problem.motions.T
     target = transform.T @ problem.target
 
-    def close_gap(gap_force: np.ndarray, loads: np.ndarray) -> tuple:
+    def close_gap(gap_force: np.ndarray, loads: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the nodal forces (k,) [N] and orthogonalized motions (r,) that close a gap.
 
         gap_force: (k,) forces [N] that close the gap without any motion; loads: (r,) of these motions.
@@ -158,6 +162,7 @@ def solve_on_set(
         motion = (loads + rows[:, nodes] @ gap_force) / stiffness
         return motion @ forces[:, nodes] - gap_force, motion
 
+    # Iterative refinement: the openings that a solution leaves in the contact are closed by a further solution
     nodal_force, motion = close_gap(solution[0, nodes], target)
     motion[:1] += offset
     force = np.zeros(problem.gap.size)
@@ -173,12 +178,12 @@ def solve_on_set(
             )
             nodal_force = nodal_force + force_change
             motion = motion + motion_change
+
     return SetSolution(
         force=force,
         opening=opening,
         scale=np.abs(problem.gap) + np.abs(motion) @ np.abs(motions) + np.abs(displacement).max(),
         motion=transform @ motion,
-        stiffness=float(stiffness[0]) if n_motions else 0.0,
     )
 
 
@@ -188,10 +193,13 @@ def refine_solution(compliance, problem, solution: SetSolution, active) -> SetSo
     Parameters
     ----------
     compliance : StripCompliance
+        Compliance with which it was found.
     problem : ContactProblem
+        Problem that it solves.
     solution : SetSolution
         Solution on the set `active`; it is returned unless its openings show rounding errors.
     active : (n,) bool ndarray
+        Nodes in contact.
     """
     # The solution is refined only if an opening exceeds a tenth of the overlap at which a node
     # enters the set.
@@ -238,7 +246,7 @@ def complete_set(problem: ContactProblem, active: np.ndarray) -> np.ndarray:
 
 def solve_primal_dual(
     compliance, problem: ContactProblem, active: np.ndarray, max_iterations: int = 100
-) -> tuple:
+) -> tuple[SetSolution | None, int]:
     """Solve by the primal-dual active-set method (Hintermüller, Ito, Kunisch 2003).
 
     Nodes of tensile force leave the set and nodes that overlap enter it, all at once, until the set repeats itself. The
@@ -247,7 +255,9 @@ def solve_primal_dual(
     Parameters
     ----------
     compliance : StripCompliance
+        C, positive definite.
     problem : ContactProblem
+        Gap [m], motions and loads of the n nodes.
     active : (n,) bool ndarray
         Set to start from.
     max_iterations : int
@@ -281,7 +291,7 @@ def solve_primal_dual(
 
 def solve_primal(
     compliance, problem: ContactProblem, force: np.ndarray, max_iterations: int | None = None
-) -> tuple:
+) -> tuple[SetSolution, int]:
     """Solve by the primal active-set method, which terminates after finitely many steps.
 
     Each step moves the forces towards the minimum of the energy on the active set. If a force becomes zero on the way
@@ -299,7 +309,9 @@ def solve_primal(
     Parameters
     ----------
     compliance : StripCompliance
+        C, positive definite.
     problem : ContactProblem
+        Gap [m], motions and loads of the n nodes.
     force : (n,) ndarray
         Forces [N] >= 0 whose resultants are the prescribed load and moments.
     max_iterations : int, optional
@@ -322,6 +334,8 @@ def solve_primal(
         if problem.free_rotations or not active.any():
             active = complete_set(problem, active)
         solution = solve_on_set(compliance, problem, active)
+
+        # Ratio test: the step towards the minimum ends where the first force becomes zero
         is_tensile = active & (solution.force < 0)
         if is_tensile.any():
             decrease = np.where(is_tensile, force - solution.force, 1.0)
@@ -331,6 +345,8 @@ def solve_primal(
             force[leaving] = 0.0
             active[leaving] = False
             continue
+
+        # The minimum on the set is reached; the node of the largest overlap enters, if there is any
         force = solution.force
         overlap = np.where(active, np.inf, solution.opening / solution.scale)
         entering = int(np.argmin(overlap))
@@ -359,9 +375,12 @@ def find_rest_rotation(x, gap, load: float, moment: float, spring: float) -> flo
     left = 0
     right = x.size - 1
     while left < right:
+        # Rotation at which the piece would rest on both nodes
         theta = -(gap[right] - gap[left]) / (x[right] - x[left])
         height = gap + theta * x
         lowest = int(np.argmin(height))
+
+        # A node between them touches first. The side of it that the load line is on keeps the support.
         if left < lowest < right and height[lowest] < min(height[left], height[right]):
             imbalance = load * x[lowest] - moment - spring * theta
             if imbalance == 0:
@@ -370,12 +389,15 @@ def find_rest_rotation(x, gap, load: float, moment: float, spring: float) -> flo
                 right = lowest
             else:
                 left = lowest
+        # Both nodes touch. Against a spring the moment may lift the piece off one of them.
         elif spring > 0 and load * x[left] - moment - spring * theta > 0:
             right = left
         elif spring > 0 and load * x[right] - moment - spring * theta < 0:
             left = right
         else:
             return float(theta)
+
+    # The piece rests on one node, and the spring balances the moment
     return float((load * x[left] - moment) / spring)
 
 

@@ -21,7 +21,7 @@ from .strip_compliance import StripCompliance
 from .unilateral import compute_balances, solve
 
 # Largest number of Newton steps; thin layers on rough gaps need up to 40
-MAX_NEWTON_STEPS = 60
+MAX_LAYER_STEPS = 60
 DIVERGED_MESSAGE = (
     "contact.asperities: the iteration of the rough layer did not converge; raise the decay length or the height "
     'deviation, or set law = "linear"'
@@ -33,11 +33,11 @@ MAX_LOG_FORCE = 600.0
 # Smallest slope, relative to the largest slope, for which a Newton step changes the force
 MIN_RELATIVE_SLOPE = 1e-18
 # Relative imbalance and relative change of pressure at which Newton's method has converged
-NEWTON_TOL = 1e-12
+LAYER_TOL = 1e-12
 # Largest pressure that an unloaded node may reach in one step, relative to the mean pressure
 MAX_PRESSURE_RISE = 0.01
-# Smallest total force [N] in a divisor; it keeps quotients of an unloaded interface finite
-MIN_TOTAL_FORCE = 1e-150
+# Smallest depth [m] in a divisor; it keeps the residual of a flat gap finite
+MIN_GAP_DEPTH = 1e-150
 
 
 class AsperityProblem(NamedTuple):
@@ -70,7 +70,13 @@ class AsperityProblem(NamedTuple):
 
 
 class AsperitySolution(NamedTuple):
-    """Forces, separations and motion of a contact through asperities, and the iteration count."""
+    """Solution of a contact through asperities.
+
+    - force (n,): Nodal forces [N].
+    - separation (n,): Separations [m] of the mean planes.
+    - motion (r,): Approach [m] and rotations [rad] of the holder.
+    - n_iterations: Number of Newton steps.
+    """
 
     force: np.ndarray
     separation: np.ndarray
@@ -92,24 +98,34 @@ class _StripResponse(NamedTuple):
     to_values: np.ndarray
 
 
-def solve_tangent(compliance, motions, slope, values) -> tuple:
+class _TangentSolution(NamedTuple):
+    """Linearized equations of all strips: responses of the strips, and (r, r) derivative of the resultants by the motion."""
+
+    responses: list[_StripResponse]
+    tangent: np.ndarray
+
+
+class _NewtonStep(NamedTuple):
+    """Changes of forces (n,) [N], motion (r,) and separations (n,) [m] in a Newton step."""
+
+    force: np.ndarray
+    motion: np.ndarray
+    separation: np.ndarray
+
+
+def solve_tangent(compliance, motions, slope, values) -> _TangentSolution:
     """Factorize the linearized equations of every strip with its asperity layer.
 
     Parameters
     ----------
     compliance : StripCompliance
+        Compliance C of the pieces.
     motions : (n, r) ndarray
         Closing of the nodes per motion.
     slope : (n,) ndarray
         Stiffness D of the asperity layer at each node [N/m].
     values : (n,) ndarray
-        One more right-hand side.
-
-    Returns
-    -------
-    responses : list of _StripResponse
-    tangent : (r, r) ndarray
-        Derivative of the resultants by the motion.
+        One more right-hand side [m].
     """
     n_nodes = len(compliance.common)
     n_motions = motions.shape[1]
@@ -120,6 +136,8 @@ def solve_tangent(compliance, motions, slope, values) -> tuple:
         in_strip = np.flatnonzero(strip_slope > negligible)
         if not in_strip.size:
             continue
+
+        # I + D^1/2 C D^1/2 of the nodes that the layer loads; it is well conditioned at every slope D
         nodes = strip * n_nodes + in_strip
         root = np.sqrt(slope[nodes])
         matrix = root[:, None] * compliance.block(strip, in_strip) * root
@@ -128,10 +146,10 @@ def solve_tangent(compliance, motions, slope, values) -> tuple:
         response = cho_solve(cho_factor(matrix, lower=True, overwrite_a=True), right_sides)
         responses.append(_StripResponse(nodes, root, response[:, :-1], response[:, -1]))
         tangent += right_sides[:, :-1].T @ response[:, :-1]
-    return responses, tangent
+    return _TangentSolution(responses, tangent)
 
 
-def _newton_step(problem: AsperityProblem, slope, mismatch, imbalance) -> tuple:
+def _newton_step(problem: AsperityProblem, slope, mismatch, imbalance) -> _NewtonStep:
     """Return the Newton step of the contact equations: forces, motion and separations.
 
     slope: (n,) stiffness of the asperity layer [N/m]; mismatch: (n,) separation of the geometry less that of the law
@@ -148,14 +166,15 @@ def _newton_step(problem: AsperityProblem, slope, mismatch, imbalance) -> tuple:
     for nodes, root, to_motions, to_values in responses:
         force[nodes] = root * (to_motions @ motion - to_values)
     displacement = problem.compliance.product(force)
-    return force, motion, mismatch - contact.motions @ motion + displacement
+    return _NewtonStep(force, motion, mismatch - contact.motions @ motion + displacement)
 
 
 def _solve_newton(problem: AsperityProblem, separation, motion) -> AsperitySolution | None:
     """Solve by Newton's method from initial values, or return None if it does not converge."""
     contact = problem.contact
     asperities = problem.asperities
-    for iteration in range(1, MAX_NEWTON_STEPS + 1):
+    for iteration in range(1, MAX_LAYER_STEPS + 1):
+        # Forces of the law at the separations, and what they leave of the two equations
         log_pressure, decay = asperities.log_pressure(separation)
         log_force = log_pressure + np.log(problem.area)
         force = np.exp(np.minimum(log_force, MAX_LOG_FORCE))
@@ -169,13 +188,17 @@ def _solve_newton(problem: AsperityProblem, separation, motion) -> AsperitySolut
             except (np.linalg.LinAlgError, ValueError):
                 return None
         motion = motion + motion_change
+
+        # Largest relative change of a pressure; of nodes that carry nothing only the part that matters counts
         log_change = -change * decay
         new_log_force = np.maximum(log_force, log_force + log_change)
         fraction = np.exp(np.minimum(0.0, new_log_force - log_force.max()))
+
+        # Convergence, or round-off of the separations over the depth of the gap
         depth = np.ptp(contact.gap) + np.abs(problem.compliance.product(force)).max()
         depth += 2 * np.abs(motion[1:]).sum()
         # Round-off of a separation changes the pressure of the loaded nodes by this fraction.
-        noise = NEWTON_TOL + 1e-15 * depth * decay[force > 1e-6 * force.max()].max()
+        noise = LAYER_TOL + 1e-15 * depth * decay[force > 1e-6 * force.max()].max()
         relative_imbalance = np.abs(imbalance).max() / contact.target[0] if imbalance.size else 0.0
         if max(relative_imbalance, np.max(fraction * np.abs(log_change))) <= noise:
             # The force of a nearly unloaded node is computed from the pressure law of the asperity
@@ -185,6 +208,8 @@ def _solve_newton(problem: AsperityProblem, separation, motion) -> AsperitySolut
             new_force = np.maximum(force + force_change, 0.0)
             new_force = np.where(fraction < 1e-15, law_force, new_force)
             return AsperitySolution(new_force, separation + change, motion, iteration)
+
+        # Rising nodes move along log P, falling ones along s; an unloaded node may rise to a small pressure at once
         along_log = -np.log1p(np.maximum(log_change, 0.0)) / decay
         limited_change = np.where(log_change > 0, along_log, change)
         load = contact.target[0] if imbalance.size else force.sum()
@@ -236,7 +261,9 @@ def solve_at_motion(problem: AsperityProblem, motion: np.ndarray) -> AsperitySol
     Parameters
     ----------
     problem : AsperityProblem
+        Strips under one holder.
     motion : (r,) ndarray
+        Approach [m] and rotations [rad] of the holder, as far as the problem has them.
 
     Returns
     -------
@@ -268,7 +295,7 @@ def solve_at_motion(problem: AsperityProblem, motion: np.ndarray) -> AsperitySol
     )
 
 
-def _linearised_start(problem: AsperityProblem) -> tuple:
+def _linearised_start(problem: AsperityProblem) -> tuple[np.ndarray, np.ndarray]:
     """Return initial separations and motion from a law that is linearized at the mean pressure."""
     contact = problem.contact
     mean_pressure = problem.mean_pressure
@@ -298,6 +325,7 @@ def solve_asperity_layer(problem: AsperityProblem) -> AsperitySolution:
     Parameters
     ----------
     problem : AsperityProblem
+        Strips under one holder that a load presses.
 
     Returns
     -------
@@ -316,7 +344,7 @@ def solve_asperity_layer(problem: AsperityProblem) -> AsperitySolution:
 
 def compute_law_residuals(
     asperities: SmoothAsperities, area, problem: ContactProblem, solution: AsperitySolution
-) -> dict:
+) -> dict[str, float]:
     """Compute the relative residuals of the contact conditions for strips with a smooth asperity layer.
 
     The mismatch of the law is relative to the largest force and to 1e-5 of what the law gains over the depth of the gap;
@@ -325,9 +353,11 @@ def compute_law_residuals(
     Parameters
     ----------
     asperities : SmoothAsperities
+        Pressure law of the layer.
     area : (n,) ndarray
         Nodal areas [m2].
     problem : ContactProblem
+        Gap [m], motions and loads of the n nodes.
     solution : AsperitySolution
         Its separations are those of the geometry.
 
@@ -338,7 +368,7 @@ def compute_law_residuals(
     """
     force = solution.force
     opening = solution.separation
-    depth = np.ptp(problem.gap) + np.abs(opening - problem.gap).max() + MIN_TOTAL_FORCE
+    depth = np.ptp(problem.gap) + np.abs(opening - problem.gap).max() + MIN_GAP_DEPTH
     largest = max(force.max(), np.exp(MIN_LOG_PRESSURE))
     mismatch = np.abs(force - area * asperities.pressure(opening))
     mismatch -= area * np.exp(MIN_LOG_PRESSURE)
@@ -350,19 +380,23 @@ def compute_law_residuals(
     }
 
 
-def press_with_asperities(strips, problem: ContactProblem) -> tuple:
+def press_with_asperities(
+    strips, problem: ContactProblem
+) -> tuple[AsperitySolution, dict[str, float]]:
     """Solve strips with an asperity layer of a smooth pressure law.
 
     Parameters
     ----------
     strips : press.StripModel
+        Compliance, nodes and pressure law.
     problem : ContactProblem
-        Of all strips.
+        Gap [m], motions and loads of the nodes of all strips.
 
     Returns
     -------
     solution : AsperitySolution
     residuals : dict of float
+        Relative residuals by name.
 
     Raises
     ------
@@ -371,6 +405,7 @@ def press_with_asperities(strips, problem: ContactProblem) -> tuple:
     """
     compliance, layout, asperities = strips
     area = np.tile(layout.weight, layout.offsets.size)
+
     if not problem.target.size:
         layer = AsperityProblem(asperities, compliance, area, problem)
         solution = solve_at_motion(layer, np.zeros(0))

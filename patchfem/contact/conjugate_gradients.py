@@ -27,7 +27,7 @@ class _QuadraticProgram(NamedTuple):
     - target (r,): Prescribed load and moments.
     """
 
-    product: Callable
+    product: Callable[[np.ndarray], np.ndarray]
     gap: np.ndarray
     rigid: np.ndarray
     target: np.ndarray
@@ -38,6 +38,7 @@ def _quadratic_program(compliance, problem: ContactProblem) -> _QuadraticProgram
 
     A spring becomes two more forces >= 0 that turn the piece either way, each with the compliance of a node.
     """
+    # Rotations about the middle, scaled to a largest closing of 1: the columns are then comparable
     rigid = problem.motions.astype(float)
     target = problem.target.copy()
     half_length = np.ones(target.size)
@@ -88,6 +89,8 @@ def project_forces(
     # motions.
     regularisation = rigid.T @ rigid
     regularisation += 1e-3 * np.trace(regularisation) * np.eye(target.size)
+
+    # Newton's method for q: the derivative of the resultants is that of the forces above zero
     shifted = force
     for _ in range(max_iterations):
         projected_force = np.maximum(shifted, 0.0)
@@ -108,6 +111,7 @@ def _line_search(start: np.ndarray, change: np.ndarray, target_value: float) -> 
 
     The left-hand side is piecewise linear in t.
     """
+    # Terms that are positive just after t = 0, and the steps at which a term appears or vanishes
     is_positive = (start > 0) | ((start == 0) & (change > 0))
     crossing = np.flatnonzero(start * change < 0)
     t = -start[crossing] / change[crossing]
@@ -115,6 +119,8 @@ def _line_search(start: np.ndarray, change: np.ndarray, target_value: float) -> 
     crossing = crossing[order]
     t = t[order]
     sign = np.sign(change[crossing])
+
+    # Value at t = 0 and slope of every linear piece; the first piece that reaches the value holds the step
     first_value = start[is_positive] @ change[is_positive]
     first_slope = change[is_positive] @ change[is_positive]
     value = np.cumsum(np.append(first_value, sign * start[crossing] * change[crossing]))
@@ -130,7 +136,7 @@ def solve_by_gradients(
     tolerance: float = 1e-11,
     max_iterations: int = 1000,
     start: np.ndarray | None = None,
-) -> tuple:
+) -> tuple[np.ndarray, int]:
     """Solve the contact problem approximately by constrained conjugate gradients.
 
     Parameters
@@ -138,6 +144,7 @@ def solve_by_gradients(
     compliance : StripCompliance or PointCompliance
         Has `product`, `node_compliance` and `eigenvalue_bound`.
     problem : ContactProblem
+        Gap [m], motions and loads of the n nodes.
     tolerance : float
         Largest slope of the energy over the largest displacement.
     max_iterations : int
@@ -158,12 +165,14 @@ def solve_by_gradients(
     descent_step = 1 / max(eigenvalue_bound, compliance.node_compliance)
     guess = _guess_forces(program, start, n_nodes, eigenvalue_bound)
     force = project_forces(guess, rigid, target)
+
     direction = np.zeros(gap.size)
     last_square = 1.0
     is_conjugate = 0.0
     best_force = force
     min_energy = np.inf
     for iteration in range(1, max_iterations + 1):
+        # The energy f . C f/2 + g . f must fall; conjugate steps after a change of the set do not guarantee it
         displacement = product(force)
         energy = force @ (gap + displacement / 2)
         noise = ENERGY_NOISE * (np.abs(force * gap).sum() + force @ displacement)
@@ -176,6 +185,8 @@ def solve_by_gradients(
             continue
         best_force = force
         min_energy = energy
+
+        # Optimality: the slope of the energy vanishes in contact and is >= 0 elsewhere
         in_contact = force > 0
         slope = _energy_slope(program, in_contact, displacement)
         square = slope[in_contact] @ slope[in_contact]
@@ -183,11 +194,14 @@ def solve_by_gradients(
         noise = OPENING_NOISE * np.abs(gap[in_contact]).max(initial=0.0)
         if residual <= tolerance * np.abs(displacement).max() + noise:
             return force[:n_nodes], iteration
+
+        # Conjugate direction (Fletcher and Reeves) with an exact step, cut at forces of zero
         previous = is_conjugate * square / last_square * direction
         direction = np.where(in_contact, slope + previous, 0.0)
         curvature = direction @ product(direction)
         step = (slope @ direction) / curvature if curvature > 0 else descent_step
         new_force = np.maximum(force - step * direction, 0.0)
+
         # Open nodes that overlap enter the contact with a gradient step.
         is_entering = (new_force == 0) & (slope < 0)
         is_conjugate = 0.0 if is_entering.any() else 1.0

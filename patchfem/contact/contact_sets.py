@@ -45,15 +45,17 @@ class ContactSets:
         self.x = frozen_array(x)
         self.opening = frozen_array(opening)
         self.in_contact = frozen_array(in_contact, bool)
+
+        # The forces in contact that close the openings
         index = np.flatnonzero(in_contact)
-        right = np.stack([self.opening, np.ones(self.x.size)], axis=1)
-        response = np.zeros_like(right)
+        response = np.zeros(self.x.size)
         if index.size:
             low = cho_factor(self.c[np.ix_(index, index)], lower=True)
             for _ in range(2):  # the second pass is one step of iterative refinement
-                response[index] += cho_solve(low, (right - self.c @ response)[index])
-        # Forces that close the openings, and their increase per approach
-        force = np.maximum(-response[:, 0], 0.0)
+                response[index] += cho_solve(low, (self.opening - self.c @ response)[index])
+
+        # A node of the set may carry a rounding error below zero
+        force = np.maximum(-response, 0.0)
         self.force = frozen_array(force)
         self.load = float(force.sum())
         if not self.load > 0:
@@ -61,22 +63,21 @@ class ContactSets:
                 "contact: the motion must start from a loaded contact; raise contact.load"
             )
         self.moment = float(force @ self.x)
-        self.energy = float(response[:, 0] @ self.opening) / 2
+        self.energy = float(response @ self.opening) / 2
         self.size = float(np.abs(self.opening).max() + np.abs(self.c @ force).max())
-        self.stiffness = float(response[:, 1].sum())
 
     def make_arrays(self, max_bytes: float = MAX_STORED_BYTES) -> SetArrays:
         """Return the arrays in which compiled code searches contact sets, starting from the preloaded one.
 
         max_bytes: size of the contact sets that can be stored [bytes].
         """
-        # One set takes 25 m + 400 bytes: unknowns, nodes, polygon and names.
-        n_slots = int(max(16, min(max_bytes / (25 * self.x.size + 400), MAX_SLOTS)))
+        # One set takes 25 m + 80 bytes: unknowns, nodes, energy and names.
+        n_slots = int(max(16, min(max_bytes / (25 * self.x.size + 80), MAX_SLOTS)))
         return make_set_arrays(
             self.c,
             self.x,
             self.opening,
-            (self.load, self.moment, self.energy, self.size, self.stiffness),
+            (self.load, self.moment, self.energy, self.size),
             self.in_contact,
             n_slots,
         )

@@ -68,7 +68,7 @@ def edge_offset(
     return (0.3048 - 0.0818 * aspect**2 / (1 + 0.585 * aspect)) * cell
 
 
-def _find_ends(active: np.ndarray) -> list:
+def _find_ends(active: np.ndarray) -> list[tuple[int, int]]:
     """Return the nodes at which the contact set ends inside the interface, and the side of each end."""
     return [
         (int(change), 1) if active[change] else (int(change) + 1, -1)
@@ -126,7 +126,7 @@ def find_edges(
     row_height: float | None = None,
     *,
     is_quadratic: bool = False,
-) -> list:
+) -> list[ContactEdge]:
     """Find the edges of a contact set.
 
     Parameters
@@ -160,7 +160,7 @@ def find_edges(
     return place_edges(x, force, gap, force_rate, 1 - compliance @ force_rate, _find_offset)
 
 
-def place_edges(x, force, gap, force_rate, gap_rate, find_offset) -> list:
+def place_edges(x, force, gap, force_rate, gap_rate, find_offset) -> list[ContactEdge]:
     """Place the edges of a contact set between its nodes.
 
     Parameters
@@ -194,12 +194,13 @@ def place_edges(x, force, gap, force_rate, gap_rate, find_offset) -> list:
     return edges
 
 
-def snap_to_steps(edges: list, x, gap, jumps) -> list:
+def snap_to_steps(edges: list[ContactEdge], x, gap, jumps) -> list[ContactEdge]:
     """Move a contact edge to a step at which the gap opens if it is less than one cell away from it.
 
     Parameters
     ----------
     edges : list of ContactEdge
+        Edges of one contact set.
     x, gap : (m,) ndarray
         Positions [m] and gap of the unloaded surfaces [m].
     jumps : sequence
@@ -220,7 +221,9 @@ def snap_to_steps(edges: list, x, gap, jumps) -> list:
     return moved_edges
 
 
-def find_pressure_edges(x, pressure, fraction: float, largest: float | None = None) -> list:
+def find_pressure_edges(
+    x, pressure, fraction: float, largest: float | None = None
+) -> list[ContactEdge]:
     """Find the edges of the region in which the pressure exceeds a fraction of its maximum.
 
     This serves the pressures of a smooth asperity law, which have no sharp edge. Between two nodes the logarithm of the
@@ -252,7 +255,7 @@ def find_pressure_edges(x, pressure, fraction: float, largest: float | None = No
     return edges
 
 
-def contact_intervals(x, force, edges: list) -> np.ndarray:
+def contact_intervals(x, force, edges: list[ContactEdge]) -> np.ndarray:
     """Return the intervals in contact (k, 2) [m] in ascending order of x.
 
     An interval of a node or two may be shorter than the offsets of its edges; its length is 0 then.
@@ -262,6 +265,7 @@ def contact_intervals(x, force, edges: list) -> np.ndarray:
     x, force : (m,) ndarray
         Positions [m] and forces [N]; the ends of the interface that carry load are ends of intervals.
     edges : list of ContactEdge
+        Edges of the set by increasing x.
     """
     positions = [edge.position for edge in edges]
     if force[0] > 0:
@@ -273,7 +277,7 @@ def contact_intervals(x, force, edges: list) -> np.ndarray:
     return np.stack([np.minimum(pairs[:, 0], middle), np.maximum(pairs[:, 1], middle)], axis=1)
 
 
-def set_stiffness(contact: SetFactor, motions, edges: list) -> np.ndarray:
+def set_stiffness(contact: SetFactor, motions, edges: list[ContactEdge]) -> np.ndarray:
     """Return the stiffnesses of a contact whose edges may lie between nodes.
 
     The stiffness motion . C_AA^-1 motion of the nodes A in contact is that of edges half a cell beyond the last nodes.
@@ -282,15 +286,18 @@ def set_stiffness(contact: SetFactor, motions, edges: list) -> np.ndarray:
     Parameters
     ----------
     contact : SetFactor
+        Contact set with its factorized compliance.
     motions : (m, r) ndarray
         Displacements of the nodes per unit: 1 for a translation, x for a rotation.
     edges : list of ContactEdge
+        Edges of the set.
 
     Returns
     -------
     (r,) ndarray
         [N/m], or [N m/rad] for a rotation.
     """
+    # Forces under the motions, under the compliances of the nodes beyond the edges, and under a unit at the last nodes
     compliance = contact.compliance
     outside = [edge.node + edge.side for edge in edges]
     nodes = [edge.node for edge in edges]
@@ -302,6 +309,9 @@ def set_stiffness(contact: SetFactor, motions, edges: list) -> np.ndarray:
     stiffness = (force * motions).sum(axis=0)
     if contact.index.size < 3:
         return stiffness
+
+    # A node more or less is a bordered matrix: the stiffness changes by the square of the mismatch over its Schur
+    # complement
     for k, edge in enumerate(edges):
         row = compliance[outside[k]]
         gain = (motions[outside[k]] - row @ force) ** 2 / (row[outside[k]] - row @ outer[:, k])
@@ -317,6 +327,9 @@ def parabola_change(shift: float, gain: float, loss: float) -> float:
 
     Parameters
     ----------
-    shift, gain, loss : float or ndarray
+    shift : float or ndarray
+        Shift of the edge from the middle of a cell, in cells.
+    gain, loss : float or ndarray
+        Change of the stiffness with one node more, and less its change with one node less [N/m], [N m/rad].
     """
     return shift * (gain + loss) / 2 + shift**2 * (gain - loss) / 2

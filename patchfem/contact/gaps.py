@@ -57,6 +57,7 @@ def step(x: np.ndarray, height: float, at: float) -> np.ndarray:
 
     Returns
     -------
-    (m,) ndarray [m]
+    (m,) ndarray
+        Gap [m].
     """
     return height * np.heaviside(x - at, 0.5)

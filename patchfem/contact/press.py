@@ -19,6 +19,7 @@ import numpy as np
 from ..core import Compliance, NotConverged, Outcome, PatchfemError, frozen_array
 from ..elasticity.lapack import use_one_blas_thread
 from ..formatting import format_length
+from . import asperity_laws
 from .active_set import ContactProblem
 from .strip_compliance import StripCompliance
 from .unilateral import (
@@ -36,7 +37,7 @@ STRIP_RESIDUAL_TOL = 1e-9
 # Smallest force of a loaded node relative to the largest force; smaller forces are rounding errors
 MIN_RELATIVE_FORCE = 1e-12
 # Smallest load [N] or overlap [m] for which the products in the check of the solution do not underflow
-MIN_LOAD = 1e-200
+MIN_COMPUTABLE_LOAD = 1e-200
 NEGLECTED_SHEAR_NOTE = (
     "the shear between neighbouring strips is neglected; fields and pictures show the mean over the strips, "
     "unless their captions name strips; result.nc contains every strip"
@@ -107,7 +108,7 @@ class StripModel(NamedTuple):
 
     compliance: StripCompliance
     layout: StripLayout
-    asperities: object = None
+    asperities: "asperity_laws.LinearAsperities | asperity_laws.SmoothAsperities | None" = None
 
     @property
     def is_smooth(self) -> bool:
@@ -213,9 +214,11 @@ def press_strips(strips: StripModel, gap, holder: Holder) -> StripsState:
     Parameters
     ----------
     strips : StripModel
+        Compliance, nodes and pressure law.
     gap : (m,) or (s, m) ndarray
         Gap [m] with the prescribed rotation about y.
     holder : Holder
+        Loads and prescribed motions.
 
     Returns
     -------
@@ -237,6 +240,7 @@ def press_strips(strips: StripModel, gap, holder: Holder) -> StripsState:
         closed = gap.min(keepdims=True).ravel()
         return _make_state(strips, np.zeros(gap.shape), gap - closed, closed, holder)
 
+    # An exponential law without a reference takes the mean pressure of the load (`ExponentialAsperities`)
     if strips.is_smooth and asperities.needs_load:
         mean_pressure = holder.load / (layout.weight.sum() * offsets.size)
         asperities = replace(asperities, reference=mean_pressure)
@@ -247,6 +251,8 @@ def press_strips(strips: StripModel, gap, holder: Holder) -> StripsState:
     if holder.approach is None and not strips.is_smooth:
         reference = float(gap.min())
     problem = _holder_problem(layout, gap - reference, holder)
+
+    # A linear layer is a compliance in series with the pieces; smooth laws need Newton's method
     with use_one_blas_thread():
         if strips.is_smooth:
             from .asperity_layer import press_with_asperities
@@ -262,6 +268,7 @@ def press_strips(strips: StripModel, gap, holder: Holder) -> StripsState:
             residuals = compute_residuals(compliance, problem, solution)
             opening = np.where(solution.force > 0, 0.0, np.maximum(opening, 0.0))
 
+    # The check of the solution, and of what the nodes in contact leave undetermined
     is_strict = offsets.size == 1 and not strips.is_smooth
     place, remedy = RESIDUAL_REMEDIES[strips.is_smooth]
     tolerance = RESIDUAL_TOL if is_strict else STRIP_RESIDUAL_TOL
@@ -269,6 +276,8 @@ def press_strips(strips: StripModel, gap, holder: Holder) -> StripsState:
     force = solution.force.reshape(gap.shape)
     if offsets.size > 1 and not strips.is_smooth:
         _refuse_loose_holder(force, holder)
+
+    # The approach is measured from the gap that was given
     motion = np.zeros(max(1, solution.motion.size))
     motion[: solution.motion.size] = solution.motion
     motion[0] += reference
@@ -298,7 +307,7 @@ def _holder_problem(layout: StripLayout, gap, holder: Holder) -> ContactProblem:
 def _press_bare(compliance: StripCompliance, problem: ContactProblem) -> ContactSolution:
     """Solve strips that have no asperity layer, or a linear one that the compliance contains."""
     if not problem.target.size and problem.gap.min() >= 0:
-        return ContactSolution(np.zeros(problem.gap.size), np.zeros(0), 0.0, 0)
+        return ContactSolution(np.zeros(problem.gap.size), np.zeros(0), 0)
     warm_start = compliance.warm_start
     start = None
     if warm_start is not None and warm_start.contact_set is not None:
@@ -321,6 +330,8 @@ def _refuse_unsolvable(strips: StripModel, gap, holder: Holder) -> None:
     """Raise PatchfemError for loads and motions of the holder for which there is no solution."""
     load = holder.load
     approach = holder.approach
+
+    # The holder is driven by a load or by an approach
     if (load is None) == (approach is None) or (holder.moment is not None and load is None):
         raise PatchfemError("contact: give a load, a load and a moment, or an approach")
     numbers = [value or 0.0 for value in holder]
@@ -328,10 +339,12 @@ def _refuse_unsolvable(strips: StripModel, gap, holder: Holder) -> None:
         raise PatchfemError(
             "contact.load: load, moment, approach, spring of the holder and gap must be finite, the spring >= 0"
         )
+
+    # An approach needs an overlap that can be computed with, and a law with a first touch
     if load is None:
         overlap = approach - gap.min()
         law = strips.asperities
-        if 0 < overlap < MIN_LOAD:
+        if 0 < overlap < MIN_COMPUTABLE_LOAD:
             raise PatchfemError(
                 f"contact.approach: an overlap of {format_length(overlap, 3)} is too small to compute with; for "
                 f"pieces that touch without load give {gap.min():.6g} m"
@@ -341,11 +354,12 @@ def _refuse_unsolvable(strips: StripModel, gap, holder: Holder) -> None:
                 'contact.approach with contact.asperities.law = "exponential": this law has no first touch '
                 "from which an approach could be measured; give contact.load, or another law"
             )
-    elif not (load == 0 or MIN_LOAD <= load <= 1 / MIN_LOAD):
+    elif not (load == 0 or MIN_COMPUTABLE_LOAD <= load <= 1 / MIN_COMPUTABLE_LOAD):
         raise PatchfemError(
             f"contact.load: {load:.3g} N cannot be computed with; give 0 (touching without load) or a load > 0 of at "
-            f"least {MIN_LOAD:.0e} N"
+            f"least {MIN_COMPUTABLE_LOAD:.0e} N"
         )
+    # A free rotation tips over if the load line lies outside the pieces
     elif load and holder.moment is not None and not holder.spring:
         x = strips.layout.x
         load_line = holder.moment / load

@@ -14,26 +14,26 @@ set.
 
 from typing import NamedTuple
 
+from ..compiled.flags_kernels import FASTMATH_FLAGS, NJIT_NO_REFCOUNT
 from ..compiled.jit import njit
-from .polygon_kernels import NJIT_NO_REFCOUNT, ROUND_OFF, is_inside, write_polygon
 from .set_arrays import (
     N_BUILT,
-    N_PIVOTS,
-    N_RESETS,
     N_STORED,
     NEXT_SLOT,
     REFERENCE_ENERGY,
     REFERENCE_LOAD,
     REFERENCE_MOMENT,
     REFERENCE_OPENING,
+    EnergyTerm,
 )
 
-FASTMATH_FLAGS = {"reassoc", "contract", "arcp"}
 # Fast-math flags with which the compiler vectorizes loops that search for a minimum
 FASTMATH_MINIMUM = FASTMATH_FLAGS | {"nnan", "nsz"}
 # Largest number of sets for which all violating nodes are exchanged at once; beyond it the
 # exchanges may cycle
 N_BLOCK_EXCHANGES = 12
+# Rounding error of a force or gap, relative to the largest of its terms
+CONDITION_ROUND_OFF = 1e-13
 # Largest relative residual for which the tableau is not recomputed; one refinement then reduces it
 # to rounding errors
 MAX_TABLEAU_RESIDUAL = 1e-8
@@ -79,6 +79,8 @@ def pivot(sets, k):
     diagonal = values[k, k]
     if not diagonal > 0:
         return False
+
+    # Row k is solved for the other variable of the node, which is then eliminated from the other rows
     for j in range(width):
         row[j] = values[k, j] / diagonal
     for i in range(n_nodes):
@@ -89,17 +91,17 @@ def pivot(sets, k):
         for j in range(width):
             line[j] -= factor * row[j]
         line[k] = factor / diagonal
+
     for j in range(width):
         values[k, j] = -row[j]
     values[k, k] = 1 / diagonal
     sets.tableau.in_contact[k] = not sets.tableau.in_contact[k]
-    sets.counters[N_PIVOTS] += 1
     return True
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def reset_tableau(sets):
-    """Initialize the tableau for the empty contact set."""
+    """Initialize the tableau for the empty contact set: w = C f + opening - d + x t."""
     values = sets.tableau.values
     n_nodes = sets.x.size
     for i in range(n_nodes):
@@ -109,27 +111,22 @@ def reset_tableau(sets):
         values[i, n_nodes + 1] = -1.0
         values[i, n_nodes + 2] = sets.x[i]
         sets.tableau.in_contact[i] = False
-    sets.counters[N_RESETS] += 1
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def multiply_three(line, columns):
-    """Return the products of a row (m,) with three vectors (3, m)."""
-    s0 = 0.0
-    s1 = 0.0
-    s2 = 0.0
-    for j in range(columns.shape[1]):
-        s0 += line[j] * columns[0, j]
-        s1 += line[j] * columns[1, j]
-        s2 += line[j] * columns[2, j]
-    return s0, s1, s2
+def _multiply(line, vector):
+    """Return the product of a row, up to its first m entries, with a vector (m,)."""
+    total = 0.0
+    for j in range(vector.size):
+        total += line[j] * vector[j]
+    return total
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def refine_rows(sets):
-    """Improve the last columns of the tableau by a step of iterative refinement.
+def refine_column(sets, column):
+    """Improve the column of 1, d or t of the tableau (0, 1 or 2) by a step of iterative refinement.
 
-    Returns the largest relative residual of a column before the step.
+    Returns the residual before the step, relative to the largest term.
     """
     n_nodes = sets.x.size
     values = sets.tableau.values
@@ -137,44 +134,40 @@ def refine_rows(sets):
     forces = sets.tableau.forces
     residuals = sets.tableau.residuals
     for i in range(n_nodes):
-        for r in range(3):
-            forces[r, i] = values[i, n_nodes + r] if in_contact[i] else 0.0
-            residuals[r, i] = 0.0
-    scale0 = 0.0
-    scale1 = 1.0
-    scale2 = 0.0
-    error0 = 0.0
-    error1 = 0.0
-    error2 = 0.0
+        forces[i] = values[i, n_nodes + column] if in_contact[i] else 0.0
+        residuals[i] = 0.0
+
+    # Openings of all nodes under the forces of the set, w = opening - d + x t + C f. They vanish in contact, up to the
+    # residual, and are the unknowns of the other nodes.
+    scale = 0.0
+    error = 0.0
     for i in range(n_nodes):
-        s0, s1, s2 = multiply_three(sets.compliance[i], forces)
-        scale0 = max(scale0, abs(s0), abs(sets.opening[i]))
-        scale1 = max(scale1, abs(s1))
-        scale2 = max(scale2, abs(s2), abs(sets.x[i]))
-        s0 += sets.opening[i]
-        s1 -= 1.0
-        s2 += sets.x[i]
+        given = sets.opening[i]
+        if column > 0:
+            given = -1.0 if column == 1 else sets.x[i]
+        displacement = _multiply(sets.compliance[i], forces)
+        scale = max(scale, abs(displacement), abs(given))
         if in_contact[i]:
-            error0 = max(error0, abs(s0))
-            error1 = max(error1, abs(s1))
-            error2 = max(error2, abs(s2))
-            residuals[0, i] = s0
-            residuals[1, i] = s1
-            residuals[2, i] = s2
+            residuals[i] = displacement + given
+            error = max(error, abs(residuals[i]))
         else:
-            values[i, n_nodes] = s0
-            values[i, n_nodes + 1] = s1
-            values[i, n_nodes + 2] = s2
-    error0 = error0 / scale0 if scale0 > 0 else 0.0
-    error2 = error2 / scale2 if scale2 > 0 else 0.0
-    largest = max(error0, error1 / scale1, error2)
-    if largest > MIN_TABLEAU_RESIDUAL:
+            values[i, n_nodes + column] = displacement + given
+
+    # The tableau multiplies residuals as the inverse of the equations does, to the accuracy that it has kept
+    residual = error / scale if scale > 0 else 0.0
+    if residual > MIN_TABLEAU_RESIDUAL:
         for i in range(n_nodes):
-            s0, s1, s2 = multiply_three(values[i], residuals)
-            values[i, n_nodes] -= s0
-            values[i, n_nodes + 1] -= s1
-            values[i, n_nodes + 2] -= s2
-    return largest
+            values[i, n_nodes + column] -= _multiply(values[i], residuals)
+    return residual
+
+
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
+def _lost_digits(sets):
+    """Refine the columns of the tableau; return whether it had lost more digits than a step restores."""
+    residual = 0.0
+    for column in range(3):
+        residual = max(residual, refine_column(sets, column))
+    return residual > MAX_TABLEAU_RESIDUAL
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
@@ -187,6 +180,8 @@ def take_slot(sets):
     if sets.counters[N_STORED] < stored.names.size:
         sets.counters[N_STORED] += 1
         return slot
+
+    # The set that the slot holds leaves the chain of its hash
     bucket = stored.names[slot] & (stored.heads.size - 1)
     k = stored.heads[bucket]
     if k == slot:
@@ -200,16 +195,21 @@ def take_slot(sets):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def store_set(sets, name):
-    """Store the contact set of the tableau with its energy and polygon; return its slot."""
+    """Store the contact set of the tableau with its energy; return its slot."""
     stored = sets.stored
     values = sets.tableau.values
     n_nodes = sets.x.size
     slot = take_slot(sets)
+
+    # Energy beyond that of the reference state and the work of its forces: E - E0 - N0 d + M0 t
     energy = stored.energy[slot]
     energy[:] = 0.0
-    energy[0] = -sets.reference[REFERENCE_ENERGY]
-    energy[1] = -sets.reference[REFERENCE_LOAD]
-    energy[2] = sets.reference[REFERENCE_MOMENT]
+    energy[EnergyTerm.CONSTANT] = -sets.reference[REFERENCE_ENERGY]
+    energy[EnergyTerm.BY_D] = -sets.reference[REFERENCE_LOAD]
+    energy[EnergyTerm.BY_T] = sets.reference[REFERENCE_MOMENT]
+
+    # Unknowns of every node. The forces f = constant + by_d d + by_t t give E = -f . (opening - d + x t)/2, of which
+    # each coefficient is a sum over the nodes in contact, since C is symmetric.
     for i in range(n_nodes):
         constant = values[i, n_nodes]
         by_d = values[i, n_nodes + 1]
@@ -219,17 +219,18 @@ def store_set(sets, name):
         stored.unknowns[slot, 2, i] = by_t
         stored.in_contact[slot, i] = sets.tableau.in_contact[i]
         if sets.tableau.in_contact[i]:
-            energy[0] -= 0.5 * constant * sets.opening[i]
-            energy[1] += constant
-            energy[2] -= constant * sets.x[i]
-            energy[3] += by_d
-            energy[4] += 0.5 * (by_t - by_d * sets.x[i])
-            energy[5] -= by_t * sets.x[i]
+            energy[EnergyTerm.CONSTANT] -= 0.5 * constant * sets.opening[i]
+            energy[EnergyTerm.BY_D] += constant
+            energy[EnergyTerm.BY_T] -= constant * sets.x[i]
+            energy[EnergyTerm.BY_DD] += by_d
+            energy[EnergyTerm.BY_DT] += 0.5 * (by_t - by_d * sets.x[i])
+            energy[EnergyTerm.BY_TT] -= by_t * sets.x[i]
+
+    # The set becomes the first one in the chain of its hash
     stored.names[slot] = name
     bucket = name & (stored.heads.size - 1)
     stored.links[slot] = stored.heads[bucket]
     stored.heads[bucket] = slot
-    write_polygon(sets, slot)
     return slot
 
 
@@ -245,16 +246,14 @@ def pivot_to_target(sets):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def build_set(sets, name):
-    """Compute the target contact set of the tableau, and return its slot.
+    """Pivot the tableau to its target contact set, store the set, and return its slot.
 
-    The slot is -1 if the compliance is not positive definite on the set.
-
-    name: name of the set. The tableau is pivoted to it. If it has lost its digits, it is computed anew
-    and pivoted once more. Cost: m^2 multiplications for each node that is exchanged.
+    If the tableau has lost its digits, it is computed anew and pivoted once more. The slot is -1 if the compliance is not
+    positive definite on the set. Cost: m^2 multiplications for each node that is exchanged. name: name of the set.
     """
-    if not pivot_to_target(sets) or refine_rows(sets) > MAX_TABLEAU_RESIDUAL:
+    if not pivot_to_target(sets) or _lost_digits(sets):
         reset_tableau(sets)
-        if not pivot_to_target(sets) or refine_rows(sets) > MAX_TABLEAU_RESIDUAL:
+        if not pivot_to_target(sets) or _lost_digits(sets):
             return -1
     return store_set(sets, name)
 
@@ -287,19 +286,25 @@ def check_contact_conditions(sets, slot, d, t):
     Parameters
     ----------
     sets : set_arrays.SetArrays
+        Preloaded interface with its stored contact sets.
     slot : int
+        Slot of the contact set.
     d, t : float
         Displacement [m] and rotation [rad] of the holder.
 
     Returns
     -------
     holds : bool
+        Whether no force and no gap lies below its bound.
     bounds : ContactBounds
+        Bounds for the rounding errors at this displacement.
     """
     constant = sets.stored.unknowns[slot, 0]
     by_d = sets.stored.unknowns[slot, 1]
     by_t = sets.stored.unknowns[slot, 2]
     in_contact = sets.stored.in_contact[slot]
+
+    # Smallest force in contact and smallest gap outside
     scale = 0.0
     smallest_force = 0.0
     smallest_gap = 0.0
@@ -309,9 +314,10 @@ def check_contact_conditions(sets, slot, d, t):
         scale = max(scale, term if in_contact[i] else 0.0)
         smallest_force = min(smallest_force, value if in_contact[i] else 0.0)
         smallest_gap = min(smallest_gap, 0.0 if in_contact[i] else value)
-    min_force = -ROUND_OFF * scale
+
+    min_force = -CONDITION_ROUND_OFF * scale
     arm = max(abs(sets.x[0]), abs(sets.x[-1]))
-    min_gap = -ROUND_OFF * (sets.reference[REFERENCE_OPENING] + abs(d) + abs(t) * arm)
+    min_gap = -CONDITION_ROUND_OFF * (sets.reference[REFERENCE_OPENING] + abs(d) + abs(t) * arm)
     holds = smallest_force >= min_force and smallest_gap >= min_gap
     return holds, ContactBounds(min_force, min_gap)
 
@@ -323,10 +329,13 @@ def exchange_violating_nodes(sets, slot, d, t, bounds, is_single):
     Parameters
     ----------
     sets : set_arrays.SetArrays
+        Preloaded interface with its stored contact sets.
     slot : int
+        Slot of the contact set.
     d, t : float
         Motion [m] and [rad].
     bounds : ContactBounds
+        Force and gap below which a node violates its condition.
     is_single : bool
         Whether only the first failing node is exchanged.
 
@@ -359,6 +368,7 @@ def find_set(sets, slot, d, t):
     Parameters
     ----------
     sets : set_arrays.SetArrays
+        Preloaded interface with its stored contact sets.
     slot : int
         Slot of the first set.
     d, t : float
@@ -370,8 +380,6 @@ def find_set(sets, slot, d, t):
         Slot of the contact set, -1 if none is found.
     """
     for count in range(N_BLOCK_EXCHANGES + 10 * sets.x.size):
-        if is_inside(sets, slot, d, t):
-            return slot
         holds, bounds = check_contact_conditions(sets, slot, d, t)
         if holds:
             return slot
@@ -404,7 +412,9 @@ def compute_energy(sets, slot, heave, rotation):
     Parameters
     ----------
     sets : set_arrays.SetArrays
+        Preloaded interface with its stored contact sets.
     slot : int
+        Slot of the contact set.
     heave, rotation : float
         Heave -d [m] and rotation [rad] of the holder.
 
@@ -414,10 +424,14 @@ def compute_energy(sets, slot, heave, rotation):
     """
     energy = sets.stored.energy[slot]
     d = -heave
-    by_d = energy[3] * d + energy[4] * rotation
-    by_t = energy[4] * d + energy[5] * rotation
-    value = energy[0] + d * (energy[1] + 0.5 * by_d) + rotation * (energy[2] + 0.5 * by_t)
-    return ContactEnergy(value, -(energy[1] + by_d), energy[2] + by_t)
+    linear_d = energy[EnergyTerm.BY_D]
+    linear_t = energy[EnergyTerm.BY_T]
+    coupling = energy[EnergyTerm.BY_DT]
+    by_d = energy[EnergyTerm.BY_DD] * d + coupling * rotation
+    by_t = coupling * d + energy[EnergyTerm.BY_TT] * rotation
+    value = energy[EnergyTerm.CONSTANT] + d * (linear_d + 0.5 * by_d)
+    value += rotation * (linear_t + 0.5 * by_t)
+    return ContactEnergy(value, -(linear_d + by_d), linear_t + by_t)
 
 
 @njit(error_model="numpy", cache=True, **NJIT_NO_REFCOUNT)
@@ -427,7 +441,9 @@ def press_state(sets, slot, d, t, force):
     Parameters
     ----------
     sets : set_arrays.SetArrays
+        Preloaded interface with its stored contact sets.
     slot : int
+        Slot of the contact set.
     d, t : float
         Motion [m] and [rad].
     force : (m,) ndarray

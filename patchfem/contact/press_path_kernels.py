@@ -7,8 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..compiled.flags_kernels import NJIT_NO_REFCOUNT
 from ..compiled.jit import njit
-from .polygon_kernels import NJIT_NO_REFCOUNT, find_exit, is_inside
 from .press_kernels import (
     FASTMATH_MINIMUM,
     ContactBounds,
@@ -16,6 +16,7 @@ from .press_kernels import (
     compute_energy,
     find_set,
 )
+from .set_arrays import EnergyTerm, PathMean
 
 # Distance beyond a border at which the next set is determined, as a fraction of the increment; it
 # is larger than rounding errors
@@ -36,10 +37,13 @@ def find_first_violation(sets, slot, motion, change, bounds):
     Parameters
     ----------
     sets : set_arrays.SetArrays
+        Preloaded interface with its stored contact sets.
     slot : int
+        Slot of the contact set.
     motion, change : HolderMotion
         Heave and rotation at which the increment begins, and the increment.
     bounds : press_kernels.ContactBounds
+        Force and gap below which a node violates its condition.
 
     Returns
     -------
@@ -61,84 +65,44 @@ def find_first_violation(sets, slot, motion, change, bounds):
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def cross_side(sets, slot, side, d, t):
-    """Find the neighbouring contact set beyond a side of a polygon.
-
-    The set is stored with the side, so the next crossing needs no search.
-
-    Parameters
-    ----------
-    sets : set_arrays.SetArrays
-    slot : int
-        Slot of the set before the side.
-    side : int
-        Side of its polygon, -1 if the side is not known.
-    d, t : float
-        Displacement [m] and rotation [rad] just beyond the side.
-
-    Returns
-    -------
-    int
-        Slot of the set beyond the side, -1 if none is found.
-    """
-    if side < 0:
-        return find_set(sets, slot, d, t)
-    stored = sets.stored
-    polygons = sets.polygons
-    next_slot = polygons.neighbours[slot, side]
-    name = stored.names[slot] ^ stored.node_names[polygons.nodes[slot, side]]
-    if next_slot >= 0 and stored.names[next_slot] == name and is_inside(sets, next_slot, d, t):
-        return next_slot
-    next_slot = find_set(sets, slot, d, t)
-    if next_slot >= 0 and stored.names[next_slot] == name and next_slot != slot:
-        polygons.neighbours[slot, side] = next_slot
-    return next_slot
-
-
-@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def find_border(sets, slot, start, motion, change):
     """Find the fraction of an increment at which a contact set ceases to be valid.
 
     Parameters
     ----------
     sets : set_arrays.SetArrays
+        Preloaded interface with its stored contact sets.
     slot : int
+        Slot of the contact set.
     start : float
+        Fraction of the increment from which the set holds.
     motion, change : HolderMotion
         Heave and rotation at which the increment begins, and the increment.
 
     Returns
     -------
-    end : float
+    float
         Fraction of the increment, 1 if the set holds up to its end.
-    side : int
-        Side of the polygon of the set, -1 if it is not known.
     """
     end_d = -(motion.heave + change.heave)
     end_t = motion.rotation + change.rotation
-    if is_inside(sets, slot, end_d, end_t):
-        return 1.0, -1
+    holds, end_bounds = check_contact_conditions(sets, slot, end_d, end_t)
+    if holds:
+        return 1.0
+
+    # The rounding errors along the increment are bounded by those at both of its ends
     start_motion = HolderMotion(
         motion.heave + start * change.heave, motion.rotation + start * change.rotation
     )
-    d = -start_motion.heave
-    t = start_motion.rotation
-    remainder = 1 - start
-    fraction, side = find_exit(
-        sets, slot, d, t, -remainder * change.heave, remainder * change.rotation
+    _, start_bounds = check_contact_conditions(
+        sets, slot, -start_motion.heave, start_motion.rotation
     )
-    if side >= 0:
-        return min(start + max(fraction, 0.0) * remainder, 1.0), side
-    holds, end_bounds = check_contact_conditions(sets, slot, end_d, end_t)
-    if holds:
-        return 1.0, -1
-    _, start_bounds = check_contact_conditions(sets, slot, d, t)
     bounds = ContactBounds(
         min(end_bounds.min_force, start_bounds.min_force),
         min(end_bounds.min_gap, start_bounds.min_gap),
     )
     fraction = find_first_violation(sets, slot, start_motion, change, bounds)
-    return min(start + max(fraction, 0.0), 1.0), -1
+    return min(start + max(fraction, 0.0), 1.0)
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
@@ -151,13 +115,13 @@ def path_mean(sets, slot, heave, rotation, heave_change, rotation_change, out):
     Parameters
     ----------
     sets : set_arrays.SetArrays
+        Preloaded interface with its stored contact sets.
     slot : int
         Slot of the set at the beginning.
     heave, rotation, heave_change, rotation_change : float
         Heave [m] and rotation [rad] at the beginning, and their increments.
     out : (9,) ndarray
-        Written: mean slopes (2,), energy, slopes at the end (2,), derivatives of the mean by the
-        increment (2, 2).
+        Written, in the order of `PathMean`.
 
     Returns
     -------
@@ -169,36 +133,45 @@ def path_mean(sets, slot, heave, rotation, heave_change, rotation_change, out):
     out[:] = 0.0
     start = 0.0
     border_step = BORDER_STEP
+
     # The number of sets is limited, because rounding errors may make a path return to the same
     # sets.
     for _ in range(20 * sets.x.size + 100):
-        end, side = find_border(sets, slot, start, motion, change)
+        end = find_border(sets, slot, start, motion, change)
         at_start = compute_energy(
             sets, slot, heave + start * heave_change, rotation + start * rotation_change
         )
         at_end = compute_energy(
             sets, slot, heave + end * heave_change, rotation + end * rotation_change
         )
+
+        # The slopes are linear on a set, so the trapezoidal rule is exact. Their derivatives by the increment are the
+        # second derivatives of the energy, times the integral of the fraction; d is minus the heave.
         coefficients = sets.stored.energy[slot]
         half_length = 0.5 * (end - start)
         first_moment = 0.5 * (end * end - start * start)
-        out[0] += half_length * (at_start.heave_slope + at_end.heave_slope)
-        out[1] += half_length * (at_start.rotation_slope + at_end.rotation_slope)
-        out[5] += first_moment * coefficients[3]
-        out[6] -= first_moment * coefficients[4]
-        out[8] += first_moment * coefficients[5]
+        heave_slopes = at_start.heave_slope + at_end.heave_slope
+        rotation_slopes = at_start.rotation_slope + at_end.rotation_slope
+        out[PathMean.HEAVE] += half_length * heave_slopes
+        out[PathMean.ROTATION] += half_length * rotation_slopes
+        out[PathMean.HEAVE_BY_HEAVE] += first_moment * coefficients[EnergyTerm.BY_DD]
+        out[PathMean.HEAVE_BY_ROTATION] -= first_moment * coefficients[EnergyTerm.BY_DT]
+        out[PathMean.ROTATION_BY_ROTATION] += first_moment * coefficients[EnergyTerm.BY_TT]
         start = end
         if start >= 1.0:
-            out[2] = at_end.value
-            out[3] = at_end.heave_slope
-            out[4] = at_end.rotation_slope
-            out[7] = out[6]
+            out[PathMean.END_ENERGY] = at_end.value
+            out[PathMean.END_HEAVE] = at_end.heave_slope
+            out[PathMean.END_ROTATION] = at_end.rotation_slope
+            out[PathMean.ROTATION_BY_HEAVE] = out[PathMean.HEAVE_BY_ROTATION]
             return slot
+
+        # The set beyond the border
         beyond = min(start + border_step, 1.0)
         d = -(heave + beyond * heave_change)
-        next_slot = cross_side(sets, slot, side, d, rotation + beyond * rotation_change)
+        next_slot = find_set(sets, slot, d, rotation + beyond * rotation_change)
         if next_slot < 0:
             return next_slot
+
         # If the search beyond the border returns the same set, it is repeated farther beyond it.
         if next_slot == slot:
             border_step *= 10

@@ -1,14 +1,13 @@
 """Records of arrays in which the compiled search stores contact sets.
 
-`press_kernels` searches for contact sets and `polygon_kernels` computes where each holds.
+`press_kernels` searches for contact sets, and `press_path_kernels` follows a motion from set to set.
 """
 
+from enum import IntEnum
 from typing import NamedTuple
 
 import numpy as np
 
-# Largest number of sides of a stored polygon; sets with more sides are checked node by node
-MAX_POLYGON_SIDES = 16
 REFERENCE_LOAD = 0  # index into `SetArrays.reference` of the load of the reference state [N]
 # Index into `SetArrays.reference` of the moment of the reference state about x = 0 [N m]
 REFERENCE_MOMENT = 1
@@ -16,23 +15,48 @@ REFERENCE_MOMENT = 1
 REFERENCE_ENERGY = 2
 # Index into `SetArrays.reference` of the largest magnitude of the openings [m]
 REFERENCE_OPENING = 3
-# Index into `SetArrays.reference` of the stiffness dN/d(approach) of the reference state [N/m]
-REFERENCE_STIFFNESS = 4
 N_STORED = 0  # index into `SetArrays.counters` of the number of stored sets
 NEXT_SLOT = 1  # index into `SetArrays.counters` of the slot of the next set
 N_BUILT = 2  # index into `SetArrays.counters` of the number of sets computed so far
-N_PIVOTS = 3  # index into `SetArrays.counters` of the number of pivots so far
-# Index into `SetArrays.counters` of the number of times that the tableau was recomputed
-N_RESETS = 4
+
+
+class EnergyTerm(IntEnum):
+    """Indices of the coefficients of 1, d, t, d^2/2, d t and t^2/2 of the energy [J] in `StoredSets.energy`."""
+
+    CONSTANT = 0
+    BY_D = 1
+    BY_T = 2
+    BY_DD = 3
+    BY_DT = 4
+    BY_TT = 5
+
+
+class PathMean(IntEnum):
+    """Indices of the results of `press_path_kernels.path_mean`.
+
+    - HEAVE, ROTATION: slopes of the energy by heave [N] and rotation [N m], averaged over the increment
+    - END_ENERGY, END_HEAVE, END_ROTATION: energy [J] and its slopes at the end of the increment
+    - HEAVE_BY_HEAVE to ROTATION_BY_ROTATION: derivatives of both means by the increments
+    """
+
+    HEAVE = 0
+    ROTATION = 1
+    END_ENERGY = 2
+    END_HEAVE = 3
+    END_ROTATION = 4
+    HEAVE_BY_HEAVE = 5
+    HEAVE_BY_ROTATION = 6
+    ROTATION_BY_HEAVE = 7
+    ROTATION_BY_ROTATION = 8
 
 
 class Tableau(NamedTuple):
     """Tableau [T | R] of the linear complementarity problem, pivoted to one contact set.
 
-    - values (m, m + 3).
+    - values (m, m + 3): T, then the columns R of 1, d and t.
     - in_contact (m,): nodes of the set to which it is pivoted.
     - target (m,): nodes of the set that is searched for.
-    - row (m + 3,), forces (3, m) and residuals (3, m): workspaces.
+    - row (m + 3,), forces (m,) and residuals (m,): workspaces.
     """
 
     values: np.ndarray
@@ -50,7 +74,7 @@ class StoredSets(NamedTuple):
 
     - in_contact (k, m): nodes in contact.
     - unknowns (k, 3, m): force [N] of nodes in contact and gap [m] of the others per (1, d, t).
-    - energy (k, 6): coefficients of 1, d, t, d^2/2, d t, t^2/2 of the energy of the preloaded contact.
+    - energy (k, 6): coefficients of the energy of the preloaded contact, in the order of `EnergyTerm`.
     - names (k,): names of the sets; node_names (m,): names of the nodes.
     - heads, links (k,): hash chains of the names.
     """
@@ -64,31 +88,14 @@ class StoredSets(NamedTuple):
     links: np.ndarray
 
 
-class Polygons(NamedTuple):
-    """Polygons of rigid displacements for which the stored contact sets are valid.
-
-    - n_sides (k,): number of sides; 0 without a polygon, and then all nodes have to be checked.
-    - nodes (k, MAX_POLYGON_SIDES): node of each side.
-    - neighbours (k, MAX_POLYGON_SIDES): slot of the set beyond each side, or -1.
-    - limits (k, 2): force [N] and gap [m] below which a node fails.
-    - corners (2, 3, 4 MAX_POLYGON_SIDES): workspace.
-    """
-
-    n_sides: np.ndarray
-    nodes: np.ndarray
-    neighbours: np.ndarray
-    limits: np.ndarray
-    corners: np.ndarray
-
-
 class SetArrays(NamedTuple):
     """Arrays for a preloaded interface, for its stored contact sets and for the search for them.
 
     - compliance (m, m) [m/N]; x (m,) [m].
     - opening (m,): openings of the reference state without forces [m].
-    - reference (5,): properties of the reference state, from `REFERENCE_LOAD` to `REFERENCE_STIFFNESS`.
-    - tableau, stored, polygons: see there.
-    - counters (5,): from `N_STORED` to `N_RESETS`.
+    - reference (4,): properties of the reference state, from `REFERENCE_LOAD` to `REFERENCE_OPENING`.
+    - tableau, stored: see there.
+    - counters (3,): from `N_STORED` to `N_BUILT`.
     """
 
     compliance: np.ndarray
@@ -97,7 +104,6 @@ class SetArrays(NamedTuple):
     reference: np.ndarray
     tableau: Tableau
     stored: StoredSets
-    polygons: Polygons
     counters: np.ndarray
 
 
@@ -114,47 +120,46 @@ def make_set_arrays(compliance, x, opening, reference, in_contact, n_slots: int)
 
     Parameters
     ----------
-    compliance : (m, m) ndarray [m/N]
-    x, opening : (m,) ndarray [m]
-    reference : (5,) sequence of float
-        Properties of the reference state, from `REFERENCE_LOAD` to `REFERENCE_STIFFNESS`.
+    compliance : (m, m) ndarray
+        Compliance [m/N] of the interface.
+    x, opening : (m,) ndarray
+        Positions, and openings of the reference state without forces [m].
+    reference : (4,) sequence of float
+        Properties of the reference state, from `REFERENCE_LOAD` to `REFERENCE_OPENING`.
     in_contact : (m,) bool ndarray
         Contact set of the reference state, the first target of the search.
     n_slots : int
         Number of contact sets that can be stored.
     """
     m = x.size
-    node_names = _make_names(m)
+    tableau = Tableau(
+        values=np.zeros((m, m + 3)),
+        in_contact=np.zeros(m, bool),
+        target=in_contact.copy(),
+        row=np.zeros(m + 3),
+        forces=np.zeros(m),
+        residuals=np.zeros(m),
+    )
+
+    # The heads of the hash chains are a power of 2 above the number of slots, so that a chain has at most one set on average
+    stored = StoredSets(
+        in_contact=np.zeros((n_slots, m), bool),
+        unknowns=np.zeros((n_slots, 3, m)),
+        energy=np.zeros((n_slots, len(EnergyTerm))),
+        names=np.zeros(n_slots, np.int64),
+        node_names=_make_names(m),
+        heads=np.full(1 << n_slots.bit_length(), -1, np.int64),
+        links=np.zeros(n_slots, np.int64),
+    )
+
     return SetArrays(
         compliance.copy(),
         x.copy(),
         opening.copy(),
         np.array(reference, float),
-        Tableau(
-            values=np.zeros((m, m + 3)),
-            in_contact=np.zeros(m, bool),
-            target=in_contact.copy(),
-            row=np.zeros(m + 3),
-            forces=np.zeros((3, m)),
-            residuals=np.zeros((3, m)),
-        ),
-        StoredSets(
-            in_contact=np.zeros((n_slots, m), bool),
-            unknowns=np.zeros((n_slots, 3, m)),
-            energy=np.zeros((n_slots, 6)),
-            names=np.zeros(n_slots, np.int64),
-            node_names=node_names,
-            heads=np.full(1 << n_slots.bit_length(), -1, np.int64),
-            links=np.zeros(n_slots, np.int64),
-        ),
-        Polygons(
-            n_sides=np.zeros(n_slots, np.int64),
-            nodes=np.zeros((n_slots, MAX_POLYGON_SIDES), np.int64),
-            neighbours=np.zeros((n_slots, MAX_POLYGON_SIDES), np.int64),
-            limits=np.zeros((n_slots, 2)),
-            corners=np.zeros((2, 3, 4 * MAX_POLYGON_SIDES)),
-        ),
-        np.zeros(5, np.int64),
+        tableau,
+        stored,
+        np.zeros(3, np.int64),
     )
 
 

@@ -37,9 +37,9 @@ class WarmStart:
     """
 
     contact_set: np.ndarray | None = None
-    factors: dict = field(default_factory=dict)
+    factors: dict[tuple[bytes, bytes], np.ndarray] = field(default_factory=dict)
 
-    def factor(self, key: tuple, make_matrix: Callable) -> np.ndarray:
+    def factor(self, key: tuple[bytes, bytes], make_matrix: Callable[[], np.ndarray]) -> np.ndarray:
         """Return the Cholesky factor of a matrix, from the cache if it is stored there."""
         lower_factor = self.factors.pop(key, None)
         if lower_factor is None:
@@ -100,7 +100,7 @@ class StripCompliance:
             block[np.diag_indices_from(block)] += self.added[strip, nodes]
         return block
 
-    def solver(self, active: np.ndarray) -> Callable:
+    def solver(self, active: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:
         """Factorize the compliance of the active nodes; return a function that solves with it.
 
         Parameters

@@ -35,46 +35,36 @@ INDEFINITE_MESSAGE = (
     "contact.element_size, bring the stiffnesses of coating and substrate closer together, or check the "
     "cells of contact.mesh"
 )
-MIN_TOTAL_FORCE = (
-    1e-200  # smallest total force [N] in a divisor; it keeps residuals of open pieces finite
-)
+# Smallest total force [N] in a divisor; it keeps residuals of open pieces finite
+MIN_TOTAL_FORCE = 1e-200
 
 
 class ContactSolution(NamedTuple):
-    """Solution of a contact problem: nodal forces, holder motion and stiffness.
+    """Solution of a contact problem: nodal forces and motion of the holder.
 
     - force (n,): Nodal forces [N], > 0 on the contact set and 0 elsewhere.
     - motion (r,): Approach [m] and rotations [rad] q; the rotation about y is -theta.
-    - stiffness: dN/d(approach) at fixed rotations [N/m], 0 under a prescribed approach.
     - n_iterations: Number of contact sets tried.
     """
 
     force: np.ndarray
     motion: np.ndarray
-    stiffness: float
     n_iterations: int
 
-    @property
-    def closing(self) -> float:
-        """Approach [m] in addition to the gap of the problem, or 0 if the approach is prescribed."""
-        return float(self.motion[0]) if self.motion.size else 0.0
 
-    @property
-    def theta(self) -> float:
-        """Rotation [rad] about y in addition to the one that the gap of a patch contains."""
-        return -float(self.motion[1]) if self.motion.size > 1 else 0.0
-
-
-def _solve_by_fallbacks(compliance, problem: ContactProblem, max_iterations: int) -> tuple:
+def _solve_by_fallbacks(
+    compliance, problem: ContactProblem, max_iterations: int
+) -> tuple[SetSolution, int]:
     """Solve a contact problem by slower methods if the primal-dual method does not converge.
 
-    Returns the SetSolution and the number of iterations. The methods are, in turn: primal-dual from all nodes,
-    primal-dual from the result of conjugate gradients, and primal.
+    The methods are, in turn: primal-dual from all nodes, primal-dual from the result of conjugate gradients, and primal,
+    which always ends. The number of iterations is that of all methods.
     """
     every_node = np.ones(problem.gap.size, bool)
     solution, n_first = solve_primal_dual(compliance, problem, every_node, max_iterations)
     if solution is not None and relative_violation(solution) <= RESIDUAL_TOL:
         return solution, n_first
+
     force, n_second = conjugate_gradients.solve_by_gradients(compliance, problem)
     # Smaller forces are remainders that the gradient steps have not yet removed.
     is_loaded = force > 1e-9 * force.max()
@@ -100,6 +90,8 @@ def _solve_on_one_node(compliance, problem: ContactProblem, rest_rotation: float
     node = int(np.argmin(np.abs(position - moment / load)))
     if abs(position[node] - moment / load) > 1e-15 * np.ptp(position):
         return None
+
+    # Opening of the other nodes without rotation, and the rotation at which each of them would touch
     force = np.zeros(gap.size)
     force[node] = load
     displacement = compliance.product(force)
@@ -108,10 +100,13 @@ def _solve_on_one_node(compliance, problem: ContactProblem, rest_rotation: float
     noise = OPENING_NOISE * (np.abs(gap) + abs(displacement[node]))
     with np.errstate(divide="ignore", invalid="ignore"):
         bound = (height + noise) / arm
+
+    # The rotations that leave all other nodes open
     lower = bound[arm < 0].max(initial=-np.inf)
     upper = bound[arm > 0].min(initial=np.inf)
     if not lower <= upper:
         return None
+
     rotation = -rest_rotation if lower <= -rest_rotation <= upper else (lower + upper) / 2
     approach = gap[node] - rotation * position[node] + displacement[node]
     return SetSolution(
@@ -119,7 +114,6 @@ def _solve_on_one_node(compliance, problem: ContactProblem, rest_rotation: float
         opening=height - rotation * arm,
         scale=np.abs(height) + abs(displacement[node]) + np.abs(rotation * arm),
         motion=np.array([approach, rotation]),
-        stiffness=float(load / displacement[node]),
     )
 
 
@@ -138,6 +132,7 @@ def solve(
     Parameters
     ----------
     compliance : StripCompliance
+        C, positive definite.
     problem : ContactProblem
         Without a free rotation, its gap [m] is measured from a point near the contact: an offset costs digits.
     start : (n,) bool ndarray, optional
@@ -156,6 +151,7 @@ def solve(
     LinAlgError
         If the compliance is not positive definite.
     """
+    # The gap is measured from the rest position of a rigid piece, which may close it by far more than the pieces deform
     rest_motion = np.zeros(problem.target.size)
     if rest_motion.size > 1:
         rest_motion = find_rest_motion(problem)
@@ -163,11 +159,14 @@ def solve(
             gap=problem.gap - problem.motions @ rest_motion,
             target=problem.target - problem.springs * rest_motion,
         )
+
+    # A patch that may rotate freely can rest on a single node, whose set does not determine the rotation
     solution = None
     n_iterations = 0
     is_patch = problem.gap.size == len(compliance.common)
     if is_patch and problem.min_nodes == 2:
         solution = _solve_on_one_node(compliance, problem, rest_motion[1])
+
     if solution is None:
         if start is None or np.count_nonzero(start) < problem.min_nodes:
             start = guess_contact_set(compliance, problem)
@@ -175,14 +174,12 @@ def solve(
         if solution is None or not relative_violation(solution) <= RESIDUAL_TOL:
             solution, n_more = _solve_by_fallbacks(compliance, problem, max_iterations)
             n_iterations += n_more
-    return ContactSolution(
-        solution.force, solution.motion + rest_motion, solution.stiffness, n_iterations
-    )
+    return ContactSolution(solution.force, solution.motion + rest_motion, n_iterations)
 
 
 def compute_residuals(
     compliance: StripCompliance, problem: ContactProblem, solution: ContactSolution
-) -> dict:
+) -> dict[str, float]:
     """Compute the relative residuals of the contact conditions for a solution.
 
     An opening is relative to the sum of the magnitudes of its terms at the same node, so a spike of the gap elsewhere
@@ -191,8 +188,11 @@ def compute_residuals(
     Parameters
     ----------
     compliance : StripCompliance
+        C of the problem.
     problem : ContactProblem
+        Gap [m], motions and loads as they were given.
     solution : ContactSolution
+        Forces and motion that are checked.
 
     Returns
     -------
@@ -216,7 +216,7 @@ def compute_residuals(
     )
 
 
-def compute_balances(problem: ContactProblem, solution) -> dict:
+def compute_balances(problem: ContactProblem, solution) -> dict[str, float]:
     """Compute the relative residuals of the balance of load and moments.
 
     A moment is relative to the load times the length over which its axis varies, plus the moment of the spring.
@@ -224,7 +224,9 @@ def compute_balances(problem: ContactProblem, solution) -> dict:
     Parameters
     ----------
     problem : ContactProblem
+        Motions, loads and springs.
     solution : ContactSolution or AsperitySolution
+        Forces and motion that are checked.
 
     Returns
     -------
@@ -256,6 +258,7 @@ def explain_singular_set(c: np.ndarray, problem: ContactProblem) -> str:
     c : (m, m) ndarray
         Compliance of the pieces [m/N].
     problem : ContactProblem
+        Problem whose equations are singular.
     """
     try:
         factorise(np.array(c, order="C"))
@@ -281,6 +284,7 @@ def refuse_residuals(residuals, tolerance: float, place: str = "contact", remedy
     residuals : mapping
         Relative residuals by name.
     tolerance : float
+        Largest residual that is accepted.
     place : str
         Beginning of the message.
     remedy : str

@@ -56,6 +56,7 @@ def write_atomically(path, needed_bytes: int | None = None) -> Iterator[Path]:
     Parameters
     ----------
     path : path-like
+        Target.
     needed_bytes : int or None
         Bytes that will be written, if they are known.
 
@@ -69,12 +70,16 @@ def write_atomically(path, needed_bytes: int | None = None) -> Iterator[Path]:
         raise WriteError(
             f"{format_path(path)}: cannot be written, because this is a folder; name a file"
         )
+
+    # A rename would put a file in the place of a device
     if _is_special(path):
         try:
             yield path
         except OSError as error:
             raise explain_write_error(error, path, path, needed_bytes) from None
         return
+
+    # The rename is atomic: other processes see the old file or the complete new one
     partial = make_partial_path(path)
     try:
         _remove_stale_partials(path)
@@ -95,7 +100,7 @@ def write_text(path, text: str, encoding: str = "utf-8") -> None:
     write_bytes(path, text.encode(encoding, errors="replace"))
 
 
-def write_rows(path, rows: Iterable) -> None:
+def write_rows(path, rows: Iterable[Iterable]) -> None:
     """Write rows of cells as a comma-separated file atomically."""
     with (
         write_atomically(path) as partial,
@@ -172,6 +177,7 @@ def explain_write_error(
     Parameters
     ----------
     error : OSError
+        Error of the system.
     path : Path
         Target.
     partial : Path
@@ -188,6 +194,8 @@ def explain_write_error(
     # The size of a device is not the free space of a disk.
     if partial == path and error.errno in NO_SPACE_ERRNOS:
         return WriteError(f"{name}: not enough space ({error.strerror})")
+
+    # Finding the space may fail on the disk that failed before; then only the reason of the system is stated
     with suppress(OSError):
         space = find_free_space(path)
         written = partial.stat().st_size if partial != path and partial.exists() else 0
@@ -199,6 +207,8 @@ def explain_write_error(
                 f"{name}: not enough space: the disk has no free entries for new files (inodes); "
                 "remove files"
             )
+
+        # NumPy and HDF5 report a full disk without an error number
         if error.errno in NO_SPACE_ERRNOS or (error.errno is None and remaining < MIN_FREE_BYTES):
             needed = f"more than {format_bytes(written)}"
             if needed_bytes is not None:

@@ -8,14 +8,13 @@ import re
 from collections.abc import Iterable, Iterator
 from hashlib import sha256
 from pathlib import Path
-from typing import Any
 
 _SEPARATOR_PATTERN = re.compile(r"[,;=\[\]{}\"'\t\r\n]")
 _QUOTED_PATTERN = re.compile(r"\"([^\"\n]*)\"|'([^'\n]*)'")
 
 
-def iterate_texts(value: Any) -> Iterator[str]:
-    """Iterate over all strings in the tables of a scene, in their order."""
+def iterate_texts(value) -> Iterator[str]:
+    """Iterate over all strings in a value of TOML, such as the tables of a scene, in their order."""
     if isinstance(value, str):
         yield value
     elif isinstance(value, dict):
@@ -34,7 +33,9 @@ def hash_named_files(texts: Iterable[str], *folders: Path) -> list[list[str]]:
     Parameters
     ----------
     texts : iterable of str
+        Strings of a scene.
     *folders : Path
+        Folders in which the files are looked up.
 
     Raises
     ------
@@ -42,12 +43,13 @@ def hash_named_files(texts: Iterable[str], *folders: Path) -> list[list[str]]:
         If a file cannot be read.
     """
     names = dict.fromkeys(name for text in texts for name in _iterate_candidate_names(text))
-    paths = ((name, os.path.join(folder, name)) for name in names for folder in folders)
-    return [
-        [name, sha256(Path(path).read_bytes()).hexdigest()]
-        for name, path in paths
-        if _is_file(path)
-    ]
+    hashes = []
+    for name in names:
+        for folder in folders:
+            path = os.path.join(folder, name)
+            if _is_file(path):
+                hashes.append([name, sha256(Path(path).read_bytes()).hexdigest()])
+    return hashes
 
 
 def _iterate_candidate_names(text: str) -> Iterator[str]:

@@ -17,7 +17,7 @@ def find_package_version(name: str) -> str:
 
 
 @cache
-def list_installed_versions() -> dict:
+def list_installed_versions() -> dict[str, str]:
     """Return the versions of the installed packages by their normalised names."""
     versions = {}
     for folder in sys.path:
@@ -28,7 +28,8 @@ def list_installed_versions() -> dict:
         for name in names:
             if match := METADATA_PATTERN.fullmatch(name):
                 # Python imports the first package on the path.
-                versions.setdefault(_normalise_name(match[1]), match[2])
+                package, version = match.groups()
+                versions.setdefault(_normalise_name(package), version)
     return versions
 
 

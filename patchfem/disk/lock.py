@@ -13,10 +13,12 @@ import threading
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from typing import NamedTuple
 
 from ..core import Missing
 
 OWN_LOCK_PATHS = set()  # lock files of this process
+MAX_ENTRY_BYTES = 200  # number of bytes that are read of a lock file; entries are shorter
 _THREAD_LOCK = threading.Lock()
 
 
@@ -40,8 +42,11 @@ def read_start_ticks(pid: int) -> str:
     "" if the system does not know it, "ended" for a dead process that its parent has not collected.
     """
     try:
-        words = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
-        return "ended" if words[0] in "ZX" else words[19]
+        # The name of the program stands in brackets and may contain blanks; state and start time follow it as the
+        # fields 3 and 22 of proc(5)
+        *_, text = Path(f"/proc/{pid}/stat").read_text().rpartition(")")
+        fields = text.split()
+        return "ended" if fields[0] in "ZX" else fields[22 - 3]
     except (OSError, IndexError):
         return ""
 
@@ -59,6 +64,23 @@ def is_running(pid: int, start: str = "") -> bool:
         return False
     ticks = read_start_ticks(pid)
     return ticks != "ended" and (not (start and ticks) or start == ticks)
+
+
+class Owner(NamedTuple):
+    """Entry of a lock file: number and start time of a process, "-" if unknown, and hash of its machine.
+
+    An incomplete entry has empty fields.
+    """
+
+    pid: str = ""
+    start: str = ""
+    host: str = ""
+
+    @classmethod
+    def read(cls, file: int) -> "Owner":
+        """Read the entry of an open lock file."""
+        words = os.read(file, MAX_ENTRY_BYTES).decode("utf-8", "replace").split()
+        return cls(*words[: len(cls._fields)])
 
 
 class FolderLock:
@@ -84,15 +106,16 @@ class FolderLock:
         """Acquire the lock; raise Missing if another process holds it."""
         try:
             with _open_exclusively(self.path) as file:
-                owner = os.read(file, 200).decode("utf-8", "replace").split()
+                owner = Owner.read(file)
                 if self._is_active(owner):
-                    where = "" if len(owner) < 3 or owner[2] == HOST_HASH else " of another machine"
+                    where = "" if owner.host in ("", HOST_HASH) else " of another machine"
                     raise Missing(
-                        f"{self.folder}: another {self.kind} (process {owner[0]}{where}) is writing to this "
+                        f"{self.folder}: another {self.kind} (process {owner.pid}{where}) is writing to this "
                         "folder; wait until that process ends, or name another folder with -o; if that "
                         "process is not patchfem, remove the file "
                         f"{self.path.parent.name}/{self.path.name}"
                     )
+
                 os.ftruncate(file, 0)
                 # An incomplete entry would not identify a process.
                 if os.pwrite(file, self.owner.encode(), 0) < len(self.owner):
@@ -114,19 +137,20 @@ class FolderLock:
         with suppress(OSError):
             if self.path.is_file():
                 with _open_exclusively(self.path) as file:
-                    if os.read(file, 200).decode("utf-8", "replace") in ("", self.owner):
+                    content = os.read(file, MAX_ENTRY_BYTES).decode("utf-8", "replace")
+                    if content in ("", self.owner):
                         self.path.unlink()
 
-    def _is_active(self, owner: list) -> bool:
+    def _is_active(self, owner: Owner) -> bool:
         """Return whether the process that holds the lock is running."""
-        if not owner or not owner[0].isdecimal():
+        if not owner.pid.isdecimal():
             return False
-        if len(owner) > 2 and owner[2] != HOST_HASH:
+        if owner.host not in ("", HOST_HASH):
             return True
         # The file belongs to another thread, or remains from an earlier failure of this process.
-        if int(owner[0]) == os.getpid():
+        if int(owner.pid) == os.getpid():
             return self.path in OWN_LOCK_PATHS
-        return is_running(int(owner[0]), owner[1] if len(owner) > 1 and owner[1] != "-" else "")
+        return is_running(int(owner.pid), owner.start.removeprefix("-"))
 
 
 @contextmanager

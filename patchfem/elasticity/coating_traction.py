@@ -6,7 +6,7 @@ import numpy as np
 
 from ..mesh.grading import LENGTH_TOL
 from ..mesh.pieces import find_edges
-from .elasticity import hooke
+from .elasticity import CellPoints, hooke
 from .recovery import Cells, make_points
 
 
@@ -36,6 +36,7 @@ def compute_coating_traction(cells: Cells, u) -> CoatingTraction | None:
     Parameters
     ----------
     cells : Cells
+        Cells of the piece.
     u : (frames, N, 2) ndarray
         Displacements [m].
 
@@ -51,6 +52,8 @@ def compute_coating_traction(cells: Cells, u) -> CoatingTraction | None:
     is_bonded = is_coating & (n_coating == 1) & ~edges.is_border
     if not is_bonded.any():
         return None
+
+    # Fractions of the length of an edge that belong to its nodes, as for a uniform traction
     ends = edges.ends[is_bonded]
     middles = edges.middles[is_bonded]
     edge_nodes = ends
@@ -67,12 +70,15 @@ def compute_coating_traction(cells: Cells, u) -> CoatingTraction | None:
     for nodes, fraction in zip(edge_nodes.T, fractions):
         np.add.at(across, nodes, edge_normals)
         np.add.at(length, nodes, fraction * np.hypot(*edge_normals.T))
+
+    # The nodes along the line, and the unit vectors across it and along it at each
     nodes = np.unique(edge_nodes)
     nodes = nodes[np.lexsort((cells.points[nodes, 1], cells.points[nodes, 0]))]
     length = length[nodes]
     across = across[nodes] / np.hypot(*across[nodes].T)[:, None]
     along = across[:, ::-1] * [1.0, -1.0]
 
+    # The forces in equilibrium with the stress of the coating, divided by the length of a node
     coating = _select_coating(cells, nodes)
     gauss_points = make_points(coating, "gauss")
     force = np.stack([-_nodal_forces(coating, gauss_points, motion)[nodes] for motion in u])
@@ -92,7 +98,7 @@ def _select_coating(cells: Cells, nodes) -> Cells:
     return Cells(cells.points, groups, np.ones(sum(map(len, groups.values())), bool), cells.layers)
 
 
-def _nodal_forces(coating: Cells, gauss_points: list, u) -> np.ndarray:
+def _nodal_forces(coating: Cells, gauss_points: list[CellPoints], u) -> np.ndarray:
     """Return the nodal forces (N, 2) [N/m] in equilibrium with the stress of coating cells."""
     out = np.zeros(coating.points.shape)
     for nodes, points in zip(coating.groups.values(), gauss_points):
@@ -106,14 +112,19 @@ def _nodal_forces(coating: Cells, gauss_points: list, u) -> np.ndarray:
     return out
 
 
-def interpolate_coating_traction(cells: Cells, traction: CoatingTraction | None, x) -> dict:
+def interpolate_coating_traction(
+    cells: Cells, traction: CoatingTraction | None, x
+) -> dict[str, np.ndarray]:
     """Interpolate the tractions below a coating at positions along the interface.
 
     Parameters
     ----------
     cells : Cells
+        Cells of the piece.
     traction : CoatingTraction or None
-    x : (m,) ndarray [m]
+        Tractions at the nodes of the common line, None without a coating.
+    x : (m,) ndarray
+        Positions along the interface [m].
 
     Returns
     -------

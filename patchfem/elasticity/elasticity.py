@@ -11,6 +11,7 @@ import numpy as np
 
 from ..core import NotConverged, frozen_array
 from ..formatting import format_length
+from ..mesh import grid, pieces
 from ..mesh.elements import ELEMENTS, Element
 from .fronts import CellBlock, Fronts, condense
 
@@ -43,11 +44,14 @@ def lame(young: float, poisson: float, plane: str) -> tuple[float, float]:
     young : float
         Young's modulus [Pa].
     poisson : float
+        Poisson's ratio [1], below 0.5.
     plane : {"strain", "stress"}
+        No strain, or no stress, across the plane.
 
     Returns
     -------
-    lam, mu : float [Pa]
+    lam, mu : float
+        [Pa]
     """
     mu = young / (2 * (1 + poisson))
     if plane == "stress":
@@ -83,8 +87,11 @@ def evaluate_cells(points, cells, element: Element, local_points, weights) -> Ce
     points : (N, 2) ndarray
         Nodes [m].
     cells : (t, k) ndarray of int
+        Nodes of the cells.
     element : Element
+        Reference element of all cells.
     local_points : (g, 2) ndarray
+        Points in its local coordinates.
     weights : (g,) ndarray
         Of the integration in local coordinates.
 
@@ -109,7 +116,9 @@ def compute_stiffness(points, cells, element: Element, lam, mu) -> np.ndarray:
     points : (N, 2) ndarray
         Nodes [m].
     cells : (t, k) ndarray of int
+        Nodes of the cells.
     element : Element
+        Reference element of all cells.
     lam, mu : (t,) ndarray
         Lame constants [Pa].
 
@@ -122,11 +131,14 @@ def compute_stiffness(points, cells, element: Element, lam, mu) -> np.ndarray:
     along, inward = np.moveaxis(gradients, 2, 0)
     weighted_along = along * weights[..., None]
     weighted_inward = inward * weights[..., None]
+
+    # Integrals of the products of the gradients of two nodes, by which the stiffness is (lam + 2 mu) xx + mu yy along x
     xx = weighted_along.swapaxes(1, 2) @ along
     yy = weighted_inward.swapaxes(1, 2) @ inward
     xy = weighted_along.swapaxes(1, 2) @ inward
     lam = lam[:, None, None]
     mu = mu[:, None, None]
+
     n_cells, k = cells.shape
     out = np.empty((n_cells, k, 2, k, 2))
     out[:, :, 0, :, 0] = (lam + 2 * mu) * xx + mu * yy
@@ -143,12 +155,13 @@ class Piece:
     - ``mesh``: TensorGrid or PieceMesh
     - ``layers``: materials
     - ``guided``: displacement that is also fixed at both ends of a rectangle (0 along x, 1 inward), or None
+    - ``computed``: "factor" and "round_off_error" once they are computed
     """
 
-    mesh: object
+    mesh: "grid.TensorGrid | pieces.PieceMesh"
     layers: Layers
     guided: int | None = None
-    computed: dict = field(default_factory=dict)
+    computed: dict[str, Fronts | float] = field(default_factory=dict)
 
     @property
     def factor(self) -> Fronts:
@@ -232,10 +245,12 @@ def spread_matrix(mesh) -> np.ndarray:
     Parameters
     ----------
     mesh : TensorGrid or PieceMesh
+        Mesh with m pressure nodes and n interface nodes.
 
     Returns
     -------
-    (m, n) ndarray [1]
+    (m, n) ndarray
+        [1]
     """
     m = mesh.x.size
     if mesh.interface.size == m:
@@ -254,6 +269,7 @@ def compute_displacement(piece: Piece, shear: np.ndarray, normal: np.ndarray) ->
     Parameters
     ----------
     piece : Piece
+        Piece with N nodes, of which m carry pressure.
     shear, normal : (frames, m) or (m,) ndarray
         Forces per unit width along x and inward [N/m].
 
@@ -274,7 +290,9 @@ def hooke(strain, is_coating, layers: Layers) -> np.ndarray:
     strain : (3, ...) array_like
         exx, eyy, exy [1].
     is_coating : (...) ndarray of bool
+        Whether a strain is one of the coating.
     layers : Layers
+        Materials of coating and substrate.
 
     Returns
     -------

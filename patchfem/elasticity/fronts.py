@@ -19,7 +19,7 @@ MAX_LEAF_CELLS = 100  # largest number of cells in a part that is not halved fur
 # pivots lose digits where a long thin part bends
 MIN_SAFE_PIVOT = 1e-6
 # Largest residual of a solution, relative to the largest load, that is not refined
-RESIDUAL_TOL = 1e-8
+SAFE_RESIDUAL = 1e-8
 # Largest relative change of the displacements by one step of refinement; factors with a larger
 # change are rejected
 MAX_REFINEMENT_CHANGE = 1e-2
@@ -62,8 +62,8 @@ class Fronts:
     - ``smallest_pivot``: smallest pivot relative to the diagonal entry of its front
     """
 
-    blocks: list
-    fronts: list
+    blocks: list[CellBlock]
+    fronts: list[Front]
     interface: np.ndarray
     compliance: np.ndarray
     n_nodes: int
@@ -72,8 +72,9 @@ class Fronts:
     def solve(self, load) -> np.ndarray:
         """Return the displacements (n, 2, r) [m] under loads of the same shape [N/m]."""
         u = np.array(load, float)
-        frames = u.shape[2]
+        frames = u.shape[-1]
         with use_one_blas_thread():
+            # Forward substitution from the leaves to the interface, then back
             for own, ring, factor, coupling, _ in self.fronts:
                 half_solved = dtrsm(1.0, factor, u[own].reshape(-1, frames), lower=1)
                 u[own] = half_solved.reshape(-1, 2, frames)
@@ -89,7 +90,7 @@ class Fronts:
         """Return the nodal forces (n, 2, r) [N/m] that cause displacements of the same shape [m]."""
         out = np.zeros_like(u)
         for nodes, matrices in self.blocks:
-            local = u[nodes].reshape(len(nodes), -1, u.shape[2])
+            local = u[nodes].reshape(len(nodes), -1, u.shape[-1])
             np.add.at(out, nodes, (matrices @ local).reshape(*nodes.shape, 2, -1))
         return out
 
@@ -103,7 +104,7 @@ class Fronts:
         -------
         float
             Largest change over the largest displacement; 0 if no pivot is small or the residual is at most
-            `RESIDUAL_TOL`.
+            `SAFE_RESIDUAL`.
 
         Raises
         ------
@@ -118,7 +119,7 @@ class Fronts:
         load[self.interface] = number**2 * ((np.sqrt(5) - 1) / 2) % 1 - 0.5
         u = self.solve(load)
         residual = load - self.compute_forces(u)
-        if np.abs(residual).max() <= RESIDUAL_TOL * np.abs(load).max():
+        if np.abs(residual).max() <= SAFE_RESIDUAL * np.abs(load).max():
             return 0.0
         change = float(np.abs(self.solve(residual)).max() / np.abs(u).max())
         if not change <= MAX_REFINEMENT_CHANGE:
@@ -130,9 +131,9 @@ class Fronts:
 
 
 class _Part(NamedTuple):
-    """Part of a mesh that consists of the leaves from `begin` to `end`, and the numbers of its two halves."""
+    """Part of a mesh that consists of the leaves from `begin` to `end`, and the numbers of its two halves, () for a leaf."""
 
-    halves: tuple
+    halves: tuple[int, ...]
     begin: int
     end: int
 
@@ -182,10 +183,11 @@ def condense(blocks: list[CellBlock], positions, interface, is_fixed) -> Fronts:
     Parameters
     ----------
     blocks : list of CellBlock
+        Stiffnesses of the t cells, by element.
     positions : (t, 2) ndarray
         Positions of the cells, by which they are divided.
     interface : (m,) ndarray of int
-        Nodes.
+        Nodes that remain.
     is_fixed : (n, 2) ndarray of bool
         Fixed displacements; none of them belongs to the interface unless the compliance there is not used.
 
@@ -198,11 +200,14 @@ def condense(blocks: list[CellBlock], positions, interface, is_fixed) -> Fronts:
     NotConverged
         If the stiffness is not positive definite.
     """
+    # A node is eliminated in the smallest part that contains all of its cells
     blocks = [_decouple_fixed(block, is_fixed) for block in blocks]
     parts, leaves = _dissect(positions)
     first, last = _find_leaves_of_nodes(blocks, leaves, len(is_fixed))
     last[interface] = len(leaves)  # these nodes belong to no part
     place = np.empty(len(is_fixed), np.int64)
+
+    # Halves stand before their part, so their stiffnesses are ready when the part is reached
     stiffnesses = {}
     fronts = []
     with use_one_blas_thread():
@@ -217,6 +222,8 @@ def condense(blocks: list[CellBlock], positions, interface, is_fixed) -> Fronts:
             ring = nodes[~is_own]
             front, stiffnesses[number] = _eliminate(own, ring, terms, place)
             fronts.append(front)
+
+        # The last stiffness is the Schur complement; its rows and columns are put in the order of the interface
         nodes, schur = stiffnesses[len(parts) - 1]
         place[nodes] = np.arange(nodes.size)
         unknowns = _number_unknowns(place[interface])
@@ -295,6 +302,8 @@ def _eliminate(own, ring, terms, place) -> tuple[Front, _Stiffness]:
             matrix.take(of_ring, 0).take(of_ring, 1),
         )
         sums = term if sums is None else tuple(map(np.add, sums, term, sums))
+
+    # The coupling W and the remaining stiffness S overwrite their terms
     own_own, own_ring, remaining = sums
     factor = own_own
     smallest_pivot = 1.0
@@ -304,6 +313,7 @@ def _eliminate(own, ring, terms, place) -> tuple[Front, _Stiffness]:
         coupling = own_ring.T
         dtrsm(1.0, factor, coupling, side=1, lower=1, trans_a=1, overwrite_b=1)
         dgemm(-1.0, coupling, coupling, beta=1.0, c=remaining.T, trans_b=1, overwrite_c=1)
+
     front = Front(own, ring, factor, own_ring[:, : 2 * ring.size], smallest_pivot)
     return front, _Stiffness(ring, remaining)
 

@@ -64,6 +64,7 @@ def join_pieces(lower: PieceInterface, upper: PieceInterface) -> Mortar:
     Parameters
     ----------
     lower, upper : PieceInterface
+        Interface nodes and compliances of both pieces.
 
     Returns
     -------
@@ -98,7 +99,8 @@ def transfer_matrix(x, piece_x) -> np.ndarray:
 
     Returns
     -------
-    (m, n) ndarray [1]
+    (m, n) ndarray
+        T [1], whose rows sum to 1.
     """
     cuts = np.union1d(x, piece_x)
     left = cuts[:-1]

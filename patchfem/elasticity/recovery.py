@@ -33,7 +33,7 @@ class Cells:
     """
 
     points: np.ndarray
-    groups: dict
+    groups: dict[str, np.ndarray]
     is_coating: np.ndarray
     layers: Layers
 
@@ -78,6 +78,7 @@ def centre_stress(cells: Cells, u: np.ndarray) -> np.ndarray:
     Parameters
     ----------
     cells : Cells
+        Cells of the piece.
     u : (frames, N, 2) ndarray
         Displacements [m].
 
@@ -162,11 +163,13 @@ def fit_recovery(cells: Cells) -> Recovery:
     Parameters
     ----------
     cells : Cells
+        Cells of the piece.
 
     Returns
     -------
     Recovery
     """
+    # A recovery point is a node together with a material, and its patch the cells of this material at the node
     cell_of_corner = cells.cell_of_corner()
     corners = np.concatenate([block.ravel() for block in cells.blocks])
     key = 2 * corners + cells.is_coating[cell_of_corner]
@@ -175,19 +178,23 @@ def fit_recovery(cells: Cells) -> Recovery:
     patches = collect_patches(recovery_point, cell_of_corner)
     centres = cells.centres()
     fit, is_thin = _fit_planes(patches, cells.points[node], centres)
+
+    # A patch of too few cells gets the cells around all points of its cells
     if is_thin.any():
-        # The cells around all points of the cells in a thin patch
         thin = np.flatnonzero(is_thin)
         around, owner = patches.list_cells(thin)
         points, number = collect_patches(patches.cell, patches.point).list_cells(around)
         wide_cells, wide_number = patches.list_cells(points)
         wide = collect_patches(owner[number[wide_number]], wide_cells)
         wide_fit, _ = _fit_planes(wide, cells.points[node[thin]], centres)
+
+        # They replace the thin patches, in the order of the points
         is_kept = ~is_thin[fit.point]
         parts = zip((part[is_kept] for part in fit), wide_fit._replace(point=thin[wide_fit.point]))
         fit = Patches(*map(np.concatenate, parts))
         order = np.argsort(fit.point, kind="stable")
         fit = Patches(*(part[order] for part in fit))
+
     return Recovery(cells, node, key % 2 == 1, recovery_point, fit)
 
 
@@ -200,7 +207,8 @@ def _fit_planes(patches: Patches, points, centres) -> tuple[Patches, np.ndarray]
         Cells around each node.
     points : (s, 2) ndarray
         Nodes [m].
-    centres : (t, 2) ndarray [m]
+    centres : (t, 2) ndarray
+        Centres of the cells [m].
 
     Returns
     -------
@@ -216,12 +224,14 @@ def _fit_planes(patches: Patches, points, centres) -> tuple[Patches, np.ndarray]
     size = np.maximum.reduceat(np.abs(offset), starts)
     offset /= np.where(size > 0, size, 1.0)[row]
 
+    # Normal equations of 1, x and y around each node; their correlations tell whether they determine a plane
     terms = np.column_stack([np.ones(row.size), offset])
     gram = np.add.reduceat(terms[:, :, None] * terms[:, None], starts)
     scale = np.sqrt(np.einsum("sii->si", gram))
     scale = np.where(scale > 0, scale, 1.0)
     is_thin = np.linalg.det(gram / (scale[:, :, None] * scale[:, None])) < MIN_PLANE_DETERMINANT
 
+    # Value of the plane at the node: mean of the values, less the slopes times the mean offset
     mean = gram[:, 0, 1:] / counts[:, None]
     deviation = offset - mean[row]
     spread = np.add.reduceat(deviation[:, :, None] * deviation[:, None], starts)
@@ -249,7 +259,9 @@ class StressError:
         Returns
         -------
         by_cell : (frames, t) ndarray
+            Errors of the cells [1].
         in_piece : (frames,) ndarray
+            Errors of the piece [1].
         """
         total = self.error.sum(axis=1)
         norm = np.zeros(total.size)
@@ -259,17 +271,19 @@ class StressError:
         return np.sqrt(self.error / norm[:, None]), np.sqrt(total / norm)
 
 
-def estimate_error(recovery: Recovery, u, stress, gauss_points: list) -> StressError:
+def estimate_error(recovery: Recovery, u, stress, gauss_points: list[CellPoints]) -> StressError:
     """Estimate the error of the stress by the method of Zienkiewicz and Zhu.
 
     Parameters
     ----------
     recovery : Recovery
+        Map of the stresses at the centres to the nodes.
     u : (frames, N, 2) ndarray
         Displacements [m].
     stress : (frames, t, 4) ndarray
         From `centre_stress` [Pa].
     gauss_points : list of CellPoints
+        Points of `make_points`, by element, at which the error is integrated.
 
     Returns
     -------
@@ -283,11 +297,13 @@ def estimate_error(recovery: Recovery, u, stress, gauss_points: list) -> StressE
     error = np.zeros((len(u), mu.size))
     energy = np.zeros(len(u))
     for frame, motion in enumerate(u):
+        # The same components from the stresses at the centres, recovered at the corners of the cells
         xx, yy, _, xy = stress[frame].T
         at_centres = np.stack([(xx + yy) / (2 * bulk), (xx - yy) / (2 * shear), xy / shear], axis=1)
         recovered = recovery(at_centres)[recovery.recovery_point]
         first_cell = first_corner = 0
         for (kind, nodes), points in zip(cells.groups.items(), gauss_points):
+            # Recovered components of the cells of one element, interpolated to the Gauss points
             n_corners = ELEMENTS[kind].n_corners
             part = slice(first_cell, first_cell + len(nodes))
             at_corners = recovered[first_corner : first_corner + n_corners * len(nodes)]
@@ -295,6 +311,8 @@ def estimate_error(recovery: Recovery, u, stress, gauss_points: list) -> StressE
             first_corner = first_corner + len(at_corners)
             shape = LINEAR_ELEMENTS[n_corners].evaluate(ELEMENTS[kind].gauss).values
             at_points = shape @ at_corners.reshape(len(nodes), n_corners, 3)
+
+            # Squared difference from the computed components, integrated over each cell
             exx, eyy, exy = points.strain(motion[nodes])
             computed = np.stack(
                 [

@@ -10,7 +10,9 @@ import numpy as np
 CELL_MERGES = tuple((4, first_cell) for first_cell in range(4))
 
 
-def join_cells(count: int, first: int, stiffness, yield_displacement) -> tuple:
+def join_cells(
+    count: int, first: int, stiffness, yield_displacement
+) -> tuple[np.ndarray, np.ndarray]:
     """Return the stiffness [N/m] and yield displacement [m] of joined elements.
 
     Parameters
@@ -26,6 +28,7 @@ def join_cells(count: int, first: int, stiffness, yield_displacement) -> tuple:
     Returns
     -------
     stiffness, yield_displacement : ndarray
+        Of the joined elements [N/m], [m], in increasing order of the yield displacement.
     """
     n_last = stiffness.size % 2
     begins = np.r_[0, np.arange(first, stiffness.size - n_last, count)]

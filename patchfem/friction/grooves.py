@@ -24,7 +24,7 @@ from ..exceptions import PatchfemError
 # Largest product of friction coefficient and slope for which the friction loss is computed as a
 # power series; the closed form suffers from cancellation there
 MAX_SERIES_SLOPE = 0.1
-N_SERIES_TERMS = 18  # number of terms of this series; 0.1^18 is below round-off
+N_SLOPE_TERMS = 18  # number of terms of this series; 0.1^18 is below round-off
 
 
 @dataclass(frozen=True, slots=True)
@@ -129,6 +129,7 @@ class Grooves:
         Returns
         -------
         float or array
+            Ratio [1].
         """
         slope = self.slope(q)
         phi = np.asarray(direction) * friction
@@ -168,6 +169,7 @@ class Grooves:
         Returns
         -------
         float or array
+            Energy per vertical force [J/N].
         """
         q0 = np.asarray(q0, float)
         q1 = np.asarray(q1, float)
@@ -180,10 +182,10 @@ class Grooves:
 
     def _integrate_series(self, start, end, signed_friction):
         """Integrate the friction loss mu (1 + t^2)/(1 - mu t) over angles as a power series."""
-        powers = _integrate_sine_powers(start, end, N_SERIES_TERMS + 2)
+        powers = _integrate_sine_powers(start, end, N_SLOPE_TERMS + 2)
         b = signed_friction * self.max_slope
         total = 0.0
-        for j in range(N_SERIES_TERMS):
+        for j in range(N_SLOPE_TERMS):
             total = total + b**j * (powers[j] + self.max_slope**2 * powers[j + 2])
         return signed_friction * total
 
@@ -217,8 +219,8 @@ class Grooves:
         return slope * (slope - friction) / (1 + friction * slope)
 
 
-def _integrate_sine_powers(start, end, count: int) -> list:
-    """Integrate powers of the sine from start to end (k,) [rad] by a recursion formula."""
+def _integrate_sine_powers(start, end, count: int) -> list[np.ndarray]:
+    """Return the integrals of sin^j from start to end (k,) [rad] for j < count, by partial integration."""
     integrals = [end - start, 2 * np.sin(0.5 * (end - start)) * np.sin(0.5 * (end + start))]
     for j in range(2, count):
         boundary = np.cos(start) * np.sin(start) ** (j - 1) - np.cos(end) * np.sin(end) ** (j - 1)

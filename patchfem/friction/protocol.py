@@ -23,7 +23,7 @@ class Step(NamedTuple):
 
     - mean: path mean (m,) [Pa] of the traction, positive against slip to +x
     - dissipated: energy per area (m,) [J/m2], negative only if the law creates energy
-    - state: state after the increment
+    - state: state after the increment, of the type that the `initial_state` of the law returns
     """
 
     mean: np.ndarray

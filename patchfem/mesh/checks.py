@@ -15,7 +15,7 @@ from .pieces import PieceMesh, find_edges, freeze_piece, signed_areas
 
 # Largest slope of a rounded edge within the interface; the normal and the vertical gap then differ
 # by half a percent
-MAX_SLOPE = 0.1
+MAX_ROUNDED_SLOPE = 0.1
 # Names of the tags of the cells of both pieces, with their numbers in mesh files
 CELL_TAGS = {"upper_substrate": 1, "upper_coating": 2, "lower_substrate": 3, "lower_coating": 4}
 # Names of the tags of the edges on the interfaces and the far faces of both pieces, with these numbers
@@ -39,7 +39,7 @@ class TaggedMesh(NamedTuple):
     """
 
     points: np.ndarray
-    blocks: list
+    blocks: list[TaggedBlock]
     tag_help: str
 
     def select(self, kinds, *tags: str) -> list[TaggedBlock]:
@@ -69,7 +69,8 @@ def build_pair(mesh: TaggedMesh, source) -> PairMesh:
     Parameters
     ----------
     mesh : TaggedMesh
-    source : object
+        Mesh with the lower piece at y <= 0 and the upper one at y >= 0.
+    source : Path or str
         The file; it begins every message.
 
     Returns
@@ -88,15 +89,19 @@ def build_pair(mesh: TaggedMesh, source) -> PairMesh:
         _check_numbers(mesh)
         lower = _build_piece(mesh, "lower")
         upper = _build_piece(mesh, "upper")
+
+        # Shared nodes would bond the pieces; interfaces of different ends would not face each other
         nodes = []
         for side in ("lower", "upper"):
             blocks = mesh.select(ELEMENTS, f"{side}_substrate", f"{side}_coating")
             nodes.append(np.concatenate([block.cells.ravel() for block in blocks]))
+
         n_shared = np.intersect1d(*nodes).size
         if n_shared:
             raise PatchfemError(
                 f"the two pieces share {n_shared} nodes; each piece needs its own interface nodes"
             )
+
         distance = np.abs(lower.x[[0, -1]] - upper.x[[0, -1]]).max()
         if distance > LENGTH_TOL * lower.length:
             raise PatchfemError(
@@ -106,6 +111,8 @@ def build_pair(mesh: TaggedMesh, source) -> PairMesh:
             )
     except PatchfemError as error:
         raise PatchfemError(f"{source}: {error}") from None
+
+    # x is 0 in the middle of the interface
     middle = [(lower.x[0] + lower.x[-1]) / 2, 0.0]
     return PairMesh(
         *(freeze_piece(replace(piece, points=piece.points - middle)) for piece in (lower, upper))
@@ -147,9 +154,10 @@ def _check_numbers(mesh: TaggedMesh) -> None:
     if not np.abs(used_points).max() < 1e150:
         raise PatchfemError("a node has a coordinate that is not finite")
     span = np.ptp(used_points, axis=0)
-    if span.size > 2 and span[2] > LENGTH_TOL * span[:2].max():
+    z_span = span[-1]
+    if span.size > 2 and z_span > LENGTH_TOL * span[:2].max():
         raise PatchfemError(
-            f"the mesh is not plane: its z values span {span[2]:.6g} m; draw the mesh in x and y"
+            f"the mesh is not plane: its z values span {z_span:.6g} m; draw the mesh in x and y"
         )
 
 
@@ -170,6 +178,7 @@ def _build_piece(mesh: TaggedMesh, side: str) -> PieceMesh:
             f"the {side} piece has elements of first and of second order, which do not fit together"
         )
 
+    # The nodes of the interface and of the far face, numbered within the piece
     edges = find_edges(blocks, len(points))
     ends = []
     for name in (f"{side}_interface", f"{side}_far"):
@@ -185,6 +194,8 @@ def _build_piece(mesh: TaggedMesh, side: str) -> PieceMesh:
         # A node in the middle of a tagged edge of second order belongs to the tag.
         is_tagged = np.isin(edges.ends, nodes).all(axis=1) & edges.is_border & (edges.middles >= 0)
         ends.append(np.union1d(nodes, edges.middles[is_tagged]))
+
+    # Round-off of the depths is removed, so that the gap of a flat interface is exactly 0
     interface, far = ends
     interface = interface[np.argsort(points[interface, 0], kind="stable")]
     _check_interface(points, interface, side)
@@ -211,6 +222,8 @@ def _turn_counterclockwise(points, cells, kind: str) -> np.ndarray:
     if ELEMENTS[kind].is_quadratic:
         order[n : 2 * n] = n + (np.arange(n)[::-1] - 1) % n
     cells = np.where(is_clockwise[:, None], cells[:, order], cells)
+
+    # At every corner the two edges must turn left, by more than round-off
     corners = points[cells[:, :n]]
     side = np.roll(corners, -1, axis=1) - corners
     next_side = np.roll(side, -1, axis=1)
@@ -236,26 +249,31 @@ def _check_interface(points, nodes, side: str) -> None:
     nodes : (m,) ndarray of int
         Interface nodes by increasing x.
     side : str
+        "lower" or "upper", for the messages.
     """
     name = f"{side}_interface"
     if nodes.size < 3:
         raise PatchfemError(f"{name} contains {nodes.size} nodes; three or more are needed")
+
     x, y = points[nodes].T
     cells = np.diff(x)
     tolerance = LENGTH_TOL * np.ptp(x)
     shortest = int(np.argmin(cells))
     if cells[shortest] <= tolerance and np.ptp(x) > 0:
         raise PatchfemError(f"{name} has two nodes at x = {x[shortest]:.6g} m; merge these nodes")
+
+    # A rounded edge is convex, and its slope is limited; some node must lie at y = 0
     slope = np.diff(y) / np.maximum(cells, 1e-300)
-    is_wrong = np.append(np.abs(slope) > MAX_SLOPE, np.abs(y).min() > tolerance)
+    is_wrong = np.append(np.abs(slope) > MAX_ROUNDED_SLOPE, np.abs(y).min() > tolerance)
     is_wrong[1:-1] |= np.diff(slope) < -1e-6 - 4 * tolerance / max(cells.min(), tolerance)
     if is_wrong.any():
         node = int(np.argmax(is_wrong))
         raise PatchfemError(
             f"{name} is not the straight line y = 0 (rounded edges may reach a slope of "
-            f"{MAX_SLOPE:g}): the node at x = {x[node]:.6g} m lies {abs(y[node]):.6g} m away "
+            f"{MAX_ROUNDED_SLOPE:g}): the node at x = {x[node]:.6g} m lies {abs(y[node]):.6g} m away "
             "from this line; give the shape of a surface by [contact.crown] or [contact.tilt]"
         )
+
     if points[:, 1].min() < -tolerance:
         raise PatchfemError(
             f"the {side} piece reaches {-points[:, 1].min():.6g} m across y = 0; the lower "
@@ -270,19 +288,24 @@ def _check_connections(mesh: PieceMesh, side: str) -> None:
     _check_touching_nodes(mesh, border, side)
     if len(np.unique(edges.ends, axis=0)) < len(edges.ends):
         raise PatchfemError(f"cells of the {side} piece overlap")
+
+    # Cells that share an edge are linked; all of them must form one component
     n_cells = mesh.is_coating.size
     shape = (n_cells, edges.twin.max() + 1)
     links = coo_array((np.ones(edges.owner.size), (edges.owner, edges.twin)), shape=shape)
     n_parts, _ = connected_components(links @ links.T, directed=False)
     if n_parts > 1:
         raise PatchfemError(f"the {side} piece falls into {n_parts} parts that share no edge")
+
     on_border = np.concatenate([border.ravel(), edges.middles[edges.is_border]])
     n_inside = np.setdiff1d(mesh.far, on_border).size
     if n_inside:
         raise PatchfemError(
             f"{side}_far contains {n_inside} nodes inside the {side} piece; tag only nodes on the border"
         )
-    # Along a continuous interface every second node is a corner in a mesh of second order.
+
+    # Two neighbouring corners of the interface must be the ends of an edge of the border. Along a continuous interface
+    # every second node is a corner in a mesh of second order.
     corners = mesh.interface[np.isin(mesh.interface, edges.ends)]
     steps = np.sort(np.stack([corners[:-1], corners[1:]], axis=1), axis=1)
     keys = np.sort(border, axis=1) @ [len(mesh.points), 1]
@@ -297,6 +320,7 @@ def _check_connections(mesh: PieceMesh, side: str) -> None:
 
 def _check_touching_nodes(mesh: PieceMesh, border, side: str) -> None:
     """Raise PatchfemError if a boundary node lies on a boundary edge (e, 2) of which it is no end."""
+    # Only nodes within half the length of an edge from its middle can lie on it
     nodes = np.unique(border)
     begin = mesh.points[border[:, 0]]
     along = mesh.points[border[:, 1]] - begin
@@ -305,10 +329,13 @@ def _check_touching_nodes(mesh: PieceMesh, border, side: str) -> None:
     nearby_nodes = tree.query_ball_point(begin + along / 2, length / 2 * (1 + 1e-9))
     edge = np.repeat(np.arange(len(border)), [len(found) for found in nearby_nodes])
     node = nodes[np.concatenate(nearby_nodes).astype(int)]
+
+    # The area that edge and node span is 0 where the node lies on the edge
     offset = mesh.points[node] - begin[edge]
     area = along[edge, 0] * offset[:, 1] - along[edge, 1] * offset[:, 0]
     is_touching = np.abs(area) <= LENGTH_TOL * mesh.length * length[edge]
     is_touching &= (border[edge] != node[:, None]).all(axis=1)
+
     if is_touching.any():
         x, y = mesh.points[node[np.argmax(is_touching)]]
         raise PatchfemError(

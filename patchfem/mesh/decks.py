@@ -43,13 +43,13 @@ class Deck:
     def __init__(self, text: str):
         self.nodes: dict[int, list[float]] = {}
         self.elements: dict[int, tuple[str, list[int]]] = {}
-        self.sets: dict[str, dict[str, list]] = {"NSET": {}, "ELSET": {}}
+        self.sets: dict[str, dict[str, list[int]]] = {"NSET": {}, "ELSET": {}}
         self.surfaces: dict[str, list[list[str]]] = {}
         self.max_members = MAX_SET_SIZE_RATIO * (text.count("\n") + 1)
         for keyword, parameters, lines in _split_blocks(text):
             self._add(keyword, parameters, lines)
 
-    def _add(self, keyword: str, parameters: dict, lines: list) -> None:
+    def _add(self, keyword: str, parameters: dict[str, str], lines: list[list[str]]) -> None:
         """Add the contents of a keyword block to the deck."""
         if keyword in UNSUPPORTED_KEYWORDS:
             raise PatchfemError(
@@ -67,8 +67,14 @@ class Deck:
         elif keyword == "SURFACE":
             self.surfaces.setdefault(parameters.get("NAME", "").lower(), []).extend(lines)
 
-    def _add_numbered(self, known: dict, new: dict, kind: str, parameters: dict) -> None:
-        """Add numbered nodes or elements, and their numbers to the set that the block names."""
+    def _add_numbered(
+        self,
+        known: dict[int, object],
+        new: dict[int, object],
+        kind: str,
+        parameters: dict[str, str],
+    ) -> None:
+        """Add numbered nodes or elements, and their numbers to the set of a kind that the block names."""
         if new.keys() & known.keys():
             raise PatchfemError(
                 "a node or element number is given twice (several parts are not supported yet: write a flat deck)"
@@ -77,7 +83,7 @@ class Deck:
         if kind in parameters:
             self.sets[kind].setdefault(parameters[kind].lower(), []).extend(new)
 
-    def _read_members(self, kind: str, is_range: bool, lines: list) -> list[int]:
+    def _read_members(self, kind: str, is_range: bool, lines: list[list[str]]) -> list[int]:
         """Return the node or element numbers of a set, which may contain other sets."""
         members = []
         for words in lines:
@@ -100,11 +106,14 @@ class Deck:
 
     def tag_mesh(self) -> TaggedMesh:
         """Convert the deck to a mesh with named groups."""
+        # An element has one tag at most; without a tag it is reported later
         tags = {}
         for tag in (*CELL_TAGS, *EDGE_TAGS):
             for number in self.sets["ELSET"].get(tag, ()):
                 if tags.setdefault(number, tag) != tag:
                     raise PatchfemError(f"element {number} is tagged {tags[number]} and {tag}")
+
+        # Members by element in meshio: cells, nodes that tag an edge, and sides of cells
         groups = {}
         for number, (kind, nodes) in self.elements.items():
             groups.setdefault(kind, []).append((nodes, tags.get(number, "")))
@@ -114,6 +123,7 @@ class Deck:
             for side in self._list_sides(tag):
                 groups.setdefault("line", []).append((side, tag))
 
+        # Node numbers become positions in the array of points
         position = {number: k for k, number in enumerate(self.nodes)}
         blocks = []
         for kind, members in groups.items():
@@ -127,6 +137,7 @@ class Deck:
             cells = [[position[node] for node in nodes] for nodes, _ in members]
             names = [tag for _, tag in members]
             blocks.append(TaggedBlock(kind, np.array(cells, np.int64), np.array(names, str)))
+
         if len({len(coordinates) for coordinates in self.nodes.values()}) > 1:
             raise PatchfemError("either all nodes need two coordinates, or all nodes need three")
         points = np.array(list(self.nodes.values()), float).reshape(len(self.nodes), -1)
@@ -149,6 +160,7 @@ def read_deck(text: str) -> TaggedMesh:
     Parameters
     ----------
     text : str
+        Content of the file.
 
     Returns
     -------

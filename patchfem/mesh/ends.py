@@ -5,8 +5,8 @@ from math import hypot, sqrt
 
 import numpy as np
 
-# Largest slope at which the face of a rounded end belongs to the interface; the same limit holds for
-# pieces that are read from a mesh file
+# Largest slope at which the face of a rounded end belongs to the interface, a little below the largest one between two
+# nodes that a mesh file may have (`checks.MAX_ROUNDED_SLOPE`)
 MAX_INTERFACE_SLOPE = 0.097
 # Slope (60 degrees) at which a rounded end leaves the circle and continues along its tangent
 MAX_CIRCLE_SLOPE = sqrt(3)
@@ -52,7 +52,8 @@ class End:
 
         Returns
         -------
-        (k,) ndarray [m]
+        (k,) ndarray
+            Depth [m], 0 on the flat face.
         """
         end_distance = np.maximum(np.abs(np.asarray(x, float)) - (length / 2 - self.size), 0.0)
         if self.kind == "chamfer":

@@ -48,6 +48,7 @@ def write_mesh(lower, path: Path, upper=None) -> None:
     path = Path(path)
     if path.suffix not in (".msh", ".vtu"):
         raise PatchfemError(f"{path}: a mesh can be written only as .msh or .vtu")
+
     points, blocks = join_meshes(lower, lower if upper is None else upper)
     numbers = CELL_TAGS | EDGE_TAGS
     tags = [np.array([numbers[name] for name in block.names], np.int32) for block in blocks]
@@ -55,6 +56,8 @@ def write_mesh(lower, path: Path, upper=None) -> None:
         np.column_stack([points, np.zeros(len(points))]),
         [(block.kind, block.cells) for block in blocks],
     )
+
+    # Gmsh names its physical groups by dimension and number; a .vtu file has the numbers alone
     if path.suffix == ".msh":
         mesh.cell_data = {"gmsh:physical": tags, "gmsh:geometrical": tags}
         mesh.field_data = {name: np.array([tag, 2]) for name, tag in CELL_TAGS.items()}
@@ -63,6 +66,7 @@ def write_mesh(lower, path: Path, upper=None) -> None:
     else:
         mesh.cell_data = {"tag": tags}
         options = {"file_format": "vtu"}
+
     with write_atomically(path) as partial:
         meshio.write(partial, mesh, **options)
 
@@ -81,12 +85,15 @@ def join_meshes(lower, upper) -> tuple[np.ndarray, list[TaggedBlock]]:
     lines = []
     n_points = 0
     for side, sign, body in (("lower", -1.0, lower), ("upper", 1.0, upper)):
+        # Cells of a kind, with the numbers of their nodes among those of both pieces
         n_cells = 0
         for kind, nodes in body.blocks.items():
             is_coating = body.is_coating[n_cells : n_cells + len(nodes)]
             n_cells += len(nodes)
             names = np.where(is_coating, f"{side}_coating", f"{side}_substrate")
             cells.setdefault(kind, []).append((nodes + n_points, names))
+
+        # Lines along the tagged edges of the border; those of second order have the node in their middle as well
         edges = find_edges(body.blocks, len(body.points))
         for tag, tagged in (("interface", body.interface), ("far", body.far)):
             is_tagged = edges.is_border & np.isin(edges.ends, tagged).all(axis=1)
@@ -94,9 +101,12 @@ def join_meshes(lower, upper) -> tuple[np.ndarray, list[TaggedBlock]]:
             if (edges.middles >= 0).any():
                 nodes = np.column_stack([nodes, edges.middles[is_tagged] + n_points])
             lines.append((nodes, np.full(len(nodes), f"{side}_{tag}")))
+
         points.append(body.points * [1.0, sign])
         n_points += len(body.points)
-    cells[LINES[lines[0][0].shape[1] - 2]] = lines
+
+    n_line_nodes = lines[0][0].shape[1]
+    cells[LINES[n_line_nodes - 2]] = lines
     blocks = [TaggedBlock(kind, *map(np.concatenate, zip(*parts))) for kind, parts in cells.items()]
     return np.concatenate(points), blocks
 
@@ -107,6 +117,7 @@ def read_pieces(path: Path, unit: float = 1.0) -> PairMesh:
     Parameters
     ----------
     path : Path
+        File of at most MAX_FILE_BYTES.
     unit : float
         Length unit of the coordinates [m].
 
@@ -126,6 +137,8 @@ def read_pieces(path: Path, unit: float = 1.0) -> PairMesh:
         raise PatchfemError(
             f"{path}: more than {MAX_FILE_BYTES >> 20} MiB; a mesh of two plane pieces is smaller"
         )
+
+    # Decks have a reader of their own; meshio reads the other formats
     if path.suffix == ".inp":
         try:
             mesh = read_deck(path.read_text("utf-8", "replace"))
@@ -142,6 +155,7 @@ def read_pieces(path: Path, unit: float = 1.0) -> PairMesh:
         )
     else:
         raise PatchfemError(f"{path}: a mesh can be read only from .msh, .vtu, .inp or .med")
+
     return build_pair(mesh._replace(points=unit * mesh.points), path)
 
 
@@ -153,8 +167,8 @@ class _Tags(NamedTuple):
     - ``tag_help``: how files of this format contain tags
     """
 
-    names: dict
-    codes: list | None
+    names: dict[tuple[int, int], str]
+    codes: list[np.ndarray] | None
     tag_help: str
 
 

@@ -23,8 +23,8 @@ class Layout:
 
     start: float
     stop: float
-    bands: tuple
-    span: tuple
+    bands: tuple[tuple[float, float, float], ...]
+    span: tuple[float, float]
     max_loaded_length: float
     max_length: float
     slope: float
@@ -70,6 +70,7 @@ def graded_levels(layout: Layout, *, is_even: bool = False, min_cells: int = 1) 
     Parameters
     ----------
     layout : Layout
+        Interval and target lengths.
     is_even : bool
         Whether the number of cells is even.
     min_cells : int
@@ -87,6 +88,8 @@ def graded_levels(layout: Layout, *, is_even: bool = False, min_cells: int = 1) 
     for low, high, band_length in layout.bands:
         distances = np.append(0.0, np.geomspace(band_length / 16, max(length, band_length), 400))
         samples += [low - distances, high + distances]
+
+    # Number of cells up to each sample, by the trapezoidal rule
     s = np.unique(np.clip(np.concatenate(samples), layout.start, layout.stop))
     rate = 1 / layout.cell_lengths(s)
     steps = (rate[1:] + rate[:-1]) / 2 * np.diff(s)
@@ -96,6 +99,7 @@ def graded_levels(layout: Layout, *, is_even: bool = False, min_cells: int = 1) 
         n_cells = 2 * int(np.ceil(max(min_cells, wanted_cells) / 2))
     else:
         n_cells = max(min_cells, int(np.ceil(wanted_cells)))
+
     x = np.interp(np.linspace(0, integral[-1], n_cells + 1), integral, s)
     x[0] = layout.start
     x[-1] = layout.stop
@@ -117,6 +121,7 @@ def divide_into_columns(layout: Layout, required_levels=()) -> np.ndarray:
     Parameters
     ----------
     layout : Layout
+        Interval along the interface and target lengths.
     required_levels : sequence of float
         Positions [m] at each of which a column ends.
 
@@ -140,6 +145,7 @@ def divide_into_rows(layout: Layout, coating_thickness: float) -> tuple[np.ndarr
     Parameters
     ----------
     layout : Layout
+        Interval from the interface to the far face, and target heights.
     coating_thickness : float
         Thickness of the coating [m], at whose depth a row ends.
 
@@ -148,6 +154,7 @@ def divide_into_rows(layout: Layout, coating_thickness: float) -> tuple[np.ndarr
     depth : (k,) ndarray [m]
         From the interface to the far face.
     coating_rows : int
+        Number of rows in the coating.
     """
     substrate_levels = graded_levels(
         replace(layout, start=layout.start + coating_thickness), min_cells=3

@@ -25,7 +25,7 @@ N_REFERENCE_COLUMNS = 32
 # are a fifth more rows for the same error of the compliance
 ROW_SLOPE = 0.3
 COATING_ROWS = 4  # ratio of the thickness of a coating to the rows at its inner face
-MIN_ROWS = 6  # smallest number of rows of a piece
+MIN_PIECE_ROWS = 6  # smallest number of rows of a piece
 
 
 @dataclass(frozen=True, eq=False)
@@ -189,6 +189,7 @@ class TensorGrid:
         length : float
             Length of the piece [m].
         end : End
+            Shape of both ends of the piece.
         growth : float
             Ratio of the lengths of successive columns beyond the interface.
 
@@ -225,7 +226,8 @@ def graded_rows(
 
     Returns
     -------
-    (ny,) ndarray [m]
+    (ny,) ndarray
+        Heights [m], the smallest first.
     """
     start = min(start, total / min_rows)
     n_rows = max(min_rows, ceil(log(1 + total * (growth - 1) / start) / log(growth) - 1e-9))
@@ -279,6 +281,8 @@ def graded_grid(
             f"contact.coating.thickness: {coating:.6g} m leaves no substrate in a piece of height "
             f"{height:.6g} m"
         )
+
+    # Rows for N_REFERENCE_COLUMNS columns, which are then scaled with the columns
     n_columns = max(2, ceil(length / element_size - 1e-9))
     scale = row_scale(n_columns)
     reference_cell = length / n_columns / scale
@@ -287,7 +291,7 @@ def graded_grid(
     bands = [(0.0, 0.0, reference_cell), (height, height, reference_cell)]
     if coating > 0:
         bands.append((coating, coating, min(reference_cell, coating / COATING_ROWS)))
-    max_row = height / MIN_ROWS
+    max_row = height / MIN_PIECE_ROWS
     rows = Layout(
         0.0, height, tuple(bands), (0.0, height), max_row, max_row, ROW_SLOPE
     ).scale_cells(scale)

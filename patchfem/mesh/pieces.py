@@ -54,7 +54,7 @@ class PieceMesh:
     """
 
     points: np.ndarray
-    blocks: dict
+    blocks: dict[str, np.ndarray]
     is_coating: np.ndarray
     interface: np.ndarray
     far: np.ndarray
@@ -155,6 +155,8 @@ class PieceMesh:
                 nodes = np.column_stack([cells, len(points) + np.arange(len(cells))])
                 points = np.concatenate([points, np.tensordot(points[cells], shape, ([1], [0]))])
             children[LINEAR_KINDS[n]] = nodes[:, CHILDREN[n]].reshape(-1, n)
+
+        # A piece of second order gets its middle nodes again
         tagged = _tag_inner_points(tagged, len(points))
         if self.is_quadratic:
             kinds = {LINEAR_KINDS[ELEMENTS[kind].n_corners]: kind for kind in self.blocks}
@@ -167,7 +169,7 @@ class PieceMesh:
         )
 
 
-def find_edges(blocks: dict, n_points: int) -> CellEdges:
+def find_edges(blocks: dict[str, np.ndarray], n_points: int) -> CellEdges:
     """Return the edges of cells (t, k) by the names of their elements."""
     ends = []
     owners = []
@@ -181,20 +183,25 @@ def find_edges(blocks: dict, n_points: int) -> CellEdges:
         has_middles = cells.shape[1] >= 2 * n
         middles.append(cells[:, n : 2 * n].ravel() if has_middles else np.full(corners.size, -1))
         n_cells += len(cells)
+
+    # Both cells at an edge have the same key, whatever the direction in which they pass it
     ends = np.concatenate(ends)
     key = ends.min(axis=1) * n_points + ends.max(axis=1)
     _, twin, counts = np.unique(key, return_inverse=True, return_counts=True)
     return CellEdges(ends, np.concatenate(owners), np.concatenate(middles), twin, counts[twin] == 1)
 
 
-def _tag_inner_points(tagged: list, n_points: int) -> list:
+def _tag_inner_points(tagged: list[np.ndarray], n_points: int) -> list[np.ndarray]:
     """Return whether each of `n_points` has each tag; points beyond the known ones are inside and have none."""
     return [np.append(part, np.zeros(n_points - part.size, bool)) for part in tagged]
 
 
 def raise_order(
-    points, blocks: dict, tagged: list, kinds: dict = SECOND_ORDER
-) -> tuple[np.ndarray, dict, list]:
+    points,
+    blocks: dict[str, np.ndarray],
+    tagged: list[np.ndarray],
+    kinds: dict[str, str] = SECOND_ORDER,
+) -> tuple[np.ndarray, dict[str, np.ndarray], list[np.ndarray]]:
     """Add the nodes of elements of second order to cells of first order.
 
     A node in the middle of an edge on the border has the tags that both ends of the edge have.
@@ -202,6 +209,7 @@ def raise_order(
     Parameters
     ----------
     points : (N, 2) ndarray
+        x and depth [m].
     blocks : dict
         Cells (t, n) by the name of their element.
     tagged : list of (N,) bool ndarray
@@ -212,12 +220,16 @@ def raise_order(
     Returns
     -------
     points, blocks, tagged
+        As the parameters, with the new nodes after the given ones.
     """
+    # One node per edge, which both of its cells share
     edges = find_edges(blocks, len(points))
     _, first = np.unique(edges.twin, return_index=True)
     ends = edges.ends[first]
     middles = len(points) + edges.twin
     tagged = [np.append(part, part[ends].all(axis=1) & edges.is_border[first]) for part in tagged]
+
+    # The nodes of a cell: corners, middles of the edges, and the centre of a quadrilateral
     out = {}
     n_edges = 0
     corner_points = points

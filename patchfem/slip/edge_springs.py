@@ -36,6 +36,7 @@ def add_edge_springs(compliance: np.ndarray, loaded: np.ndarray, stiffness: floa
     Returns
     -------
     (m, m) ndarray
+        Compliance with the springs [m/N].
     """
     points = np.flatnonzero(loaded)
     inverse = np.linalg.inv(compliance[np.ix_(points, points)])

@@ -23,6 +23,7 @@ def element_fields(patch, elements, states, length: float) -> ShearFields:
     patch : Patch
         The pressed patch.
     elements : JenkinsSet
+        Elements that are equivalent to its t yielding nodes.
     states : sequence
         f pairs of relative displacement [m] and stretches (t,) [m] of the elements.
     length : float
@@ -54,6 +55,7 @@ def point_fields(patch, shear, snapshots) -> ShearFields:
     shear : ShearModes or None
         Shear of the pieces; None if every node is a point.
     snapshots : sequence of points.time_march.Snapshot
+        f states of the points.
 
     Returns
     -------
@@ -82,6 +84,7 @@ def bond_shear_modes(
     patch : Patch
         The pressed patch.
     law : Bonds
+        Parameters of the bonds.
     count : int or None
         Number of modes; None to determine it from the tolerance.
     tolerance : float

@@ -17,10 +17,10 @@ SPREAD_FACTOR = 1.5
 N_ELEMENT_PARTS = 4  # number of parts into which each element but the first is divided
 # Number of times that the range of the first element is halved, with N_ELEMENT_PARTS parts per
 # halving; displacements down to 1/256 of this range then cause slip
-N_HALVINGS = 8
+N_RANGE_HALVINGS = 8
 # Largest relative difference of yield displacements for which nodes at both ends of a contact count
 # as one
-EQUAL_YIELD_TOL = 1e-6
+MIRRORED_YIELD_TOL = 1e-6
 
 
 class SpreadElements(NamedTuple):
@@ -45,13 +45,16 @@ def spread_elements(stiffness, yield_displacement) -> SpreadElements:
     -------
     SpreadElements
     """
+    # Nodes that yield together at both ends of a contact are one element
     k = np.asarray(stiffness, float)
     y = np.asarray(yield_displacement, float)
-    starts = np.flatnonzero(np.diff(y, prepend=-np.inf) > EQUAL_YIELD_TOL * y)
+    starts = np.flatnonzero(np.diff(y, prepend=-np.inf) > MIRRORED_YIELD_TOL * y)
     total = np.add.reduceat(k, starts)
     y = np.add.reduceat(k * y, starts) / total
     if y.size < 2:
         return SpreadElements(total, y)
+
+    # Width of the range of each element
     distance = np.diff(y)
     width = np.empty(y.size)
     width[1:-1] = np.maximum(distance[1:], distance[:-1])
@@ -59,12 +62,15 @@ def spread_elements(stiffness, yield_displacement) -> SpreadElements:
     # The second element may be at the other end of the contact.
     width[0] = 2 * min(y[0], y[min(2, y.size - 1)] - y[0])
     width = np.minimum(width, 2 * y)
+
     # The widths of the parts of the first element decrease by a constant ratio towards zero
     # displacement.
-    number = np.arange(N_ELEMENT_PARTS * N_HALVINGS + 1)
+    number = np.arange(N_ELEMENT_PARTS * N_RANGE_HALVINGS + 1)
     borders = np.append(2.0 ** (-number / N_ELEMENT_PARTS), 0.0)
     first_fraction = -np.diff(borders)
     first_position = (borders[1:] + borders[:-1]) / 2 - 0.5
+
+    # The other elements have equal parts. All parts are sorted, because ranges overlap.
     position = (np.arange(N_ELEMENT_PARTS) + 0.5) / N_ELEMENT_PARTS - 0.5
     first = y[0] + width[0] * first_position
     others = (y[1:, None] + width[1:, None] * position).ravel()

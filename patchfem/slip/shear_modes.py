@@ -45,10 +45,10 @@ N_BACKBONE_DISPLACEMENTS = 24  # number of relative displacements at which backb
 MAX_BACKBONE_LENGTHS = 6
 # Smallest number of modes for which the backbone error of a reduction is computed
 N_ERROR_MODES = 64
-MAX_ITERATIONS = 400  # largest number of Newton iterations for a backbone
+MAX_BACKBONE_STEPS = 400  # largest number of Newton iterations for a backbone
 # Relative step at which Newton's method has converged; because of its quadratic convergence, the
 # next step is round-off
-NEWTON_TOL = 1e-11
+BACKBONE_TOL = 1e-11
 MAX_DECAY_EXPONENT = 700.0  # largest exponent in the law, which keeps the exponential finite
 
 
@@ -63,7 +63,6 @@ class JenkinsSet:
     - cholesky_factor (a, a): lower Cholesky factor of the compliance in that order; empty for rigid pieces in series
       with one spring
     - starts (t,): position of the first node of each element, in the order of yielding
-    - n_reluctant: number of nodes whose force has the wrong sign before any node yields
     """
 
     stiffness: np.ndarray
@@ -73,7 +72,6 @@ class JenkinsSet:
     order: np.ndarray
     cholesky_factor: np.ndarray
     starts: np.ndarray
-    n_reluctant: int
 
     @cached_property
     def point_yields(self) -> np.ndarray:
@@ -139,7 +137,7 @@ class Spectrum:
         )
 
     @cached_property
-    def cache(self) -> dict:
+    def cache(self) -> "dict[int, _Backbone]":
         """Backbones that have been computed, by number of modes."""
         return {}
 
@@ -238,27 +236,18 @@ def jenkins_set(tangential: np.ndarray, limit: np.ndarray, local_length: float =
         raise PatchfemError("contact.shear: the friction limit is 0 at every point of the contact")
     points = np.flatnonzero(limit > 0)
     force = limit[points]
-    no_nodes = np.zeros(0, np.int64)
-    # Rigid pieces in series with one spring slip at all nodes together.
     if local_length == 0 and np.ptp(tangential) == 0:
-        stiffness = 1 / tangential[0, 0]
-        return JenkinsSet(
-            frozen_array([stiffness]),
-            frozen_array([force.sum() / stiffness]),
-            frozen_array(points, np.int64),
-            frozen_array(force),
-            no_nodes,
-            np.zeros((0, 0)),
-            no_nodes,
-            0,
-        )
+        return _make_single_element(1 / tangential[0, 0], points, force)
+
     # One thread is used because, on a loaded machine, waiting for a second one turns 5 ms into 270
     # ms.
     with use_one_blas_thread():
         c = tangential[np.ix_(points, points)]
         if local_length:
             c = c + np.diag(local_length / force)
-        sequence, yield_displacements, n_reluctant = _find_order(c, force)
+        sequence, yield_displacements = _find_order(c, force)
+
+    # Nodes that yield together form one element, whose stiffness is the force rate that all nodes lose by its yield
     starts = np.flatnonzero(
         np.diff(yield_displacements, prepend=-np.inf) > EQUAL_YIELD_TOL * yield_displacements
     )
@@ -270,7 +259,20 @@ def jenkins_set(tangential: np.ndarray, limit: np.ndarray, local_length: float =
         sequence.order,
         sequence.cholesky_factor,
         starts,
-        n_reluctant,
+    )
+
+
+def _make_single_element(stiffness: float, points, force) -> JenkinsSet:
+    """Return the element of rigid pieces in series with one spring [N/m], which slip at all nodes together."""
+    no_nodes = np.zeros(0, np.int64)
+    return JenkinsSet(
+        frozen_array([stiffness]),
+        frozen_array([force.sum() / stiffness]),
+        frozen_array(points, np.int64),
+        frozen_array(force),
+        no_nodes,
+        np.zeros((0, 0)),
+        no_nodes,
     )
 
 
@@ -305,12 +307,10 @@ class _YieldOrder(NamedTuple):
 
     - sequence: yields in this order
     - displacements (n,): increasing yield displacements [m]
-    - n_reluctant: number of nodes whose force has the wrong sign before any node yields
     """
 
     sequence: _YieldSequence
     displacements: np.ndarray
-    n_reluctant: int
 
 
 def _find_order(c: np.ndarray, force: np.ndarray) -> _YieldOrder:
@@ -334,7 +334,7 @@ def _find_order(c: np.ndarray, force: np.ndarray) -> _YieldOrder:
     else:
         sequence = _yield_sequence(c, force, _eliminate_points(c, force))
     increasing = np.maximum.accumulate(sequence.displacements[::-1])
-    return _YieldOrder(sequence, increasing, int((rate <= 0).sum()))
+    return _YieldOrder(sequence, increasing)
 
 
 def _divide_or_inf(numerator: np.ndarray, denominator: np.ndarray) -> np.ndarray:
@@ -417,6 +417,7 @@ def shear_modes(
     bond_length : float
         Bond length [m].
     count : int
+        Number of modes.
     weakening : float
         Static / kinetic friction coefficient.
 
@@ -429,7 +430,7 @@ def shear_modes(
 
 
 def _make_spectrum(tangential, limit, bond_length: float, weakening: float) -> Spectrum:
-    """Return the Spectrum of the nodes that carry load; the parameters are as in `shear_modes`."""
+    """Return the Spectrum of the nodes that carry load, with the parameters of `shear_modes` but the number of modes."""
     points = frozen_array(np.flatnonzero(limit > 0), np.int64)
     limit = limit[points]
     if np.ptp(tangential) == 0:
@@ -469,8 +470,14 @@ def find_sufficient_modes(
 
     Parameters
     ----------
-    tangential, limit, bond_length, weakening
-        As in `shear_modes`.
+    tangential : (m, m) ndarray
+        Compliance C [m/N].
+    limit : (m,) ndarray
+        Friction limits D [N]; the bonds of a node have the stiffness limit/bond_length.
+    bond_length : float
+        Bond length [m].
+    weakening : float
+        Static / kinetic friction coefficient.
     count, max_modes : int
         First and largest number of modes.
     tolerance : float
@@ -503,8 +510,14 @@ def find_fewest_modes(
 
     Parameters
     ----------
-    tangential, limit, bond_length, weakening
-        As in `shear_modes`.
+    tangential : (m, m) ndarray
+        Compliance C [m/N].
+    limit : (m,) ndarray
+        Friction limits D [N]; the bonds of a node have the stiffness limit/bond_length.
+    bond_length : float
+        Bond length [m].
+    weakening : float
+        Static / kinetic friction coefficient.
     tolerance : float
         Largest error of the backbone / friction limit.
     max_modes : int
@@ -555,6 +568,7 @@ def find_fewest_gauss_points(modes: ShearModes, x: np.ndarray, tolerance: float)
     Parameters
     ----------
     modes : ShearModes
+        Modes at the a nodes.
     x : (a,) ndarray
         Positions [m] of the nodes.
     tolerance : float
@@ -580,6 +594,7 @@ def modes_at_gauss_points(modes: ShearModes, x: np.ndarray, count: int) -> Gauss
     Parameters
     ----------
     modes : ShearModes
+        Modes at the a nodes.
     x : (a,) ndarray
         Positions [m] of the nodes.
     count : int
@@ -600,7 +615,7 @@ def modes_at_gauss_points(modes: ShearModes, x: np.ndarray, count: int) -> Gauss
     return GaussModes(replace(modes, points=points, shape=frozen_array(shape)), limit, error)
 
 
-def gauss_rule(x: np.ndarray, weight: np.ndarray, count: int) -> tuple:
+def gauss_rule(x: np.ndarray, weight: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
     """Return positions and weights (count,) of the Gauss rule for a weighted sum over given points.
 
     The rule is exact for polynomials up to the degree 2 count - 1. It follows from Lanczos' method, in which each vector
@@ -616,6 +631,7 @@ def gauss_rule(x: np.ndarray, weight: np.ndarray, count: int) -> tuple:
     Returns
     -------
     positions, weights : (count,) ndarray
+        In the units of `x` and `weight`.
     """
     scaled = 2 * (x - x.mean()) / np.ptp(x)
     total = weight.sum()
@@ -649,6 +665,7 @@ def _solve_backbone(limit, shape, compliance, length, displacements, start) -> _
     initial guess and are overwritten. No step moves a node back by more than MAX_BACKWARD_LENGTHS lengths, because the
     law is so steep there that Newton's method does not return.
     """
+    # The Newton matrix is symmetric, so each product of two modes is formed once
     coordinates = start
     pending = np.arange(displacements.size)
     n_modes = compliance.size
@@ -656,7 +673,9 @@ def _solve_backbone(limit, shape, compliance, length, displacements, start) -> _
     products = (shape.T[first] * shape.T[second]).T
     entries = np.empty((n_modes, n_modes), np.int64)
     entries[first, second] = entries[second, first] = np.arange(first.size)
-    for _ in range(MAX_ITERATIONS):
+
+    for _ in range(MAX_BACKBONE_STEPS):
+        # Balance of every mode: its spring against the friction of the nodes
         xi = displacements[pending, None] - coordinates[pending] @ shape.T
         decay = np.exp(np.minimum(-xi / length, MAX_DECAY_EXPONENT))
         residual = coordinates[pending] / compliance - (limit * (1 - decay)) @ shape
@@ -665,18 +684,22 @@ def _solve_backbone(limit, shape, compliance, length, displacements, start) -> _
             step = np.linalg.solve(tangent, residual[:, :, None])[:, :, 0]
         except np.linalg.LinAlgError:
             return _Backbone(np.full(displacements.size, np.nan), coordinates)
+
         change = step @ shape.T
         # This is the largest fraction of the step that moves no node back by more than the limit.
         backward = np.where(change < 0, -change, 1.0)
         fraction = (xi + MAX_BACKWARD_LENGTHS * length) / backward
         fraction = np.where(change < 0, fraction, 1.0).min(axis=1)
         fraction = np.where((fraction > 0) & (fraction < 1), fraction, 1.0)
+
+        # Displacements whose full step is small are done
         coordinates[pending] -= fraction[:, None] * step
         size = np.abs(coordinates[pending]).max(axis=1) + 1e-300
-        is_converged = (fraction == 1.0) & (np.abs(step).max(axis=1) <= NEWTON_TOL * size)
+        is_converged = (fraction == 1.0) & (np.abs(step).max(axis=1) <= BACKBONE_TOL * size)
         pending = pending[~is_converged]
         if not pending.size:
             break
+
     xi = displacements[:, None] - coordinates @ shape.T
     force = -np.expm1(np.minimum(-xi / length, MAX_DECAY_EXPONENT)) @ limit
     force[pending] = np.nan

@@ -14,9 +14,8 @@ from ..model.earlier_wear import GAP_DIFFERENCE_FRACTION, LOADING_KEYS
 from ..surface.quantity import Quantity
 
 FLOOR_PARTS = 5  # width of the worn part divided by that of its floor, the deepest fifth
-FLOOR_POINTS = (
-    100  # number of points on the floor; more change its depth by less than the error of a run
-)
+# Number of points on the floor; more change its depth by less than the error of a run
+FLOOR_POINTS = 100
 MIN_WORN_FRACTION = 1e-3  # smallest depth of a worn node relative to the largest depth
 MIN_ROUGHNESS = 1e-12  # range of heights [m] below which an unworn surface is flat
 
@@ -41,7 +40,7 @@ class PatchState(NamedTuple):
     """
 
     source: str
-    contact: dict
+    contact: dict[str, object]
     x: np.ndarray
     y: np.ndarray | None
     area: np.ndarray
@@ -183,9 +182,10 @@ def find_plane_below(x, y, depth) -> tuple[float, ...]:
 
     Parameters
     ----------
-    x, y : (m,), (s,) arrays [m]
-        y is None for a single line.
-    depth : (m,) or (s, m) array [m]
+    x, y : (m,), (s,) arrays
+        Positions [m]; y is None for a single line.
+    depth : (m,) or (s, m) array
+        Worn depths [m].
 
     Returns
     -------

@@ -7,11 +7,22 @@ C + diag(rate cycles). This is the same complementarity problem, better conditio
 """
 
 from collections.abc import Callable
+from typing import NamedTuple
 
 import numpy as np
 
+# `press(worn, softening)` returns the contact forces (m,) [N] of the pieces with the depth `worn` (m,) [m] added to
+# their gap and `softening` (m,) [m/N] to the diagonal of their compliance
+Press = Callable[[np.ndarray, np.ndarray], np.ndarray]
 # Coefficient of the L-stable method of two stages; both of its weights are positive
 STAGE_COEFFICIENT = 1 - np.sqrt(0.5)
+
+
+class JumpEnd(NamedTuple):
+    """Worn depth (m,) [m] and contact forces (m,) [N] at the end of a jump."""
+
+    depth: np.ndarray
+    force: np.ndarray
 
 
 def wear_rates(coefficient: float, path, area) -> np.ndarray:
@@ -32,7 +43,7 @@ def wear_rates(coefficient: float, path, area) -> np.ndarray:
     return coefficient * np.asarray(path) / area
 
 
-def solve_jump(press: Callable, depth, rate, cycles: float) -> tuple:
+def solve_jump(press: Press, depth, rate, cycles: float) -> JumpEnd:
     """Return the worn depth and the contact forces after a jump over many cycles.
 
     The method is the singly diagonally implicit Runge-Kutta method of two stages and order two (Alexander, SIAM J.
@@ -42,8 +53,7 @@ def solve_jump(press: Callable, depth, rate, cycles: float) -> tuple:
     Parameters
     ----------
     press : callable
-        `press(worn, softening)` returns the contact forces (m,) [N] of the pieces with the depth `worn` (m,) [m] added
-        to their gap and `softening` (m,) [m/N] to the diagonal of their compliance.
+        Contact forces of the worn pieces (`Press`).
     depth : (m,) array
         Worn depth [m] at the start of the jump.
     rate : (m,) array
@@ -53,10 +63,9 @@ def solve_jump(press: Callable, depth, rate, cycles: float) -> tuple:
 
     Returns
     -------
-    depth, force : (m,) array
-        Worn depth [m] and contact forces [N] at the end of the jump.
+    JumpEnd
     """
     softening = STAGE_COEFFICIENT * cycles * rate
     first = cycles * rate * press(depth, softening)
     force = press(depth + (1 - STAGE_COEFFICIENT) * first, softening)
-    return depth + (1 - STAGE_COEFFICIENT) * first + softening * force, force
+    return JumpEnd(depth + (1 - STAGE_COEFFICIENT) * first + softening * force, force)

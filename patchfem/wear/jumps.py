@@ -5,21 +5,21 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from .depth import solve_jump, wear_rates
+from .depth import Press, solve_jump, wear_rates
 
 MAX_JUMP_GROWTH = 4.0  # largest ratio of the length of a jump to that of the previous jump
 # Smallest ratio of the length of a repeated jump to that of the rejected jump
 MIN_RETRY_RATIO = 0.2
-SAFETY_FACTOR = 0.9  # safety factor on the length of a jump that would just meet the tolerance
+JUMP_SAFETY = 0.9  # safety factor on the length of a jump that would just meet the tolerance
 FIRST_JUMP_FRACTION = 1e-3  # length of the first automatic jump as a fraction of all cycles
 MIN_JUMP_FRACTION = 1e-9  # smallest length of a jump as a fraction of all cycles
-METHOD_ORDER = 2  # order of the method of `depth.solve_jump`
+JUMP_ORDER = 2  # order of the method of `depth.solve_jump`
 # Ratio of the difference between a jump and its two halves to the error of the halves
-RICHARDSON_DIVISOR = 2**METHOD_ORDER - 1
+RICHARDSON_DIVISOR = 2**JUMP_ORDER - 1
 # Smallest ratio of error to tolerance from which the length of the next jump is computed
 MIN_ERROR_RATIO = 1e-9
 # Smallest depth [m] in a divisor; it keeps quotients finite before anything is worn
-MIN_DEPTH = 1e-300
+MIN_WORN_DEPTH = 1e-300
 # Smallest wear of a jump, relative to the worn depth, with which the error of its slip path is
 # compared; a jump with less wear hardly changes the depth
 SHAKEDOWN_WEAR_RATIO = 1e-3
@@ -29,7 +29,7 @@ SHAKEDOWN_WEAR_RATIO = 1e-3
 class WearProblem:
     """Contact problem, slip path and wear law of two pieces.
 
-    - press: `press(worn, softening)`, as in `depth.solve_jump`
+    - press: contact forces of the worn pieces (`depth.Press`)
     - path: `path(worn)` returns the slip path (m,) [m] of one cycle; the same array object while wear does not change it
     - area: areas (m,) [m2] of the nodes
     - coefficient: wear coefficient [m2/N]
@@ -38,8 +38,8 @@ class WearProblem:
     In a patch of s strips, arrays (m,) are (s, m).
     """
 
-    press: Callable
-    path: Callable
+    press: Press
+    path: Callable[[np.ndarray], np.ndarray]
     area: np.ndarray
     coefficient: float
     cycles: float
@@ -84,6 +84,7 @@ def make_initial_wear_state(problem: WearProblem, depth=None) -> WearState:
     Parameters
     ----------
     problem : WearProblem
+        Contact, slip path and wear law.
     depth : (m,) array, optional
         Depth [m] that was worn before.
 
@@ -124,7 +125,9 @@ def take_jump(
     Parameters
     ----------
     problem : WearProblem
+        Contact, slip path and wear law.
     state : WearState
+        State before the jump.
     tolerance : float
         Relative tolerance of depth and forces.
     count : int, optional
@@ -136,11 +139,14 @@ def take_jump(
     -------
     WearState
     """
+    # The last jump takes what round-off would leave over
     end = min(problem.cycles, until)
     remaining = end - state.cycle
     length = min(problem.cycles / count if count else state.length, remaining)
     if remaining - length < 1e-9 * problem.cycles:
         length = remaining
+
+    # A jump whose error exceeds the tolerance is shortened and repeated
     while True:
         path = np.maximum(state.path + 0.5 * length * state.trend, 0.0)
         after, error = _take_halves(problem, state, path, length, tolerance)
@@ -149,9 +155,11 @@ def take_jump(
             after, error = _correct_path(problem, state, after, error, length, tolerance)
             if is_forced or error <= 1:
                 break
-        length *= max(MIN_RETRY_RATIO, SAFETY_FACTOR * error ** (-1 / (METHOD_ORDER + 1)))
+        length *= max(MIN_RETRY_RATIO, JUMP_SAFETY * error ** (-1 / (JUMP_ORDER + 1)))
+
+    # The error of a method of order p falls with the power p + 1 of the length
     growth = min(
-        MAX_JUMP_GROWTH, SAFETY_FACTOR * max(error, MIN_ERROR_RATIO) ** (-1 / (METHOD_ORDER + 1))
+        MAX_JUMP_GROWTH, JUMP_SAFETY * max(error, MIN_ERROR_RATIO) ** (-1 / (JUMP_ORDER + 1))
     )
     cycle = end if length == remaining else after.cycle
     return replace(after, cycle=cycle, length=length * growth)
@@ -164,7 +172,7 @@ def _correct_path(
     error: float,
     length: float,
     tolerance: float,
-) -> tuple:
+) -> tuple[WearState, float]:
     """Repeat a jump with the mean of the slip paths at both ends; return the state and error / tolerance."""
     path = problem.path(after.depth)
     if path is state.path:
@@ -182,17 +190,19 @@ def _correct_path(
         trend=(path - state.path) / length,
         path_error=state.path_error + path_error,
     )
-    return corrected, max(error, path_error / max(tolerance * scale, MIN_DEPTH))
+    return corrected, max(error, path_error / max(tolerance * scale, MIN_WORN_DEPTH))
 
 
 def _take_halves(
     problem: WearProblem, state: WearState, path, length: float, tolerance: float
-) -> tuple:
+) -> tuple[WearState, float]:
     """Take a jump in two halves with a constant slip path; return the state and error / tolerance."""
     rate = wear_rates(problem.coefficient, path, problem.area)
     coarse, coarse_force = solve_jump(problem.press, state.depth, rate, length)
     half, _ = solve_jump(problem.press, state.depth, rate, length / 2)
     depth, force = solve_jump(problem.press, half, rate, length / 2)
+
+    # The sum of all whole jumps, whose difference from the halves is the error of the run
     coarse_depth = coarse
     if state.coarse_depth is not state.depth:
         coarse_depth, _ = solve_jump(problem.press, state.coarse_depth, rate, length)
@@ -204,7 +214,9 @@ def _take_halves(
         coarse_depth=coarse_depth,
         jump_path=path,
     )
-    depth_limit = tolerance * max(float(depth.max()), MIN_DEPTH)
+
+    # Richardson's estimate of the error of the halves, relative to the tolerance
+    depth_limit = tolerance * max(float(depth.max()), MIN_WORN_DEPTH)
     depth_error = float(np.abs(depth - coarse).max()) / RICHARDSON_DIVISOR / depth_limit
     load = float(force.sum())
     if load <= 0:
@@ -215,13 +227,17 @@ def _take_halves(
     return after, max(depth_error, force_error)
 
 
-def replay_jumps(press: Callable, area, coefficient: float, jumps, depth) -> np.ndarray:
+def replay_jumps(press: Press, area, coefficient: float, jumps, depth) -> np.ndarray:
     """Compute the worn depth on other nodes by repeating the jumps of an earlier computation.
 
     Parameters
     ----------
-    press, area, coefficient : callable, (m,) array, float
-        As in `WearProblem`.
+    press : callable
+        Contact forces of the worn pieces (`depth.Press`).
+    area : (m,) array
+        Areas [m2] of the nodes.
+    coefficient : float
+        Wear coefficient [m2/N].
     jumps : sequence of (float, (m,) array)
         Cycles, and slip path [m] on these nodes, of every jump.
     depth : (m,) array
@@ -230,6 +246,7 @@ def replay_jumps(press: Callable, area, coefficient: float, jumps, depth) -> np.
     Returns
     -------
     (m,) array
+        Worn depth [m] after all jumps.
     """
     for cycles, path in jumps:
         rate = wear_rates(coefficient, path, area)

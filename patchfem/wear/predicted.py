@@ -20,14 +20,14 @@ from ..surface.quantity import LEVEL, SIDE, Quantity
 N_BINS = 100  # number of bins along the patch, in which the noise of single heights averages out
 N_RATIOS = 90  # number of trial coefficients in the search
 MAX_PLACES = 24  # largest number of positions that are refined in addition to the best one
-MIN_OVERLAP = 0.25  # smallest fraction of the patch on the traces for which its position is known
-END_MARGIN = (
-    0.1  # part of half the patch beyond its ends, whose unworn depths show where the wear ends
-)
-MAX_RATIO = 2.0  # largest coefficient relative to that of the run for which the shape is known
-SEARCHED_RATIO = (
-    1e4  # largest relative coefficient of the search, so that a message can propose one
-)
+# Smallest fraction of the patch on the traces for which its position is known
+MIN_PATCH_OVERLAP = 0.25
+# Part of half the patch beyond its ends, whose unworn depths show where the wear ends
+END_MARGIN = 0.1
+# Largest coefficient relative to that of the run for which the shape is known
+MAX_COEFFICIENT_RATIO = 2.0
+# Largest relative coefficient of the search, so that a message can propose one
+SEARCHED_RATIO = 1e4
 MAX_WIDTH_RATIO = 1.5  # largest ratio of the widths of measured and computed wear
 WORN_FRACTION = 0.05  # depth at the ends of the computed wear relative to its largest depth
 ACCEPTED_DEVIANCE = 4.0  # increase of the sum of squares, in variances, of an equally good position
@@ -77,6 +77,7 @@ class WearHistory:
 
     @cached_property
     def _curve(self):
+        """Function of the completed fraction of the cycles that returns the depth (m,) [m]."""
         from scipy.interpolate import PchipInterpolator, make_interp_spline
 
         if self.is_linear:
@@ -196,7 +197,9 @@ def fit_wear(measured: MeasuredDepth, history: WearHistory) -> PredictedWear:
     Parameters
     ----------
     measured : MeasuredDepth
+        Worn depth along the second trace.
     history : WearHistory
+        Worn depth of one piece in the course of the run.
 
     Returns
     -------
@@ -229,11 +232,11 @@ def _average_measured(measured: MeasuredDepth, history: WearHistory) -> Bins:
     """Average the measured depth over bins, and draw random errors of the means."""
     width = 2 * history.half / N_BINS
     length = float(np.ptp(measured.x))
-    if length < MIN_OVERLAP * 2 * history.half:
+    if length < MIN_PATCH_OVERLAP * 2 * history.half:
         raise PatchfemError(
             f"compare --predicted: the common part of the traces is {format_length(length, 3)} long, and the patch of "
-            f"{history.source} {format_length(2 * history.half, 3)}; at least {100 * MIN_OVERLAP:.0f} % of the patch must "
-            f"lie within the traces{_suspect_units(2 * history.half / length, 'x')}"
+            f"{history.source} {format_length(2 * history.half, 3)}; at least {100 * MIN_PATCH_OVERLAP:.0f} % of the patch "
+            f"must lie within the traces{_suspect_units(2 * history.half / length, 'x')}"
         )
 
     # integral of the depth, whose differences over a bin give its mean
@@ -261,7 +264,7 @@ def _suspect_units(ratio: float, axis: str) -> str:
 
 def _require_similar(width: float | None, bins: Bins, history: WearHistory, best: Place) -> None:
     """Raise PatchfemError if the measured depth, or the width [m] of its track, is not that of the run."""
-    if not history.work[1] <= best.ratio <= MAX_RATIO:
+    if not history.work[1] <= best.ratio <= MAX_COEFFICIENT_RATIO:
         raise PatchfemError(
             f"compare --predicted: the measured wear needs {best.ratio:.3g} times the wear coefficient of {history.source}, "
             "for which the run computed no depth; run the scene again with wear.coefficient = "
@@ -283,7 +286,7 @@ def _search(bins: Bins, history: WearHistory) -> tuple[Place, list[Place]]:
     For each trial coefficient and both directions, the sums of squares at all shifts by a bin follow from two
     correlations.
     """
-    n_shown = int(MIN_OVERLAP * N_BINS)
+    n_shown = int(MIN_PATCH_OVERLAP * N_BINS)
     edges = np.linspace(-history.half, history.half, N_BINS + 1)
     size = bins.depth.size
     squares = np.full((2, size + N_BINS - 1), np.inf)
@@ -307,6 +310,7 @@ def _search(bins: Bins, history: WearHistory) -> tuple[Place, list[Place]]:
     best = places[0]
 
     def is_apart(place: Place) -> bool:
+        """Return whether a place lies more than its bin away from the best one, or runs the other way."""
         is_far = abs(place.centre - best.centre) > 1.5 * bins.width
         return is_far or place.is_mirrored != best.is_mirrored
 
@@ -320,10 +324,12 @@ def _refine(bins: Bins, history: WearHistory, start: Place, *, is_fixed: bool = 
     scale = float(np.abs(bins.depth).max())
 
     def move(values) -> Place:
+        """Return the place at a relative coefficient, and a shift in bins."""
         shift = 0.0 if is_fixed else values[1] * bins.width
         return start._replace(ratio=float(start.ratio * values[0]), centre=start.centre + shift)
 
     def residuals(values) -> np.ndarray:
+        """Return the differences (b,) of both depths, relative to the largest measured one."""
         return (history.average(bins.edges, move(values)) - bins.depth) / scale
 
     bounds = [(0.2, 5.0)] if is_fixed else [(0.2, 5.0), (-5.0, 5.0)]
@@ -390,6 +396,7 @@ def _differentiate(bins: Bins, history: WearHistory, best: Place) -> np.ndarray:
     """Return the derivatives (b, 2) of the computed depth by ratio and centre, from central differences."""
 
     def average(name: str, change: float) -> np.ndarray:
+        """Return the computed depths (b,) [m] after a change of one field of the place."""
         place = best._replace(**{name: getattr(best, name) + change})
         return history.average(bins.edges, place)
 

@@ -439,6 +439,7 @@ def test_exact_wedge_loop_area_equals_sum_of_strips(tilt, ratio):
         lambda: exact.cattaneo_stick_half_width(0.1, 1.0, 1.0, 1.0, 0.0),
         lambda: exact.wedge_opening_tilt(1.0, 1.0, 0.0, 1.0),
         lambda: exact.wedge_on_linear_foundation(1.0, 1.0, -1.0, -1.0, 1.0),
+        lambda: exact.wedge_on_linear_foundation(1.0, 1.0, 1.0, 0.0, 1.0),
         lambda: exact.wedge_on_asperities(1.0, 1.0, 0.0),
         lambda: exact.wedge_loop_area(1.0, 1.0, 1.0, 1.0, 2.0, 1.0),
         lambda: exact.wedge_loop_area(1.0, 1.0, 1.0, 1.0, 0.0, 0.0),

@@ -12,15 +12,10 @@ from hypothesis import strategies as st
 from pieces import LENGTH, LOAD, WIDTH, draw_gap, make_coated_pair
 from pressed import press, press_to_approach
 
-from patchfem.contact import (
-    RESIDUAL_TOL,
-    StripCompliance,
-    patch_problem,
-    solve_by_gradients,
-)
+from patchfem.contact import StripCompliance, patch_problem, solve_by_gradients
 from patchfem.contact.active_set import solve_primal_dual
 from patchfem.contact.gaps import crown, tilt
-from patchfem.contact.unilateral import explain_singular_set
+from patchfem.contact.unilateral import RESIDUAL_TOL, explain_singular_set
 from patchfem.core import Compliance, Interface, NotConverged, Outcome, PatchfemError
 
 

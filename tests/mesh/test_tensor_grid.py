@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from patchfem.core import PatchfemError
 from patchfem.mesh import ROW_SLOPE, graded_grid, row_scale
-from patchfem.mesh.grid import MIN_ROWS
+from patchfem.mesh.grid import MIN_PIECE_ROWS
 
 
 @st.composite
@@ -34,7 +34,7 @@ def test_always_grid_has_given_dimensions_and_coating_rows(piece):
     assert np.ptp(np.diff(grid.x)) <= 1e-12 * length
     assert grid.coating_rows >= 2 if coating else grid.coating_rows == 0
     rows = np.diff(grid.depth)
-    assert rows.min() > 0 and rows.max() <= height / MIN_ROWS * (1 + 1e-5)
+    assert rows.min() > 0 and rows.max() <= height / MIN_PIECE_ROWS * (1 + 1e-5)
     columns = grid.x.size - 1
     for face_row in (rows[0], rows[-1]):
         assert face_row <= length / columns * (1 + ROW_SLOPE)

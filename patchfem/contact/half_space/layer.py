@@ -39,15 +39,20 @@ def layer_compliance(k, height: float, thickness: float, layers: Layers) -> Wave
     thickness : float
         Thickness of the coating [m].
     layers : Layers
+        Materials of coating and substrate.
     """
     k = np.asarray(k, float)
     stack = [(thickness, layers.coating)] if thickness else []
     stack.append((height - thickness, layers.substrate))
     depths = [depth for depth, _ in stack]
     moduli = [lame(*material, layers.plane) for _, material in stack]
+
+    # A uniform traction (k = 0) strains each layer by itself, confined along x
     uniform = [(depth / (lam + 2 * mu), depth / mu) for depth, (lam, mu) in zip(depths, moduli)]
     normal = np.full(k.size, sum(part for part, _ in uniform))
     shear = np.full(k.size, sum(part for _, part in uniform))
+
+    # A short wave sees a half-space of the first layer: (1 - nu)/(mu k)
     lam, mu = moduli[0]
     is_short = k * depths[0] > MAX_WAVE_DEPTH
     normal[is_short] = shear[is_short] = (lam + 2 * mu) / (2 * mu * (lam + mu)) / k[is_short]
@@ -56,12 +61,16 @@ def layer_compliance(k, height: float, thickness: float, layers: Layers) -> Wave
     return WaveCompliance(normal, shear)
 
 
-def _solve_waves(k, depths: list, moduli: list) -> WaveCompliance:
-    """Compute the compliance for wavenumbers k (n,) [1/m] whose waves reach all layers."""
+def _solve_waves(k, depths: list[float], moduli: list[tuple[float, float]]) -> WaveCompliance:
+    """Compute the compliance for wavenumbers k (n,) [1/m] whose waves reach all layers.
+
+    depths: thickness [m] of each layer from the face down; moduli: its Lamé constants [Pa].
+    """
     n_unknowns = 4 * len(depths)
     scale = moduli[0][1]
     matrix = np.zeros((k.size, n_unknowns, n_unknowns))
     face = _layer_states(k, 0.0, depths[0], moduli[0], scale)
+
     # The tractions on the face are prescribed.
     matrix[:, 0:2, :4] = face[:, 2:4]
     for n, (depth, layer_moduli) in enumerate(zip(depths, moduli)):
@@ -78,17 +87,21 @@ def _solve_waves(k, depths: list, moduli: list) -> WaveCompliance:
         matrix[:, rows, columns] = foot
         lower_states = _layer_states(k, 0.0, depths[n + 1], moduli[n + 1], scale)
         matrix[:, rows, first_column + 4 : first_column + 8] = -lower_states
+
     right_sides = np.zeros((k.size, n_unknowns, 2))
     # The loads on the face are a normal stress of -1 for a unit pressure and a shear stress of -1
     # for a unit shear traction.
     right_sides[:, 0, 0] = -1.0
     right_sides[:, 1, 1] = -1.0
+
     coefficients = np.linalg.solve(matrix, right_sides)[:, :4]
     displacement = (face[:, :2] @ coefficients) / (scale * k)[:, None, None]
     return WaveCompliance(displacement[:, 1, 0], displacement[:, 0, 1])
 
 
-def _layer_states(k, z: float, depth: float, moduli: tuple, scale: float) -> np.ndarray:
+def _layer_states(
+    k, z: float, depth: float, moduli: tuple[float, float], scale: float
+) -> np.ndarray:
     """Return displacements and tractions (n, 4, 4) of the four wave solutions at depth z [m].
 
     A state is k scale u_x, k scale u_z, tension and shear.

@@ -70,9 +70,11 @@ class PointCompliance:
         Parameters
         ----------
         active : (n,) bool ndarray
+            Points in contact.
         motion : (n,) ndarray
             Displacement of the active points [m].
         max_iterations : int
+            Number of steps after which the method gives up.
 
         Returns
         -------
@@ -136,12 +138,13 @@ def smooth_modes(positions, change, x) -> SmoothModes:
     )
 
 
-def find_edges(compliance: PointCompliance, force, gap, force_rate) -> list:
+def find_edges(compliance: PointCompliance, force, gap, force_rate) -> list[ContactEdge]:
     """Find the contact edges between equally spaced points.
 
     Parameters
     ----------
     compliance : PointCompliance
+        Compliance of the n points.
     force, gap : (n,) ndarray
         Forces [N] and gap under load [m].
     force_rate : (n,) ndarray
@@ -163,7 +166,7 @@ def find_edges(compliance: PointCompliance, force, gap, force_rate) -> list:
     )
 
 
-def set_stiffness(compliance: PointCompliance, active, motion, edges: list) -> float:
+def set_stiffness(compliance: PointCompliance, active, motion, edges: list[ContactEdge]) -> float:
     """Return the stiffness of a contact whose edges may lie between equally spaced points.
 
     Each edge adds the change along the parabola through the set with one point less and one more (`contact.edges`). The
@@ -173,16 +176,20 @@ def set_stiffness(compliance: PointCompliance, active, motion, edges: list) -> f
     Parameters
     ----------
     compliance : PointCompliance
+        Compliance of the n points.
     active : (n,) bool ndarray
         Contact set.
     motion : (n,) ndarray
         Displacement of the points per unit: 1 for a translation, x for a rotation.
     edges : list of ContactEdge
+        Edges of the set.
     """
     force = compliance.solve_forces(active, motion)
     stiffness = float(force @ motion)
     if not edges or active.sum() < 3:
         return stiffness
+
+    # Schur complements of the points inside and outside the edge of the longest contact
     mismatch = motion - compliance.product(force)
     longest_edge = max(edges, key=lambda edge: _contact_length(active, edge))
     indices = np.arange(motion.size)
@@ -191,6 +198,7 @@ def set_stiffness(compliance: PointCompliance, active, motion, edges: list) -> f
     inner_stiffness = inner[longest_edge.node]
     column = compliance.product((indices == outside).astype(float))
     outer_compliance = column[outside] - float(compliance.solve_forces(active, column) @ column)
+
     for edge in edges:
         gain = mismatch[edge.node + edge.side] ** 2 / outer_compliance
         loss = force[edge.node] ** 2 / inner_stiffness

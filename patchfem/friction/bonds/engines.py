@@ -109,6 +109,7 @@ def choose_engine(
     Parameters
     ----------
     law : Bonds
+        Parameters of the bonds.
     tolerance : float
         Relative tolerance of the run.
     stroke, steps : float
@@ -129,17 +130,25 @@ def choose_engine(
     reason = unsupported_reason(engine, law)
     if reason:
         raise ValueError(f"{engine} {reason}")
+
+    # Nothing is faster than the recursion, and it has no error.
     if engine == "recursion" or (engine == "auto" and not unsupported_reason("recursion", law)):
         return RECURSION
+
+    # A tenth of the tolerance is shared out: the merge width, whose error grows with its square, may use 0.09 of the
+    # tolerance and the cut-off 0.001.
     if tail is None:
         tail = min(1e-3 * tolerance, MAX_TAIL)
     width = merge
     if width is None:
         width = min(MAX_MERGE_WIDTH, sqrt(0.09 * tolerance / _merge_error_factor(law)))
-    choices = {
-        name: _estimate(law, name, tail * drops_strips, width * merges_strips, stroke, steps)
-        for name, (drops_strips, merges_strips) in LIST_SETTINGS.items()
-    }
+    choices = {}
+    for name, (drops_strips, merges_strips) in LIST_SETTINGS.items():
+        tail_used = tail * drops_strips
+        choices[name] = _estimate(law, name, tail_used, width * merges_strips, stroke, steps)
+
+    # What the scene prescribes wins. Otherwise the error of bonds that form at a reversal (order below 0) may forbid
+    # merging at every width.
     if engine != "auto":
         return choices[engine]
     if merge is not None:
@@ -161,8 +170,9 @@ def _estimate(
 ) -> EngineChoice:
     """Estimate length, cost and error of a bond list with given settings; a setting of 0 is switched off.
 
-    Stroke and steps are those of `choose_engine`.
+    The stroke is the path between two reversals [eps_0], on which there are `steps` steps.
     """
+    # Every increment of a step adds a strip, or several if it is longer than a strip may be.
     form = sum_form(law)
     increment = stroke / max(steps, 1)
     reach = min(cutoff_age(law.order, tail) if tail > 0 else MAX_DAMAGE, MAX_DAMAGE)
@@ -176,6 +186,8 @@ def _estimate(
         # Strips of age R are joined up to merge exp(R/3), but not beyond a reversal
         strips = min(strips, 5 / merge + 20 + 2 * reach / stroke + 180 * (form == FORM_GROWING))
 
+    # A strip costs a fixed time per evaluation; the number of evaluations depends on the rule that averages the force
+    # over an increment.
     seconds_per_strip = cost_model.STRIP_SECONDS[int(form)]
     if law.order not in (0, 1, 2):
         seconds_per_strip = cost_model.ANY_ORDER_STRIP_SECONDS
@@ -185,6 +197,7 @@ def _estimate(
     factor = 1 if increment <= 0.1 else 5 / 2 * panels
     pass_seconds = cost_model.PASS_SECONDS + seconds_per_strip * strips
     seconds = cost_model.LIST_STEP_SECONDS + N_PASSES_PER_STEP * pass_seconds * factor
+
     error = tail + (_merge_error_factor(law) * merge**2 if merge > 0 else 0.0)
     if merge > 0 and form == FORM_GROWING and law.order < 0:
         error += NEGATIVE_ORDER_ERROR

@@ -31,7 +31,7 @@ from .list_rows_kernels import (
     STRIP,
 )
 from .list_sum_kernels import (
-    MIN_LENGTH_RATIO,
+    MIN_BOND_RATIO,
     MIN_POSITIVE,
     BondSum,
     PathValues,
@@ -107,8 +107,10 @@ def find_path(fraction, increment, bonds, v0, v1, dt):
     ----------
     fraction : float
         Fraction of the increment, 0 to 1.
-    increment, bonds : float, BondList
-        As in the docstring of the module.
+    increment : float
+        Straight increment [m] from the present state.
+    bonds : BondList
+        The path state before the increment and the growth of the bonds are read.
     v0, v1, dt : float
         Velocities [m/s] at the ends of the increment, and its duration [s].
 
@@ -142,13 +144,19 @@ def sum_list(fraction, increment, bonds, v0, dt):
     ----------
     fraction : float
         Fraction of the increment, 0 to 1.
-    increment, bonds, v0, dt : float, BondList, float, float
-        As in the docstring of the module.
+    increment : float
+        Straight increment [m] from the present state.
+    bonds : BondList
+        Its rows `STRIP.force` and `STRIP.energy` receive the sums.
+    v0, dt : float
+        Velocity [m/s], taken as constant along the increment, and its duration [s].
     """
     strips = bonds.bondlist
     status = bonds.status
     first = int(status[STATUS.room_start])
     end = int(status[STATUS.end])
+
+    # The strips that exist, then the two columns that are no strips: initial bonds and new bonds
     after = find_path(fraction, increment, bonds, v0, v0, dt)
     sum_strips(after, bonds)
     initial = sum_initial(after, bonds)
@@ -173,10 +181,12 @@ def total(row, point, bonds):
     point : int
         Number of the point, 0 for the list of a single point.
     bonds : BondList
+        Strips with the values of the row for unit pressure.
 
     Returns
     -------
     float
+        Force [1] or stored energy [m] per friction limit, as the row.
     """
     strips = bonds.bondlist
     pressure = STRIP.pressure + point
@@ -208,6 +218,8 @@ def _formed_growing_force(path, after, bonds):
     growth = after.growth - before[PATH.growth]
     target = target_length(before[PATH.length], after.length, growth)
     division = divide(path, after.middle_length, growth, law)
+
+    # Two Gauss points per strip sum (R/eps)^p exp(-R/eps) over the path R since the bonds formed
     result = 0.0
     for piece in range(int(division.count)):
         low = find_end(piece, division)
@@ -215,7 +227,7 @@ def _formed_growing_force(path, after, bonds):
         for point in range(2):
             # New bonds start at length 0 and relax to the target of eq. 2.10
             fraction = low + width * (GAUSS_POINT_1 if point == 0 else GAUSS_POINT_2)
-            length = max(-target * expm1(-fraction * growth), MIN_LENGTH_RATIO * after.length)
+            length = max(-target * expm1(-fraction * growth), MIN_BOND_RATIO * after.length)
             x = fraction * path / length
             result += width * power(x, law[LAW.order]) * fast_exp(-x)
     return result * law[LAW.inverse_gamma] * path / (2 * law[LAW.length])
@@ -233,6 +245,7 @@ def target_length(before, after, exponent):
     Returns
     -------
     float
+        Target [m]; without growth it is the length itself.
     """
     fraction = -expm1(-exponent)
     return after if fraction == 0 else before + (after - before) / fraction
@@ -247,9 +260,9 @@ def divide(path, eps, growth, law):
     Parameters
     ----------
     path, eps, growth : float
-        Length of the increment [m], bond length [m], and growth J.
+        Length of the increment [m], bond length [m] in its middle, and growth J [1] along it.
     law : (8,) array
-        Numbers of `LAW`.
+        Parameters of the law, in the order of `LAW`.
 
     Returns
     -------
@@ -258,11 +271,15 @@ def divide(path, eps, growth, law):
     form = law[LAW.form]
     if form == FORM_REPORT:
         return Division(1.0, 1.0, 1.0, True)
+
+    # Ages R = -AGE_PER_WIDTH eps ln(1 - j step) of the ends j of the strips: equal steps of exp(-R/(AGE_PER_WIDTH eps))
     x = path / eps
     cutoff = law[LAW.cutoff] if form == FORM_STRETCH else law[LAW.cutoff] / eps
     cutoff = min(cutoff, MAX_NEW_AGE)
     covered = -expm1(-min(x, cutoff) / AGE_PER_WIDTH)
     count = AGE_PER_WIDTH / MAX_STRIP_LENGTH * covered
+
+    # Growing bonds also need strips so short that the growth J in each stays small
     if form == FORM_GROWING:
         limit = (path / law[LAW.length]) ** (1 + min(law[LAW.order], 0.0))
         min_count = (limit / NEW_BOND_TOL) ** 0.25
@@ -290,14 +307,21 @@ def list_mean_and_slope(increment, bonds, v0, dt):
 
     Parameters
     ----------
-    increment, bonds, v0, dt : float, BondList, float, float
-        As in the docstring of the module.
+    increment : float
+        Straight increment [m] from the present state.
+    bonds : BondList
+        The rows of its sums are overwritten; the present state stays.
+    v0, dt : float
+        Velocity [m/s], taken as constant along the increment, and its duration [s].
 
     Returns
     -------
     MeanForce
     """
     mean = list_mean(increment, bonds, v0, dt)
+
+    # The mean is (1/dq) int F dq, so its derivative is (F - mean)/dq. Near 0 it is F'/2, here from the forces at a tiny
+    # increment to either side, because the slopes of both directions differ.
     small = SLOPE_INCREMENT_RATIO * bonds.law[LAW.length]
     if abs(increment) > small:
         return MeanForce(mean, (total(STRIP.force, 0, bonds) - mean) / increment)
@@ -319,17 +343,25 @@ def list_mean(increment, bonds, v0, dt):
 
     Parameters
     ----------
-    increment, bonds, v0, dt : float, BondList, float, float
-        As in the docstring of the module.
+    increment : float
+        Straight increment [m] from the present state.
+    bonds : BondList
+        The rows of its sums are overwritten; the present state stays.
+    v0, dt : float
+        Velocity [m/s], taken as constant along the increment, and its duration [s].
 
     Returns
     -------
     float
+        Path-mean force [1] per friction limit.
     """
     if abs(increment) < MIN_POSITIVE:
         return bonds.status[STATUS.force]
     strips = bonds.bondlist
     first = int(bonds.status[STATUS.room_start])
+
+    # Energy balance divided by the increment: damage dissipates the fraction dR/eps of the mean energy, and the stored
+    # energy rises from its present value to that at the end
     is_stretch = bonds.law[LAW.form] == FORM_STRETCH
     has_balance = is_stretch and _needs_energy_balance(increment, bonds)
     row = STRIP.energy if has_balance else STRIP.force
@@ -341,7 +373,8 @@ def list_mean(increment, bonds, v0, dt):
         loss = np.copysign(1 / after.middle_length, increment)
         gain = 1 / increment
 
-    # The mean is a weighted sum of the values at the start, inside and at the end of the increment
+    # The mean is a weighted sum of the values at the start, inside and at the end of the increment. Simpson's rule has
+    # the weights 1/6, 4/6 and 1/6; near its limit it shares the sum with panels of Gauss points.
     strips[STRIP.mean, first] = 0.0
     for k in range(int(bonds.status[STATUS.head]), int(bonds.status[STATUS.end]) + 1):
         strips[STRIP.mean, k] = 0.0
@@ -358,15 +391,24 @@ def list_mean(increment, bonds, v0, dt):
     end_weight = gain + share * loss / 6
     if end_weight != 0:
         _add_to_mean(end_weight, row, bonds)
-
-    # A closed form replaces the rule, but not for the new bonds of reading="report": their steep force at the start of
-    # the increment cancels that of the strip before
-    if is_stretch:
-        new = int(bonds.status[STATUS.end])
-        strips[STRIP.mean, new] = average_formed(increment, after.middle_length, bonds)
-    else:
-        strips[STRIP.mean, first] = average_initial(increment, bonds)
+    _write_exact_means(increment, after.middle_length, bonds)
     return total(STRIP.mean, 0, bonds)
+
+
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
+def _write_exact_means(increment, eps, bonds):
+    """Replace the mean force of a rule by a closed form where there is one.
+
+    There is none for the new bonds of reading="report": their steep force at the start of the increment cancels that of
+    the strip before. eps: bond length [m] in the middle of the increment.
+    """
+    strips = bonds.bondlist
+    if bonds.law[LAW.form] == FORM_STRETCH:
+        new = int(bonds.status[STATUS.end])
+        strips[STRIP.mean, new] = average_formed(increment, eps, bonds)
+    else:
+        first = int(bonds.status[STATUS.room_start])
+        strips[STRIP.mean, first] = average_initial(increment, bonds)
 
 
 @njit(**NJIT_KERNEL)
@@ -388,6 +430,7 @@ def _integrate_panels(weight, row, increment, bonds, v0, dt):
     on the increment.
     """
     path = abs(increment) / bonds.now[PATH.length]
+
     low = 0.0
     high = min(MAX_PANEL_LENGTH / path, 1.0)
     while low < 1:

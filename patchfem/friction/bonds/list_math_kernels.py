@@ -11,9 +11,8 @@ from ...compiled.flags_kernels import NJIT_NO_REFCOUNT
 from ...compiled.jit import njit
 from .list_rows_kernels import N_TABLE_STEPS
 
-N_SERIES_TERMS = (
-    22  # number of terms of the series of P(p + 1, x) that are above round-off for x < 1
-)
+# Number of terms of the series of P(p + 1, x) that are above round-off for x < 1
+N_GAMMA_TERMS = 22
 
 # Gauss rules of the panels of an increment: points in (-1, 1) and weights (2, k)
 MAX_SHORT_PANEL = 0.1  # largest length of a panel with fewer points, in bond lengths
@@ -27,9 +26,12 @@ def fast_exp(x):
 
     Below this range it is exp(-708).
     """
+    # exp(x) = 2^n exp(r) with |r| <= ln(2)/2; ln 2 is subtracted in two parts, so that r keeps its digits
     x = min(max(x, -708.0), 709.0)
     n = np.floor(x * 1.4426950408889634 + 0.5)
     r = (x - n * 0.693145751953125) - n * 1.4286068203094172e-6
+
+    # Taylor series of exp(r), by Horner's rule
     p = 1 / 479001600.0 + r * (1 / 6227020800.0)
     p = 1 / 39916800.0 + r * p
     p = 1 / 3628800.0 + r * p
@@ -42,15 +44,20 @@ def fast_exp(x):
     p = 1 / 6.0 + r * p
     p = 0.5 + r * p
     p = 1 + r * (1 + r * p)
+
+    # 2^n is the number whose exponent bits are n + 1023
     return p * np.int64((np.int64(n) + 1023) << np.int64(52)).view(np.float64)
 
 
 @njit(error_model="numpy", fastmath={"contract"}, **NJIT_NO_REFCOUNT)
 def fast_log(x):
     """Return the natural logarithm of a normal number x > 0 to 2.3e-16; -709.09 at zero."""
+    # x = 2^e m with m in [sqrt(1/2), sqrt 2), from the bits of x
     bits = np.float64(x).view(np.int64)
     e = (bits - np.int64(0x3FE6A09E667F3BCD)) >> np.int64(52)
     m = np.int64(bits - (e << np.int64(52))).view(np.float64)
+
+    # ln m = 2 artanh(s) = 2 s (1 + s^2/3 + s^4/5 + ...)
     s = (m - 1) / (m + 1)
     z = s * s
     p = 1 / 19.0 + z * (1 / 21.0)
@@ -91,7 +98,7 @@ def bond_gammainc(p, x, density, inverse_gamma, table):
     Parameters
     ----------
     p, x : float
-        Order and argument.
+        Order p > -1 and argument x >= 0, the path in bond lengths.
     density, inverse_gamma : float
         x^(p + 1) exp(-x)/Gamma(p + 1), 1/Gamma(p + 1).
     table : (k,) array
@@ -107,7 +114,7 @@ def bond_gammainc(p, x, density, inverse_gamma, table):
         # P(a, x) = x^a exp(-x)/Gamma(a + 1) (1 + x/(a + 1) + x^2/((a + 1)(a + 2)) + ...), a = p + 1
         term = density / (p + 1)
         total = term
-        for n in range(1, N_SERIES_TERMS):
+        for n in range(1, N_GAMMA_TERMS):
             term *= x / (p + 1 + n)
             total += term
         return total

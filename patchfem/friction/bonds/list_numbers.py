@@ -17,9 +17,8 @@ from .list_rows_kernels import (
 from .parameters import Bonds
 
 MAX_DAMAGE = 745.0  # damage from which exp(-damage) underflows to zero
-MAX_STRIPS_PER_LENGTH = (
-    4  # number of strips per bond length of the cut-off for which there is memory
-)
+# Number of strips per bond length of the cut-off for which there is memory
+MAX_STRIPS_PER_LENGTH = 4
 N_WORK_STRIPS = 64  # number of strips of workspace in addition to those of an increment
 UNMERGED_CAPACITY = 20_000  # initial capacity, in strips, of a list whose strips are not merged
 
@@ -47,6 +46,7 @@ def law_numbers(law: Bonds, reach: float, merge: float, half_width: float = 0.0)
     Parameters
     ----------
     law : Bonds
+        Parameters of the bonds.
     reach : float
         Cut-off in bond lengths of path; for reading="stretch" in units of damage.
     merge : float
@@ -58,6 +58,7 @@ def law_numbers(law: Bonds, reach: float, merge: float, half_width: float = 0.0)
     Returns
     -------
     (8,) array
+        In the order of `LAW`, in SI units.
     """
     numbers = np.zeros(len(LawNumbers._fields))
     numbers[LAW.order] = law.order
@@ -78,12 +79,14 @@ def make_status(capacity: int, count: int | None = None) -> np.ndarray:
     Parameters
     ----------
     capacity : int
+        Number of columns of each list.
     count : int, optional
         Number of lists that follow each other in an array.
 
     Returns
     -------
     (14,) array, or (count, 14) array
+        In the order of `STATUS`, with the relative pressure 1.
     """
     status = np.zeros((count or 1, len(ListStatus._fields)))
     start = capacity * np.arange(count or 1)
@@ -119,12 +122,16 @@ def list_capacity(law: Bonds, reach: float, merge: float) -> int:
     Parameters
     ----------
     law : Bonds
-    reach, merge : float
-        As in `law_numbers`.
+        Parameters of the bonds.
+    reach : float
+        Cut-off in bond lengths of path; for reading="stretch" in units of damage.
+    merge : float
+        Largest width of a joined strip of age 0 in bond lengths; 0 joins nothing.
 
     Returns
     -------
     int
+        Number of strips; a run that needs more enlarges its lists (`enlarge_lists`).
     """
     step = MAX_STRIPS_PER_LENGTH * ceil(min(reach, MAX_DAMAGE)) + N_WORK_STRIPS
     if merge > 0:
@@ -147,6 +154,7 @@ def enlarge_lists(bondlist, statuses, capacity: int) -> np.ndarray:
     Returns
     -------
     (r, m capacity) array
+        Strips of all lists, each from its new first column on.
     """
     enlarged = np.zeros((len(bondlist), capacity * len(statuses)))
     for j, status in enumerate(statuses):

@@ -43,7 +43,7 @@ class BondList(NamedTuple):
     - status: (14,) see `ListStatus`
     - law: (8,) parameters, see `LawNumbers`
     - table: (k,) values of P(p + 1, x), see `list_math_kernels.bond_gammainc`
-    - growth: (5,) parameters of eq. 2.10, see `point_kernels.grow`
+    - growth: (5,) parameters of eq. 2.10, see `point_rows_kernels.GrowthNumbers`
     """
 
     bondlist: np.ndarray

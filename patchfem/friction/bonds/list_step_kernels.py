@@ -1,6 +1,7 @@
 """Compiled list of strips of bonds (eq. 2.17): increment of a point, joined strips, and change of its load.
 
-Arguments are those of `list_kernels`.
+`bonds` is a `list_rows_kernels.BondList`, which these functions change. `before` and `after` are `PathValues` at the ends
+of an increment, and k is the column of a strip.
 """
 
 from math import exp
@@ -25,7 +26,7 @@ from .list_sum_kernels import PathValues, interpolate_value
 
 # Largest exponent of the scaled values before they are rescaled; exp(709) is the largest
 # floating-point number
-MAX_EXPONENT = 300.0
+MAX_SCALE_EXPONENT = 300.0
 # Number of strips, in addition to a fifth of the list, by which the list grows before it is merged
 # again
 MIN_STRIPS_BETWEEN_MERGES = 12
@@ -33,9 +34,9 @@ MIN_STRIPS_BETWEEN_MERGES = 12
 MAX_START_LENGTH_RATIO = 1e-8
 MAX_GROWTH_SPAN = 0.1  # largest range of the growth J within a joined strip of growing bonds
 # Largest relative decrease of the bond length from the first to the last bond of a joined strip
-MAX_SHORTENING = 0.1
+MAX_BOND_SHORTENING = 0.1
 # Largest age in bond lengths at which the merge width still grows; the limit keeps it finite
-MAX_AGE = 200.0
+MAX_MERGE_AGE = 200.0
 
 
 # ---- increment of the list
@@ -72,12 +73,16 @@ def list_step(increment, bonds, v0, v1, dt):
         0.0,
     )
     after = find_path(1.0, increment, bonds, v0, v1, dt)
+
+    # The path state moves first, because the values of the new strips refer to its damage or growth
     now[PATH.displacement] = after.displacement
     now[PATH.path] = after.path
     now[PATH.damage] = after.damage
     now[PATH.growth] = after.growth
     now[PATH.length] = after.length
     _move_reference(bonds)
+
+    # Without pressure no bonds form, but those that exist still grow old
     has_room = True
     if increment != 0:
         if status[STATUS.pressure] > 0:
@@ -116,7 +121,7 @@ def _move_reference(bonds):
     now = bonds.now
     is_stretch = bonds.law[LAW.form] == FORM_STRETCH
     age = now[PATH.damage] if is_stretch else now[PATH.growth]
-    if age - now[PATH.reference] < MAX_EXPONENT:
+    if age - now[PATH.reference] < MAX_SCALE_EXPONENT:
         return
     factor = exp(now[PATH.reference] - age)
     for k in range(int(bonds.status[STATUS.head]), int(bonds.status[STATUS.end])):
@@ -133,6 +138,8 @@ def _append_strips(increment, before, after, bonds):
     law = bonds.law
     path = abs(increment)
     damage = after.damage - before.damage
+
+    # Bonds of reading="report" fill one strip; other forms need several strips if the increment is long
     division = divide(path, after.middle_length, after.growth - before.growth, law)
     status[STATUS.n_extra] += division.count - 1
     if not _make_room(int(division.count), bonds):
@@ -141,24 +148,28 @@ def _append_strips(increment, before, after, bonds):
     new = int(status[STATUS.end])
     if strips.shape[0] == N_ROWS:
         strips[STRIP.pressure, new] = status[STATUS.pressure]
+
+    # Strips follow each other from old to young, so that the head of the list is the oldest one
     for piece in range(int(division.count) - 1, -1, -1):
-        k = int(status[STATUS.end])
+        column = int(status[STATUS.end])
         low = find_end(piece, division)
         high = find_end(piece + 1, division)
-        strips[STRIP.start, k] = after.displacement - high * increment
+        strips[STRIP.start, column] = after.displacement - high * increment
         if high == 1:
-            strips[STRIP.start, k] = before.displacement
-        strips[STRIP.end, k] = after.displacement - low * increment
-        strips[STRIP.path, k] = after.path - low * path
-        strips[STRIP.damage, k] = after.damage - low * damage
-        strips[STRIP.covered, k] = (high - low) * path
+            strips[STRIP.start, column] = before.displacement
+        strips[STRIP.end, column] = after.displacement - low * increment
+        strips[STRIP.path, column] = after.path - low * path
+        strips[STRIP.damage, column] = after.damage - low * damage
+        strips[STRIP.covered, column] = (high - low) * path
         for i in range(STRIP.pressure, strips.shape[0]):
-            strips[i, k] = strips[i, new]
+            strips[i, column] = strips[i, new]
+
+        # The values at the Gauss points depend on the form of the sum
         if law[LAW.form] == FORM_STRETCH:
-            _write_weights((high - low) * damage, after.middle_length, bonds, k)
+            _write_weights((high - low) * damage, after.middle_length, bonds, column)
         elif law[LAW.form] == FORM_GROWING:
-            _write_start_lengths(low, high - low, before, after, bonds, k)
-        status[STATUS.end] = k + 1
+            _write_start_lengths(low, high - low, before, after, bonds, column)
+        status[STATUS.end] = column + 1
     if law[LAW.form] == FORM_REPORT:
         # The sum is exact for strips of any length, so a strip of equal pressure is extended
         _join_last_strips(bonds)
@@ -167,7 +178,7 @@ def _append_strips(increment, before, after, bonds):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def _make_room(count, bonds):
-    """Make room for further strips at the end of a list, by moving it to its first column; return whether there is room."""
+    """Move a list to its first column if further strips do not fit at its end; return whether they fit."""
     strips = bonds.bondlist
     status = bonds.status
     # The column after the last strip is that of new bonds
@@ -186,19 +197,19 @@ def _make_room(count, bonds):
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def _write_weights(width, eps, bonds, k):
+def _write_weights(width, eps, bonds, column):
     """Write the scaled weights of a strip of a given damage along it, for reading="stretch"."""
     strips = bonds.bondlist
     p = bonds.law[LAW.order]
-    weight = strips[STRIP.covered, k] / power(eps, p)
-    age = strips[STRIP.damage, k] - bonds.now[PATH.reference]
-    strips[STRIP.value_1, k] = 0.5 * weight * exp(age - GAUSS_POINT_1 * width)
-    strips[STRIP.value_2, k] = 0.5 * weight * exp(age - GAUSS_POINT_2 * width)
-    strips[STRIP.density, k] = power(eps, p) / eps
+    weight = strips[STRIP.covered, column] / power(eps, p)
+    age = strips[STRIP.damage, column] - bonds.now[PATH.reference]
+    strips[STRIP.value_1, column] = 0.5 * weight * exp(age - GAUSS_POINT_1 * width)
+    strips[STRIP.value_2, column] = 0.5 * weight * exp(age - GAUSS_POINT_2 * width)
+    strips[STRIP.density, column] = power(eps, p) / eps
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def _write_start_lengths(low, width, before, after, bonds, k):
+def _write_start_lengths(low, width, before, after, bonds, column):
     """Write the scaled starting lengths of a strip of growing bonds that ends at a fraction `low` of the increment.
 
     At a Gauss point it is the mature length when its bonds formed, times exp(J - reference) at that time. Later, the
@@ -211,7 +222,7 @@ def _write_start_lengths(low, width, before, after, bonds, k):
     for point in range(2):
         fraction = low + width * (GAUSS_POINT_1 if point == 0 else GAUSS_POINT_2)
         length = target * exp(after.growth - fraction * growth - reference) + start
-        bonds.bondlist[STRIP.value_1 + point, k] = length
+        bonds.bondlist[STRIP.value_1 + point, column] = length
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
@@ -246,7 +257,7 @@ def _merge_strips(bonds):
     last = head
     for k in range(head + 1, int(status[STATUS.end])):
         age = (bonds.now[PATH.path] - strips[STRIP.path, k]) / law[LAW.length]
-        width = law[LAW.merge_width] * law[LAW.length] * exp(min(age / 3, MAX_AGE))
+        width = law[LAW.merge_width] * law[LAW.length] * exp(min(age / 3, MAX_MERGE_AGE))
         is_narrow = strips[STRIP.covered, last] + strips[STRIP.covered, k] <= width
         if is_narrow and _join_strips(bonds, last, k):
             continue
@@ -273,61 +284,66 @@ def _join_last_strips(bonds):
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def _join_strips(bonds, i, k):
-    """Add strip k to strip i if it continues it in the same direction; return whether it does."""
+def _join_strips(bonds, older, younger):
+    """Add a strip to an older one if it continues it in the same direction; return whether it does."""
     strips = bonds.bondlist
     form = bonds.law[LAW.form]
-    width_i = strips[STRIP.end, i] - strips[STRIP.start, i]
-    width_k = strips[STRIP.end, k] - strips[STRIP.start, k]
-    if strips[STRIP.end, i] != strips[STRIP.start, k] or width_i * width_k <= 0:
+    older_width = strips[STRIP.end, older] - strips[STRIP.start, older]
+    younger_width = strips[STRIP.end, younger] - strips[STRIP.start, younger]
+    if strips[STRIP.end, older] != strips[STRIP.start, younger] or older_width * younger_width <= 0:
         return False
-    if form == FORM_GROWING and not _have_similar_lengths(bonds, i, k):
+    if form == FORM_GROWING and not _have_similar_lengths(bonds, older, younger):
         return False
 
-    # Two values with the sum and the first moment of the four; positions are measured from the end of k. The values of
-    # growing bonds are lengths, not weights, and count with the length of their strip.
-    covered = strips[STRIP.covered, i] + strips[STRIP.covered, k]
-    part = strips[STRIP.covered, k] / covered
-    scale_i = 1 - part if form == FORM_GROWING else 1.0
-    scale_k = part if form == FORM_GROWING else 1.0
-    i_1 = scale_i * strips[STRIP.value_1, i]
-    i_2 = scale_i * strips[STRIP.value_2, i]
-    k_1 = scale_k * strips[STRIP.value_1, k]
-    k_2 = scale_k * strips[STRIP.value_2, k]
-    moment = (1 - part) * (GAUSS_POINT_1 * i_1 + GAUSS_POINT_2 * i_2) + part * (i_1 + i_2)
-    moment += part * (GAUSS_POINT_1 * k_1 + GAUSS_POINT_2 * k_2)
-    weight = i_1 + i_2 + k_1 + k_2
+    # Two values with the sum and the first moment of the four; positions are measured from the end of the younger strip.
+    # The values of growing bonds are lengths, not weights, and count with the length of their strip.
+    covered = strips[STRIP.covered, older] + strips[STRIP.covered, younger]
+    part = strips[STRIP.covered, younger] / covered
+    older_scale = 1 - part if form == FORM_GROWING else 1.0
+    younger_scale = part if form == FORM_GROWING else 1.0
+    older_1 = older_scale * strips[STRIP.value_1, older]
+    older_2 = older_scale * strips[STRIP.value_2, older]
+    younger_1 = younger_scale * strips[STRIP.value_1, younger]
+    younger_2 = younger_scale * strips[STRIP.value_2, younger]
+    moment = (1 - part) * (GAUSS_POINT_1 * older_1 + GAUSS_POINT_2 * older_2)
+    moment += part * (older_1 + older_2)
+    moment += part * (GAUSS_POINT_1 * younger_1 + GAUSS_POINT_2 * younger_2)
+    weight = older_1 + older_2 + younger_1 + younger_2
     value_2 = (moment - GAUSS_POINT_1 * weight) / (GAUSS_POINT_2 - GAUSS_POINT_1)
     value_1 = weight - value_2
     if value_1 < 0 or value_2 < 0:
         return False
     if form == FORM_STRETCH:
-        part = (k_1 + k_2) / weight
+        part = (younger_1 + younger_2) / weight
 
     # The joint pressure conserves the sum of the weights of every point
-    strips[STRIP.density, i] += part * (strips[STRIP.density, k] - strips[STRIP.density, i])
+    strips[STRIP.density, older] += part * (
+        strips[STRIP.density, younger] - strips[STRIP.density, older]
+    )
     for row in range(STRIP.pressure, strips.shape[0]):
-        strips[row, i] += part * (strips[row, k] - strips[row, i])
-    strips[STRIP.end, i] = strips[STRIP.end, k]
-    strips[STRIP.path, i] = strips[STRIP.path, k]
-    strips[STRIP.damage, i] = strips[STRIP.damage, k]
-    strips[STRIP.covered, i] = covered
-    strips[STRIP.value_1, i] = value_1
-    strips[STRIP.value_2, i] = value_2
+        strips[row, older] += part * (strips[row, younger] - strips[row, older])
+    strips[STRIP.end, older] = strips[STRIP.end, younger]
+    strips[STRIP.path, older] = strips[STRIP.path, younger]
+    strips[STRIP.damage, older] = strips[STRIP.damage, younger]
+    strips[STRIP.covered, older] = covered
+    strips[STRIP.value_1, older] = value_1
+    strips[STRIP.value_2, older] = value_2
     return True
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def _have_similar_lengths(bonds, i, k):
+def _have_similar_lengths(bonds, older, younger):
     """Return whether the growing bonds of two strips have similar lengths or are fully grown."""
     strips = bonds.bondlist
     mature = bonds.now[PATH.length]
     scale = exp(bonds.now[PATH.reference] - bonds.now[PATH.growth])
-    young = scale * interpolate_value(0.0, strips[STRIP.value_1, k], strips[STRIP.value_2, k])
-    old = scale * interpolate_value(1.0, strips[STRIP.value_1, i], strips[STRIP.value_2, i])
+    young = scale * interpolate_value(
+        0.0, strips[STRIP.value_1, younger], strips[STRIP.value_2, younger]
+    )
+    old = scale * interpolate_value(1.0, strips[STRIP.value_1, older], strips[STRIP.value_2, older])
     if young <= MAX_START_LENGTH_RATIO * mature:
         return True
-    return young <= exp(MAX_GROWTH_SPAN) * old and mature - young >= (1 - MAX_SHORTENING) * (
+    return young <= exp(MAX_GROWTH_SPAN) * old and mature - young >= (1 - MAX_BOND_SHORTENING) * (
         mature - old
     )
 
@@ -364,6 +380,9 @@ def release(before, after, point, bonds):
         return 0.0
     if after > before:
         return bonds.law[LAW.initial] * (after - before)
+
+    # The density of the bonds falls in proportion to the pressure. Those that formed last have the least stretch, so
+    # their loss changes the force least.
     _release_last_formed(_total_density(point, bonds) * (1 - after / before), point, bonds)
     carried = abs(total(STRIP.present_force, point, bonds))
     if carried <= after:
@@ -395,15 +414,15 @@ def _scale_pressure(factor, point, bonds):
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def _density(k, point, bonds):
+def _density(column, point, bonds):
     """Return the density of the surviving bonds of a strip at a point, for reading="stretch"."""
     strips = bonds.bondlist
-    pressure = strips[STRIP.pressure + point, k]
-    if k == int(bonds.status[STATUS.room_start]):
+    pressure = strips[STRIP.pressure + point, column]
+    if column == int(bonds.status[STATUS.room_start]):
         return pressure * bonds.law[LAW.initial] * exp(-bonds.now[PATH.damage])
     scale = exp(bonds.now[PATH.reference] - bonds.now[PATH.damage])
-    weight = strips[STRIP.value_1, k] + strips[STRIP.value_2, k]
-    return pressure * scale * strips[STRIP.density, k] * weight
+    weight = strips[STRIP.value_1, column] + strips[STRIP.value_2, column]
+    return pressure * scale * strips[STRIP.density, column] * weight
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
@@ -446,16 +465,18 @@ def append_unstretched(bonds):
         return False
     strips = bonds.bondlist
     now = bonds.now
-    k = int(bonds.status[STATUS.end])
+    column = int(bonds.status[STATUS.end])
     for i in range(strips.shape[0]):
-        strips[i, k] = 0.0
-    strips[STRIP.start, k] = strips[STRIP.end, k] = now[PATH.displacement]
-    strips[STRIP.path, k] = now[PATH.path]
-    strips[STRIP.damage, k] = now[PATH.damage]
+        strips[i, column] = 0.0
+    strips[STRIP.start, column] = strips[STRIP.end, column] = now[PATH.displacement]
+    strips[STRIP.path, column] = now[PATH.path]
+    strips[STRIP.damage, column] = now[PATH.damage]
     # Their length is eps_0
     eps0 = bonds.law[LAW.length]
-    strips[STRIP.density, k] = power(eps0, bonds.law[LAW.order]) / eps0
+    strips[STRIP.density, column] = power(eps0, bonds.law[LAW.order]) / eps0
     scale = exp(now[PATH.damage] - now[PATH.reference])
-    strips[STRIP.value_1, k] = strips[STRIP.value_2, k] = 0.5 * scale / strips[STRIP.density, k]
-    bonds.status[STATUS.end] = k + 1
+    strips[STRIP.value_1, column] = strips[STRIP.value_2, column] = (
+        0.5 * scale / strips[STRIP.density, column]
+    )
+    bonds.status[STATUS.end] = column + 1
     return True

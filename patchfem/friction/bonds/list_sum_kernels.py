@@ -33,7 +33,7 @@ from .list_rows_kernels import (
 # Largest displacement, relative to the path, at which the initial bonds count as unstressed
 UNSTRESSED_TOL = 1e-14
 # Smallest length of a growing bond relative to that of mature bonds; it keeps R/length finite
-MIN_LENGTH_RATIO = 1e-9
+MIN_BOND_RATIO = 1e-9
 PATH_ROUND_OFF = 1e-15  # largest difference of two equal paths, relative to the whole path
 MIN_POSITIVE = 1e-300  # smallest path [m] or value whose logarithm is taken
 # Distance of u = 0 from the middle of a strip, in half lengths of the strip, from which two Gauss points suffice
@@ -46,7 +46,7 @@ MIN_RESTING_RATIO = 0.05
 # Largest damage along a piece, and largest number of pieces; with them the linear density of a piece changes the force
 # by less than 2e-6 of the friction limit
 MAX_PIECE_DAMAGE = 0.07
-MAX_PIECES = 4
+MAX_STRIP_PIECES = 4
 # Ratio of u to the length of a piece from which two Gauss points are more exact than a difference of powers
 FAR_RATIO = 30.0
 
@@ -78,12 +78,14 @@ def sum_strips(after, bonds):
     after : PathValues
         State of the path for which the sum is taken.
     bonds : BondList
+        Its rows `STRIP.force` and `STRIP.energy` receive the sums.
     """
     law = bonds.law
     form = law[LAW.form]
     if form == FORM_REPORT:
         _sum_report(after, bonds)
         return
+
     strips = bonds.bondlist
     scale = _value_scale(after, bonds)
     # A bond of reading="stretch" stores f u/(p + 1), because its force is proportional to |u|^p
@@ -93,6 +95,8 @@ def sum_strips(after, bonds):
     if form == FORM_STRETCH:
         force_factor *= scale
         energy_factor = force_factor / (p + 1)
+
+    # All strips by two Gauss points in a loop without branches, then those again for which this is not exact enough
     if form == FORM_STRETCH:
         _sum_gauss_stretch(after, force_factor, energy_factor, bonds)
     else:
@@ -114,11 +118,11 @@ def _value_scale(after, bonds):
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def _suits_gauss(after, bonds, k, p, form):
+def _suits_gauss(after, bonds, column, p, form):
     """Return whether two Gauss points sum a strip exactly enough."""
     strips = bonds.bondlist
-    start = strips[STRIP.start, k]
-    end = strips[STRIP.end, k]
+    start = strips[STRIP.start, column]
+    end = strips[STRIP.end, column]
     distance = abs(2 * after.displacement - start - end)
     if form == FORM_STRETCH:
         if p == 1.0 or p == 3.0:
@@ -126,7 +130,9 @@ def _suits_gauss(after, bonds, k, p, form):
         reach = KINK_REACH if p == 0.0 or p == 2.0 else SINGULAR_REACH
         return distance > reach * abs(end - start)
     is_steep = p < 2 and p != np.floor(p)
-    is_young = after.path - strips[STRIP.path, k] <= STEEP_REACH * strips[STRIP.covered, k]
+    is_young = (
+        after.path - strips[STRIP.path, column] <= STEEP_REACH * strips[STRIP.covered, column]
+    )
     return distance > KINK_REACH * abs(end - start) and not (is_steep and is_young)
 
 
@@ -160,18 +166,23 @@ def _sum_gauss_growing(after, scale, factor, bonds):
     strips = bonds.bondlist
     p = bonds.law[LAW.order]
     is_whole = p == 0.0 or p == 1.0 or p == 2.0
-    min_length = MIN_LENGTH_RATIO * after.length
+    min_length = MIN_BOND_RATIO * after.length
     for k in range(uint64(bonds.status[STATUS.head]), uint64(bonds.status[STATUS.end])):
+        # Stretch u and path R of the bonds at both Gauss points
         end = strips[STRIP.end, k]
         step = end - strips[STRIP.start, k]
         u_1 = after.displacement - end + GAUSS_POINT_1 * step
         u_2 = after.displacement - end + GAUSS_POINT_2 * step
         covered = strips[STRIP.covered, k]
         path = after.path - strips[STRIP.path, k]
+
+        # Their length: that of mature bonds, less what the time since they formed leaves of the difference (eq. 2.10)
         length_1 = max(after.length - scale * strips[STRIP.value_1, k], min_length)
         length_2 = max(after.length - scale * strips[STRIP.value_2, k], min_length)
         x_1 = max(path + GAUSS_POINT_1 * covered, MIN_POSITIVE) / length_1
         x_2 = max(path + GAUSS_POINT_2 * covered, MIN_POSITIVE) / length_2
+
+        # Eq. 2.17 as printed: (R/eps)^p exp(-R/eps) along u/|u|
         if is_whole:
             force_1 = whole_power(x_1, p) * fast_exp(-x_1)
             force_2 = whole_power(x_2, p) * fast_exp(-x_2)
@@ -206,22 +217,26 @@ def interpolate_value(fraction, value_1, value_2):
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def _integrate_strip(after, scale, bonds, k):
+def _integrate_strip(after, scale, bonds, column):
     """Integrate a strip on each side of u = 0, in pieces of linear density."""
     strips = bonds.bondlist
-    start = strips[STRIP.start, k]
-    end = strips[STRIP.end, k]
+    start = strips[STRIP.start, column]
+    end = strips[STRIP.end, column]
     is_stretch = bonds.law[LAW.form] == FORM_STRETCH
+
+    # The power |u|^p is not smooth at u = 0, so a strip that contains it is divided there
     zero_position = 0.0
     if end != start:
         zero_position = min(max((end - after.displacement) / (end - start), 0.0), 1.0)
+
+    # The density exp(damage) is close to linear on a piece along which the damage is small
     n_pieces = 1
     if is_stretch:
-        ratio = max(strips[STRIP.value_1, k], MIN_POSITIVE) / max(
-            strips[STRIP.value_2, k], MIN_POSITIVE
+        ratio = max(strips[STRIP.value_1, column], MIN_POSITIVE) / max(
+            strips[STRIP.value_2, column], MIN_POSITIVE
         )
         damage = fast_log(ratio) / (GAUSS_POINT_2 - GAUSS_POINT_1)
-        n_pieces = min(max(ceil(abs(damage) / MAX_PIECE_DAMAGE), 1), MAX_PIECES)
+        n_pieces = min(max(ceil(abs(damage) / MAX_PIECE_DAMAGE), 1), MAX_STRIP_PIECES)
 
     force = 0.0
     energy = 0.0
@@ -234,35 +249,35 @@ def _integrate_strip(after, scale, bonds, k):
             piece_low = low + (high - low) * piece / n_pieces
             piece_high = low + (high - low) * (piece + 1) / n_pieces
             if is_stretch:
-                part = _integrate_stretch_piece(after, bonds, k, piece_low, piece_high)
+                part = _integrate_stretch_piece(after, bonds, column, piece_low, piece_high)
             else:
-                part = _integrate_growing_piece(after, scale, bonds, k, piece_low, piece_high)
+                part = _integrate_growing_piece(after, scale, bonds, column, piece_low, piece_high)
             force += part.force
             energy += part.energy
     return BondSum(force, energy)
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def _integrate_stretch_piece(after, bonds, k, low, high):
+def _integrate_stretch_piece(after, bonds, column, low, high):
     """Integrate c |u|^p sgn u, and this times |u|, between two positions of a strip of weight c."""
     strips = bonds.bondlist
-    value_1 = strips[STRIP.value_1, k]
-    value_2 = strips[STRIP.value_2, k]
+    value_1 = strips[STRIP.value_1, column]
+    value_2 = strips[STRIP.value_2, column]
     width = high - low
     weight_1 = value_1
     weight_2 = value_2
     if width < 1:
         weight_1 = width * interpolate_value(low + GAUSS_POINT_1 * width, value_1, value_2)
         weight_2 = width * interpolate_value(low + GAUSS_POINT_2 * width, value_1, value_2)
-    step = strips[STRIP.end, k] - strips[STRIP.start, k]
-    u_low = after.displacement - strips[STRIP.end, k] + low * step
-    u_high = after.displacement - strips[STRIP.end, k] + high * step
+    step = strips[STRIP.end, column] - strips[STRIP.start, column]
+    u_low = after.displacement - strips[STRIP.end, column] + low * step
+    u_high = after.displacement - strips[STRIP.end, column] + high * step
     p = bonds.law[LAW.order]
     return _average_power(u_low, u_high, weight_1, weight_2, p)
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def _integrate_growing_piece(after, scale, bonds, k, low, high):
+def _integrate_growing_piece(after, scale, bonds, column, low, high):
     """Integrate (R/eps)^p exp(-R/eps) sgn u, and this times |u|, between two positions of a strip on one side of u = 0.
 
     Young bonds that grew along the strip have a length proportional to R, so (R/eps)^p is smooth. Where they grew at
@@ -270,11 +285,13 @@ def _integrate_growing_piece(after, scale, bonds, k, low, high):
     """
     strips = bonds.bondlist
     p = bonds.law[LAW.order]
-    value_1 = strips[STRIP.value_1, k]
-    value_2 = strips[STRIP.value_2, k]
-    covered = strips[STRIP.covered, k]
-    path = max(after.path - strips[STRIP.path, k], 0.0)
-    step = strips[STRIP.end, k] - strips[STRIP.start, k]
+    value_1 = strips[STRIP.value_1, column]
+    value_2 = strips[STRIP.value_2, column]
+    covered = strips[STRIP.covered, column]
+    path = max(after.path - strips[STRIP.path, column], 0.0)
+    step = strips[STRIP.end, column] - strips[STRIP.start, column]
+
+    # Bonds that grew along the strip have a last length near 0
     last = _bond_length(0.0, after, scale, value_1, value_2)
     first = _bond_length(1.0, after, scale, value_1, value_2)
     is_steep = p < 2 and p != np.floor(p) and last > MIN_RESTING_RATIO * first
@@ -289,13 +306,15 @@ def _integrate_growing_piece(after, scale, bonds, k, low, high):
         fraction = low + (GAUSS_POINT_1 if point == 0 else GAUSS_POINT_2) * width
         length = _bond_length(fraction, after, scale, value_1, value_2)
         distance = max(path + fraction * covered, MIN_POSITIVE)
-        u = after.displacement - strips[STRIP.end, k] + fraction * step
+        u = after.displacement - strips[STRIP.end, column] + fraction * step
         density = fast_exp(-distance / length)
         if is_steep:
             density *= power(1 / length, p)
         else:
             density *= power(distance / length, p)
         density *= 0.5 * width * covered
+
+        # u keeps its sign on the piece, so the sign of either point serves
         sign = np.copysign(1.0, u)
         if point == 0:
             force_1 = density
@@ -303,6 +322,7 @@ def _integrate_growing_piece(after, scale, bonds, k, low, high):
         else:
             force_2 = density
             energy_2 = density * abs(u)
+
     r_low = path + low * covered
     r_high = path + high * covered
     force = _average_power(r_low, r_high, force_1, force_2, steep_power).force
@@ -314,7 +334,7 @@ def _integrate_growing_piece(after, scale, bonds, k, low, high):
 def _bond_length(fraction, after, scale, value_1, value_2):
     """Return the length [m] of growing bonds at a position within a strip."""
     start = interpolate_value(fraction, value_1, value_2)
-    return max(after.length - scale * start, MIN_LENGTH_RATIO * after.length)
+    return max(after.length - scale * start, MIN_BOND_RATIO * after.length)
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
@@ -335,6 +355,8 @@ def _average_power(u_low, u_high, weight_1, weight_2, p):
     BondSum
     """
     width = u_high - u_low
+
+    # Far from u = 0 the power is smooth, and the difference of powers below would cancel
     if abs(u_low + u_high) > FAR_RATIO * abs(width):
         u_1 = u_low + GAUSS_POINT_1 * width
         u_2 = u_low + GAUSS_POINT_2 * width
@@ -416,6 +438,7 @@ def sum_initial(after, bonds):
     after : PathValues
         State of the path for which the sum is taken.
     bonds : BondList
+        Its law has the density, the width and the cut-off of the initial bonds.
 
     Returns
     -------
@@ -433,12 +456,16 @@ def sum_initial(after, bonds):
     if weight == 0 or after.path == 0 or is_at_place or is_old:
         return BondSum(0.0, 0.0)
 
+    # (|u|/eps_0)^p exp(-damage) for reading="stretch", (R/eps_0)^p exp(-R/eps_0) for reading="report"
     stretch_power = 0.0
     if law[LAW.form] == FORM_STRETCH:
         stretch_power = p
         weight *= fast_exp(-after.damage) / power(eps0, p)
     else:
         weight *= power(max(after.path / eps0, MIN_POSITIVE), p) * fast_exp(-after.path / eps0)
+
+    # The bonds are unstretched at displacements from -half_width to half_width. The energy that they would store at
+    # displacement 0 is subtracted, so that a contact that has not moved stores nothing.
     low = displacement - half_width
     high = displacement + half_width
     total = _average_power(low, high, 0.5 * weight, 0.5 * weight, stretch_power)
@@ -450,15 +477,17 @@ def sum_initial(after, bonds):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def average_initial(increment, bonds):
-    """Return the exact mean force of the initial bonds over an increment for unit pressure and reading="report".
+    """Return the mean force of the initial bonds over an increment for unit pressure and reading="report".
 
-    The force jumps at displacement 0, or changes its sign over the width over which the bonds are distributed.
+    The force jumps at displacement 0, for which the mean is exact, or rises from -phi to phi over the width over which
+    the bonds are distributed; there phi is replaced by its mean over the width.
 
     Parameters
     ----------
     increment : float
         Increment [m] from the present state.
     bonds : BondList
+        Its law has the density, the width and the cut-off of the initial bonds.
 
     Returns
     -------
@@ -485,6 +514,9 @@ def average_initial(increment, bonds):
     at_exit = at_entry
     if to_exit > to_entry:
         at_exit = _sum_youngest((path + to_exit) / eps0, bonds).force
+
+    # The force is -phi before the entry and phi beyond the exit; the integral of phi(R/eps_0) over each part is a
+    # difference of P(p + 1, R/eps_0)
     total = _sum_youngest((path + size) / eps0, bonds).force - at_exit - (at_entry - at_start)
     if to_exit > to_entry:
         middle = along + 0.5 * (to_entry + to_exit)
@@ -501,6 +533,7 @@ def sum_formed(path, eps, bonds):
     path, eps : float
         Length of the increment and bond length [m].
     bonds : BondList
+        Its law has the order p and the bond length eps_0.
 
     Returns
     -------
@@ -524,6 +557,7 @@ def average_formed(increment, eps, bonds):
     increment, eps : float
         Increment and bond length [m].
     bonds : BondList
+        Its law has the order p and the bond length eps_0.
 
     Returns
     -------

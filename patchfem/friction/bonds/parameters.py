@@ -42,8 +42,8 @@ class Bonds:
 def growth_numbers(law: Bonds) -> np.ndarray:
     """Return the parameters (5,) or (5, c) of bond growth as an array for compiled code.
 
-    They are a_s [m s-2], or -1 for a constant bond length, l_k [m], v_h [m/s], eps_0 [m] and eps_k [m]. Fields of the law
-    may be arrays (c,) of the values of c points.
+    They are a_s [m s-2], or -1 for a constant bond length, l_k [m], v_h [m/s], eps_0 [m] and eps_k [m], in the order of
+    `point_rows_kernels.GROWTH`. Fields of the law may be arrays (c,) of the values of c points.
     """
     growth = (CONSTANT_LENGTH_FLAG, 1.0, 1.0, law.length, law.length)
     if law.has_growth:

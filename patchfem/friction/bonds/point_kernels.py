@@ -25,6 +25,7 @@ import numpy as np
 
 from ...compiled.flags_kernels import FASTMATH_FLAGS, NJIT_NO_REFCOUNT
 from ...compiled.jit import njit
+from .point_rows_kernels import GROWTH
 
 # Largest path in bond lengths for which the power series are exact to round-off
 MAX_SHORT_PATH = 0.5
@@ -36,9 +37,10 @@ SHAPE_SERIES = np.array([1 / factorial(k + 2) for k in range(13)])
 # of -x
 MOMENT_SERIES = np.array([1 / (factorial(k) * (k + 4)) for k in range(13)])
 N_SHORT_TERMS = 7  # number of terms of SHAPE_SERIES for paths up to MAX_SERIES_PATH
-MAX_EXPONENT = 1e100  # exponent of growth from which the bond length no longer changes
-# Largest relative difference of two speeds for which their mean is used; it avoids cancellation
-SAME_SPEED_TOL = 1e-6
+MAX_GROWTH_EXPONENT = 1e100  # exponent of growth from which the bond length no longer changes
+# Largest relative difference of the speeds at the ends of a step for which their mean determines the growth; it avoids
+# cancellation
+GROWTH_SPEED_TOL = 1e-6
 
 
 class ShapeFunctions(NamedTuple):
@@ -47,6 +49,40 @@ class ShapeFunctions(NamedTuple):
     f1: float
     f2: float
     decay: float
+
+
+class PathIntegrals(NamedTuple):
+    """Integrals over a path from 0 to x in bond lengths.
+
+    - first, second: of y exp(-y) and y^2 exp(-y)
+    - of_second: integral of the second one over its upper limit
+    """
+
+    first: float
+    second: float
+    of_second: float
+
+
+class MeanStretch(NamedTuple):
+    """Path mean of z over an increment [Pa m], and its derivative with respect to the increment [Pa]."""
+
+    mean: float
+    slope: float
+
+
+class BondMoments(NamedTuple):
+    """Sums over the bonds of a point: m [Pa], z [Pa m] and s2 [Pa m2]; of a point with a load in N instead of Pa."""
+
+    m: float
+    z: float
+    s2: float
+
+
+class GrownLength(NamedTuple):
+    """Bond length [m] after a step, whose distance to its target has decayed by exp(-exponent)."""
+
+    length: float
+    exponent: float
 
 
 class BondStep(NamedTuple):
@@ -92,7 +128,7 @@ def _short_shape_functions(x):
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def _integrate_powers(x, decay):
-    """Return the integrals from 0 to x of y exp(-y) and y^2 exp(-y), and the integral of the second one over x."""
+    """Return the `PathIntegrals` of a path x in bond lengths; decay = exp(-x)."""
     if x < MAX_SHORT_PATH:
         return _integrate_short_powers(x, decay)
     return _powers_from_cubic(x, decay, 6 - decay * (x * x * x + 3 * x * x + 6 * x + 6))
@@ -100,16 +136,16 @@ def _integrate_powers(x, decay):
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, forceinline=True, **NJIT_NO_REFCOUNT)
 def _integrate_short_powers(x, decay):
-    """Return the integrals of `_integrate_powers` for x up to MAX_SHORT_PATH by a power series."""
+    """Return the `PathIntegrals` of a path x up to MAX_SHORT_PATH by a power series; decay = exp(-x)."""
     series = _sum_series(MOMENT_SERIES, MOMENT_SERIES.size, x)
     return _powers_from_cubic(x, decay, x**4 * series)
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, forceinline=True, **NJIT_NO_REFCOUNT)
 def _powers_from_cubic(x, decay, cubic):
-    """Return the integrals of y exp(-y) and y^2 exp(-y) from that of y^3 exp(-y)."""
+    """Return the `PathIntegrals` from the integral of y^3 exp(-y) by parts."""
     second = (cubic + x * x * x * decay) / 3
-    return (second + x * x * decay) / 2, second, x * second - cubic
+    return PathIntegrals((second + x * x * decay) / 2, second, x * second - cubic)
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
@@ -118,13 +154,14 @@ def bond_mean(m, z, increment, sigma, eps):
 
     Parameters
     ----------
-    m, z, increment, sigma, eps : float
-        As in the docstring of the module, before the increment [m].
+    m, z : float
+        Sums over the bonds before the increment [Pa], [Pa m].
+    increment, sigma, eps : float
+        Increment [m], pressure [Pa] under which new bonds form, and bond length [m].
 
     Returns
     -------
-    mean, slope : float
-        Path-mean z [Pa m] and its derivative over the increment [Pa].
+    MeanStretch
     """
     shapes = shape_functions(abs(increment) / eps)
     return _mean_stretch(m, z, increment, sigma, eps, (shapes.f1, shapes.f2))
@@ -136,13 +173,14 @@ def short_bond_mean(m, z, increment, sigma, eps):
 
     Parameters
     ----------
-    m, z, increment, sigma, eps : float
-        As in `bond_mean`.
+    m, z : float
+        Sums over the bonds before the increment [Pa], [Pa m].
+    increment, sigma, eps : float
+        Increment [m] up to MAX_SHORT_PATH bond lengths, pressure [Pa] under which new bonds form, and bond length [m].
 
     Returns
     -------
-    mean, slope : float
-        As in `bond_mean`.
+    MeanStretch
     """
     shapes = _short_shape_functions(abs(increment) / eps)
     return _mean_stretch(m, z, increment, sigma, eps, (shapes.f1, shapes.f2))
@@ -150,7 +188,7 @@ def short_bond_mean(m, z, increment, sigma, eps):
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, forceinline=True, **NJIT_NO_REFCOUNT)
 def _mean_stretch(m, z, increment, sigma, eps, shapes):
-    """Return the mean of z over the path of an increment, and its derivative over the increment."""
+    """Return the mean of z over the path of an increment; `shapes` are f1 and f2."""
     f1, f2 = shapes
     direction = 1.0 if increment > 0 else -1.0
     x = abs(increment) / eps
@@ -159,7 +197,7 @@ def _mean_stretch(m, z, increment, sigma, eps, shapes):
     slope = (
         direction * z * (f2 - f1) / eps + sigma * (f1 - f2) - density_deficit * (f2 - x * (f1 - f2))
     )
-    return mean, slope
+    return MeanStretch(mean, slope)
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
@@ -168,8 +206,10 @@ def bond_step(m, z, s2, increment, sigma, eps):
 
     Parameters
     ----------
-    m, z, s2, increment, sigma, eps : float
-        As in the docstring of the module, before the increment [m].
+    m, z, s2 : float
+        Sums over the bonds before the increment [Pa], [Pa m], [Pa m2].
+    increment, sigma, eps : float
+        Increment [m], pressure [Pa] under which new bonds form, and bond length [m].
 
     Returns
     -------
@@ -187,8 +227,10 @@ def short_bond_step(m, z, s2, increment, sigma, eps):
 
     Parameters
     ----------
-    m, z, s2, increment, sigma, eps : float
-        As in `bond_step`.
+    m, z, s2 : float
+        Sums over the bonds before the increment [Pa], [Pa m], [Pa m2].
+    increment, sigma, eps : float
+        Increment [m] up to MAX_SHORT_PATH bond lengths, pressure [Pa] under which new bonds form, and bond length [m].
 
     Returns
     -------
@@ -202,7 +244,10 @@ def short_bond_step(m, z, s2, increment, sigma, eps):
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, forceinline=True, **NJIT_NO_REFCOUNT)
 def _step_bonds(bonds, increment, sigma, eps, shapes, powers):
-    """Return the sums over the bonds after an increment, from shape functions and integrals of its path."""
+    """Return the sums over the bonds after an increment: the solution of the equations of the module.
+
+    `bonds` are m, z and s2 before it, `shapes` are f1 and exp(-x), `powers` the `PathIntegrals` of its path.
+    """
     m, z, s2 = bonds
     f1, decay = shapes
     first, second, second_integral = powers
@@ -233,35 +278,35 @@ def grow(eps, v0, v1, path, dt, growth):
     v0, v1, path, dt : float
         Speeds [m/s] at the ends, path [m] and duration [s] of the step.
     growth : (5,) array
-        Growth a_s at rest [m s-2], below 0 for a constant length; path l_k of the weakening [m]; floor
-        v_h of the speed [m/s]; lengths eps_0 at rest and eps_k of sliding bonds [m].
+        Parameters a_s, l_k, v_h, eps_0 and eps_k in the order of `GROWTH`.
 
     Returns
     -------
-    eps, exponent : float
-        Bond length after [m]; the distance to its target has decayed by exp(-exponent).
+    GrownLength
     """
-    a_s = growth[0]
-    l_k = growth[1]
-    min_speed = growth[2]
-    eps_0 = growth[3]
-    eps_k = growth[4]
+    a_s = growth[GROWTH.rest_growth]
+    min_speed = growth[GROWTH.rest_speed]
     if a_s < 0:
-        return eps, 0.0
+        return GrownLength(eps, 0.0)
+
+    # Healing is the integral of a_s dt/max(|v|, v_h) at a speed that changes linearly
     if max(abs(v0), abs(v1)) < min_speed:
         healing = a_s * dt / min_speed
-    elif abs(v1 - v0) > SAME_SPEED_TOL * (abs(v0) + abs(v1)):
+    elif abs(v1 - v0) > GROWTH_SPEED_TOL * (abs(v0) + abs(v1)):
         healing = _integrate_slowness(v1, min_speed) - _integrate_slowness(v0, min_speed)
         healing = a_s * dt * healing / (v1 - v0)
     else:
         healing = a_s * dt / max(abs(v0 + v1) / 2, min_speed)
-    healing = min(healing, MAX_EXPONENT)
-    weakening = min(path / l_k, MAX_EXPONENT)
+    healing = min(healing, MAX_GROWTH_EXPONENT)
+    weakening = min(path / growth[GROWTH.slip_growth], MAX_GROWTH_EXPONENT)
     total = healing + weakening
     if total == 0:
-        return eps, 0.0
-    target = (healing * eps_0 + weakening * eps_k) / total
-    return target + (eps - target) * exp(-total), total
+        return GrownLength(eps, 0.0)
+
+    # Healing draws the length towards eps_0 and weakening towards eps_k; it relaxes to their weighted mean
+    lengths = healing * growth[GROWTH.rest_length] + weakening * growth[GROWTH.slip_length]
+    target = lengths / total
+    return GrownLength(target + (eps - target) * exp(-total), total)
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
@@ -279,23 +324,28 @@ def press_point(bonds, s0, s1, initial, length):
     Parameters
     ----------
     bonds : (float, float, float)
-        m, z and s2 under the load s0.
+        m [N], z [N m] and s2 [N m2] under the load s0.
     s0, s1 : float
         Loads before and after [N].
     initial, length : float
-        m_0 and eps_0 [m].
+        Density m_0 [1] of the bonds that a rising load forms, and bond length eps_0 [m].
 
     Returns
     -------
-    m, z, s2 : float
+    BondMoments
     """
     m, z, s2 = bonds
     if s1 >= s0:
-        return m + initial * (s1 - s0), z, s2
+        return BondMoments(m + initial * (s1 - s0), z, s2)
+
+    # The bonds that formed last, without stretch, are released first. Once m would fall below z^2/s2, the least for
+    # which a population with these moments exists, all stretches shrink.
     remaining = m * s1 / s0
     min_density = z * z / s2 if s2 > 0 else 0.0
     factor = remaining / min_density if min_density > remaining else 1.0
+
+    # The force mu_s z/eps_0 may not exceed the new limit mu_s s1
     bound = length * s1
     if factor * abs(z) > bound:
         factor = bound / abs(z)
-    return remaining, z * factor, s2 * factor
+    return BondMoments(remaining, z * factor, s2 * factor)

@@ -21,18 +21,18 @@ from .list_numbers import (
 )
 from .list_rows_kernels import N_ROWS, STATUS, STRIP, BondList
 from .parameters import Bonds, growth_numbers
+from .point_rows_kernels import MOMENT
 
-N_FIRST_STRIPS = (
-    32  # number of columns of a list before any motion; it is doubled when the list is full
-)
+# Number of columns of a list before any motion; it is doubled when the list is full
+N_FIRST_STRIPS = 32
 
 
 @dataclass(frozen=True, slots=True)
 class FirstOrderBonds:
     """Bonds of order p = 1 for friction.reading = "stretch", known by their moments; exact for any step.
 
-    A state is an array (4, m): m [Pa], z [Pa m], s2 [Pa m2] and the bond length [m] of every point. Tractions (m,) [Pa] are
-    positive against slip.
+    A state is an array (4, m): m [Pa], z [Pa m], s2 [Pa m2] and the bond length [m] of every point, rows of `MOMENT`.
+    Tractions (m,) [Pa] are positive against slip.
     """
 
     law: Bonds
@@ -40,8 +40,8 @@ class FirstOrderBonds:
     def initial_state(self, sigma) -> np.ndarray:
         """Return unstretched bonds of density m_0 under a pressure (m,) [Pa]."""
         moments = np.zeros((4, np.size(sigma)))
-        moments[0] = self.law.initial * np.asarray(sigma, float)
-        moments[3] = self.law.length
+        moments[MOMENT.m] = self.law.initial * np.asarray(sigma, float)
+        moments[MOMENT.length] = self.law.length
         return moments
 
     def step(self, state: np.ndarray, dq: float, s0, s1, dt: float) -> Step:
@@ -52,6 +52,7 @@ class FirstOrderBonds:
         Parameters
         ----------
         state : (4, m) array
+            Moments and bond lengths of the points.
         dq : float
             Increment [m].
         s0, s1 : (m,) array
@@ -77,6 +78,7 @@ class FirstOrderBonds:
         Parameters
         ----------
         state : (4, m) array
+            Moments and bond lengths of the points.
         s0, s1 : (m,) array
             Pressures before and after [Pa].
 
@@ -99,11 +101,11 @@ class FirstOrderBonds:
 
     def traction(self, state: np.ndarray):
         """Return the traction mu_s z/eps_0 (m,) [Pa], positive against slip."""
-        return self._stiffness * state[1]
+        return self._stiffness * state[MOMENT.z]
 
     def stored_energy(self, state: np.ndarray):
         """Return the elastic energy per area mu_s s2/(2 eps_0) (m,) [J/m2]."""
-        return self._stiffness / 2 * state[2]
+        return self._stiffness / 2 * state[MOMENT.s2]
 
 
 @dataclass(frozen=True, slots=True)
@@ -148,6 +150,7 @@ class ListedBonds:
         Parameters
         ----------
         state : BondList
+            List that all points share.
         dq : float
             Increment [m].
         s0, s1 : (m,) array
@@ -168,6 +171,7 @@ class ListedBonds:
         Parameters
         ----------
         state : BondList
+            List that all points share.
         s0, s1 : (m,) array
             Pressures before and after [Pa].
 
@@ -180,7 +184,11 @@ class ListedBonds:
         return self._change(state, press, _as_array(s0), _as_array(s1))
 
     def _change(self, state: BondList, change, *arguments) -> Step:
-        """Apply a compiled change to a copy of the state, with larger lists where they do not suffice."""
+        """Apply a compiled change to a copy of the state, with larger lists where they do not suffice.
+
+        `change(state, *arguments, out)` writes traction and dissipation per mu_s into `out` and returns whether the list
+        was large enough.
+        """
         capacity = state.bondlist.shape[1]
         while True:
             status = state.status.copy()

@@ -16,12 +16,12 @@ import numpy as np
 
 from ..protocol import Element, SteadyLoop
 
-N_GAUSS_POINTS = 20  # number of Gauss points on each piece of a half-loop
+N_HALF_LOOP_POINTS = 20  # number of Gauss points on each piece of a half-loop
 N_INTEGRATION_PIECES = 10  # number of pieces for the integrals over a half-loop
 # Value of w = -ln(1 - y) from which 1 - y is below 1e-13 and dw/dx equals n to round-off
-MAX_W = 30.0
-MAX_NEWTON_STEPS = 200  # largest number of Newton iterations for the tip of a loop
-NEWTON_TOL = 1e-14  # largest change of w, relative to 1 + w, at which Newton's method has converged
+SATURATED_W = 30.0
+MAX_TIP_STEPS = 200  # largest number of Newton iterations for the tip of a loop
+TIP_TOL = 1e-14  # largest change of w, relative to 1 + w, at which Newton's method has converged
 
 
 class _HalfLoop(NamedTuple):
@@ -74,7 +74,7 @@ class BoucWen:
         displacement = (weights * displacement_by_w).sum(axis=-1)
         return _HalfLoop(displacement, self._rates(w)[0], (weights * area_by_w).sum(axis=-1))
 
-    def _rates(self, w) -> tuple:
+    def _rates(self, w) -> tuple[np.ndarray, np.ndarray]:
         """Return the derivatives of the displacement [eps] and the area [mu N eps] with respect to w."""
         rate = self._loading_rate(w)
         y = -np.expm1(-w)
@@ -89,16 +89,16 @@ class BoucWen:
         with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
             log_y = np.where(w < 0.7, np.log(y), np.log1p(-np.exp(-w)))
             rate = -np.expm1(self.exponent * log_y) * np.exp(w)
-        return np.where(w > MAX_W, self.exponent, rate)
+        return np.where(w > SATURATED_W, self.exponent, rate)
 
 
 @cache
-def _gauss_rule() -> tuple:
+def _gauss_rule() -> tuple[np.ndarray, np.ndarray]:
     """Return Gauss points and weights on (0, 1) for the substitution x = r^4.
 
     Fractional powers of x are smooth functions of r.
     """
-    points, weights = np.polynomial.legendre.leggauss(N_GAUSS_POINTS)
+    points, weights = np.polynomial.legendre.leggauss(N_HALF_LOOP_POINTS)
     edges = np.linspace(0.0, 1.0, N_INTEGRATION_PIECES + 1)
     half = np.diff(edges)[:, None] / 2
     root = (edges[:-1, None] + half * (1 + points)).ravel()
@@ -128,10 +128,10 @@ def loop_from_keys(friction, load: float, amplitude) -> SteadyLoop:
     limit = friction.static * load
     target = 2 * np.asarray(amplitude, float) / law.length
     w = np.minimum(target / 2, 1.0)
-    for _ in range(MAX_NEWTON_STEPS):
+    for _ in range(MAX_TIP_STEPS):
         half_loop = law._half_loop(w)
         step = (half_loop.displacement - target) / half_loop.displacement_by_w
-        if np.all(np.abs(step) <= NEWTON_TOL * (1 + w)):
+        if np.all(np.abs(step) <= TIP_TOL * (1 + w)):
             break
         w = np.maximum(w - step, w / 8)
     return SteadyLoop(limit * -np.expm1(-w), 2 * limit * law.length * half_loop.area)

@@ -69,6 +69,7 @@ def _node_weights(positions, nodes, is_bare, length: float, order: float) -> np.
 
     is_bare (m - 1,): whether a segment between two nodes has no pressure; nothing is averaged beyond it.
     """
+    # The average is over the path behind a position: distances s >= 0 to the nodes below it
     distance = positions[:, None] - nodes
     x = np.maximum(distance, 0.0) / length
     # These are the integrals of phi and of phi s over each segment; the pressure is linear between
@@ -76,6 +77,7 @@ def _node_weights(positions, nodes, is_bare, length: float, order: float) -> np.
     zeroth = -np.diff(_bond_gammainc(order, x), axis=1)
     first = -(order + 1) * length * np.diff(_bond_gammainc(order + 1, x), axis=1)
     second_node = (distance[:, :-1] * zeroth - first) / np.diff(nodes)
+
     segment = np.clip(np.searchsorted(nodes, positions) - 1, 0, nodes.size - 2)
     # Segments without pressure divide the interface into islands; only the island of a position
     # contributes to its average.
@@ -116,6 +118,8 @@ def average_pressure(
         return average_pressure(-positions, -nodes[::-1], sigma[::-1], 1.0, length, order)
     is_bare = (sigma[1:] <= 0) & (sigma[:-1] <= 0)
     cutoff = length * float(gammainccinv(order + 2, CUTOFF_WEIGHT))
+
+    # Blocks of positions bound the memory; nodes whose weight is below round-off are left out
     averages = np.zeros(positions.size)
     for first in range(0, positions.size, N_POSITIONS_PER_BLOCK):
         block = positions[first : first + N_POSITIONS_PER_BLOCK]
@@ -135,10 +139,14 @@ def sliding_limits(nodes, sigma, weight, length: float, order: float) -> Sliding
 
     Parameters
     ----------
-    nodes, sigma, length, order
-        As in `average_pressure`.
+    nodes : (m,) array
+        Increasing positions [m] of the nodes.
+    sigma : (m,) array
+        Pressure [Pa] >= 0 at the nodes, linear between them and 0 outside.
     weight : (m,) array
         Areas [m2] of the nodes.
+    length, order : float
+        Bond length eps [m] and exponent p > -1.
 
     Returns
     -------
@@ -167,7 +175,7 @@ class Convolution:
     order: float = 1.0
     nodes: np.ndarray | None = None
     lower_pressure: np.ndarray | None = None
-    cache: dict = field(default_factory=dict)
+    cache: dict[float, tuple[np.ndarray, np.ndarray]] = field(default_factory=dict)
     can_change_load: ClassVar[bool] = True  # the law has no stretch
     has_force_at_rest: ClassVar[bool] = True  # the traction persists while the interface rests
 
@@ -194,6 +202,7 @@ class Convolution:
         Parameters
         ----------
         state : ConvolutionState
+            Last traction, displacement and direction.
         dq : float
             Increment [m].
         s0, s1 : (m,) array
@@ -222,6 +231,7 @@ class Convolution:
         Parameters
         ----------
         state : ConvolutionState
+            Last traction, displacement and direction.
         s0, s1 : (m,) array
             Pressures [Pa] before and after.
 
@@ -253,6 +263,7 @@ class Convolution:
         return np.where(sigma > 0, average, 0.0)
 
     def _average_at(self, positions, sigma, direction: float) -> np.ndarray:
+        """Return the average (n,) [Pa] at positions (n,) [m] of a pressure (m,) [Pa] at the nodes."""
         return average_pressure(positions, self.nodes, sigma, direction, self.length, self.order)
 
     def traction(self, state: ConvolutionState):

@@ -44,6 +44,7 @@ class ElasticPlastic:
         Parameters
         ----------
         state : (2, m) array
+            Traction/mu [Pa] and density of the springs [Pa].
         dq : float
             Increment [m].
         s0, s1 : (m,) array
@@ -55,16 +56,20 @@ class ElasticPlastic:
         -------
         Step
         """
+        # Springs stretch until y = traction/mu reaches sigma; `elastic` is that fraction of the increment
         sigma = (s0 + s1) / 2
         y0, springs = self._limit_traction(state, sigma)
         change = springs * dq / self.length
         y1 = np.clip(y0 + change, -sigma, sigma)
         elastic = np.divide(y1 - y0, change, out=np.zeros_like(y0), where=change != 0)
         mean = np.where(change != 0, elastic * (y0 + y1) / 2 + (1 - elastic) * y1, y0)
+
+        # Springs beyond the limit break within one length of slip (class docstring)
         remaining = np.minimum(sigma, springs)
         decay = np.exp(-(1 - elastic) * abs(dq) / self.length)
         springs = remaining + (springs - remaining) * decay
         after = np.where(s1 > 0, np.stack([y1, springs]), 0.0)
+
         energy_gain = self.stored_energy(after) - self.stored_energy(state)
         return Step(self.static * mean, self.static * mean * dq - energy_gain, after)
 
@@ -74,6 +79,7 @@ class ElasticPlastic:
         Parameters
         ----------
         state : (2, m) array
+            Traction/mu [Pa] and density of the springs [Pa].
         s0, s1 : (m,) array
             Pressures [Pa] before and after.
 
@@ -157,6 +163,7 @@ def loop_from_keys(friction, load: float, amplitude) -> SteadyLoop:
     Parameters
     ----------
     friction : model of a [friction] table
+        Keys `static` [1] and `bond_length` [m].
     load : float
         Normal load [N].
     amplitude : float or array

@@ -22,7 +22,7 @@ from .elastic_plastic import parallel_element
 # Number of cells of the power law, each a Jenkins element; forces are exact to 1e-6 of F_S
 N_SLIDER_CELLS = 768
 # Smallest yield displacement of a slider with a cell of its own, relative to phi_max
-MIN_CELL_RATIO = 1e-5
+MIN_SLIDER_RATIO = 1e-5
 # Fraction of the cells that is spaced uniformly in log(phi), for small cycles
 LOG_CELL_FRACTION = 0.25
 
@@ -79,8 +79,10 @@ def slider_cells(force: float, stiffness: float, chi: float, beta: float) -> Sli
 
     Parameters
     ----------
-    force, stiffness, chi, beta
-        As in `max_yield_displacement`.
+    force, stiffness : float
+        Slip force F_S [N] and stiffness K_T [N/m].
+    chi, beta : float
+        Exponent > -1 of the micro-slip, and weight >= 0 of the last slider.
 
     Returns
     -------
@@ -95,11 +97,16 @@ def slider_cells(force: float, stiffness: float, chi: float, beta: float) -> Sli
 def _unit_sliders(chi: float, beta: float) -> Sliders:
     """Return the `slider_cells` for a unit stiffness and phi_max = 1."""
     power_law_fraction = 1 / (1 + beta)
-    log_min = np.log(MIN_CELL_RATIO)
+    log_min = np.log(MIN_SLIDER_RATIO)
+
+    # Borders of the cells at equal steps of a cell fraction: most of it follows the square root of the density
+    # phi^chi, the remainder is uniform in log(phi)
     x = np.concatenate([[0.0], np.exp(np.linspace(log_min, 0.0, 20 * N_SLIDER_CELLS + 1))])
-    log_part = np.clip(1 - np.log(np.maximum(x, MIN_CELL_RATIO)) / log_min, 0.0, 1.0)
+    log_part = np.clip(1 - np.log(np.maximum(x, MIN_SLIDER_RATIO)) / log_min, 0.0, 1.0)
     cell_fraction = (1 - LOG_CELL_FRACTION) * x ** (1 + chi / 2) + LOG_CELL_FRACTION * log_part
     edges = np.interp(np.linspace(0.0, 1.0, N_SLIDER_CELLS + 1), cell_fraction, x)
+
+    # Integrals of rho and of phi rho over each cell
     stiffness = power_law_fraction * np.diff(edges ** (chi + 1))
     force = power_law_fraction * (chi + 1) / (chi + 2) * np.diff(edges ** (chi + 2))
     yield_displacement = force / stiffness

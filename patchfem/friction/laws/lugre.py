@@ -33,14 +33,19 @@ class LuGre:
 
     def element(self, load: float) -> Element:
         """Return the `protocol.Element` of a contact under a constant load [N], of form "flow"."""
-        per_load = np.array(
-            [self.stiffness, self.kinetic, self.static, 0.0, self.micro_damping, self.viscous]
-        )
-        numbers = np.concatenate([[0.0], load * per_load])
-        numbers[4] = self.speed
+        # In the order of `lugre_kernels.LuGreNumber`; the first number is reserved for the engines
+        numbers = [
+            0.0,
+            load * self.stiffness,
+            load * self.kinetic,
+            load * self.static,
+            self.speed,
+            load * self.micro_damping,
+            load * self.viscous,
+        ]
         return Element(
             "friction.laws.lugre_kernels",
-            numbers,
+            np.array(numbers),
             np.zeros(1),
             self.static * load,
             self.static / self.stiffness,

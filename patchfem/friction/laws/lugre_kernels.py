@@ -5,6 +5,7 @@ numbers: stiffness [N/m], kinetic and static force [N], Stribeck velocity v_s [m
 path.
 """
 
+from enum import IntEnum
 from math import exp
 
 from ...compiled.flags_kernels import FASTMATH_FLAGS, NJIT_NO_REFCOUNT
@@ -16,13 +17,30 @@ from ..protocol_kernels import Rates, RelaxedStretch
 MIN_LIMIT_RATIO = 1e-9
 
 
+class LuGreNumber(IntEnum):
+    """Indices of the parameters of the law; the first one is reserved for the engines."""
+
+    STIFFNESS = 1
+    KINETIC = 2
+    STATIC = 3
+    SPEED = 4
+    MICRO_DAMPING = 5
+    VISCOUS = 6
+
+
 @njit(error_model="numpy", forceinline=True, **NJIT_NO_REFCOUNT)
 def _relaxation_length(numbers, velocity):
     """Return the length g/stiffness [m] over which z relaxes, and its velocity derivative [s]."""
-    ratio = velocity / numbers[4]
-    rise = (numbers[3] - numbers[2]) * exp(-ratio * ratio)
-    limit = max(numbers[2] + rise, MIN_LIMIT_RATIO * numbers[3])
-    return limit / numbers[1], -2 * ratio / numbers[4] * rise / numbers[1]
+    stiffness = numbers[LuGreNumber.STIFFNESS]
+    kinetic = numbers[LuGreNumber.KINETIC]
+    static = numbers[LuGreNumber.STATIC]
+    speed = numbers[LuGreNumber.SPEED]
+
+    # The Stribeck curve g(v)
+    ratio = velocity / speed
+    rise = (static - kinetic) * exp(-ratio * ratio)
+    limit = max(kinetic + rise, MIN_LIMIT_RATIO * static)
+    return limit / stiffness, -2 * ratio / speed * rise / stiffness
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
@@ -35,13 +53,16 @@ def rate_equation(numbers, stretch, velocity, direction):
     -------
     Rates
     """
+    stiffness = numbers[LuGreNumber.STIFFNESS]
+    micro_damping = numbers[LuGreNumber.MICRO_DAMPING]
+    viscous = numbers[LuGreNumber.VISCOUS]
     length, length_derivative = _relaxation_length(numbers, velocity)
     stretch_rate = 1 - direction * stretch / length
     length_term = direction * stretch * velocity * length_derivative / (length * length)
     return Rates(
-        numbers[1] * stretch + (numbers[5] * stretch_rate + numbers[6]) * velocity,
-        numbers[1] - numbers[5] * direction * velocity / length,
-        numbers[5] * (stretch_rate + length_term) + numbers[6],
+        stiffness * stretch + (micro_damping * stretch_rate + viscous) * velocity,
+        stiffness - micro_damping * direction * velocity / length,
+        micro_damping * (stretch_rate + length_term) + viscous,
     )
 
 
@@ -57,7 +78,8 @@ def relax_stretch(numbers, stretch, increment, dt):
     """
     direction = 1.0 if increment > 0 else -1.0
     path = abs(increment)
-    length = max(numbers[2], MIN_LIMIT_RATIO * numbers[3]) / numbers[1]
+    limit = max(numbers[LuGreNumber.KINETIC], MIN_LIMIT_RATIO * numbers[LuGreNumber.STATIC])
+    length = limit / numbers[LuGreNumber.STIFFNESS]
     length_by_path = 0.0  # derivative of the length with respect to the path
     if dt > 0:
         length, length_by_velocity = _relaxation_length(numbers, path / dt)

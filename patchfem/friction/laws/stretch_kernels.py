@@ -7,11 +7,19 @@ numbers: 0, mu_s load/eps_0 [N/m], eps_0 [m], the growth (5,) of eq. 2.10. At a 
 exponentials of the path between two reversals.
 """
 
+from enum import IntEnum
 from math import exp, expm1
 
 from ...compiled.flags_kernels import FASTMATH_FLAGS, NJIT_NO_REFCOUNT
 from ...compiled.jit import njit
 from ..protocol_kernels import Rates, RelaxedStretch
+
+
+class StretchNumber(IntEnum):
+    """Indices of the parameters of the law; the first one is reserved for the engines, the growth follows."""
+
+    STIFFNESS = 1
+    LENGTH = 2
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
@@ -24,7 +32,7 @@ def relax_stretch(numbers, stretch, increment, dt):
     -------
     RelaxedStretch
     """
-    length = numbers[2]
+    length = numbers[StretchNumber.LENGTH]
     end = length if increment > 0 else -length
     decay = exp(-abs(increment) / length)
     # With expm1, increments far below the bond length keep their digits.
@@ -40,4 +48,5 @@ def rate_equation(numbers, stretch, velocity, direction):
     -------
     Rates
     """
-    return Rates(numbers[1] * stretch, numbers[1], 0.0)
+    stiffness = numbers[StretchNumber.STIFFNESS]
+    return Rates(stiffness * stretch, stiffness, 0.0)

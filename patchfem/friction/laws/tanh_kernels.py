@@ -3,10 +3,18 @@
 numbers: mu N [N], 1/v_0 [s/m]. NumPy form: `tanh.TanhLaw`.
 """
 
+from enum import IntEnum
 from math import tanh
 
 from ...compiled.flags_kernels import NJIT_NO_REFCOUNT
 from ...compiled.jit import njit
+
+
+class TanhNumber(IntEnum):
+    """Indices of the parameters of the law; the first one is reserved for the engines."""
+
+    LIMIT = 1
+    INVERSE_SPEED = 2
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
@@ -18,5 +26,7 @@ def find_force(numbers, velocity):
     force, slope : float
         Force [N] and its derivative by the velocity [N s/m].
     """
-    ratio = tanh(velocity * numbers[2])
-    return numbers[1] * ratio, numbers[1] * (1 - ratio) * (1 + ratio) * numbers[2]
+    limit = numbers[TanhNumber.LIMIT]
+    inverse_speed = numbers[TanhNumber.INVERSE_SPEED]
+    ratio = tanh(velocity * inverse_speed)
+    return limit * ratio, limit * (1 - ratio) * (1 + ratio) * inverse_speed
