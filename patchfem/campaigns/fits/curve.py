@@ -342,13 +342,8 @@ def fit_curve(
     begin = perf_counter()
     ranges = parse_ranges(free_parameters)
     measured = read_damping_curve(curve_file)
-    n_amplitudes = measured.amplitude.size
-    if 2 * n_amplitudes <= len(ranges):
-        raise PatchfemError(
-            f"{curve_file}: {n_amplitudes} amplitudes are too few to determine {len(ranges)} values; at least "
-            f"{len(ranges) // 2 + 1} are needed"
-        )
     keys = FreeKeys(scene, ranges)
+    keys.require_enough_rows(curve_file, measured.value.size, "values")
     curves = CurveModel(keys, measured.amplitude, say)
 
     # The fast method gives the start of the search by the reference method, and the errors that the table does not give.

@@ -12,7 +12,7 @@ from patchfem import SceneError, run
 from patchfem.campaigns.rows.cells import read_response_table
 from patchfem.campaigns.rows.checkpoint import SearchCheckpoint
 from patchfem.campaigns.rows.condition_models import ConditionModels, FitRequest
-from patchfem.campaigns.rows.fit import RowsOptions, SearchSettings, fit_rows, make_residual
+from patchfem.campaigns.rows.fit import RowsOptions, fit_rows, make_residual
 from patchfem.campaigns.rows.model_readings import ModelReadings
 from patchfem.core import G_N, PatchfemError
 from patchfem.export.fits import describe_rows_fit
@@ -99,10 +99,7 @@ def read_free_keys(*texts):
 
 def fit_to_rows(scene, path, wanted, **beside):
     """Fit a scene to rows and return the result."""
-    how = SearchSettings(
-        beside.pop("starts", 2), beside.pop("seed", 0), beside.pop("unstable", "bound")
-    )
-    return fit_rows(FitRequest(scene, wanted, path), RowsOptions(search=how, **beside))
+    return fit_rows(FitRequest(scene, wanted, path), RowsOptions(**{"starts": 2} | beside))
 
 
 LINEAR_FREE = (
@@ -365,8 +362,8 @@ def test_exact_fit_resumes_from_stored_starts(tmp_path):
     file = tmp_path / "starts.json"
 
     def go(question, resume):
-        how = SearchSettings(2, 0, "bound", SearchCheckpoint(file, question, resume))
-        return fit_rows(FitRequest(scene, wanted, path), RowsOptions(search=how))
+        options = RowsOptions(starts=2, checkpoint=SearchCheckpoint(file, question, resume))
+        return fit_rows(FitRequest(scene, wanted, path), options)
 
     first = go("one", False)
     again = go("one", True)
