@@ -376,6 +376,7 @@ def describe_rows_fit(fit: FittedRows) -> Parts:
             "starts": starts,
             "rows": rows,
             "motions": fit.n_motions,
+            "notes": [fit.advice] if fit.advice else [],
         },
         scores={f"score_{name}": Quantity(value) for name, value in totals.items()},
         data=data,

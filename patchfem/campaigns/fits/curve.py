@@ -16,6 +16,7 @@ import numpy as np
 
 from ...core import NotConverged, PatchfemError, frozen_array
 from ...formatting import format_length, format_number
+from ...identify.advice import advise_test
 from ...identify.least_squares import Fit
 from ...inputs.tables import TableFormat, read_columns
 from ...inputs.units import RATIO_UNITS
@@ -56,7 +57,6 @@ SAME_AMPLITUDE = (
 N_CURVE_POINTS = 25  # number of amplitudes of the fitted curve
 # Change of a parameter in half-widths of its interval, for the slope of the fitted curve.
 BAND_STEP = 0.1
-MIN_GAIN = 0.1  # smallest decrease of an interval for which a further measurement is advised
 EXTENT = 3.0  # ratio by which the fitted curve goes beyond the measured amplitudes on both sides
 NO_MODE_ERROR = "the intervals do not contain the error of the modes left out of the structure"
 
@@ -439,22 +439,12 @@ def extrapolate_curve(
     variance = np.einsum("iqk,ij,jqk->qk", slopes, correlation, slopes)
     beyond = np.array([amplitudes, *curve, *np.sqrt(np.maximum(variance, 0.0))])
 
-    # A further measurement with the gradients G changes the covariance C to (C^-1 + G^T G)^-1. A 95 % half-width is 1.96
-    # standard deviations.
-    widest = int(np.argmax(half_widths / np.maximum(np.abs(fit.values), 1e-300)))
+    # the errors of further measurements are relative ones, as those of the table; a half-width is 1.96 standard deviations
     deviation = np.median(measured.error / np.abs(measured.value), axis=1)[:, None] * np.abs(curve)
-    gradients = np.nan_to_num(np.array(slopes) / deviation).transpose(2, 1, 0)
-    covariance = correlation / 1.96**2
-    information = np.linalg.pinv(covariance)
-    after = np.linalg.pinv(information + np.einsum("jqn,jqm->jnm", gradients, gradients))
-    ratio = np.sqrt(after[:, widest, widest] / covariance[widest, widest])
-    best = int(np.argmin(ratio))
-    advice = ""
-    if ratio[best] <= 1 - MIN_GAIN:
-        advice = (
-            f"a further measurement at about {format_length(amplitudes[best], 2)} would narrow the interval of "
-            f"{curves.keys.ranges[widest].key} most, by about {100 * (1 - ratio[best]):.0f} %"
-        )
+    gradients = np.array(slopes) / (1.96 * deviation)
+    information = np.einsum("iqk,jqk->kij", gradients, gradients)
+    places = [f"at about {format_length(amplitude, 2)}" for amplitude in amplitudes]
+    advice = advise_test(fit, [bound.key for bound in curves.keys.ranges], information, places)
     return beyond[:, known], advice
 
 

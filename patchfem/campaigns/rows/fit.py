@@ -11,7 +11,8 @@ from time import perf_counter
 
 import numpy as np
 
-from ...core import PatchfemError
+from ...core import G_N, PatchfemError
+from ...identify.advice import advise_test
 from ...identify.least_squares import Descents, Fit, Search
 from ..fits.problem import FittedKeys, FreeKeys
 from .cells import MAX_LOG_RATIO, Readings, compute_rms_scores, read_response_table
@@ -76,6 +77,8 @@ class FittedRows:
         Log ratios from the fit without the reading; NaN if every fit used it.
     n_motions : int
         Number of computed motions.
+    advice : str
+        Sentence on the further test that would narrow an interval most; "" without one.
     """
 
     keys: FittedKeys
@@ -87,6 +90,7 @@ class FittedRows:
     logs: np.ndarray
     left_out_logs: np.ndarray
     n_motions: int
+    advice: str
 
     @property
     def search(self) -> Descents:
@@ -218,12 +222,28 @@ def fit_rows(
         logs=logs,
         left_out_logs=left_out_logs,
         n_motions=computed.n_motions,
+        advice=_advise_condition(cells, best, request.ranges, options.unstable, ~held_out),
     )
 
 
 def select_fitted(readings: Readings, training: np.ndarray, unstable: str) -> np.ndarray:
     """Return the mask (n,) of the readings of a training set (n,) that the fit uses."""
     return training & ~readings.unstable if unstable == "out" else training
+
+
+def _advise_condition(
+    readings: Readings, fit: Fit, ranges: Sequence, unstable: str, training: np.ndarray
+) -> str:
+    """Return a sentence on the measured condition whose repetition would narrow an interval most, or ""."""
+    is_used = select_fitted(readings, training, unstable)
+    condition = readings.condition[is_used]
+    information = np.zeros((len(readings.conditions), len(ranges), len(ranges)))
+    for is_of_kind in (readings.is_acceleration[is_used], ~readings.is_acceleration[is_used]):
+        for k in set(condition[is_of_kind].tolist()):
+            gradient = fit.intervals.effects[is_of_kind & (condition == k)].mean(axis=0)
+            information[k] += np.outer(gradient, gradient)
+    places = [f"at {f:.6g} Hz and {level / G_N:.4g} g" for f, level in readings.conditions]
+    return advise_test(fit, [bound.key for bound in ranges], information, places)
 
 
 def _warn_of_doubtful_fit(readings: Readings, search: Descents, logs, options: RowsOptions) -> list:

@@ -337,6 +337,9 @@ def test_exact_fit_command_writes_documented_json(tmp_path):
             for part in ("fitted", "held_out", "left_out")
         )
     assert "left out" in text and "held out" in text
+    # the damping ratio shows near the resonance at 141 Hz only
+    assert answer["notes"][0].startswith("a further measurement at 143 Hz and 2.039 g would narrow")
+    assert "structure.mode.axial.damping most" in answer["notes"][0]
     assert "2 of 2 starts led to within 1 %" in text
     with open(out / "fit.csv", newline="", encoding="utf-8") as file:
         written = list(csv.DictReader(file))
