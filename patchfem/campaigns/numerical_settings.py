@@ -61,12 +61,12 @@ def list_tolerances(model: Model) -> list[Setting]:
     """Return settings for several values of accuracy.tolerance with that of the scene, from large to small."""
     settings = []
     for value in sorted({*TOLERANCES, model.accuracy.tolerance}, reverse=True):
-        changed = change_setting(model, "tolerance", value)
+        changed = _change_setting(model, "tolerance", value)
         settings.append(Setting(f"{value:g}", value, f"tolerance {value:g}", changed))
     return settings
 
 
-def change_setting(model: Model, name: str, value: float | None) -> Model:
+def _change_setting(model: Model, name: str, value: float | None) -> Model:
     """Return a model with another value of a numerical setting; None if the tolerance sets it."""
     if name == "element_size":
         return replace(model, patch=model.patch.with_element_size(value))
@@ -89,13 +89,13 @@ def make_setting_values(model: Model, name: str) -> list[Setting]:
             size = length / count
             label = f"{1e6 * size:.4g} um"
             settings.append(
-                Setting(label, size, f"{words} {label}", change_setting(model, name, size))
+                Setting(label, size, f"{words} {label}", _change_setting(model, name, size))
             )
     else:
         for count in _scale_count(_find_count(model, name), COUNT_FACTORS, COUNT_LIMITS[name]):
-            changed = change_setting(model, name, count)
+            changed = _change_setting(model, name, count)
             settings.append(Setting(str(count), float(count), f"{count} {words}", changed))
-    automatic = change_setting(model, name, None)
+    automatic = _change_setting(model, name, None)
     return [*settings, Setting("by tolerance", None, f"{words} set by the tolerance", automatic)]
 
 

@@ -227,7 +227,7 @@ def _describe_search(fit: FittedLoop | FittedCurve | FittedRows) -> dict:
         "correlation": _replace_unknown(intervals.correlation),
         "evaluations": keys.fit.counts.evaluations,
         "failures": keys.fit.counts.failures,
-        "descents_agreed": keys.fit.agreed,
+        "descents_agreed": keys.fit.n_agreed,
         "warnings": keys.warnings,
         "seconds": round(keys.seconds, 6),
     }

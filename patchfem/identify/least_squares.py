@@ -111,7 +111,7 @@ class Fit:
     descents: Descents
 
     @property
-    def agreed(self) -> int:
+    def n_agreed(self) -> int:
         """Number of descents with the same final sum of squares."""
         return self.descents.count_within(SAME_RESULT_RATIO)
 

@@ -28,6 +28,7 @@ from backbone_band import (
     LAWS,
     Joint,
     band_rows,
+    compute_backbone,
     draw_joint,
     law_parameters,
     march_steady,
@@ -39,7 +40,6 @@ from numba import njit
 from scipy.optimize import root
 
 import patchfem as pf
-from patchfem.campaigns.backbone.curves import compute_backbone
 
 FRACTIONS = (0.35, 0.55, 0.7, 0.85)  # places of the amplitudes in the logarithmic default range
 N_HARMONICS = 31  # largest odd harmonic of the own balance

@@ -167,7 +167,7 @@ def fit_rows(
     models = request.make_condition_models(cells.conditions)
     keys = FreeKeys(models.scene, models.ranges, sets=models.sets, notes=models.notes)
     for training in trainings.values():
-        is_used = select_fitted(cells, training, options.unstable)
+        is_used = _select_fitted(cells, training, options.unstable)
         keys.require_enough_rows(request.measured, np.count_nonzero(is_used), "readings")
 
     # readings of the model, and the counter of finished descents
@@ -226,7 +226,7 @@ def fit_rows(
     )
 
 
-def select_fitted(readings: Readings, training: np.ndarray, unstable: str) -> np.ndarray:
+def _select_fitted(readings: Readings, training: np.ndarray, unstable: str) -> np.ndarray:
     """Return the mask (n,) of the readings of a training set (n,) that the fit uses."""
     return training & ~readings.unstable if unstable == "out" else training
 
@@ -235,7 +235,7 @@ def _advise_condition(
     readings: Readings, fit: Fit, ranges: Sequence, unstable: str, training: np.ndarray
 ) -> str:
     """Return a sentence on the measured condition whose repetition would narrow an interval most, or ""."""
-    is_used = select_fitted(readings, training, unstable)
+    is_used = _select_fitted(readings, training, unstable)
     condition = readings.condition[is_used]
     information = np.zeros((len(readings.conditions), len(ranges), len(ranges)))
     for is_of_kind in (readings.is_acceleration[is_used], ~readings.is_acceleration[is_used]):
@@ -293,7 +293,7 @@ def make_residual(
         motion was still growing, so that only a smaller computed value gives a residual; "out":
         the reading is excluded; "read": it is treated like any other reading.
     """
-    is_used = select_fitted(readings, training, unstable)
+    is_used = _select_fitted(readings, training, unstable)
     conditions = sorted(set(readings.condition[is_used].tolist()))
     is_lower_bound = (
         readings.unstable[is_used] if unstable == "bound" else np.zeros(int(is_used.sum()), bool)

@@ -123,9 +123,7 @@ def locate_peak(frequency: np.ndarray, height: np.ndarray, error: np.ndarray) ->
             degree = n_below + n_above
             curves.append(make_interp_spline(square[window], inverse[window], degree))
     shapes = [_find_shape(PPoly.from_spline(curve), square[near]) for curve in curves]
-    known = np.array(
-        [shape for shape in shapes if shape is not None] or [(0.0, 1.0, *[np.nan] * 2)]
-    )
+    known = np.array(list(filter(None, shapes)) or [_Shape(0.0, 1.0, np.nan, np.nan)])
     frequencies = np.sqrt(frequency[top] ** 2 + known[:, [0, 2, 3]])
     heights = height[top] / np.sqrt(known[:, 1])
     widths = frequencies[:, 2] - frequencies[:, 1]
@@ -150,20 +148,22 @@ def _estimate_error(values: np.ndarray) -> float:
     return DIFFERENCE_FACTOR * np.nanmax(np.abs(values - values[0]), initial=0.0) + 0 * values[0]
 
 
-def _find_shape(curve: PPoly, near: np.ndarray) -> tuple[float, float, float, float] | None:
-    """Return place and value of the minimum of 1/y^2, and the places where 1/y^2 is twice as large on either side.
+class _Shape(NamedTuple):
+    """Minimum of 1/y^2 over the squares of the frequencies.
 
-    Parameters
-    ----------
-    curve : PPoly
-        1/y^2 over the squares of the frequencies.
-    near : (3,) array
-        The square of the frequency of the largest value between those of its neighbours [Hz^2].
+    place, level: of the minimum; below, above: where 1/y^2 is twice as large on either side, NaN if it is not.
+    """
 
-    Returns
-    -------
-    tuple or None
-        NaN for a side that does not reach this level; None without a minimum above 0 between the neighbours.
+    place: float
+    level: float
+    below: float
+    above: float
+
+
+def _find_shape(curve: PPoly, near: np.ndarray) -> _Shape | None:
+    """Return the minimum of a curve of 1/y^2; None without one above 0 between the neighbours of the largest value.
+
+    `near` (3,) [Hz^2] are the squares of the frequencies of the largest value and of its neighbours.
     """
     places = curve.derivative().roots(extrapolate=False)
     places = places[(places > near[0]) & (places < near[2])]
@@ -175,5 +175,4 @@ def _find_shape(curve: PPoly, near: np.ndarray) -> tuple[float, float, float, fl
     crossings = curve.solve(2 * level, extrapolate=False)
     below = np.max(crossings[crossings < place], initial=-np.inf)
     above = np.min(crossings[crossings > place], initial=np.inf)
-    below, above = (end if np.isfinite(end) else np.nan for end in (below, above))
-    return place, level, below, above
+    return _Shape(place, level, *(end if np.isfinite(end) else np.nan for end in (below, above)))
