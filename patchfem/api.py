@@ -117,8 +117,8 @@ __all__ = [
 ]
 INLINE_SCENE_NAME = "<text>"  # displayed file name of a scene that is given as a string
 DICT_NAME = "<dict>"  # displayed file name of a scene that is given as a dict
-# location prefix of an error in an option --set or in a scene text, which is meaningless to Python callers
-LOCATION_PATTERN = re.compile(rf"^(--set: |{DICT_NAME}(:\d+)?: )", re.MULTILINE)
+# location prefix of an error in an option --set or --over or in a scene text, which is meaningless to Python callers
+LOCATION_PATTERN = re.compile(rf"^(--(set|over): |{DICT_NAME}(:\d+)?: )", re.MULTILINE)
 
 
 def _strip_file_and_line_from_errors(function: Callable) -> Callable:

@@ -55,7 +55,6 @@ PUBLIC = {
     "sweeps.cases": ("Cases",),
     "sweeps.parse_request": (
         "Request",
-        "warn_of_invalid_cases",
         "read_cases",
         "read_sweep",
     ),

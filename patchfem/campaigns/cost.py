@@ -16,7 +16,7 @@ from time import perf_counter, process_time
 from typing import NamedTuple
 
 from .. import compiled
-from ..core import NotConverged, PatchfemError, compute_allowed_error
+from ..core import NotConverged, PatchfemError
 from ..formatting import format_number
 from ..model.model import Model
 from ..model.source import locate_errors
@@ -97,20 +97,6 @@ class Cost:
     remedies: tuple[str, ...] = ()
     steps: int | None = None
     nodes: int | None = None
-
-    def is_allowed(self, name: str, error: float, tolerance: float) -> bool:
-        """Return whether an error of a measure is at most tolerance x |value| + floor.
-
-        Parameters
-        ----------
-        name : str
-            Name of the measure.
-        error : float
-            In the unit of the measure.
-        tolerance : float
-            Largest error, relative to the value.
-        """
-        return error <= compute_allowed_error(tolerance, self.values[name], self.floors[name])
 
 
 def compute_setting_costs(
@@ -317,10 +303,9 @@ def judge_run(run: Cost, names: Sequence[str], tolerance: float) -> Judgement:
     Judgement
         UNKNOWN if the run has no error estimate of one of the measures, and no other error is too large.
     """
-    known = [name for name in names if name in run.errors]
-    if not all(run.is_allowed(name, run.errors[name], tolerance) for name in known):
+    if find_worst_error(run, names, tolerance).fraction > tolerance:
         return Judgement.MISSES
-    return Judgement.MEETS if len(known) == len(names) else Judgement.UNKNOWN
+    return Judgement.MEETS if all(name in run.errors for name in names) else Judgement.UNKNOWN
 
 
 def describe_fastest_setting(runs: list[Cost], tolerance: float) -> str:

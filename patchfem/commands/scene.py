@@ -121,7 +121,7 @@ def _plan_sweep(scene: Path, sets, what: CaseOptions, json_: bool, verbose: bool
     """Print the plan of a sweep."""
     sweep_scene, cases = _read_sweep(scene, sets, what)
     plan_data = sweep_plan.plan_sweep(sweep_scene, cases)
-    if wrong := parse_request.warn_of_invalid_cases(sweep_scene, cases):
+    if wrong := cases.warning:
         note(wrong)
     if json_:
         print(json.dumps(plan_data))

@@ -185,7 +185,7 @@ def _print_notes(sweep_scene, cases, what: CaseOptions | None) -> None:
     """Print notes on the ranges of the keys, on invalid cases and on a bolted joint."""
     texts = [
         *assignments.describe_ranges(what.over if what else ()),
-        parse_request.warn_of_invalid_cases(sweep_scene, cases),
+        cases.warning,
         sweep_scene.note_bolted_joint(),
     ]
     for text in texts:

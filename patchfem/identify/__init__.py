@@ -24,4 +24,5 @@ PUBLIC = {
     ),
     "space": ("make_space_filling_points",),
     "fit_sentences": ("describe_fit",),
+    "advice": ("advise_test",),
 }

@@ -12,7 +12,6 @@ import numpy as np
 from scipy.fft import irfft, rfft, rfftfreq
 
 from ..core import PatchfemError
-from ..structure.modal_fit import ModalFit
 from .frequency_response import MAX_NYQUIST_FRACTION, FrequencyResponse, estimate_response
 from .sinusoids import Limits, SinusoidFit, SinusoidProblem
 
@@ -39,7 +38,6 @@ class DrivenModes:
     - damping: damping ratios (n,).
     - residue: residues A (n,) of sum A / (w_r^2 - w^2 + 2i zeta w_r w).
     - damping_error: half-widths (n,) of the 95 % intervals of the damping ratios.
-    - estimate_damping: damping ratios (n,) of a fit to the windowed H1 estimate; nan without a mode there.
     - coherence: coherence (n,) at the peaks, or None.
     - misfit: root mean square of the residual relative to that of the response.
     """
@@ -48,7 +46,6 @@ class DrivenModes:
     damping: np.ndarray
     residue: np.ndarray
     damping_error: np.ndarray
-    estimate_damping: np.ndarray
     coherence: np.ndarray | None
     misfit: float
 
@@ -125,7 +122,7 @@ def fit_driven_modes(
     quantity : str
         Kind of the response, a key of `DERIVATIVE_ORDERS`.
     estimate : FrequencyResponse
-        Frequency response of the same record, for `estimate_damping`.
+        Frequency response of the same record, whose segments and coherence are used.
     band : (float, float)
         Frequency band [Hz] of the returned modes; modes outside are fitted, too.
 
@@ -138,10 +135,8 @@ def fit_driven_modes(
     PatchfemError
         If no mode is visible in the band.
     """
-    derivative = DERIVATIVE_ORDERS[quantity]
-    record = _DrivenRecord(
-        step, force[:MAX_FITTED_SAMPLES], response[:MAX_FITTED_SAMPLES], derivative
-    )
+    fitted = slice(MAX_FITTED_SAMPLES)
+    record = _DrivenRecord(step, force[fitted], response[fitted], DERIVATIVE_ORDERS[quantity])
     problem = record.problem
 
     fit = problem.fit(lambda fit: record.find_starts(fit, estimate), LIMITS)
@@ -171,20 +166,6 @@ def fit_driven_modes(
         damping=zeta[order],
         residue=fit.coefficients[order, 2],
         damping_error=problem.estimate_damping_errors(fit)[order],
-        estimate_damping=_fit_estimate(estimate, w, zeta, derivative)[order],
         coherence=coherence,
         misfit=float(np.sqrt(fit.mean_square)) / problem.scale,
     )
-
-
-def _fit_estimate(estimate: FrequencyResponse, w, zeta, derivative: int) -> np.ndarray:
-    """Return the damping ratios (n,) of a fit to the windowed frequency response `estimate`.
-
-    The fit starts from the natural frequencies `w` (n,) [rad/s] and the damping ratios `zeta` (n,); `derivative` is
-    the number of time derivatives between displacement and response. The ratio is nan for a mode whose frequency
-    changes by 10 % or more.
-    """
-    fit = ModalFit(2 * np.pi * estimate.frequency, estimate.value[:, None], np.array([derivative]))
-    theta, _ = fit.refine(np.log(np.concatenate([w, zeta])))
-    estimate_w, estimate_zeta = np.exp(theta).reshape(2, -1)
-    return np.where(np.abs(estimate_w / w - 1) < 0.1, estimate_zeta, np.nan)

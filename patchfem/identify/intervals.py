@@ -42,6 +42,8 @@ class FitIntervals:
     - methods: "linear", "profile" or "none" for each parameter.
     - open_ends: whether each end (n, 2) is the bound of the parameter.
     - correlation: correlation matrix (n, n); NaN for an undetermined parameter.
+    - effects: change of each row (r, n) of the residual per standard deviation of each parameter, in standard deviations
+      of the rows; NaN for an undetermined parameter.
     - sensitivity: root mean square change (n,) of the residual per range of each parameter.
     - unknown: undetermined directions (d, n) in parameter space, as relative changes (relative to the
       range if a value is 0).
@@ -52,6 +54,7 @@ class FitIntervals:
     methods: tuple[str, ...]
     open_ends: np.ndarray
     correlation: np.ndarray
+    effects: np.ndarray
     sensitivity: np.ndarray
     unknown: np.ndarray
     rows: float
@@ -65,6 +68,7 @@ def make_unknown_intervals(n: int) -> FitIntervals:
         methods=("none",) * n,
         open_ends=frozen_array(np.zeros((n, 2)), bool),
         correlation=frozen_array(unknown[:, 3:]),
+        effects=frozen_array(np.zeros((0, n))),
         sensitivity=frozen_array(unknown[:, 2]),
         unknown=frozen_array(np.zeros((0, n))),
         rows=np.nan,
@@ -223,6 +227,7 @@ def compute_intervals(
         methods=tuple(methods),
         open_ends=frozen_array(open_ends, bool),
         correlation=frozen_array(correlation),
+        effects=frozen_array(jacobian * scale / np.sqrt(cost / dof)),
         sensitivity=frozen_array(norms / np.sqrt(model.rows)),
         unknown=frozen_array(_list_unknown_directions(model, u, free, null_vectors / norms[free])),
         rows=rows,

@@ -30,10 +30,9 @@ QUICK_COST_TOL = 1e-4  # COST_TOL of a residual that is expensive to evaluate
 MAX_EVALUATIONS = 100  # largest number of evaluations in one descent, without Jacobians
 # Largest root mean square residual of an exact fit, relative to the largest residual of the search.
 EXACT_FIT_RATIO = 1e-9
-# A descent has reached the best minimum if the ratio of its sum of squares to the smallest one is
-# at most this value.
-SAME_MINIMUM_RATIO = 1.02
-SAME_RESULT_TOL = 1e-6  # relative difference between the sums of squares of equal results
+# A descent has reached the best minimum if the ratio of its residual to the smallest one is at most this value.
+SAME_MINIMUM_RATIO = 1.01
+SAME_RESULT_RATIO = 1 + 5e-7  # largest ratio of the residuals of equal results
 # Largest distance from a bound at which a parameter is tried on the bound, relative to its range.
 NEAR_BOUND_FRACTION = 1e-3
 # Number of trial points per parameter for the choice of the starting points.
@@ -82,7 +81,11 @@ class Descents(NamedTuple):
     @property
     def n_best(self) -> int:
         """Number of descents that ended within 1 % of the smallest residual."""
-        return int((self.rms <= np.nanmin(self.rms) * 1.01).sum())
+        return self.count_within(SAME_MINIMUM_RATIO)
+
+    def count_within(self, ratio: float) -> int:
+        """Return the number of descents whose residual is at most a ratio times the smallest one."""
+        return int((self.rms <= np.nanmin(self.rms) * ratio).sum())
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -93,7 +96,6 @@ class Fit:
     - at_bound: "low", "high" or "" for each parameter.
     - intervals: 95 % intervals, and undetermined directions.
     - rms: root mean square of the residual.
-    - agreed: number of descents with the same final sum of squares.
     - counts: number of evaluations of the residual.
     - outcome: DONE if the best descent converged, or if another one reached the same minimum. With
       round-off noise in the residual, a descent may not converge formally.
@@ -104,30 +106,35 @@ class Fit:
     at_bound: tuple[str, ...]
     intervals: FitIntervals
     rms: float
-    agreed: int
     counts: SearchCounts
     outcome: Outcome
     descents: Descents
 
+    @property
+    def n_agreed(self) -> int:
+        """Number of descents with the same final sum of squares."""
+        return self.descents.count_within(SAME_RESULT_RATIO)
+
     def count_earlier_search(self, earlier: "Fit") -> "Fit":
-        """Return this fit with evaluations and agreed descents of an earlier search, which gave its only start."""
-        return replace(self, counts=earlier.counts.add(self.counts), agreed=earlier.agreed)
+        """Return this fit with evaluations and descents of an earlier search, which gave its only start."""
+        return replace(self, counts=earlier.counts.add(self.counts), descents=earlier.descents)
 
 
 @dataclass(frozen=True, slots=True)
 class Search:
-    """Search from random starting points, for a residual that is expensive to evaluate.
+    """Starting points of a search, and what accompanies its descents.
 
-    Derivatives are one-sided differences; the best descent is continued with central ones.
-
-    - starts, seed: number of starting points, and seed of the random numbers.
+    - starts: number of descents. With one, only that from the start of the problem, unless the evaluation there fails.
+    - seed: seed of random starting points, for a residual that is expensive to evaluate: derivatives are one-sided
+      differences, and the best descent is continued with central ones. None: the start of the problem and the best of
+      some trial points.
     - before_descent: called before each descent.
     - report: called with 1 after each descent.
     - load, save: functions of the number of a start that return the stored descent or None, and store one.
     """
 
     starts: int
-    seed: int = 0
+    seed: int | None = None
     before_descent: Callable = lambda: None
     report: Callable = lambda count: None
     load: Callable = lambda start: None
@@ -155,12 +162,18 @@ class Problem:
         return make_search_space(self.low, self.high)
 
     def solve(self, max_descents: int = 3, interval_kind: str = IntervalKind.ROWS) -> Fit:
+        """Minimize the sum of squares from the start of the problem and the best of some trial points.
+
+        `max_descents` is the largest number of descents; the rest is as in `search`.
+        """
+        return self.search(Search(max_descents), interval_kind)
+
+    def search(self, search: Search, interval_kind: str = IntervalKind.ROWS) -> Fit:
         """Minimize the sum of squares of the residual within the bounds.
 
         Parameters
         ----------
-        max_descents : int
-            Largest number of descents; if 1, only that from `start`, unless the evaluation there fails.
+        search : Search
         interval_kind : str
             Value of `IntervalKind`.
 
@@ -175,28 +188,16 @@ class Problem:
         NotConverged
             If the evaluations at all starting points fail.
         """
-        model = UnitCubeResidual(self.residual, self.search_space)
-        starts = self._choose_starts(model, max_descents)
         n = len(self.low)
-        if model.rows < n:
-            raise ValueError(f"{model.rows} rows of data cannot determine {n} values")
-        ends = []
-        for start in starts:
-            ends.append(descend(model, start, range(n)))
-            # a fit that is exact to round-off is not repeated
-            if ends[-1].cost <= (EXACT_FIT_RATIO * model.largest) ** 2 * model.rows:
-                break
-        best = min(ends, key=lambda end: end.cost)
-        return _assemble_fit(model, best, starts[: len(ends)], ends, interval_kind)
+        is_random = search.seed is not None
+        model = UnitCubeResidual(self.residual, self.search_space, is_expensive=is_random)
+        if is_random:
+            starts = list(np.random.default_rng(search.seed).random((search.starts, n)))
+        else:
+            starts = self._choose_starts(model, search.starts)
+            if model.rows < n:
+                raise ValueError(f"{model.rows} rows of data cannot determine {n} values")
 
-    def search(self, search: Search, interval_kind: str = IntervalKind.ROWS) -> Fit:
-        """Minimize the sum of squares of an expensive residual from random starting points.
-
-        Raises NotConverged if all descents fail.
-        """
-        model = UnitCubeResidual(self.residual, self.search_space, is_expensive=True)
-        n = len(self.low)
-        starts = np.random.default_rng(search.seed).random((search.starts, n))
         ends = []
         for number, start in enumerate(starts):
             end = search.load(number)
@@ -206,17 +207,24 @@ class Problem:
                 search.save(number, end)
             ends.append(end)
             search.report(1)
+            # a fit that is exact to round-off is not repeated
+            if not is_random and end.cost <= (EXACT_FIT_RATIO * model.largest) ** 2 * model.rows:
+                break
         best = min(ends, key=lambda end: end.cost)
         if not np.isfinite(best.cost):
             raise NotConverged(
-                f"fit: all {search.starts} searches failed; the first failed for this reason: {model.counts.reason}"
+                f"fit: all {len(ends)} searches failed; the first failed for this reason: {model.counts.reason}"
             )
+        descents = _collect_descents(model, starts[: len(ends)], ends)
+        if not is_random:
+            return _assemble_fit(model, best, descents, interval_kind)
+
+        # the best descent is continued with central differences; all descents may be stored ones
         search.before_descent()
         central = UnitCubeResidual(self.residual, model.space)
         best = descend(central, best.u, range(n))
-        # all descents may be stored ones
         model.sum_of_squares(best.u)
-        fit = _assemble_fit(model, best, starts, ends, interval_kind)
+        fit = _assemble_fit(model, best, descents, interval_kind)
         return replace(fit, counts=fit.counts.add(central.counts))
 
     def _choose_starts(self, model: UnitCubeResidual, max_points: int) -> list[np.ndarray]:
@@ -240,41 +248,33 @@ class Problem:
         return points[: max(1, max_points)]
 
 
-def _assemble_fit(
-    model: UnitCubeResidual, best: Descent, starts: Sequence, ends: list[Descent], kind: str
-) -> Fit:
-    """Return the result of a fit from its best descent and the descents from all starting points (s, n).
-
-    kind: value of `IntervalKind`.
-    """
-    n = best.u.size
-    costs = np.array([end.cost for end in ends])
-    max_difference = SAME_RESULT_TOL * best.cost + 1e-20 * model.largest**2 * model.rows
-    finals = np.full((len(ends), n), np.nan)
-    for final, end in zip(finals, ends):
-        if np.isfinite(end.cost):
-            final[:] = model.space.to_values(end.u)
-    descents = Descents(
+def _collect_descents(model: UnitCubeResidual, starts: Sequence, ends: list[Descent]) -> Descents:
+    """Return the record of descents from starting points (s, n) of the unit cube."""
+    rms = np.sqrt([end.cost / max(end.rows, 1) for end in ends])
+    values = np.array([model.space.to_values(end.u) for end in ends])
+    is_known = np.isfinite(rms)
+    return Descents(
         starts=np.array([model.space.to_values(start) for start in starts]),
-        ends=finals,
-        rms=np.where(np.isfinite(costs), np.sqrt(costs / model.rows), np.nan),
+        ends=np.where(is_known[:, None], values, np.nan),
+        rms=np.where(is_known, rms, np.nan),
     )
 
+
+def _assemble_fit(model: UnitCubeResidual, best: Descent, descents: Descents, kind: str) -> Fit:
+    """Return the result of a fit from its best descent; `kind` is a value of `IntervalKind`."""
     u = best.u
     cost = best.cost
-    intervals = make_unknown_intervals(n)
+    intervals = make_unknown_intervals(u.size)
     if kind != IntervalKind.NONE:
         u, cost = _move_onto_bounds(model, u, cost)
         is_series = kind == IntervalKind.SERIES
         intervals = compute_intervals(model, u, cost, descend, is_series=is_series)
-    n_same_minimum = int(np.sum(costs <= SAME_MINIMUM_RATIO * cost))
-    is_converged = best.is_converged or n_same_minimum > 1
+    is_converged = best.is_converged or descents.n_best > 1
     return Fit(
         values=frozen_array(model.space.to_values(u)),
         at_bound=tuple(np.where(u <= 0, "low", np.where(u >= 1, "high", "")).tolist()),
         intervals=intervals,
         rms=float(np.sqrt(cost / model.rows)),
-        agreed=int(np.sum(np.abs(costs - best.cost) <= max_difference)),
         counts=model.counts,
         outcome=Outcome.DONE if is_converged else Outcome.NOT_CONVERGED,
         descents=descents,

@@ -17,8 +17,6 @@ from .half_cycles import describe_missing_samples_at_end, find_half_cycles
 INPUT_QUANTITIES = ("force", "base_acceleration")  # possible inputs of a record
 # Components of a mode whose node and direction in a file of mode shapes a user can give (--map).
 SHAPE_QUANTITIES = ("slide", "output", "base", "normal", "pitch")
-# Largest relative excess of the damping ratio of the windowed estimate for which no note is issued.
-MAX_DAMPING_EXCESS = 0.05
 # Largest half-width of the interval of a damping ratio, relative to the damping ratio.
 MAX_ERROR_RATIO = 2.0
 # Largest misfit of a driven response for which no note is issued.
@@ -159,6 +157,11 @@ def identify_driven_modes(
     rows, mass, notes = (
         _convert_force_residues(modes) if input_name == "force" else _convert_base_residues(modes)
     )
+    if modes.misfit > MAX_MISFIT:
+        notes.append(
+            f"the modes leave {100 * modes.misfit:.0f} % of the response (root mean square) unexplained: the "
+            "record is noisy, or the rig is not linear"
+        )
     if excitation.size > MAX_FITTED_SAMPLES:
         notes.append(
             f"the modes are fitted to the first {MAX_FITTED_SAMPLES} of {excitation.size} samples, a duration of "
@@ -170,7 +173,7 @@ def identify_driven_modes(
         rows=rows,
         mass=mass,
         descriptions=_describe_modes(modes),
-        notes=_write_fit_notes(modes, estimate, step) + notes,
+        notes=notes,
         estimate=estimate,
     )
 
@@ -216,34 +219,10 @@ def _describe_modes(modes: DrivenModes) -> list:
     descriptions = []
     for k, (zeta, error) in enumerate(zip(modes.damping, modes.damping_error)):
         text = f"damping {zeta:.4g} +- {error:.1g} from the whole record"
-        if modes.estimate_damping[k] > 0:
-            text += f"; the estimate from windowed segments gives {modes.estimate_damping[k]:.4g}"
         if modes.coherence is not None:
             text += f"; coherence {modes.coherence[k]:.3g}"
         descriptions.append(text)
     return descriptions
-
-
-def _write_fit_notes(modes: DrivenModes, estimate: FrequencyResponse, step: float) -> list:
-    """Return notes on peaks that are widened by the window, and on a large misfit."""
-    notes = []
-    is_widened = modes.estimate_damping > (1 + MAX_DAMPING_EXCESS) * modes.damping
-    # a single segment has no window, so that a larger damping is due to noise
-    if is_widened.any() and estimate.segments > 1:
-        ratio = np.where(is_widened, modes.estimate_damping / modes.damping, 0)
-        k = int(np.argmax(ratio))
-        notes.append(
-            f"segments of {estimate.segment * step:.3g} s (window {estimate.window}) widen the peak at "
-            f"{modes.frequency[k]:.5g} Hz: the segments give the damping {modes.estimate_damping[k]:.4g}, but the whole "
-            f"record gives {modes.damping[k]:.4g}, and the value from the whole record is written; a free "
-            "decay (--decay) gives the damping without an input"
-        )
-    if modes.misfit > MAX_MISFIT:
-        notes.append(
-            f"the modes leave {100 * modes.misfit:.0f} % of the response (root mean square) unexplained: the "
-            "record is noisy, or the rig is not linear"
-        )
-    return notes
 
 
 def _select_decay(values: dict, begin: float | None) -> tuple:

@@ -26,7 +26,6 @@ PUBLIC = {
         "is_sinusoidal",
     ),
     "drives": ("make_release",),
-    "modal_fit": ("ModalFit",),
     "places": (
         "DIRECTION_NAMES",
         "MeasuredModes",

@@ -33,7 +33,7 @@ from modal_test import march_samples
 from study_text import read_answer
 
 from patchfem.campaigns.rows.condition_models import FitRequest
-from patchfem.campaigns.rows.fit import RowsOptions, SearchSettings, fit_rows
+from patchfem.campaigns.rows.fit import RowsOptions, fit_rows
 from patchfem.inputs import read_table
 from patchfem.scene import BOUNDS, loads, read_assignments
 
@@ -141,7 +141,7 @@ def fit_gauge(gauge: bool):
     assert not wrong
     return fit_rows(
         FitRequest(scene, wanted, TABLE),
-        RowsOptions((HOLD,), search=SearchSettings(STARTS, SEED, "bound")),
+        RowsOptions((HOLD,), starts=STARTS, seed=SEED),
     )
 
 

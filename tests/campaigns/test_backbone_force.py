@@ -2,9 +2,11 @@
 
 import csv
 import json
+import re
 
 import numpy as np
 import pytest
+from command_line import run_cli
 
 import patchfem as pf
 from patchfem.__main__ import main
@@ -203,3 +205,15 @@ def test_force_that_no_amplitude_has_is_refused():
     with pytest.raises(pf.PatchfemError, match=r"needs a force of 100 N .* the forces there are"):
         pf.backbone(scene, forces=[100.0])
     assert pf.backbone(scene, forces=[5.0]).balance_amplitude.values < 0.2e-3
+
+
+@pytest.mark.parametrize("key", ["friction.static", "structure.mode[1].damping"])
+def test_refuses_wrong_values_of_over_without_naming_set(key, tmp_path):
+    """A wrong value of a key is refused as one of --over; mistakes of --set keep their name."""
+    scene = tmp_path / "joint.toml"
+    scene.write_text(JOINT, "utf-8")
+    leaf = key.rpartition(".")[2]
+    answer = run_cli("backbone", scene, "--over", f"{key}=0.3,-7")
+    assert answer.code == 2 and re.search(rf"^--over: [\w.]+{leaf}: must be", answer.err, re.M)
+    answer = run_cli("backbone", scene, "--over", f"{key}=0.3,0.4", "--set", "normal.load=-5 N")
+    assert answer.code == 2 and "--set: normal.load: must be" in answer.err

@@ -80,14 +80,13 @@ def test_exact_imported_modes_agree_with_driven_oscillators(measured_file, tmp_p
     found = json.loads(answer.out)
     assert [one["frequency"] for one in found["modes"]] == pytest.approx(HERTZ, rel=1e-8)
     assert [one["damping"] for one in found["modes"]] == pytest.approx(ZETA, rel=1e-6)
-    assert any("widen the peak at 143 Hz" in note for note in found["notes"])
     text = (tmp_path / "modes.toml").read_text()
     modes = build(FORCED + text).rig.modes
     assert modes.omega == pytest.approx(OMEGA, rel=1e-8) and modes.mass == pytest.approx(
         1 / 1.2, rel=1e-6
     )
     assert modes.output**2 / modes.mass == pytest.approx(RESIDUE, rel=1e-6)
-    assert "# modes of shaker.uff" in text and "the estimate from windowed segments gives" in text
+    assert "# modes of shaker.uff" in text
 
 
 def test_exact_modes_of_free_decay(tmp_path):

@@ -1,6 +1,6 @@
 """Random joints: force of the phase resonance and effect of the preload, against own computations.
 
-Campaigns `backbone-forces` and `backbone-preload` of `campaigns`, for the joints of `backbone_band`.
+Campaigns `backbone-forces`, `backbone-preload` and `backbone-motions` of `campaigns`, for the joints of `backbone_band`.
 
 - `backbone-forces`: at four amplitudes the backbone states a force at the output. (a) `solve_balance`, a harmonic
 balance that shares no code with the package (real harmonics of the slide, laws stepped in time, Jacobian by differences),
@@ -11,6 +11,9 @@ of the march.
 
 - `backbone-preload`: frequency and damping ratio of the backbone at four amplitudes for 80, 100 and 120 % of the load,
 in one call with `over`, against `solve_balance` with a negative damping of all coordinates.
+
+- `backbone-motions`: the band of the default methods at four amplitudes against the motion that defines the curve, by
+`solve_balance` with a negative damping of all coordinates; value and error are the middle and the half-width of the band.
 
 Recipe, written before the first run: seeds 59000 to 59039 for the forces, 59100 to 59109 for the preload (with
 elastic-plastic, Iwan, Bouc-Wen, LuGre and tanh joints); none of them was used before.
@@ -24,6 +27,8 @@ import numpy as np
 from backbone_band import (
     LAWS,
     Joint,
+    band_rows,
+    compute_backbone,
     draw_joint,
     law_parameters,
     march_steady,
@@ -41,6 +46,7 @@ N_HARMONICS = 31  # largest odd harmonic of the own balance
 N_SAMPLES = 4096  # of a cycle; twice as many give the doubt
 MARCH_DOUBT = 3e-4  # relative: steps of the march, and the change at which it counts as steady
 MAX_CYCLES = 200  # laws with a memory need many cycles in micro-slip
+MAX_DAMPING = 0.4  # larger damping ratios are not compared
 N_FREQUENCY_STEPS = 6  # secant steps of the stepped sine
 
 
@@ -164,7 +170,7 @@ def compare_force(seed: int, folder: Path, earlier: dict | None = None) -> dict:
     for place in (int(part * (size - 1)) for part in FRACTIONS):
         names = ("amplitude", "frequency", "damping", "force", "force_error")
         point = {name: float(curves[f"balance_{name}"][place]) for name in names}
-        if not np.isfinite(point["force"]) or point["damping"] > 0.4:
+        if not np.isfinite(point["force"]) or point["damping"] > MAX_DAMPING:
             continue
         rows += _compare_point(joint, point, curves, place)
     return line | {"rows": rows}
@@ -195,13 +201,51 @@ def _compare_point(joint: Joint, point: dict, curves, place: int) -> list[Row]:
     return rows
 
 
+def compare_motions(seed: int, folder: Path, earlier: dict | None = None) -> dict:
+    """Compare the band of frequency and damping ratio with the motions that define the curve."""
+    joint = draw_elastic_joint(seed)
+    begin = process_time()
+    backbone = compute_backbone(build_model(joint), "mode1")
+    line = {"law": joint.law, "modes": joint.omega.size, "seconds": process_time() - begin}
+    if "balance" not in backbone.curves:
+        return line | {"rows": [], "refused": str(backbone.missing)}
+    curve = backbone.curves["balance"]
+    points = []
+    for place in (int(part * (curve.amplitude.size - 1)) for part in FRACTIONS):
+        guess = Balance(float(curve.frequency[place]), float(curve.damping[place]))
+        amplitude = float(curve.amplitude[place])
+        known = find_free_motion(joint, amplitude, guess)
+        if known is not None:
+            coarse, fine = known
+            doubts = (2 * abs(one - other) for one, other in zip(fine, coarse))
+            points.append((amplitude, *fine, *doubts))
+    return line | {"rows": band_rows(backbone.band, "motion", points)}
+
+
+def draw_elastic_joint(seed: int) -> Joint:
+    """Draw the joint of a seed; an elastic-plastic one takes the place of one with rigid friction."""
+    joint = draw_joint(seed)
+    if joint.law != "coulomb":
+        return joint
+    joint = draw_joint(seed + 6000)._replace(law="elastic-plastic")
+    slip = joint.static * joint.load / (0.3 * joint.mass * joint.omega[0] ** 2)
+    return joint._replace(numbers={"bond_length": float(slip)})
+
+
+def find_free_motion(joint: Joint, amplitude: float, guess: "Balance") -> list | None:
+    """Return the free motion at an amplitude with N_SAMPLES and twice as many; None if a balance finds none."""
+    if guess.strength > MAX_DAMPING:
+        return None
+    known = [
+        solve_balance(joint, amplitude, guess, is_forced=False, samples=samples)
+        for samples in (N_SAMPLES, 2 * N_SAMPLES)
+    ]
+    return None if None in known else known
+
+
 def compare_preload(seed: int, folder: Path, earlier: dict | None = None) -> dict:
     """Compare frequency and damping ratio at three preloads with the own balance."""
-    joint = draw_joint(seed)
-    if joint.law == "coulomb":
-        joint = draw_joint(seed + 6000)._replace(law="elastic-plastic")
-        slip = joint.static * joint.load / (0.3 * joint.mass * joint.omega[0] ** 2)
-        joint = joint._replace(numbers={"bond_length": float(slip)})
+    joint = draw_elastic_joint(seed)
     begin = process_time()
     loads = [part * joint.load for part in (0.8, 1.0, 1.2)]
     curves = pf.backbone(
@@ -220,14 +264,10 @@ def _compare_preload_point(joint: Joint, curves, at: tuple[int, int]) -> list[Ro
     """Return the rows of one amplitude at one preload."""
     amplitude = float(curves.balance_amplitude[at[1]])
     frequency, damping = (float(curves[f"balance_{name}"][at]) for name in ("frequency", "damping"))
-    if not np.isfinite(frequency) or damping > 0.4:
-        return []
-    guess = Balance(frequency, damping)
-    known = [
-        solve_balance(joint, amplitude, guess, is_forced=False, samples=samples)
-        for samples in (N_SAMPLES, 2 * N_SAMPLES)
-    ]
-    if None in known:
+    known = None
+    if np.isfinite(frequency):
+        known = find_free_motion(joint, amplitude, Balance(frequency, damping))
+    if known is None:
         return []
     rows = []
     for name, value, truths in (

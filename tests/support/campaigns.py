@@ -48,6 +48,7 @@ KINDS = {  # Name on the command line -> module and function.
     "backbone-bands": ("backbone_band", "compare_band"),
     "backbone-forces": ("backbone_forces", "compare_force"),
     "backbone-preload": ("backbone_forces", "compare_preload"),
+    "backbone-motions": ("backbone_forces", "compare_motions"),
 }
 # Time limit of a scene with its reference; a longer one is recorded as failed.
 MAX_CPU_SECONDS = 60

@@ -1,5 +1,7 @@
 """Amplitudes of a backbone: a default range, those of given forces, and more points where the damping changes fast."""
 
+from functools import partial
+
 import numpy as np
 
 from ...core import NotConverged, PatchfemError
@@ -7,7 +9,7 @@ from ...formatting import format_length, format_quantity
 from . import balance
 from .joint import MIN_AMPLITUDE_FACTOR, JointMode
 from .quasi_static import compute_static_curve
-from .records import Curve, make_curve
+from .records import Curve
 
 AMPLITUDES_PER_DECADE = 6  # Number of default amplitudes per decade before points are added.
 # Ratio of the largest default amplitude to the amplitude at which the complete contact slips.
@@ -79,29 +81,18 @@ def _max_amplitude(joint: JointMode) -> float:
 
 
 def estimate_curve(joint: JointMode, amplitudes) -> Curve | None:
-    """Return the curve (k,) of the recommended method without errors, with few harmonics; None if there is none.
-
-    Amplitudes without a motion have NaN.
-    """
+    """Return the curve of the recommended method without errors, with few harmonics; None if there is none."""
     joint = joint._replace(has_errors=False)
-    try:
-        if joint.is_linear or joint.is_rigid:
-            return balance.compute_balance_curve(joint, amplitudes)
-        joint.require_steady_loops("balance")
-        harmonics = balance.HARMONIC_COUNTS[0]
-        laws = joint.steady_laws()
-        values, motions = balance.tabulate_free_motions(laws, joint, amplitudes, harmonics)
-        forces = np.full((2, len(amplitudes)), np.nan)
-        if joint.has_force:
-            forces = balance.find_forces(laws, joint, amplitudes, harmonics, motions)
-        values = np.vstack([values, forces])
-        return make_curve(amplitudes, values, np.zeros_like(values))
-    except (NotConverged, PatchfemError):
-        pass
-    try:
-        return compute_static_curve(joint, amplitudes)
-    except (NotConverged, PatchfemError):
-        return None
+    few_harmonics = balance.HARMONIC_COUNTS[:1]
+    for compute in (
+        partial(balance.compute_balance_curve, counts=few_harmonics),
+        compute_static_curve,
+    ):
+        try:
+            return compute(joint, amplitudes)
+        except (NotConverged, PatchfemError):
+            continue
+    return None
 
 
 def refine_amplitudes(joint: JointMode, amplitudes) -> np.ndarray:

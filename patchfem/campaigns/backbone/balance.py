@@ -24,10 +24,19 @@ NO_MOTION = "no free motion of these amplitudes was found"
 NO_OSCILLATION = "the mode does not oscillate at these amplitudes: its damping ratio is above 1"
 
 
-def compute_balance_curve(joint: JointMode, amplitudes) -> Curve:
+def compute_balance_curve(
+    joint: JointMode, amplitudes, counts: tuple[int, ...] = HARMONIC_COUNTS
+) -> Curve:
     """Compute the backbone of a mode from periodic motions at amplitudes (k,) [m] of the output.
 
     Raises NotConverged or PatchfemError if there is no curve.
+
+    Parameters
+    ----------
+    joint : JointMode
+    amplitudes : (k,) array
+    counts : tuple of int
+        Numbers of harmonics that are tried in turn; with a single one the errors of the harmonics are not estimated.
     """
     if joint.is_linear:
         return compute_constant_curve(joint, amplitudes)
@@ -38,8 +47,10 @@ def compute_balance_curve(joint: JointMode, amplitudes) -> Curve:
     # more harmonics until frequency and damping change by less than the tolerance
     laws = joint.steady_laws()
     tolerance = joint.model.accuracy.tolerance
-    values, _ = tabulate_free_motions(laws, joint, amplitudes, HARMONIC_COUNTS[0])
-    for harmonics in HARMONIC_COUNTS[1:]:
+    harmonics = counts[0]
+    values, motions = tabulate_free_motions(laws, joint, amplitudes, harmonics)
+    error = np.zeros_like(values)
+    for harmonics in counts[1:]:
         # Beyond the last motion that few harmonics find, more harmonics find none.
         count = 1 + int(np.isfinite(values[0]).nonzero()[0].max(initial=-1))
         if not count:
@@ -53,7 +64,7 @@ def compute_balance_curve(joint: JointMode, amplitudes) -> Curve:
             break
 
     error += joint.spatial_discretization_errors(
-        lambda mode, group: tabulate_free_motions(group, mode, amplitudes, HARMONIC_COUNTS[0])[0]
+        lambda mode, group: tabulate_free_motions(group, mode, amplitudes, counts[0])[0]
     )
     known = np.isfinite(values + error).all(axis=0)
     if not known.any():

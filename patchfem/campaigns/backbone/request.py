@@ -6,6 +6,7 @@ from typing import NamedTuple
 from ...core import PatchfemError
 from ...model.source import Source
 from ...scene.assignments import Axis, read_assignments, read_positive_values
+from ...scene.scene import SceneError
 from .curves import Levels, choose_methods, compute_backbones
 from .given_modes import prepare_model
 from .records import Backbone
@@ -65,6 +66,8 @@ def compute_cases(
     ------
     PatchfemError
         If the request is invalid, or the scene has no such mode.
+    SceneError
+        If the scene is invalid with a value of the key.
     """
     methods = choose_methods(request.method)
     if request.amplitudes and request.forces:
@@ -83,7 +86,18 @@ def compute_cases(
             """Build the scene as written, or the one with the value of the key."""
             return build(tables, is_written=is_written, sets=() if is_written else sets)
 
-        prepared.append(prepare_model(build_changed, request.modes))
+        try:
+            prepared.append(prepare_model(build_changed, request.modes))
+        except SceneError as error:
+            if axis is None:
+                raise
+            # A value of --over is applied as one of --set, whose messages name items by their names.
+            key_end = f".{axis.key.rpartition('.')[2]}: "
+            mistakes = []
+            for text in error.mistakes:
+                prefix = "--over: " if key_end in text else "--set: "
+                mistakes.append(text.replace("--set: ", prefix, 1))
+            raise SceneError(mistakes) from None
     models = [case.model for case in prepared]
     backbones = compute_backbones(models, request.mode, levels, methods, progress)
     backbones = [one.add_notes(case.notes) for one, case in zip(backbones, prepared)]

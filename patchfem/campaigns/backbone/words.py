@@ -15,7 +15,8 @@ MIN_LOSS_RATIO = 4.0
 MAX_LISTED_AMPLITUDES = 6  # Largest number of amplitudes that a sentence lists individually.
 AGREEMENT = 0.02  # Largest relative difference of the damping at which two methods agree.
 MIN_REPORTED_LOSS = 0.05  # Smallest decrease of the amplitude per cycle that is reported.
-MIN_REPORTED_RATIO = 0.05  # Smallest relative motion of other modes that is reported.
+# Smallest shift of the phase resonance by other modes that is reported, in half-widths of the resonance.
+MIN_REPORTED_RATIO = 0.05
 MISSING_ERRORS = (
     "the errors of the curves do not account for the mesh, because no coarser mesh was computed: "
 )
@@ -250,51 +251,19 @@ def describe_static_curve(curves: dict[str, Curve]) -> list[str]:
 
 
 def _describe_coupling(joint: JointMode, curve: Curve) -> list[str]:
-    """Describe the coupling of the mode with the other modes."""
-    modes = joint.modes
-    if modes.omega.size == 1:
-        return []
-    ratio = _forced_mode_ratio(joint, curve).max()
-    omega = 2 * np.pi * curve.frequency[-1]
-    others = np.delete(modes.omega, joint.mode)
-    nearest = others[np.argmin(np.abs(others - omega))] / (2 * np.pi)
-    name = format_quantity(float(nearest), "Hz", 4)
-    if ratio < MIN_REPORTED_RATIO:
-        return [f"The coupling with the other modes (nearest: {name} without the contact) is weak."]
-    size = "as much as the mode itself"
-    if ratio < 1:
-        size = f"by up to {100 * ratio:.2g} % of its motion"
-    sentence = (
-        f"The mode is coupled with the one of {name} (without the contact): a force at the output moves other modes "
-        f"{size}; a test reads the curve only if it isolates the mode"
-    )
-    shift = np.abs(curve.force_frequency - curve.frequency)
-    if np.isfinite(shift).any() and np.nanmax(shift) > 0:
-        k = int(np.nanargmax(shift))
-        frequency = format_quantity(float(curve.force_frequency[k]), "Hz", 5)
-        sentence += (
-            f": at {format_length(curve.amplitude[k], 3)} the force of the phase resonance has {frequency}, "
-            f"{100 * shift[k] / curve.frequency[k]:.2g} % beside the curve"
-        )
-    return [f"{sentence}."]
+    """Describe how far the phase resonance of a force at the output lies beside the curve.
 
-
-def _forced_mode_ratio(joint: JointMode, curve: Curve) -> np.ndarray:
-    """Return the ratio (k,) of the motion of other modes to that of the mode under a force at the output.
-
-    The force acts at the output and the friction at the contact, so each of them moves the other modes.
+    The force moves other modes, too. A shift counts in relation to the half-width of the resonance, the damping ratio.
     """
-    modes = joint.modes
-    square = (2 * np.pi * curve.frequency) ** 2
-    own = modes.output[joint.mode]
-    row = modes.interfaces[joint.face] if len(modes.interfaces) else modes.output
-    ratio = np.zeros(curve.amplitude.size)
-    for k, omega in enumerate(modes.omega):
-        if k == joint.mode or not own:
-            continue
-        participation = np.abs(modes.output[k] / own)
-        if row[joint.mode]:
-            participation += np.abs(row[k] / row[joint.mode])
-        distance = np.maximum(np.abs(omega**2 - square), ROUND_OFF_ERROR * square)
-        ratio += participation**2 * 2 * np.abs(curve.damping) * square / distance
-    return np.minimum(ratio, 1.0)
+    shift = np.abs(curve.force_frequency / curve.frequency - 1)
+    if joint.modes.omega.size == 1 or not np.nanmax(shift, initial=0.0) > 0:
+        return []
+    ratio = shift / np.maximum(np.abs(curve.damping), ROUND_OFF_ERROR)
+    k = int(np.nanargmax(ratio))
+    if ratio[k] < MIN_REPORTED_RATIO:
+        return ["The coupling with the other modes is weak."]
+    frequency = format_quantity(float(curve.force_frequency[k]), "Hz", 5)
+    return [
+        f"A force at the output moves the other modes, too: at {format_length(curve.amplitude[k], 3)} its phase resonance "
+        f"has {frequency}, {100 * shift[k]:.2g} % beside the curve; a test reads the curve only if it isolates the mode."
+    ]

@@ -1,11 +1,11 @@
 """Fit of a rig to measured frequency and damping as functions of amplitude.
 
 The curve of the model comes from periodic motions at the measured amplitudes, by harmonic balance. The
-quasi-static curve, which is a hundred times faster, gives the start of this search. If one of the two
-methods has no result, the other is used.
+quasi-static curve, which is a hundred times faster, gives the start of this search. If one of the two methods has no
+result at its starting points, the other is used.
 """
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
@@ -14,10 +14,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...core import PatchfemError, frozen_array
+from ...core import NotConverged, PatchfemError, frozen_array
 from ...formatting import format_length, format_number
-from ...identify.least_squares import Fit, Problem
-from ...identify.space import make_space_filling_points
+from ...identify.advice import advise_test
+from ...identify.least_squares import Fit
 from ...inputs.tables import TableFormat, read_columns
 from ...inputs.units import RATIO_UNITS
 from ...model.model import Model
@@ -49,8 +49,6 @@ SAME_ERROR = 0.1  # relative change of an error at which it is known
 MIN_SPREAD = 1e-6
 METHODS = ("balance", "quasi-static")  # Reference method and fast method.
 DEFAULT_STARTS = 6  # Number of starting points of a search by the fast method.
-# Largest number of trial parameters, besides those of the scene, to find usable methods.
-MAX_TRIALS = 8
 PROGRESS_SECONDS = 10.0  # Time between two progress messages [s].
 MAX_LISTED_AMPLITUDES = 6  # Largest number of amplitudes that a message lists.
 SAME_AMPLITUDE = (
@@ -59,7 +57,6 @@ SAME_AMPLITUDE = (
 N_CURVE_POINTS = 25  # number of amplitudes of the fitted curve
 # Change of a parameter in half-widths of its interval, for the slope of the fitted curve.
 BAND_STEP = 0.1
-MIN_GAIN = 0.1  # smallest decrease of an interval for which a further measurement is advised
 EXTENT = 3.0  # ratio by which the fitted curve goes beyond the measured amplitudes on both sides
 NO_MODE_ERROR = "the intervals do not contain the error of the modes left out of the structure"
 
@@ -200,36 +197,31 @@ def read_damping_curve(path) -> MeasuredCurve:
 
 
 class CurveModel:
-    """Model that computes frequency [Hz] and damping ratio (2, k) of a rig at measured amplitudes.
-
-    The methods take the free parameters, and raise PatchfemError if no curve exists for them.
+    """Curves of frequency [Hz] and damping ratio (2, k) of a rig, and their fits to measured ones.
 
     Parameters
     ----------
-    scene : Scene
-    ranges : list of Range
-        Bounds of the free parameters.
+    keys : FreeKeys
     amplitude : (k,) array
         Measured amplitudes [m].
     say : callable, optional
         Called with a line of text that reports the progress.
     """
 
-    def __init__(self, scene: Scene, ranges: list, amplitude: np.ndarray, say=None):
-        self.base = BaseScene(scene)
-        self.ranges = ranges
+    def __init__(self, keys: FreeKeys, amplitude: np.ndarray, say=None):
+        self.keys = keys
+        self.base = BaseScene(keys.scene)
         self.amplitude = amplitude
         self.say = say
         self.begin = perf_counter()
         self.last_progress = self.begin
         self.n_computed = 0
-        self.methods = list(METHODS)
         # each step of the search needs some of the last curves again
         self._compute_once = lru_cache(8)(self._compute)
 
     def build_model(self, values) -> Model:
         """Build the rig model for given free parameters."""
-        return build_changed_model(self.base, format_assignments(self.ranges, values))
+        return build_changed_model(self.base, format_assignments(self.keys.ranges, values))
 
     def _compute(self, values: tuple[float, ...], method: str) -> np.ndarray:
         """Compute frequency and damping for given free parameters, and report the progress."""
@@ -256,39 +248,29 @@ class CurveModel:
             )
         return curve
 
-    def choose_methods(self, trials: Iterable) -> str:
-        """Select the backbone methods that have a value at every amplitude, for trial values of the free parameters.
+    def solve(
+        self, measured: MeasuredCurve, method: str, starts: int = 1, kind: str = "", start=None
+    ) -> Fit:
+        """Fit the free parameters to a measured curve.
 
-        The selection is that of the first trial for which the largest number of METHODS succeeds.
-
-        Returns
-        -------
-        str
-            Note on the method that is left out, with the reason of its first failure; "" if both succeed.
+        Parameters
+        ----------
+        measured : MeasuredCurve
+        method : str
+            Method of the backbone.
+        starts : int
+            Number of starting points.
+        kind : str
+            Value of `IntervalKind`.
+        start : (n,) array, optional
+            First starting point in place of that of the scene.
         """
-        reasons: dict[str, str] = {}
-        self.methods = []
-        for values in trials:
-            successful = []
-            for method in METHODS:
-                try:
-                    self.compute(values, method)
-                    successful.append(method)
-                except PatchfemError as reason:
-                    reasons.setdefault(method, str(reason))
-            self.methods = max(self.methods, successful, key=len)
-            if len(self.methods) == len(METHODS):
-                return ""
-
-        # one method has no value within the ranges, or none has
-        if not self.methods:
-            listed = "; ".join(f"{method}: {reasons[method]}" for method in METHODS)
-            raise PatchfemError(
-                f"no curve of frequency and damping could be computed within the ranges of --free; {listed}; leave out "
-                "the rows with the largest damping, or change the ranges of --free"
-            )
-        (omitted,) = set(METHODS) - set(self.methods)
-        return f"the fit is by {self.methods[0]} alone: {omitted}: {reasons[omitted]}"
+        problem = self.keys.make_problem(
+            lambda values: measured.normalized_residual(self.compute(values, method))
+        )
+        if start is not None:
+            problem = replace(problem, start=start)
+        return problem.solve(starts, kind)
 
 
 def compute_points(model: Model, amplitudes: np.ndarray, method: str) -> np.ndarray:
@@ -360,44 +342,45 @@ def fit_curve(
     begin = perf_counter()
     ranges = parse_ranges(free_parameters)
     measured = read_damping_curve(curve_file)
-    n_amplitudes = measured.amplitude.size
-    if 2 * n_amplitudes <= len(ranges):
-        raise PatchfemError(
-            f"{curve_file}: {n_amplitudes} amplitudes are too few to determine {len(ranges)} values; at least "
-            f"{len(ranges) // 2 + 1} are needed"
-        )
-    curves = CurveModel(scene, ranges, measured.amplitude, say)
     keys = FreeKeys(scene, ranges)
-
-    def make_problem(method: str, start) -> Problem:
-        """Return the fit of the curve by a method."""
-        problem = keys.make_problem(
-            lambda values: measured.normalized_residual(curves.compute(values, method))
-        )
-        return problem if start is None else replace(problem, start=start)
-
-    problem = make_problem(METHODS[0], None)
-    points = make_space_filling_points(MAX_TRIALS, len(ranges))
-    choice = curves.choose_methods([problem.start, *map(problem.search_space.to_values, points)])
-    if say:
-        say(f"{n_amplitudes} amplitudes computed by {' and '.join(curves.methods)}")
+    keys.require_enough_rows(curve_file, measured.value.size, "values")
+    curves = CurveModel(keys, measured.amplitude, say)
 
     # The fast method gives the start of the search by the reference method, and the errors that the table does not give.
-    reference, fast = curves.methods[0], curves.methods[-1]
-    first = make_problem(fast, None).solve(starts, "")
+    reasons = {}
+    for method in reversed(METHODS):
+        try:
+            first = curves.solve(measured, method, starts)
+            break
+        except NotConverged as reason:
+            reasons[method] = reason
+    else:
+        listed = "; ".join(f"{method}: {reason}" for method, reason in reasons.items())
+        raise PatchfemError(
+            f"no curve of frequency and damping could be computed within the ranges of --free; {listed}; leave out "
+            "the rows with the largest damping, or change the ranges of --free"
+        )
     for _ in range(MAX_REWEIGHTINGS if measured.assumed.any() else 0):
         before = measured.error
-        measured = measured.scale_assumed_errors(curves.compute(first.values, fast), len(ranges))
+        measured = measured.scale_assumed_errors(curves.compute(first.values, method), len(ranges))
         if np.abs(np.log(measured.error / before)).max() < SAME_ERROR:
             break
-        first = make_problem(fast, first.values).solve(1, "").count_earlier_search(first)
-    problem = make_problem(reference, first.values)
-    fit = problem.solve(1, "series").count_earlier_search(first)
+        again = curves.solve(measured, method, start=first.values)
+        first = again.count_earlier_search(first)
+
+    reference = METHODS[0]
+    try:
+        fit = curves.solve(measured, reference, kind="series", start=first.values)
+    except NotConverged as reason:
+        reasons[reference] = reason
+        reference = method
+        fit = curves.solve(measured, reference, kind="series", start=first.values)
+    fit = fit.count_earlier_search(first)
     fitted = curves.compute(fit.values, reference)
-    widened, mode_notes = _widen_by_missing_modes(problem, fit, curves, measured)
-    beyond, advice = extrapolate_curve(curves, measured, widened)
+    widened, mode_note = _widen_by_missing_modes(fit, curves, measured, reference)
+    beyond, advice = extrapolate_curve(curves, measured, widened, reference)
     notes = [
-        choice,
+        *(f"the fit is by {reference} alone: {name}: {reasons[name]}" for name in reasons),
         measured.describe_assumed_errors(),
         _note_different_methods(reference, measured),
     ]
@@ -407,14 +390,14 @@ def fit_curve(
         measured=measured,
         model=fitted,
         method=reference,
-        notes=tuple(filter(None, [*notes, mode_notes, advice])),
+        notes=tuple(filter(None, [*notes, mode_note, advice])),
         n_computed=curves.n_computed,
         beyond=beyond,
     )
 
 
 def extrapolate_curve(
-    curves: CurveModel, measured: MeasuredCurve, fit: Fit
+    curves: CurveModel, measured: MeasuredCurve, fit: Fit, method: str
 ) -> tuple[np.ndarray, str]:
     """Compute the fitted curve with its band from below to beyond the measured amplitudes.
 
@@ -433,7 +416,7 @@ def extrapolate_curve(
 
     def compute(values) -> np.ndarray:
         """Return frequency [Hz] and damping ratio (2, k) for values of the parameters."""
-        return compute_points(curves.build_model(values), amplitudes, curves.methods[0])
+        return compute_points(curves.build_model(values), amplitudes, method)
 
     half_widths = np.ptp(fit.intervals.ends, axis=1) / 2
     is_determined = np.isfinite(half_widths).all() and half_widths.all()
@@ -441,7 +424,7 @@ def extrapolate_curve(
     try:
         curve = compute(fit.values)
         # changes of the curve per half-width of each parameter; a step towards the middle stays within its range
-        for k, bound in enumerate(curves.ranges if is_determined else ()):
+        for k, bound in enumerate(curves.keys.ranges if is_determined else ()):
             values = np.array(fit.values)
             step = np.copysign(BAND_STEP, (bound.low + bound.high) / 2 - values[k])
             values[k] += step * half_widths[k]
@@ -456,22 +439,12 @@ def extrapolate_curve(
     variance = np.einsum("iqk,ij,jqk->qk", slopes, correlation, slopes)
     beyond = np.array([amplitudes, *curve, *np.sqrt(np.maximum(variance, 0.0))])
 
-    # A further measurement with the gradients G changes the covariance C to (C^-1 + G^T G)^-1. A 95 % half-width is 1.96
-    # standard deviations.
-    widest = int(np.argmax(half_widths / np.maximum(np.abs(fit.values), 1e-300)))
+    # the errors of further measurements are relative ones, as those of the table; a half-width is 1.96 standard deviations
     deviation = np.median(measured.error / np.abs(measured.value), axis=1)[:, None] * np.abs(curve)
-    gradients = np.nan_to_num(np.array(slopes) / deviation).transpose(2, 1, 0)
-    covariance = correlation / 1.96**2
-    information = np.linalg.pinv(covariance)
-    after = np.linalg.pinv(information + np.einsum("jqn,jqm->jnm", gradients, gradients))
-    ratio = np.sqrt(after[:, widest, widest] / covariance[widest, widest])
-    best = int(np.argmin(ratio))
-    advice = ""
-    if ratio[best] <= 1 - MIN_GAIN:
-        advice = (
-            f"a further measurement at about {format_length(amplitudes[best], 2)} would narrow the interval of "
-            f"{curves.ranges[widest].key} most, by about {100 * (1 - ratio[best]):.0f} %"
-        )
+    gradients = np.array(slopes) / (1.96 * deviation)
+    information = np.einsum("iqk,jqk->kij", gradients, gradients)
+    places = [f"at about {format_length(amplitude, 2)}" for amplitude in amplitudes]
+    advice = advise_test(fit, [bound.key for bound in curves.keys.ranges], information, places)
     return beyond[:, known], advice
 
 
@@ -492,17 +465,17 @@ def _note_different_methods(method: str, measured: MeasuredCurve) -> str:
 
 
 def _widen_by_missing_modes(
-    problem: Problem, fit: Fit, curves: CurveModel, measured: MeasuredCurve
+    fit: Fit, curves: CurveModel, measured: MeasuredCurve, method: str
 ) -> tuple[Fit, str]:
     """Widen the intervals of a fit by the effect of modes that a reduced structure neglects.
 
     Parameters
     ----------
-    problem : Problem
     fit : Fit
-        Solution of the problem.
     curves : CurveModel
     measured : MeasuredCurve
+    method : str
+        Method of the fitted curve.
 
     Returns
     -------
@@ -510,7 +483,6 @@ def _widen_by_missing_modes(
     note : str
         "" if no mode is neglected.
     """
-    method = curves.methods[0]
     rig_model = curves.build_model(fit.values)
     richer = rig_model.rig.structure.richer_rig
     if richer is None:
@@ -524,21 +496,15 @@ def _widen_by_missing_modes(
     reference = curves.compute(fit.values, method)
     change = np.nan_to_num(richer_curve - reference)
     error = convergence_error(change, ratio=0.5, order=2.0)
-    shifted = replace(
-        problem,
-        residual=lambda values: measured.normalized_residual(
-            curves.compute(values, method) + error
-        ),
-        start=fit.values,
-    )
-    shifts = np.abs(shifted.solve(1, "").values - fit.values)
+    moved = curves.solve(measured._replace(value=measured.value - error), method, start=fit.values)
+    shifts = np.abs(moved.values - fit.values)
+    bounds = np.array([(bound.low, bound.high) for bound in curves.keys.ranges])
     ends = fit.intervals.ends + shifts[:, None] * [-1, 1]
-    space = problem.search_space
-    ends = frozen_array(np.clip(ends, space.low[:, None], space.high[:, None]))
+    ends = frozen_array(np.clip(ends, bounds[:, :1], bounds[:, 1:]))
 
     # what the note tells
     texts = []
-    for bound, shift, value in zip(curves.ranges, shifts, fit.values):
+    for bound, shift, value in zip(curves.keys.ranges, shifts, fit.values):
         size = f"{100 * shift / abs(value):.2g} %" if value else f"{shift:.2g}"
         texts.append(f"{bound.key} by {size}")
     frequency, damping = 100 * np.nanmax(np.abs(change / reference), axis=1)

@@ -12,7 +12,7 @@ from time import perf_counter
 
 import numpy as np
 
-from ...core import NotConverged, PatchfemError
+from ...core import NotConverged
 from ...effects import law_has_trait
 from ...inputs.loops import Loop, read_loop
 from ...scene.scene import Scene, SceneError
@@ -122,19 +122,13 @@ def fit_hysteresis_loop(
     for selector in held_out_rows:
         held_out |= loop.select_rows(selector)
     offsets = make_offsets(options.offsets, loop)
-    n_values = len(ranges) + len(offsets)
-    n_used = np.count_nonzero(~held_out)
-    if n_used <= n_values:
-        raise PatchfemError(
-            f"{loop_file}: only {n_used} rows are used for the fit (rows that are held out do not count), "
-            f"too few to determine {n_values} values and their intervals"
-        )
 
     # least squares of the deviations, as fractions of the largest force
     bench = BenchModel(scene, loop, ranges, offsets, warm_up=options.warm, say=say)
-    scale = float(np.abs(loop.reading[~held_out]).max())
+    scale = float(np.abs(loop.reading[~held_out]).max(initial=0.0))
     offset_ranges = [offset.range for offset in offsets]
     keys = FreeKeys(scene, ranges, offset_ranges, bench.assignments, bench.notes)
+    keys.require_enough_rows(loop_file, np.count_nonzero(~held_out), "rows")
     problem = keys.make_problem(lambda values: (bench(values) - loop.reading)[~held_out] / scale)
     try:
         if bench.is_exact:

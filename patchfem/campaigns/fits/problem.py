@@ -6,6 +6,7 @@ returns `FittedKeys` with all warnings.
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from time import perf_counter
 
 import numpy as np
@@ -90,6 +91,24 @@ class FreeKeys:
     def bounds(self) -> list:
         """Ranges of all unknowns; those of the scene keys come first."""
         return [*self.ranges, *self.offsets]
+
+    def require_enough_rows(self, path: Path, count: int, name: str) -> None:
+        """Raise PatchfemError unless more values are fitted than unknowns.
+
+        Parameters
+        ----------
+        path : Path
+            File of the measurement.
+        count : int
+            Number of fitted values, without those that are held out.
+        name : str
+            Word for them.
+        """
+        if count <= len(self.bounds):
+            raise PatchfemError(
+                f"{path}: only {count} {name} are used for the fit (what is held out does not count), too few to determine "
+                f"{len(self.bounds)} values and their intervals"
+            )
 
     def make_problem(self, residual: Callable) -> Problem:
         """Return the least-squares problem for a residual function of the unknowns.

@@ -16,7 +16,6 @@ from ..rows.fit import (
     UNSTABLE_MEANINGS,
     FittedRows,
     RowsOptions,
-    SearchSettings,
     fit_rows,
 )
 from .curve import DEFAULT_STARTS, HEADER, UNITS, FittedCurve, fit_curve
@@ -158,11 +157,17 @@ def fit_measurement(
     # an interrupted search continues only with the same inputs
     inputs = (scene.resolved(), free, options.hold, options.leave_out, options.seed)
     content = path.read_bytes() if path.is_file() else ""
-    search = SearchSettings(options.starts or DEFAULT_ROW_STARTS, options.seed, options.unstable)
+    stored = None
     if checkpoint is not None:
         stored = SearchCheckpoint(checkpoint, (*inputs, options.unstable, content), options.resume)
-        search = SearchSettings(search.starts, search.seed, search.unstable, stored)
-    row_options = RowsOptions(options.hold, options.leave_out, search)
+    row_options = RowsOptions(
+        hold=options.hold,
+        leave_out=options.leave_out,
+        starts=options.starts or DEFAULT_ROW_STARTS,
+        seed=options.seed,
+        unstable=options.unstable,
+        checkpoint=stored,
+    )
     return fit_rows(FitRequest(scene, ranges, path), row_options, listener.say, listener.progress)
 
 

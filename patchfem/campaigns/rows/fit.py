@@ -5,13 +5,14 @@ and the left-out readings. A search does not use the readings that are held out 
 predicted after the fit.
 """
 
-from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from time import perf_counter
 
 import numpy as np
 
-from ...core import PatchfemError
+from ...core import G_N, PatchfemError
+from ...identify.advice import advise_test
 from ...identify.least_squares import Descents, Fit, Search
 from ..fits.problem import FittedKeys, FreeKeys
 from .cells import MAX_LOG_RATIO, Readings, compute_rms_scores, read_response_table
@@ -28,21 +29,25 @@ UNSTABLE_MEANINGS = {
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class SearchSettings:
-    """Settings of a search from random starting points.
+class RowsOptions:
+    """Options of a fit to a response table: validation readings, and the search from random starting points.
 
     Attributes
     ----------
-    starts : int
-        Number of random starting points.
-    seed : int
-        Seed of the random numbers.
+    hold : sequence of str
+        Selectors "column=value,value" of rows that are predicted but not fitted.
+    leave_out : str
+        Column for cross-validation, whose values are left out one at a time.
+    starts, seed : int
+        Number of starting points, and seed of the random numbers.
     unstable : str
         Treatment of readings flagged U, a key of UNSTABLE_MEANINGS.
     checkpoint : SearchCheckpoint or None
         Finished descents, which are not repeated.
     """
 
+    hold: Sequence[str] = ()
+    leave_out: str = ""
     starts: int = 8
     seed: int = 0
     unstable: str = "bound"
@@ -61,7 +66,7 @@ class FittedRows:
         Models of the rig at the measured conditions.
     cells : Readings
         Measured readings.
-    settings : SearchSettings
+    options : RowsOptions
     held_out : (n,) bool
         Mask of the readings that were held out.
     computed : (2, c) array
@@ -72,17 +77,20 @@ class FittedRows:
         Log ratios from the fit without the reading; NaN if every fit used it.
     n_motions : int
         Number of computed motions.
+    advice : str
+        Sentence on the further test that would narrow an interval most; "" without one.
     """
 
     keys: FittedKeys
     models: ConditionModels
     cells: Readings
-    settings: SearchSettings
+    options: RowsOptions
     held_out: np.ndarray
     computed: np.ndarray
     logs: np.ndarray
     left_out_logs: np.ndarray
     n_motions: int
+    advice: str
 
     @property
     def search(self) -> Descents:
@@ -111,19 +119,6 @@ class FittedRows:
                 self.cells, self.left_out_logs, is_eligible & is_left_out
             ),
         }
-
-
-@dataclass(frozen=True, slots=True)
-class RowsOptions:
-    """Options of a fit to a response table: validation readings and search settings.
-
-    hold: selectors "column=value,value" of held-out rows; leave_out: column for cross-validation,
-    whose values are left out one at a time; search: settings.
-    """
-
-    hold: tuple = ()
-    leave_out: str = ""
-    search: SearchSettings = field(default_factory=SearchSettings)
 
 
 def fit_rows(
@@ -156,7 +151,6 @@ def fit_rows(
         If all descents of a search fail.
     """
     begin = perf_counter()
-    settings = options.search
     cells = read_response_table(request.measured)
     held_out = np.zeros(cells.row.size, bool)
     for selector in options.hold:
@@ -170,13 +164,14 @@ def fit_rows(
         )
     trainings = {"all": ~held_out}
     trainings |= {f"without {name}": ~held_out & ~group for name, group in groups.items()}
+    models = request.make_condition_models(cells.conditions)
+    keys = FreeKeys(models.scene, models.ranges, sets=models.sets, notes=models.notes)
     for training in trainings.values():
-        _require_enough_readings(cells, training, len(request.ranges), settings)
+        is_used = _select_fitted(cells, training, options.unstable)
+        keys.require_enough_rows(request.measured, np.count_nonzero(is_used), "readings")
 
     # readings of the model, and the counter of finished descents
-    models = request.make_condition_models(cells.conditions)
     computed = ModelReadings(models, say)
-    keys = FreeKeys(models.scene, models.ranges, sets=models.sets, notes=models.notes)
     n_finished = 0
 
     def report(count: int) -> None:
@@ -184,7 +179,7 @@ def fit_rows(
         nonlocal n_finished
         n_finished += count
         if progress is not None:
-            progress(n_finished / (settings.starts * len(trainings)))
+            progress(n_finished / (options.starts * len(trainings)))
 
     def fit(name: str, training, interval_kind: str) -> Fit:
         """Fit the parameters to some of the readings.
@@ -201,10 +196,10 @@ def fit_rows(
         interval_kind : str
             As in `Problem.solve`.
         """
-        search = Search(settings.starts, settings.seed, computed.reset_motions, report)
-        if settings.checkpoint is not None:
-            search = replace(search, **settings.checkpoint.make_callbacks(name))
-        residual = make_residual(cells, computed, training, settings.unstable)
+        search = Search(options.starts, options.seed, computed.reset_motions, report)
+        if options.checkpoint is not None:
+            search = replace(search, **options.checkpoint.make_callbacks(name))
+        residual = make_residual(cells, computed, training, options.unstable)
         return keys.make_problem(residual).search(search, interval_kind)
 
     best = fit("all", ~held_out, "rows")
@@ -216,35 +211,42 @@ def fit_rows(
         conditions = sorted(set(cells.condition[group].tolist()))
         fold_logs = cells.compute_log_ratios(*computed.predict(fold.values, conditions))
         left_out_logs[group] = fold_logs[group]
-    warnings = _warn_of_doubtful_fit(cells, best.descents, logs, settings)
+    warnings = _warn_of_doubtful_fit(cells, best.descents, logs, options)
     return FittedRows(
         keys=keys.make_fitted_keys(best, begin, warnings),
         models=models,
         cells=cells,
-        settings=settings,
+        options=options,
         held_out=held_out,
         computed=prediction,
         logs=logs,
         left_out_logs=left_out_logs,
         n_motions=computed.n_motions,
+        advice=_advise_condition(cells, best, request.ranges, options.unstable, ~held_out),
     )
 
 
-def _require_enough_readings(
-    readings: Readings, training, n_values: int, settings: SearchSettings
-) -> None:
-    """Raise PatchfemError unless there are more fitted readings than free parameters."""
-    is_used = training & ~readings.unstable if settings.unstable == "out" else training
-    if is_used.sum() <= n_values:
-        raise PatchfemError(
-            f"{readings.path}: only {int(is_used.sum())} readings are used for the fit (neither held out "
-            f"nor left out), too few to determine {n_values} values and their intervals"
-        )
+def _select_fitted(readings: Readings, training: np.ndarray, unstable: str) -> np.ndarray:
+    """Return the mask (n,) of the readings of a training set (n,) that the fit uses."""
+    return training & ~readings.unstable if unstable == "out" else training
 
 
-def _warn_of_doubtful_fit(
-    readings: Readings, search: Descents, logs, settings: SearchSettings
-) -> list:
+def _advise_condition(
+    readings: Readings, fit: Fit, ranges: Sequence, unstable: str, training: np.ndarray
+) -> str:
+    """Return a sentence on the measured condition whose repetition would narrow an interval most, or ""."""
+    is_used = _select_fitted(readings, training, unstable)
+    condition = readings.condition[is_used]
+    information = np.zeros((len(readings.conditions), len(ranges), len(ranges)))
+    for is_of_kind in (readings.is_acceleration[is_used], ~readings.is_acceleration[is_used]):
+        for k in set(condition[is_of_kind].tolist()):
+            gradient = fit.intervals.effects[is_of_kind & (condition == k)].mean(axis=0)
+            information[k] += np.outer(gradient, gradient)
+    places = [f"at {f:.6g} Hz and {level / G_N:.4g} g" for f, level in readings.conditions]
+    return advise_test(fit, [bound.key for bound in ranges], information, places)
+
+
+def _warn_of_doubtful_fit(readings: Readings, search: Descents, logs, options: RowsOptions) -> list:
     """Return warnings about rows without readings, unstable readings and an unreliable search."""
     warnings = []
     if readings.empty_rows:
@@ -256,7 +258,7 @@ def _warn_of_doubtful_fit(
     n_unstable = int(readings.unstable.sum())
     if n_unstable:
         warnings.append(
-            f"{n_unstable} readings flagged U (unstable) {UNSTABLE_MEANINGS[settings.unstable]}; "
+            f"{n_unstable} readings flagged U (unstable) {UNSTABLE_MEANINGS[options.unstable]}; "
             "scores_stable leaves these readings out"
         )
     unbounded = set()
@@ -267,9 +269,9 @@ def _warn_of_doubtful_fit(
             f"no bounded motion is found at {'; '.join(sorted(unbounded))}: each row at these inputs "
             f"counts as if the model were wrong by a factor of {np.exp(MAX_LOG_RATIO):.0f}"
         )
-    if search.n_best == 1 and settings.starts > 1:
+    if search.n_best == 1 and options.starts > 1:
         warnings.append(
-            f"only one of {settings.starts} searches ended within 1 % of the best training score, so "
+            f"only one of {options.starts} searches ended within 1 % of the best training score, so "
             "a better fit may exist; raise --starts"
         )
     return warnings
@@ -291,7 +293,7 @@ def make_residual(
         motion was still growing, so that only a smaller computed value gives a residual; "out":
         the reading is excluded; "read": it is treated like any other reading.
     """
-    is_used = training & ~readings.unstable if unstable == "out" else training
+    is_used = _select_fitted(readings, training, unstable)
     conditions = sorted(set(readings.condition[is_used].tolist()))
     is_lower_bound = (
         readings.unstable[is_used] if unstable == "bound" else np.zeros(int(is_used.sum()), bool)

@@ -48,12 +48,15 @@ class Cases:
         Whether the values of a table are random.
     arguments : tuple of str
         Command-line arguments that request the same cases; () for those of the table [sweep].
+    warning : str
+        Warning if some of the cases are invalid; "" otherwise.
     """
 
     axes: tuple[Axis, ...]
     is_table: bool = False
     is_random: bool = False
     arguments: tuple[str, ...] = ()
+    warning: str = ""
 
     def __len__(self) -> int:
         return len(self.axes[0].texts) if self.is_table else prod(self.shape)

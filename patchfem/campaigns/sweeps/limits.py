@@ -67,20 +67,16 @@ class KeyLimit(NamedTuple):
 
 
 def find_limits(table: SweepTable) -> list[KeyLimit]:
-    """Find the limits of the numerical key with the most values.
+    """Find the limits of the numerical key with the most values, as `_choose_axis` chooses it.
 
-    If other keys are swept too, a limit is the smallest one over the values of these keys.
+    If other keys are swept too, a limit is the smallest one over the values of these keys whose first case counts.
     """
-    numbers = [axis for axis, key in enumerate(table.keys) if key.is_number]
-    if not numbers or table.is_random or not table.is_grid:
+    axis = _choose_axis(table)
+    if axis is None:
         return []
-    axis = max(numbers, key=lambda axis: table.shape[axis])
-    key = table.keys[axis]
-    if key.key.startswith(KEYS_WITHOUT_LIMIT) or table.shape[axis] < 2:
-        return []
-
     limits = []
     lines = table.split_lines(axis)
+    key = table.keys[axis]
     along = key.values[lines[0]]
     order = np.argsort(along)
     for name, largest in CHANGE_AT_LIMIT.items():
@@ -93,9 +89,30 @@ def find_limits(table: SweepTable) -> list[KeyLimit]:
             _find_limit_on_line(name, key, along[order], values[line], errors[line], largest)
             for line in lines[:, order]
         ]
-        if None not in on_lines:
-            limits.append(min(on_lines, key=_rank_limit))
+        limits += sorted(filter(None, on_lines), key=_rank_limit)[:1]
     return limits
+
+
+def _choose_axis(table: SweepTable) -> int | None:
+    """Return the index of the key with the most values among the numerical ones of a grid that can have a limit."""
+    if not table.is_grid:
+        return None
+    axes = []
+    for axis, key in enumerate(table.keys):
+        if key.is_number and table.shape[axis] > 1 and not key.key.startswith(KEYS_WITHOUT_LIMIT):
+            axes.append(axis)
+    return max(axes, key=lambda axis: table.shape[axis], default=None)
+
+
+def explain_missing_limits(table: SweepTable) -> str:
+    """Return why no limit is known of a key that can have one; "" without such a key, or without two settled cases."""
+    axis = _choose_axis(table)
+    if axis is None or np.count_nonzero(table.has_settled) < 2:
+        return ""
+    return (
+        f"No limit of {table.keys[axis].key} is known: no measure has a value that counts at the smallest value of this key "
+        "and at another one."
+    )
 
 
 def _find_limit_on_line(

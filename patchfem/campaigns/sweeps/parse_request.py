@@ -8,6 +8,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from difflib import get_close_matches
+from itertools import chain
 from math import prod
 from pathlib import Path
 
@@ -154,8 +155,9 @@ def read_cases(sweep_scene: SweepScene, request: Request) -> Cases:
     elif axes:
         parts.append(Cases(tuple(axes)))
     cases = combine_cases(parts)
-    _require_valid_case(sweep_scene, cases)
-    return replace(cases, arguments=_format_arguments(request, sweep_scene.path.parent))
+    warning = _check_cases(sweep_scene, cases)
+    arguments = _format_arguments(request, sweep_scene.path.parent)
+    return replace(cases, arguments=arguments, warning=warning)
 
 
 def _format_arguments(request: Request, folder: Path) -> tuple[str, ...]:
@@ -206,41 +208,43 @@ def _find_duplicate_keys(sweep_scene: SweepScene, keys: Sequence[str]) -> list[s
     return errors
 
 
-def _require_valid_case(sweep_scene: SweepScene, cases: Cases) -> None:
-    """Raise SceneError if none of the representative cases of a sweep is valid."""
-    messages: dict = {}
-    for number in cases.representative_case_numbers(N_CHECKED):
-        errors = sweep_scene.find_errors(cases.assignments(number))
-        if not errors:
-            return
-        for message in errors:
+def _check_cases(sweep_scene: SweepScene, cases: Cases) -> str:
+    """Validate the representative cases of a sweep.
+
+    Returns
+    -------
+    str
+        Warning if some of them are invalid, because a swept key contradicts another one; "" otherwise.
+
+    Raises
+    ------
+    SceneError
+        If none of them is valid.
+    """
+    numbers = cases.representative_case_numbers(N_CHECKED)
+    errors = [sweep_scene.find_errors(cases.assignments(number)) for number in numbers]
+    invalid = list(filter(None, errors))
+    if not invalid:
+        return ""
+    if len(invalid) == len(numbers):
+        messages: dict = {}
+        for message in chain.from_iterable(invalid):
             # Errors that differ only in their random values are reported once.
             kind = re.sub(NUMBER_PATTERN, "", message) if cases.is_random else message
             messages.setdefault(kind, message)
-    lines = list(messages.values())
-    if len(lines) > MAX_PRINTED:
-        lines = [*lines[:MAX_PRINTED], f"and {len(lines) - MAX_PRINTED} more"]
-    raise SceneError(lines)
+        lines = list(messages.values())
+        if len(lines) > MAX_PRINTED:
+            lines = [*lines[:MAX_PRINTED], f"and {len(lines) - MAX_PRINTED} more"]
+        raise SceneError(lines)
 
-
-def warn_of_invalid_cases(sweep_scene: SweepScene, cases: Cases) -> str:
-    """Return a warning if some of the representative cases of a sweep are invalid; "" otherwise.
-
-    The cause is a swept key that contradicts another key; the warning says how to avoid this.
-    """
-    numbers = cases.representative_case_numbers(N_CHECKED)
-    invalid_cases = list(
-        filter(None, (sweep_scene.find_errors(cases.assignments(number)) for number in numbers))
-    )
-    if not invalid_cases:
-        return ""
-    message = invalid_cases[0][0]
+    # the key that the swept one contradicts is named by the message
+    message = invalid[0][0]
     swept = {sweep_scene.replace_mode_name(axis.key) for axis in cases.axes}
     key = re.search(r"(?:^|: )([a-z_]+(?:\.[\w-]+)+): ", message)
     advice = "give other values in --over"
     if key and sweep_scene.replace_mode_name(key[1]) not in swept:
         advice = f"sweep {key[1]}, too, remove this key from the scene, or {advice}"
-    extent = f"{len(invalid_cases)} of {len(numbers)} cases"
+    extent = f"{len(invalid)} of {len(numbers)} cases"
     if len(numbers) != len(cases):
         extent += " that were checked"
     return f"{extent} will fail: {message}; {advice}"

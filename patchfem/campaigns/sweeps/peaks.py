@@ -1,22 +1,24 @@
 """Peaks of the response over a swept frequency: frequency, height and half-power width.
 
-The peak is that of the parabola of 1/y^2 over f^2 through the largest value and its two neighbours,
-which is exact for a single mode without friction. Its error combines the errors of these cases with
-the differences from polynomials through more cases.
+The peak is the minimum of a cubic spline of 1/y^2 over f^2, which is a parabola for a single mode without friction. Its
+error combines the errors of the cases with the differences from splines of other degrees and from polynomials through
+the cases next to the largest one.
 """
 
 from typing import NamedTuple
 
 import numpy as np
-from numpy.polynomial import Polynomial
+from scipy.interpolate import PPoly, make_interp_spline
 
 from .sweep_table import SweepTable
 
 FREQUENCY_KEY = "drive.frequency"
 HEIGHT_MEASURES = ("relative_displacement_amplitude", "absolute_acceleration_peak")
 MIN_FREQUENCIES = 5  # smallest number of frequencies in which a peak is sought
-DIFFERENCE_FACTOR = 3.0  # safety factor of the differences between interpolating polynomials
-N_NEWTON_STEPS = 3  # number of steps from a root that eigenvalues give to round-off
+DIFFERENCE_FACTOR = 3.0  # safety factor of the differences between interpolating curves
+SPLINE_DEGREES = (3, 2, 4)  # splines through all cases, the best one first
+# Numbers of cases below and above the largest one through which a polynomial goes; a kink changes it most.
+POLYNOMIAL_CASES = ((1, 1), (2, 1), (1, 2))
 MAX_STEADY_ERROR = 0.01  # largest relative error of a steady estimate that counts as a height
 
 
@@ -102,115 +104,75 @@ def locate_peak(frequency: np.ndarray, height: np.ndarray, error: np.ndarray) ->
     SweptPeak or None
         None if the largest value is at an end, or if a neighbour of it does not count.
     """
-    if not np.isfinite(height).any() or frequency.size < MIN_FREQUENCIES:
+    counts = np.isfinite(height)
+    if np.count_nonzero(counts) < MIN_FREQUENCIES:
         return None
     top = int(np.nanargmax(height))
     near = slice(top - 1, top + 2)
-    if not 0 < top < frequency.size - 1 or np.isnan(height[near]).any() or height[top] <= 0:
+    if not 0 < top < frequency.size - 1 or not counts[near].all() or height[top] <= 0:
         return None
     spacing = float(frequency[top + 1] - frequency[top - 1]) / 2
 
-    # Parabola of 1/y^2 over f^2, and polynomials through more cases.
+    # 1/y^2 over f^2, relative to the largest value
     square = frequency**2 - frequency[top] ** 2
     inverse = (height[top] / height) ** 2
-    windows = [(1, 2), (2, 2), (1, 3), (2, 3)]
-    minima = [_find_minimum(square, inverse, top, *window) for window in windows]
-    known = np.array([minimum for minimum in minima if minimum is not None])
-    if minima[0] is None:
-        known = np.vstack([[0.0, 1.0], known.reshape(-1, 2)])
-    frequencies = np.sqrt(frequency[top] ** 2 + known[:, 0])
+    curves = [make_interp_spline(square[counts], inverse[counts], k) for k in SPLINE_DEGREES]
+    for n_below, n_above in POLYNOMIAL_CASES:
+        window = slice(max(top - n_below, 0), top + n_above + 1)
+        if counts[window].all() and counts[window].size == n_below + n_above + 1:
+            degree = n_below + n_above
+            curves.append(make_interp_spline(square[window], inverse[window], degree))
+    shapes = [_find_shape(PPoly.from_spline(curve), square[near]) for curve in curves]
+    known = np.array(list(filter(None, shapes)) or [_Shape(0.0, 1.0, np.nan, np.nan)])
+    frequencies = np.sqrt(frequency[top] ** 2 + known[:, [0, 2, 3]])
     heights = height[top] / np.sqrt(known[:, 1])
-    frequency_error = DIFFERENCE_FACTOR * np.ptp(frequencies)
-    height_error = DIFFERENCE_FACTOR * np.ptp(heights)
-    if len(known) < len(windows):  # a polynomial through other cases shows no peak here
+    widths = frequencies[:, 2] - frequencies[:, 1]
+
+    # The errors of the heights shift each crossing of the half-power level by this fraction of the width.
+    width = widths[0]
+    frequency_error = _estimate_error(frequencies[:, 0])
+    height_error = _estimate_error(heights)
+    if len(known) < len(shapes):  # a curve through other cases shows no peak here
         frequency_error += spacing
         height_error += heights[0] - height[near].min()
-
-    # Frequencies at which the response falls to 1/sqrt(2) of the peak.
-    level = 2 * known[0, 1]
-    below = _find_crossing(square[top::-1], inverse[top::-1], level, frequency[top])
-    above = _find_crossing(square[top:], inverse[top:], level, frequency[top])
-    width = above[0] - below[0]
-    # The errors of the heights shift each crossing by this fraction of the width.
     slack = np.nanmax(error[near]) / height[top] + height_error / heights[0]
     frequency_error += slack * (width if np.isfinite(width) else spacing)
-    width_error = above[1] + below[1] + 2 * width * slack
+    width_error = _estimate_error(widths) + 2 * width * slack
     height_error += np.nanmax(error[near])
-    numbers = (frequencies[0], frequency_error, heights[0], height_error, width, width_error)
+    numbers = (frequencies[0, 0], frequency_error, heights[0], height_error, width, width_error)
     return SweptPeak(*map(float, numbers), spacing)
 
 
-def _find_minimum(
-    square: np.ndarray, inverse: np.ndarray, top: int, n_below: int, n_above: int
-) -> tuple[float, float] | None:
-    """Return place and value of the minimum of the polynomial through cases around the largest value.
+def _estimate_error(values: np.ndarray) -> float:
+    """Return the error of the first of some values (n,), from their differences; NaN for an unknown first value."""
+    return DIFFERENCE_FACTOR * np.nanmax(np.abs(values - values[0]), initial=0.0) + 0 * values[0]
 
-    It is None if there are too few cases, or no minimum above 0 between the neighbours of `top`.
 
-    Parameters
-    ----------
-    square : (m,) array
-        Squares of the frequencies minus that of the case `top` [Hz^2].
-    inverse : (m,) array
-        (y_top / y)^2.
-    top : int
-        Index of the largest value.
-    n_below, n_above : int
-        The polynomial goes through the cases top - n_below to top + n_above - 1.
+class _Shape(NamedTuple):
+    """Minimum of 1/y^2 over the squares of the frequencies.
+
+    place, level: of the minimum; below, above: where 1/y^2 is twice as large on either side, NaN if it is not.
     """
-    low = top - n_below
-    window = slice(low, top + n_above)
-    if low < 0 or top + n_above > square.size or np.isnan(inverse[window]).any():
-        return None
-    polynomial = Polynomial.fit(square[window], inverse[window], n_below + n_above - 1)
-    slope = polynomial.deriv()
-    roots = slope.roots()
-    roots = roots[np.isreal(roots)].real
-    for _ in range(
-        N_NEWTON_STEPS
-    ):  # eigenvalues are inexact where the highest coefficient is small
-        roots = roots - slope(roots) / slope.deriv()(roots)
-    roots = roots[(roots > square[top - 1]) & (roots < square[top + 1])]
-    values = polynomial(roots)
+
+    place: float
+    level: float
+    below: float
+    above: float
+
+
+def _find_shape(curve: PPoly, near: np.ndarray) -> _Shape | None:
+    """Return the minimum of a curve of 1/y^2; None without one above 0 between the neighbours of the largest value.
+
+    `near` (3,) [Hz^2] are the squares of the frequencies of the largest value and of its neighbours.
+    """
+    places = curve.derivative().roots(extrapolate=False)
+    places = places[(places > near[0]) & (places < near[2])]
+    values = curve(places)
     if not values.size or values.min() <= 0:
         return None
-    return float(roots[values.argmin()]), float(values.min())
-
-
-def _find_crossing(
-    square: np.ndarray, inverse: np.ndarray, level: float, peak_frequency: float
-) -> tuple[float, float]:
-    """Return the frequency [Hz] at which 1/y^2 first reaches a level, and its error; NaN if it does not.
-
-    It is the crossing of a parabola through both ends of the interval and a third case; the error comes
-    from a second parabola, or from the straight line.
-
-    Parameters
-    ----------
-    square : (m,) array
-        Squares of the frequencies minus that of the peak case [Hz^2], from the peak outwards.
-    inverse : (m,) array
-        (y_top / y)^2.
-    level : float
-    peak_frequency : float
-        Frequency of the peak case [Hz].
-    """
-    known = np.isfinite(inverse)
-    square = square[known]
-    inverse = inverse[known]
-    above = np.flatnonzero(inverse >= level)
-    if not above.size or above[0] == 0:
-        return np.nan, np.nan
-    k = int(above[0])
-    ends = np.sort(square[k - 1 : k + 1])
-    linear = np.interp(level, inverse[k - 1 : k + 1], square[k - 1 : k + 1])
-    crossings = []
-    for window in (slice(max(k - 2, 0), k + 1), slice(k - 1, k + 2)):
-        if square[window].size == 3:
-            roots = (Polynomial.fit(square[window], inverse[window], 2) - level).roots()
-            roots = roots[np.isreal(roots)].real
-            crossings += roots[(roots >= ends[0]) & (roots <= ends[1])].tolist()
-    if len(crossings) < 2:
-        crossings.append(float(linear))
-    frequencies = np.sqrt(np.array(crossings) + peak_frequency**2)
-    return float(frequencies[0]), DIFFERENCE_FACTOR * float(np.ptp(frequencies))
+    place = float(places[values.argmin()])
+    level = float(values.min())
+    crossings = curve.solve(2 * level, extrapolate=False)
+    below = np.max(crossings[crossings < place], initial=-np.inf)
+    above = np.min(crossings[crossings > place], initial=np.inf)
+    return _Shape(place, level, *(end if np.isfinite(end) else np.nan for end in (below, above)))

@@ -11,7 +11,6 @@ from patchfem.campaigns import (
     SweepScene,
     plan_sweep,
     read_cases,
-    warn_of_invalid_cases,
 )
 
 
@@ -56,7 +55,7 @@ def test_exact_contradiction_in_part_of_range_is_reported(more, count, of, helps
         scene,
         Request(["friction.static=0.2..0.4", "drive.acceleration=8 g..9 g"], None, count, True),
     )
-    message = warn_of_invalid_cases(scene, cases)
+    message = cases.warning
     assert message.startswith(f"{of} will fail: a.toml:" if of else "")
     assert bool(message) == bool(of)
     assert helps in message
