@@ -198,7 +198,8 @@ def describe_channels(channels: list) -> str:
         unit = f" [{channel.unit[:20]}]" if channel.unit else ""
         texts.append(f"{number} '{channel.name[:40]}'{place}{unit}")
     n_unlisted = len(channels) - MAX_LISTED_CHANNELS
-    return ", ".join(texts) + (f" and {n_unlisted} more" if n_unlisted > 0 else "")
+    listed = ", ".join(texts) or "no channel of numbers"
+    return listed + (f" and {n_unlisted} more" if n_unlisted > 0 else "")
 
 
 def make_records(path, values: dict, notes: list, channel_list: str = "") -> Records:

@@ -179,6 +179,26 @@ def test_exact_units_of_dataset_164_are_applied(tmp_path):
     )
 
 
+def test_exact_label_of_a_response_counts_before_dataset_164(tmp_path):
+    """Responses in mm/N, whose labels and dataset 164 both say so, are converted once."""
+    units = {
+        "type": 164,
+        "units_code": 5,
+        "units_description": "mm",
+        "temp_mode": 1,
+        "length": 1000.0,
+        "force": 1.0,
+        "temp": 1.0,
+        "temp_offset": 0.0,
+    }
+    responses = make_responses(8, ordinate_axis_units_lab="mm", orddenom_axis_units_lab="N")
+    for response in responses:
+        response["data"] = 1000 * response["data"]
+    modes = universal.read_universal(write_universal(tmp_path / "a.uff", [units, *responses]))
+    check_modes(modes, 1e-6, 1e-6)
+    assert not modes.notes
+
+
 @pytest.mark.parametrize("response_type", [8, 12])
 def test_exact_modes_are_identified_from_responses(tmp_path, response_type):
     """Receptance, mobility and accelerance with a reversed accelerometer give the modes within 1e-6."""
