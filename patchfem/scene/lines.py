@@ -46,11 +46,40 @@ def split_assignment(text: str) -> tuple[str, str]:
     return key.strip(), values.strip()
 
 
-def find_item(names: Sequence[Any], piece: str) -> int | None:
+def list_item_names(items: Sequence[Any]) -> list[Any]:
+    """Return the name of each table of an array, read or not, or None for an item without it."""
+    return [find_part(item, "name") for item in items]
+
+
+def find_item(items: Sequence[Any], piece: str) -> int | None:
     """Return the index of the item with a name, or with a number counted from 0; None if there is none."""
+    names = list_item_names(items)
     if piece in names:
         return names.index(piece)
     return int(piece) if piece.isdecimal() and int(piece) < len(names) else None
+
+
+def find_part(holder: Any, name: str) -> Any:
+    """Return the value of a key of a table, read or not, or None if there is none."""
+    return holder.get(name) if isinstance(holder, dict) else getattr(holder, name, None)
+
+
+def find_scene_value(scene: Any, key: str) -> tuple[str, Any]:
+    """Find the value of a dotted key in a scene or in its plain values.
+
+    Returns the key with items by number, and the value or None.
+    """
+    value = scene
+    pieces = []
+    for piece in split_key(key):
+        if isinstance(value, list | tuple):
+            index = find_item(value, piece)
+            piece = piece if index is None else str(index)
+            value = None if index is None else value[index]
+        else:
+            value = find_part(value, piece)
+        pieces.append(piece)
+    return ".".join(pieces), value
 
 
 def number_items_from_one(text: str) -> str:

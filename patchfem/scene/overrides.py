@@ -15,7 +15,7 @@ import numpy as np
 from ..effects import find_waveform
 from .files import list_named_files, require_files
 from .keys.contact import MAX_SMALL_ANGLE
-from .lines import find_item, find_key_lines, split_key
+from .lines import find_key_lines, find_scene_value
 from .reader import apply_set
 from .rules.contact import find_max_load
 from .rules.scene_draft import SceneDraft
@@ -160,21 +160,6 @@ def _replace_number(holder: Any, pieces: list[str], value: Any) -> Any:
         return tuple(items)
     new = _replace_number(getattr(holder, name), inner, value) if inner else value
     return holder.model_copy(update={name: new})
-
-
-def find_scene_value(scene: Scene, key: str) -> tuple[str, Any]:
-    """Find the value of a dotted key; return the key with items by number, and the value or None."""
-    value: Any = scene
-    pieces = []
-    for piece in split_key(key):
-        if isinstance(value, tuple):
-            index = find_item([getattr(item, "name", None) for item in value], piece)
-            piece = piece if index is None else str(index)
-            value = None if index is None else value[index]
-        else:
-            value = getattr(value, piece, None)
-        pieces.append(piece)
-    return ".".join(pieces), value
 
 
 def _is_plain(scene: Scene) -> bool:
