@@ -25,6 +25,7 @@ SETS = {
     "accuracy.harmonics": "accuracy.harmonics=9",
     "accuracy.method=harmonic": "accuracy.method=harmonic",
     "accuracy.quadrature=merged": f"{BONDS} {{law}}.reading=report accuracy.quadrature=merged",
+    "bonds that no force can move": f"{BONDS} {{law}}.reading=report {{law}}.order=-0.5",
     "changing load": "{change}",
     "contact.grooves": GROOVES,
     "drive other than a sine": "drive.waveform=step",
@@ -66,6 +67,10 @@ SETS = {
     "shape on the lower piece": (
         "{patch}.tilt.angle=0.1_mrad {patch}.tilt.on=lower"
     ),
+    "shapes on different pieces": (
+        "{patch}.tilt.angle=0.1_mrad {patch}.crown.radius=1_m {patch}.crown.on=lower"
+    ),
+    "single contact point": "",
     "spread of the bonds": f"{BONDS} {{law}}.spread=1_um",
     "structure.bonded.wavelength": (
         "structure.bonded.stiffness=1e5_N/m structure.bonded.wavelength=80_um"
@@ -84,6 +89,7 @@ SINGLE = PAIR[: PAIR.rindex("[[structure.interface]]")]
 PROPERTY = re.compile(r"\\\{.*?\}")
 # More assignments for rows whose scene has, with the assignments of its features alone, those of another row, too.
 MORE_SETS = {
+    "structure.measured=stuck, mode with yaw": "{patch}.strips.count=4",
     "grooves, patch.strips, partial slip": "{law}.law=coulomb",
     "accuracy.harmonics, accuracy.method=harmonic, grooves": "{law}.law=coulomb",
     "wear, patch.strips, partial slip": "{law}.law=coulomb",
@@ -94,7 +100,7 @@ REDUCED = POINT_RIG[: POINT_RIG.index("[structure]")] + (
     '[structure.reduced]\nstiffness = "k.mtx"\nmass = "m.mtx"\nboundary = [1, 2]\nslide = [1, 0]\n'
     + LINEAR[LINEAR.index("[drive]") :]
 )
-POINT_FEATURES = {"load on a point", "normal.amplitude", "normal.grooves"}
+POINT_FEATURES = {"load on a point", "single contact point", "normal.amplitude", "normal.grooves"}
 MASS_FEATURES = {"interface", "several interfaces", "structure.interface", "patches of interfaces"}
 
 

@@ -1,7 +1,7 @@
 """Print the mistakes of 1000 randomly changed scenes as JSON, to compare two releases.
 
-Run it with each release: `PYTHONPATH=tests/support python tests/support/faulty_scenes.py > now.json`. A row holds the text of a
-scene and the lines of its mistakes; a scene without mistakes has none.
+Run it with each release: `PYTHONPATH=tests/support python tests/support/faulty_scenes.py > now.json`. A row holds the text
+of a scene and the lines of its mistakes; a scene without mistakes has none.
 """
 
 import json

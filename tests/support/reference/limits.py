@@ -135,6 +135,7 @@ MEANINGS = {  # Feature of a combination that is neither a key nor a law -> its 
     "bench": "`[slide]`",
     "rig": "`[drive]` with `[friction]` or `[[structure.interface]]`",
     "load on a point": "`[normal]`",
+    "single contact point": "in a rig: `[normal]`",
     "drive other than a sine": "`drive.waveform` other than `sine`, unless `drive.kind` is `free`",
     "levels or sweep in time": "`drive.waveform` is `levels` or `sweep`, and `accuracy.method` is not `harmonic`",
     "sensor apart from the output": "`accelerometer` or `gauge` of a `[[structure.mode]]` differs from its `output`",
@@ -144,6 +145,7 @@ MEANINGS = {  # Feature of a combination that is neither a key nor a law -> its 
     "mode with yaw": "`yaw` of a `[[structure.mode]]` is not 0",
     "kinetic below static": "law that sticks rigidly, with `kinetic` less than `static`",
     "spread of the bonds": f"`spread` of law {name_laws_with_key('spread')}".replace(" and ", " or "),
+    "bonds that no force can move": "law nonlocal with reading 'report', -1 < `order` < 0 and `initial_bonds` > 0",
     "sum over all bonds": "law nonlocal with reading 'report', or with an `order` other than 1",
     "sum over all stretched bonds": "law nonlocal with reading 'stretch' and an `order` other than 1",
     "sum by recursion": "law nonlocal with reading 'stretch' and order 1",
@@ -151,6 +153,8 @@ MEANINGS = {  # Feature of a combination that is neither a key nor a law -> its 
     "patch that slips as a whole": "no partial slip",
     "partial slip": "`[patch.shear]`, `patch.asperities.tangential_ratio` or `patch.holder.tangential_stiffness`",
     "shape on the lower piece": "`on` is `lower` in " + join_words(SHAPES, "or"),
+    "patch without strips": "no `[contact.strips]`",
+    "shapes on different pieces": "`on` is `upper` in one and `lower` in another of " + join_words(SHAPES, "and"),
     "strips that slip together": "`[patch.strips]` on a bench, without `[patch.shear]`, with "
     "`patch.asperities.tangential_ratio` or `patch.holder.tangential_stiffness`, or under another law than "
     + join_words(STRIP_LAWS, "or"),
