@@ -17,7 +17,6 @@ from .measured import UNIVERSAL_EXTENSIONS
 from .records import (
     Channel,
     Records,
-    check_file,
     select_channels,
 )
 from .tables import NUMBER_PATTERN, has_decimal_comma, parse_number, read_text
@@ -116,7 +115,6 @@ def _read_matlab(path: Path, requests: list) -> Records:
 
     Only real arrays are read; nothing in the file is executed.
     """
-    check_file(path, "save fewer variables or a part of the record")
     channels = []
     for name, values in matlab.read_real_arrays(path).items():
         if values.ndim != 2:

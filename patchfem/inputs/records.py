@@ -11,7 +11,7 @@ import numpy as np
 from ..core import Missing, PatchfemError, frozen_array
 from .units import CHANNEL_UNITS, SI_UNITS, find_unit_factor
 
-MAX_BYTES = 256 * 2**20  # largest size of a file of records in bytes
+MAX_BYTES = 512 * 2**20  # largest size of a file of records or of a MATLAB file in bytes
 MAX_LISTED_CHANNELS = 12  # largest number of channels that an error message lists
 _REQUEST_PATTERN = re.compile(r"\s*(\w+)\s*=\s*(.+?)\s*(?:\[\s*([^\[\]]+?)\s*\])?\s*", re.S)
 

@@ -93,7 +93,7 @@ REFUSED = [
     ),
 ]
 PLAIN = [
-    (RIG, [SHEAR, "friction.static=0"], "friction.static", "static: must be > 0 with"),
+    (RIG, [SHEAR, "friction.static=0"], "friction.static", "static = 0 with"),
     (
         RIG,
         ["accuracy.method=exact", PLASTIC, SHEAR, "structure.mode.second.pitch=1 rad/m"],

@@ -24,8 +24,10 @@ WEAR = "wear.coefficient=1e-14_m^2/N wear.cycles=1000"
 SETS = {
     "accuracy.harmonics": "accuracy.harmonics=9",
     "accuracy.method=harmonic": "accuracy.method=harmonic",
+    "accuracy.quadrature=recursion": "accuracy.quadrature=recursion",
     "accuracy.quadrature=merged": f"{BONDS} {{law}}.reading=report accuracy.quadrature=merged",
     "bonds that no force can move": f"{BONDS} {{law}}.reading=report {{law}}.order=-0.5",
+    "bonds of a given stiffness": "{law}.law=elastic-plastic {law}.stiffness=1e7_N/m",
     "changing load": "{change}",
     "contact.grooves": GROOVES,
     "drive other than a sine": "drive.waveform=step",
@@ -47,6 +49,7 @@ SETS = {
     "mode with heave or pitch": "structure.mode.second.pitch=1_rad/m",
     "mode with yaw": "structure.mode.second.yaw=1_rad/m",
     "named method of the sum": f"{BONDS} accuracy.quadrature=direct",
+    "no friction": "{law}.static=0",
     "normal.amplitude": "normal.amplitude=5_N normal.frequency=50_Hz",
     "normal.grooves": GROOVES,
     "partial slip": "{patch}.shear={{}}",

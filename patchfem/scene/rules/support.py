@@ -21,6 +21,7 @@ from ...effects import (
     law_has_trait,
     law_supports,
     law_takes_key,
+    law_takes_stiffness_or_length,
     needs_bond_list,
     suggest_laws,
 )
@@ -232,6 +233,10 @@ FEATURES = {
         "{table_key}.kinetic",
         "{kinetic:g} below static = {static:g}",
     ),
+    "no friction": Feature(lambda j: j.static == 0, "{table_key}.static", "static = 0"),
+    "bonds of a given stiffness": Feature(
+        lambda j: j.stiffness and law_takes_stiffness_or_length(j.law), "{table_key}.stiffness"
+    ),
     "spread of the bonds": Feature(
         lambda j: j.spread and law_takes_key(j.law, "spread"), "{table_key}.spread"
     ),
@@ -344,7 +349,9 @@ COMBINATIONS = {
         "shape on the lower piece, interface",
         "shape on the lower piece, grooves",
     ),
+    "use 'auto' or 'merged'": ("accuracy.quadrature=recursion, sum over all bonds",),
     "use 'recursion' or 'auto'": (
+        "named method of the sum, sum by recursion, partial slip",
         "named method of the sum, rig, sum by recursion, shape on the lower piece",
         "named method of the sum, grooves",
     ),
@@ -355,6 +362,13 @@ COMBINATIONS = {
     f"leave out {{compliance}}, or {suggest_laws('pieces', 'shear')}": (
         "law without elements, partial slip",
     ),
+    "give bond_length in place of stiffness": (
+        "bonds of a given stiffness, changing load",
+        "bonds of a given stiffness, normal.amplitude",
+        "bonds of a given stiffness, grooves",
+        "bonds of a given stiffness, patch.approach",
+    ),
+    "raise static or leave out {compliance}": ("no friction, partial slip",),
     "put all shapes on one piece": ("shapes on different pieces",),
     "add [contact.strips], whose strips slide independently": (
         "mode with yaw, rig, patch without strips",
