@@ -20,6 +20,7 @@ from .reader import apply_set
 from .rules.contact import find_max_load
 from .rules.scene_draft import SceneDraft
 from .rules.structure import MAX_USUAL_DAMPING
+from .rules.together import holds
 from .rules.view import TableView
 from .scene import Scene, finish_scene
 
@@ -44,6 +45,20 @@ PLAIN_KEYS = {
     "structure.mode.frequency": inf,
     "structure.mode.damping": MAX_USUAL_DAMPING,
 }
+
+
+# Scenes in which PLAIN_KEYS holds, as conditions of `rules.together`: a loaded patch, alone or in a rig, or a rig with one
+# contact point. The rig has modes and a sinusoidal base motion.
+_LOADED = "!wear & contact.load & !contact.load_line & !contact.strips & !contact.grooves & !contact.holder"
+_MOVED = (
+    "kind=rig & !wear & structure.mode & !structure.interface & !structure.measured=stuck & drive.kind=base & "
+    "!drive.duration & !friction.temperature & !friction.spread"
+)
+PLAIN_SCENES = (
+    f"kind=patch & {_LOADED}",
+    f"{_MOVED} & {_LOADED} & !structure.bonded",
+    f"{_MOVED} & normal & !normal.grooves",
+)
 
 
 class BaseScene:
@@ -107,7 +122,7 @@ class BaseScene:
             "friction", {}
         )
         is_reduced = scene.structure is not None and scene.structure.reduced is not None
-        if has_own_kinetic or is_reduced or not _is_plain(scene):
+        if has_own_kinetic or is_reduced or not _is_plain(self._draft, scene):
             return None
         limits = dict(_find_plain_key(scene, key) for key in keys)
         # Two keys may name the same number, one of them by the name of its mode.
@@ -162,35 +177,13 @@ def _replace_number(holder: Any, pieces: list[str], value: Any) -> Any:
     return holder.model_copy(update={name: new})
 
 
-def _is_plain(scene: Scene) -> bool:
-    """Return whether PLAIN_KEYS holds in a scene.
-
-    Such a scene is a loaded patch, alone or in a rig, or a rig with one contact point. The rig has modes and a sinusoidal
-    base motion. There is no wear, load line, holder, strip or groove, no law with a temperature, and no file, but for that
-    of [measured] with a patch.
-    """
-    contact = TableView(scene.contact)
+def _is_plain(draft: SceneDraft, scene: Scene) -> bool:
+    """Return whether PLAIN_KEYS holds in a scene that is read from a draft."""
     names = [key for key, _ in list_named_files(scene)]
-    has_files = names not in ([], ["measured.file"]) or (names and scene.normal)
-    if scene.kind not in ("patch", "rig") or scene.wear or has_files:
+    if names not in ([], ["measured.file"]) or (names and scene.normal):
         return False
-    if scene.normal:
-        is_loaded = scene.kind == "rig" and not scene.contact and not scene.normal.grooves
-    else:
-        is_coupled = contact.load_line or contact.strips or contact.grooves or contact.holder
-        is_loaded = contact.load and not is_coupled
-    if scene.kind == "patch" or not is_loaded:
-        return bool(is_loaded)
-
-    # The motion of the rig.
-    law = TableView(scene.friction)
-    structure = scene.structure
-    drive = scene.drive
-    has_modes = structure.mode and not structure.interface and structure.measured == "free"
-    has_sine = drive.kind == "base" and find_waveform(drive).is_sine and drive.duration is None
-    is_linear = scene.normal or not structure.bonded
-    has_plain_law = law.law and not law.temperature and not law.spread
-    return bool(has_modes and has_sine and is_linear and has_plain_law)
+    is_moved_by_sine = scene.kind == "patch" or find_waveform(scene.drive).is_sine
+    return is_moved_by_sine and any(holds(draft, scene.kind, row) for row in PLAIN_SCENES)
 
 
 def _find_plain_key(scene: Scene, key: str) -> tuple[str | None, float]:

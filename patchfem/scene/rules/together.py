@@ -9,6 +9,8 @@ selectors stands in `keys.choices`, and what no run can compute together in `sup
 
 from __future__ import annotations
 
+import re
+
 from .contact import iterate_patches
 from .outlines import END_KEYS, PIECE_NAMES
 from .scene_draft import SceneDraft
@@ -137,13 +139,17 @@ def check_together(draft: SceneDraft, kind: str) -> None:
     ):
         for condition, sentence in rows.items():
             for patch in patches if "patch." in condition else [""]:
-                clauses = condition.replace("patch.", f"{patch}.").split(" & ")
-                key = clauses[0].lstrip("!").partition("=")[0]
-                if all(_holds(draft, kind, clause) for clause in clauses):
-                    report(key, sentence)
+                condition_here = condition.replace("patch.", f"{patch}.")
+                if holds(draft, kind, condition_here):
+                    report(re.match("!?([\\w.]+)", condition_here)[1], sentence)
 
 
-def _holds(draft: SceneDraft, kind: str, clause: str) -> bool:
+def holds(draft: SceneDraft, kind: str, condition: str) -> bool:
+    """Return whether all clauses of a condition hold in a scene of a kind."""
+    return all(_clause_holds(draft, kind, clause) for clause in condition.split(" & "))
+
+
+def _clause_holds(draft: SceneDraft, kind: str, clause: str) -> bool:
     """Return whether one clause of a condition holds."""
     keys, _, words = clause.lstrip("!").partition("=")
     values = words.split("|") if words else []
