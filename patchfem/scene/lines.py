@@ -99,12 +99,18 @@ def locate_key(path: str | Path, text: str, key: str) -> str:
     text : str
         Its content.
     key : str
-        Dotted key. Its table stands in for a key that is not written; without its table there is no line.
+        Dotted key. The nearest table above stands in for a key that is not written; without any there is no line.
     """
-    lines = find_key_lines(text)
-    line = lines.get(key) or lines.get(key.rpartition(".")[0])
+    line = find_line(find_key_lines(text), key)
     place = f"{path}:{line}" if line else path
     return f"{place}: {number_items_from_one(key)}"
+
+
+def find_line(lines: dict[str, int], key: str) -> int:
+    """Return the line of a key, or of the nearest table above it that has one; 0 if there is none."""
+    while key and key not in lines:
+        key = key.rpartition(".")[0]
+    return lines.get(key, 0)
 
 
 class TooManyKeyParts(ValueError):

@@ -11,7 +11,7 @@ from ...exceptions import PatchfemError
 from ..keys.lookup import describe_missing_key, find_key
 from ..keys.tables import Tables
 from ..keys.types import build_table
-from ..lines import number_items_from_one
+from ..lines import find_line, number_items_from_one
 from .view import TableView
 
 # Sort order of mistakes in --set, which are listed after those of all lines of a file.
@@ -143,11 +143,9 @@ class SceneDraft:
 
     def _locate(self, key: str) -> tuple[int, str]:
         """Return the sort order of a mistake and the text that locates it, such as FILE:LINE."""
-        pieces = key.split(".")
-        paths = [".".join(pieces[:count]) for count in range(len(pieces), 0, -1)]
-        if self.sets.intersection(paths):
+        if find_line(dict.fromkeys(self.sets, 1), key):
             return SET_MISTAKE_ORDER, "--set"
-        line = next((self.lines[path] for path in paths if path in self.lines), 0)
+        line = find_line(self.lines, key)
         return line, f"{self.path}:{line}" if line else self.path
 
     def _add(self, order: int, location: str, text: str) -> None:
