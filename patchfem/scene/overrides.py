@@ -49,15 +49,15 @@ PLAIN_KEYS = {
 
 # Scenes in which PLAIN_KEYS holds, as conditions of `rules.together`: a loaded patch, alone or in a rig, or a rig with one
 # contact point. The rig has modes and a sinusoidal base motion.
-_LOADED = "!wear & contact.load & !contact.load_line & !contact.strips & !contact.grooves & !contact.holder"
-_MOVED = (
+_LOADED_PATCH = "!wear & contact.load & !contact.load_line & !contact.strips & !contact.grooves & !contact.holder"
+_MOVED_BASE = (
     "kind=rig & !wear & structure.mode & !structure.interface & !structure.measured=stuck & drive.kind=base & "
     "!drive.duration & !friction.temperature & !friction.spread"
 )
 PLAIN_SCENES = (
-    f"kind=patch & {_LOADED}",
-    f"{_MOVED} & {_LOADED} & !structure.bonded",
-    f"{_MOVED} & normal & !normal.grooves",
+    f"kind=patch & {_LOADED_PATCH}",
+    f"{_MOVED_BASE} & {_LOADED_PATCH} & !structure.bonded",
+    f"{_MOVED_BASE} & normal & !normal.grooves",
 )
 
 

@@ -146,13 +146,13 @@ def _suggest_name(
     fitting = [name for name in free if _accepts_value(model, name, raw[key])]
     lacking = [name for name in _list_needed_keys(model, raw) if name in fitting]
     words = set(key.lower().split("_"))
-    related = [
-        name for name in fitting if words & set(name.split("_")) or name.startswith(key.lower())
-    ]
+    related = [name for name in fitting if words & set(name.split("_"))]
+    begun = [name for name in fitting if name.startswith(key.lower())]
     return next(
         chain(
             _list_similar(key, fitting),
             related,
+            begun,
             lacking if len(lacking) == 1 or not is_set else (),
             _list_similar(key, free),
             _list_similar(key, written & list_keys(model).keys()),
@@ -164,9 +164,8 @@ def _suggest_name(
 def _suggest_table(model: type[Table], key: str, value: Any) -> str:
     """Return the table of the same or a similar name, or one that knows most of the keys inside; "" for none."""
     inside = set(value[0] if isinstance(value, list) else value)
-    tables = {
-        name: inner for name, inner in list_inner_tables(model).items() if name.count(".") <= 1
-    }
+    inner = list_inner_tables(model)
+    tables = {name: inner[name] for name in inner if name.count(".") <= 1}
     similar = _list_similar(key, tables)
 
     def rate(name: str) -> float:

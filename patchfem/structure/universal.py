@@ -188,12 +188,11 @@ def _fit_responses(datasets: list, factors: dict | None) -> MeasuredModes:
         derivative = _check_response(dataset, name, frequency)
         sign_out, place = _find_direction(dataset["rsp_node"], dataset["rsp_dir"])
         sign_in, reference = _find_direction(dataset["ref_node"], dataset["ref_dir"])
-        scale_out, scale_in = (
-            find_axis_scale(dataset, axis, factors) for axis in ("ordinate", "orddenom")
-        )
-        for unit in (axis.unit for axis in (scale_out, scale_in) if not axis.is_stated):
-            note = f"structure.file: the unit label '{unit}' is not known; the values are taken as {default_unit}"
-            if unit and note not in notes:
+        scale_out = find_axis_scale(dataset, "ordinate", factors)
+        scale_in = find_axis_scale(dataset, "orddenom", factors)
+        for axis in (scale_out, scale_in):
+            note = f"structure.file: the unit label '{axis.unit}' is not known; the values are taken as {default_unit}"
+            if axis.unit and not axis.is_stated and note not in notes:
                 notes.append(note)
         scale = sign_out * sign_in * scale_out.factor / scale_in.factor
         measured[place, reference] = (scale * np.asarray(dataset["data"]), derivative)

@@ -12,8 +12,8 @@ from torture import grammar, scenes
 from torture.toml import to_toml
 from torture.trial import Trial
 
+from patchfem import SceneError
 from patchfem.scene import loads
-from patchfem.scene.scene import SceneError
 
 SEED = 98790002
 COUNT = 1000

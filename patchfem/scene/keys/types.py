@@ -148,7 +148,15 @@ def whole_number(low: int, high: int) -> Any:
 
 
 def array(kind: Any, least: int = 1, most: int | None = None) -> Any:
-    """Return the type of a key that holds an array of at least `least` and at most `most` values or tables."""
+    """Return the type of a key that holds an array.
+
+    Parameters
+    ----------
+    kind
+        Type of a value, or class of a table.
+    least, most : int
+        Smallest and largest number of items; None for any.
+    """
     return Annotated[tuple[kind, ...], Field(min_length=least or None, max_length=most)]
 
 

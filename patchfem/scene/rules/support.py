@@ -134,9 +134,8 @@ class Joint(TableFacts):
     def opposite_shape(self) -> str:
         """Key of a shape on another piece than the shapes before it, the last one that is written; "" for none."""
         shapes = self.contact.table.shapes if self.contact else {}
-        sides = {
-            f"{self.patch_key}.{name}.on": shape.on for name, shape in shapes.items() if shape.on
-        }
+        placed = {name: shape.on for name, shape in shapes.items() if shape.on}
+        sides = {f"{self.patch_key}.{name}.on": side for name, side in placed.items()}
         if len(set(sides.values())) < 2:
             return ""
         return next(filter(self.draft.has, reversed(sides)), next(iter(sides)))

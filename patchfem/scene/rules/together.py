@@ -145,7 +145,16 @@ def check_together(draft: SceneDraft, kind: str) -> None:
 
 
 def holds(draft: SceneDraft, kind: str, condition: str) -> bool:
-    """Return whether all clauses of a condition hold in a scene of a kind."""
+    """Return whether all clauses of a condition hold in a scene.
+
+    Parameters
+    ----------
+    draft : SceneDraft
+    kind : str
+        Kind of the scene.
+    condition : str
+        Clauses as in the rows of this module.
+    """
     return all(_clause_holds(draft, kind, clause) for clause in condition.split(" & "))
 
 
