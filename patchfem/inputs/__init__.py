@@ -57,6 +57,8 @@ PUBLIC = {
     "universal": (
         "FunctionType",
         "OrdinateType",
+        "find_axis_scale",
+        "find_unit_factors",
         "read_datasets",
     ),
 }

@@ -5,7 +5,6 @@ tabs between the cells. Of a MATLAB file, the user names a variable, a field of 
 either for each quantity, with its unit.
 """
 
-import re
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -18,20 +17,15 @@ from .measured import UNIVERSAL_EXTENSIONS
 from .records import (
     Channel,
     Records,
-    RequestedChannel,
-    check_file,
-    make_records,
     select_channels,
 )
 from .tables import NUMBER_PATTERN, has_decimal_comma, parse_number, read_text
-from .units import CHANNEL_UNITS, find_unit_factor
+from .units import CHANNEL_UNITS
 
 EXTENSIONS = (*UNIVERSAL_EXTENSIONS, ".mat", ".csv", ".txt")
 # Channels that every motion of `patchfem export` has.
 MOTION_CHANNELS = {"absolute_acceleration", "base_acceleration"}
-MAX_COLUMNS = 1000  # largest number of columns in a table
-MAX_LISTED_ARRAYS = 20  # largest number of arrays of a MATLAB file that an error message lists
-_COLUMN_PATTERN = re.compile(r"([\w.]+)\(:,\s*([1-9][0-9]*)\)")
+MAX_COLUMNS = 1000  # largest number of columns in a table or an array
 
 
 def read_records(path, requests: list, exported_names: Mapping = EXPORTED_NAMES) -> Records:
@@ -121,54 +115,17 @@ def _read_matlab(path: Path, requests: list) -> Records:
 
     Only real arrays are read; nothing in the file is executed.
     """
-    check_file(path, "save fewer variables or a part of the record")
-    arrays = matlab.read_real_arrays(path)
-    described = [
-        f"{name} {_format_shape(arrays[name])}" for name in list(arrays)[:MAX_LISTED_ARRAYS]
-    ]
-    contents = ", ".join(described) or (
-        "no array of numbers (objects, and structures with several elements, cannot be read)"
-    )
-    if not requests:
-        raise PatchfemError(
-            f'{path}: assign the variables of the file, such as --map "time=t [s]" --map '
-            f'"force=F [N]"; the file contains {contents}'
-        )
-    requests = sorted(requests, key=lambda request: request.quantity != "time")
-    values = {
-        request.quantity: _select_values(path, arrays, request, contents) for request in requests
-    }
-    return make_records(path, values, [])
-
-
-def _select_values(path, arrays: dict, request: RequestedChannel, contents: str) -> np.ndarray:
-    """Return the values (k,) of a requested variable or column in SI."""
-    match = _COLUMN_PATTERN.fullmatch(request.source)
-    name = match[1] if match else request.source
-    if name not in arrays:
-        raise PatchfemError(f"{path}: no variable '{name[:40]}'; the file contains {contents}")
-    if not request.unit:
-        raise PatchfemError(
-            f"--map {request.quantity}={request.source}: a .mat file has no units; write the unit, such "
-            f'as "{request.quantity}={request.source} [unit]"'
-        )
-    values = arrays[name]
-    if match is None:
-        if values.ndim != 2 or min(values.shape) != 1:
-            raise PatchfemError(
-                f"{path}: {name} is {_format_shape(values)}; choose a column such as {name}(:,1)"
-            )
-        values = values.ravel()
-    else:
-        column = int(match[2])
-        if values.ndim != 2 or column > values.shape[1]:
-            raise PatchfemError(
-                f"{path}: {name} is {_format_shape(values)}, so it has no column {column}"
-            )
-        values = values[:, column - 1]
-    return values * find_unit_factor(request.quantity, request.unit)
-
-
-def _format_shape(array) -> str:
-    """Return the shape of an array in words, such as 51x2."""
-    return "x".join(map(str, array.shape))
+    channels = []
+    for name, values in matlab.read_real_arrays(path).items():
+        if values.ndim != 2:
+            continue
+        if 1 in values.shape:
+            channels.append(Channel(name, "", "", "", values.ravel()))
+        if len(values) > 1:
+            columns = values.T[:MAX_COLUMNS]
+            channels += [
+                Channel(f"{name}(:,{number})", "", "", "", column)
+                for number, column in enumerate(columns, 1)
+            ]
+    requests = [request._replace(source=request.source.replace(" ", "")) for request in requests]
+    return select_channels(path, channels, requests, [])

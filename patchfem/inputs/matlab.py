@@ -12,10 +12,9 @@ from pathlib import Path
 import numpy as np
 from scipy import sparse
 
-from ..core import PatchfemError
 from .damage import refuse_damage
+from .records import check_file
 
-MAX_BYTES = 512 * 2**20  # largest size of a MATLAB file in bytes
 MAX_NESTING = 8  # largest depth of nested structures
 # Signature at the beginning of an HDF5 file, or after the user block that MATLAB puts there.
 HDF5_SIGNATURE = b"\x89HDF\r\n\x1a\n"
@@ -42,13 +41,10 @@ def read_variables(path, data: bytes | None = None) -> dict[str, np.ndarray | sp
     OSError
         If the file cannot be opened.
     PatchfemError
-        If it is damaged, too large or no MATLAB file.
+        If there is no file, or if it is damaged, too large or no MATLAB file.
     """
     if data is None:
-        if Path(path).stat().st_size > MAX_BYTES:
-            raise PatchfemError(
-                f"{path}: more than {MAX_BYTES >> 20} MiB; save only the variables that are needed"
-            )
+        check_file(Path(path), "save only the variables that are needed")
         data = Path(path).read_bytes()
     is_hdf5 = data.startswith((HDF5_SIGNATURE, b"MATLAB 7.3")) or data[512:520] == HDF5_SIGNATURE
     arrays = {}

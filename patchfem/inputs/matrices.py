@@ -81,8 +81,7 @@ def estimate_rounding(values) -> MatrixRounding | None:
     """
     data = values.data
     size = np.abs(data)
-    samples = np.unique(size[:: max(1, data.size // (20 * N_SAMPLED_NUMBERS))])
-    samples = samples[samples > 0]
+    samples = np.unique(size[size > 0])
     samples = samples[:: max(1, samples.size // N_SAMPLED_NUMBERS)]
     if samples.size < MIN_DISTINCT_NUMBERS:
         return None

@@ -11,7 +11,7 @@ import numpy as np
 from ..core import Missing, PatchfemError, frozen_array
 from .units import CHANNEL_UNITS, SI_UNITS, find_unit_factor
 
-MAX_BYTES = 256 * 2**20  # largest size of a file of records in bytes
+MAX_BYTES = 512 * 2**20  # largest size of a file of records or of a MATLAB file in bytes
 MAX_LISTED_CHANNELS = 12  # largest number of channels that an error message lists
 _REQUEST_PATTERN = re.compile(r"\s*(\w+)\s*=\s*(.+?)\s*(?:\[\s*([^\[\]]+?)\s*\])?\s*", re.S)
 
@@ -198,7 +198,8 @@ def describe_channels(channels: list) -> str:
         unit = f" [{channel.unit[:20]}]" if channel.unit else ""
         texts.append(f"{number} '{channel.name[:40]}'{place}{unit}")
     n_unlisted = len(channels) - MAX_LISTED_CHANNELS
-    return ", ".join(texts) + (f" and {n_unlisted} more" if n_unlisted > 0 else "")
+    listed = ", ".join(texts) or "no channel of numbers"
+    return listed + (f" and {n_unlisted} more" if n_unlisted > 0 else "")
 
 
 def make_records(path, values: dict, notes: list, channel_list: str = "") -> Records:

@@ -7,6 +7,7 @@ precision.
 
 from enum import IntEnum
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -99,18 +100,24 @@ def make_channels(path, datasets: list, notes: list) -> list[Channel]:
     PatchfemError
         If a record or the factors of dataset 164 cannot be used.
     """
-    factors = next((dataset for dataset in datasets if dataset["type"] == 164), None)
-    if factors is not None and not min(factors["length"], factors["force"]) > 0:
-        raise PatchfemError(
-            f"{path}: the unit factors of dataset 164 must be > 0, not {factors['length']:g} and "
-            f"{factors['force']:g}"
-        )
+    factors = find_unit_factors(path, datasets)
     functions = [dataset for dataset in datasets if dataset["type"] == 58]
     return [
         _make_channel(path, number, dataset, factors, notes)
         for number, dataset in enumerate(functions, 1)
         if _is_record(dataset)
     ]
+
+
+def find_unit_factors(path, datasets: list) -> dict | None:
+    """Return dataset 164, whose `length` and `force` are units of the file per SI unit; None without it."""
+    factors = next((dataset for dataset in datasets if dataset["type"] == 164), None)
+    if factors is not None and not min(factors["length"], factors["force"]) > 0:
+        raise PatchfemError(
+            f"{path}: the unit factors of dataset 164 must be > 0, not {factors['length']:g} and "
+            f"{factors['force']:g}"
+        )
+    return factors
 
 
 def _is_record(dataset: dict) -> bool:
@@ -132,18 +139,14 @@ def _make_channel(path, number: int, dataset: dict, factors: dict | None, notes:
         raise PatchfemError(
             f"{location}: {values.size} values, but {dataset['num_pts']} are announced; the file is damaged"
         )
-    quantity = find_quantity(int(dataset["ordinate_spec_data_type"]))
-    unit = normalize_unit(_clean_text(dataset["ordinate_axis_units_lab"]))
-    factor = None
-    if quantity and unit not in CHANNEL_UNITS[quantity]:
-        factor = 1.0
+    scale = find_axis_scale(dataset, "ordinate", factors)
+    quantity = scale.quantity
+    if quantity and not scale.is_stated and (scale.unit or factors is None):
+        reason = f"its unit '{scale.unit[:20]}' is not known" if scale.unit else "it has no unit"
         remedy = "its values are read as SI; if they are in another unit, name this unit with --map"
         if factors is not None:
-            factor = 1.0 / factors["force" if quantity == "force" else "length"]
             remedy = "the unit of dataset 164 is used"
-        if unit or factors is None:
-            reason = f"its unit '{unit[:20]}' is not known" if unit else "it has no unit"
-            notes.append(f"record {number} ({quantity}): {reason}; {remedy}")
+        notes.append(f"record {number} ({quantity}): {reason}; {remedy}")
     direction = int(dataset["rsp_dir"])
     axis = _format_direction(direction)
     if direction < 0:
@@ -151,14 +154,46 @@ def _make_channel(path, number: int, dataset: dict, factors: dict | None, notes:
         values = -values
     name = _clean_text(dataset["id1"]) or f"record {number}"
     place = f"{int(dataset['rsp_node'])}:+{axis}" if direction else ""
-    return Channel(name, place, quantity, unit, values, time, factor)
+    factor = scale.factor if quantity and not scale.is_stated else None
+    return Channel(name, place, quantity, scale.unit, values, time, factor)
 
 
-def find_quantity(ordinate_type: int) -> str:
-    """Return the quantity of a data type, or "" for an unknown type."""
-    if ordinate_type not in list(OrdinateType):
-        return ""
-    return OrdinateType(ordinate_type).name.lower().removeprefix("excitation_")
+class AxisScale(NamedTuple):
+    """Unit of the values along an axis of dataset 58.
+
+    quantity: what its data type says, or ""; unit: its label, or ""; factor: to SI, from the label if it is a unit of
+    the quantity (is_stated), else from dataset 164, else 1.
+    """
+
+    quantity: str
+    unit: str
+    factor: float
+    is_stated: bool
+
+
+def find_axis_scale(dataset: dict, axis: str, factors: dict | None) -> AxisScale:
+    """Find the unit of an axis.
+
+    Parameters
+    ----------
+    dataset : dict
+        Dataset 58.
+    axis : {"ordinate", "orddenom"}
+    factors : dict or None
+        Dataset 164 of the file.
+    """
+    kind = int(dataset[f"{axis}_spec_data_type"])
+    quantity = ""
+    if kind in list(OrdinateType):
+        quantity = OrdinateType(kind).name.lower().removeprefix("excitation_")
+    unit = normalize_unit(_clean_text(dataset[f"{axis}_axis_units_lab"]))
+    known = CHANNEL_UNITS.get(quantity, {})
+    if unit in known:
+        return AxisScale(quantity, unit, known[unit], True)
+    factor = 1.0
+    if quantity and factors is not None:
+        factor = 1 / factors["force" if quantity == "force" else "length"]
+    return AxisScale(quantity, unit, factor, False)
 
 
 def _format_direction(direction: int) -> str:

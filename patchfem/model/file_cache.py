@@ -2,28 +2,34 @@
 
 from collections.abc import Callable
 from functools import lru_cache, wraps
+from pathlib import Path
 
 # Number of cached results of each function; results for large traces and modes take much memory.
 MAX_CACHED_RESULTS = 8
 
 
 def cache_by_file(function: Callable) -> Callable:
-    """Cache the results of a function whose first argument is a path.
+    """Cache the results of a function whose first argument is a path or a tuple of paths.
 
     A file that has changed its size or its time of modification is read again. Further arguments must
     be hashable, and are passed by position.
     """
 
     @lru_cache(MAX_CACHED_RESULTS)
-    def call_cached(path, _version, *arguments):
-        return function(path, *arguments)
+    def call_cached(paths, _versions, *arguments):
+        return function(paths, *arguments)
 
     @wraps(function)
-    def read_cached(path, *arguments):
-        version = None
-        if path.exists():
-            stat = path.stat()
-            version = (stat.st_mtime_ns, stat.st_size)
-        return call_cached(path, version, *arguments)
+    def read_cached(paths, *arguments):
+        versions = map(_find_version, paths if isinstance(paths, tuple) else (paths,))
+        return call_cached(paths, tuple(versions), *arguments)
 
     return read_cached
+
+
+def _find_version(path: Path) -> tuple[int, int] | None:
+    """Return time of modification [ns] and size [bytes] of a file, or None if there is none."""
+    if not path.exists():
+        return None
+    stat = path.stat()
+    return stat.st_mtime_ns, stat.st_size

@@ -161,7 +161,11 @@ def _check_structure(path: Path, tables, *, is_valid: bool) -> None:
 
 def _make_matrix_check(key: str):
     """Return the function that checks the file of one matrix of [structure.reduced]."""
-    return lambda path, tables, *, is_valid: structure_reduced.check_matrix(path, key)
+
+    def check_matrix(path: Path, tables, *, is_valid: bool) -> None:
+        structure_reduced.read_matrix(path, key)
+
+    return check_matrix
 
 
 def _check_measured(path: Path, tables, *, is_valid: bool) -> None:

@@ -296,7 +296,7 @@ def _build(scene, own_modes: ModalBasis, interfaces: tuple, joint: float | None 
     )
     return Rig(
         modes=modes,
-        drive=_build_drive(scene, modes),
+        drive=build_drive(scene, modes),
         start=build_start(scene, modes),
         friction=friction,
         springs=_build_springs(scene.structure, modes),
@@ -305,7 +305,7 @@ def _build(scene, own_modes: ModalBasis, interfaces: tuple, joint: float | None 
     )
 
 
-def _build_drive(scene, modes: ModalBasis) -> RigDrive:
+def build_drive(scene, modes: ModalBasis) -> RigDrive:
     """Build the drive signal of a rig from [drive], and the number of drive cycles of the run."""
     keys = scene.drive
     signal = build_signal(scene, modes)

@@ -18,11 +18,11 @@ from . import patch as patches
 from .law import complete_bond_length, find_normal_load
 from .load import build_point_load
 from .model import Model, write_resolved
-from .rig import build_rig
+from .rig import build_drive, build_rig
 from .source import locate_errors
 
 if TYPE_CHECKING:
-    from ..scene.keys.tables import Drive, Friction, Structure
+    from ..scene.keys.tables import Friction, Structure
     from ..scene.overrides import PlainNumbers
     from .rig import Rig
 
@@ -126,7 +126,7 @@ def replace_numbers(
             )
             rig = _replace_law(rig, law)
         if "drive" in tables:
-            rig = _replace_drive(rig, scene.drive)
+            rig = replace(rig, drive=build_drive(scene, rig.modes))
         if "structure" in tables:
             rig = _replace_modes(rig, scene.structure)
     motion = find_motion_features(scene, model.kind)
@@ -140,16 +140,6 @@ def _replace_law(rig: Rig, law: Friction) -> Rig:
     """Return a copy of a rig whose interfaces have another friction law."""
     interfaces = tuple(replace(interface, numbers=law) for interface in rig.friction.interfaces)
     return replace(rig, friction=replace(rig.friction, interfaces=interfaces))
-
-
-def _replace_drive(rig: Rig, drive: Drive) -> Rig:
-    """Return a copy of a rig with the frequency and the amplitude of another table [drive]."""
-    omega = 2 * np.pi * drive.frequency
-    amplitude = drive.acceleration
-    if amplitude is None:
-        amplitude = drive.displacement * omega**2
-    signal = replace(rig.drive.signal, acceleration=amplitude, omega=omega)
-    return rig.with_signal(signal, frequency=drive.frequency)
 
 
 def _replace_modes(rig: Rig, structure: Structure) -> Rig:

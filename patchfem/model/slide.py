@@ -94,10 +94,6 @@ class SlidePath:
         Missing
             If the cycles take more than `MAX_PATH_SAMPLES` steps.
         """
-        if self.kind == "constant":
-            fraction = np.linspace(0, 1, steps + 1)
-            time = fraction * self.amplitude / self.speed
-            return SlideSamples(time, fraction * self.amplitude)
         if self.corners is not None:
             return _sample_legs(*self.corners, steps)
         n_steps = max(1, round(self.cycles * steps))
@@ -147,31 +143,20 @@ class SlidePath:
         length : float or None
             Length [m] of the bonds.
         """
-        legs = None
-        min_steps = 0
-        if self.kind not in ("sine", "triangle"):
-            legs = self._legs()
-        if legs is not None and self.kind != "constant":
-            min_steps = MIN_STEPS_PER_LEG * (legs[0].size - 1)
+        legs = self.corners
+        min_steps = 0 if legs is None else MIN_STEPS_PER_LEG * (legs[0].size - 1)
         if pinned_steps is not None:
             return 4 * ceil(max(pinned_steps, min_steps) / 4)
         per_cycle = REFERENCE_STEPS * sqrt(REFERENCE_ERROR / tolerance)
         cycles = 1.0
         if legs is not None:
             path = float(np.abs(np.diff(legs[1])).sum())
-            stroke = 2 * self.amplitude if self.kind == "file" else float(np.ptp(legs[1]))
-            cycles = max(1.0, path / (2 * stroke))
+            cycles = max(1.0, path / (2 * float(np.ptp(legs[1]))))
             if length:
                 bond_lengths = min(path / cycles / length, MAX_BOND_LENGTHS)
                 per_cycle = max(per_cycle, STEPS_PER_BOND_LENGTH * bond_lengths)
         per_cycle = min(max(per_cycle, MIN_STEPS_PER_CYCLE), MAX_STEPS_PER_CYCLE)
         return 4 * ceil(max(cycles * per_cycle, min_steps) / 4)
-
-    def _legs(self) -> tuple:
-        """Return time [s] and displacement [m] at the corners of a path that consists of straight segments."""
-        if self.corners is not None:
-            return self.corners
-        return np.array([0.0, self.amplitude / self.speed]), np.array([0.0, self.amplitude])
 
 
 def build_slide(scene) -> SlidePath:
@@ -189,8 +174,8 @@ def build_slide(scene) -> SlidePath:
         with name_key("slide.file"):
             corners = read_path_file(scene.resolve_path(keys.file))
         amplitude = float(np.ptp(corners[1])) / 2
-    elif keys.kind == "dwell":
-        corners = _list_dwell_corners(keys)
+    elif keys.kind in ("constant", "dwell"):
+        corners = _list_corners(keys)
     run_in = (keys.distance or 0.0) if keys.kind == "triangle" else 0.0
     return SlidePath(
         kind=keys.kind,
@@ -203,10 +188,10 @@ def build_slide(scene) -> SlidePath:
     )
 
 
-def _list_dwell_corners(keys) -> tuple:
-    """Return time [s] and displacement [m] at the corners of a dwell; segments of zero duration are left out."""
+def _list_corners(keys) -> tuple:
+    """Return time [s] and displacement [m] at the corners of a constant slide or a dwell, without legs of no duration."""
     length = np.array([keys.distance, 0.0, keys.distance_after or 0.0])
-    duration = np.array([keys.distance / keys.speed, keys.hold, length[2] / keys.speed])
+    duration = np.array([keys.distance / keys.speed, keys.hold or 0.0, length[2] / keys.speed])
     is_leg = duration > 0
     time = np.append(0.0, np.cumsum(duration[is_leg]))
     return time, np.append(0.0, np.cumsum(length[is_leg]))

@@ -1,7 +1,6 @@
 """Modes of [structure.reduced]: the modes that the scene keeps, and more for the error estimate."""
 
 import re
-from functools import lru_cache
 from pathlib import Path
 from typing import NamedTuple
 
@@ -13,6 +12,7 @@ from ..inputs import matrices
 from ..scene.rules.structure import MATRIX_KEYS
 from ..structure import reduced
 from ..structure.places import DIRECTION_NAMES
+from .file_cache import cache_by_file
 from .source import name_key
 
 # Smallest relative uncertainty of a frequency that is reported.
@@ -37,15 +37,6 @@ class ReducedModes(NamedTuple):
     max_modes: int
 
 
-class _MatrixFile(NamedTuple):
-    """Matrix file of a scene: its key, its path, and a version that changes with the file."""
-
-    key: str
-    path: Path
-    modification_time: int
-    size: int
-
-
 class _Coordinates(NamedTuple):
     """Boundary rows (b,), motion (n,) for a unit motion of the base or None, and notes."""
 
@@ -63,7 +54,8 @@ def build_reduced_modes(scene) -> ReducedModes:
     with name_key("structure.reduced"):
         files = _find_files(table, scene.resolve_path)
         reduction, notes = _reduce(
-            files,
+            tuple(files.values()),
+            tuple(files),
             table.boundary,
             table.modes,
             table.method,
@@ -120,37 +112,23 @@ def _describe_reduction(reduction, modes: ModalBasis, table) -> str:
     return text
 
 
-def _find_files(table, locate) -> tuple:
-    """Return the matrix files of [structure.reduced]; `locate` turns a name into a path."""
-    files = []
-    for key in MATRIX_KEYS:
-        name = getattr(table, key)
-        if isinstance(name, str):
-            files.append(_find_file(key, locate(name)))
-    return tuple(files)
+def _find_files(table, locate) -> dict[str, Path]:
+    """Return the path of each matrix of [structure.reduced] by its key; `locate` turns a name into a path."""
+    names = {key: getattr(table, key) for key in MATRIX_KEYS}
+    return {key: locate(name) for key, name in names.items() if isinstance(name, str)}
 
 
-def _find_file(key: str, path: Path) -> _MatrixFile:
-    """Return the record of a matrix file in its present version."""
-    try:
-        stat = path.stat()
-    except OSError as error:
-        raise PatchfemError(
-            f"{path} cannot be read ({error.strerror})", f"structure.reduced.{key}"
-        ) from None
-    return _MatrixFile(key, path, stat.st_mtime_ns, stat.st_size)
+@cache_by_file
+def read_matrix(path: Path, key: str) -> matrices.Matrix:
+    """Read a matrix file; the key of a PatchfemError is the key of the file."""
+    with name_key(f"structure.reduced.{key}"):
+        return matrices.read_matrix(path, key)
 
 
-@lru_cache(maxsize=4)
-def _read_matrix(file: _MatrixFile) -> matrices.Matrix:
-    """Read a matrix file; a file that has not changed is read only once."""
-    with name_key(f"structure.reduced.{file.key}"):
-        return matrices.read_matrix(file.path, file.key)
-
-
-@lru_cache(maxsize=4)
+@cache_by_file
 def _reduce(
-    files: tuple,
+    paths: tuple,
+    keys: tuple,
     boundary: tuple,
     modes: int,
     method: str,
@@ -158,11 +136,11 @@ def _reduce(
     unit: float,
     is_base_driven: bool,
 ) -> tuple:
-    """Reduce the matrices in the files; return the Reduction and notes."""
-    matrix_list = [_read_matrix(file) for file in files]
+    """Reduce the matrices in files; return the Reduction and notes."""
+    matrix_list = list(map(read_matrix, paths, keys))
     coordinates = _locate_coordinates(matrix_list, boundary, moved, is_base_driven)
     aligned = matrices.align_rows(*matrix_list)
-    values = {file.key: matrix.values / unit for file, matrix in zip(files, aligned)}
+    values = {key: matrix.values / unit for key, matrix in zip(keys, aligned)}
     reduction = reduced.reduce_matrices(
         values["stiffness"],
         values["mass"],
@@ -172,11 +150,12 @@ def _reduce(
         method,
         coordinates.moved,
     )
-    rounding_notes = _note_rounding(files, aligned, values["stiffness"], unit, reduction.lowest)
+    names = [path.name for path in paths]
+    rounding_notes = _note_rounding(names, aligned, values["stiffness"], unit, reduction.lowest)
     return reduction, [*coordinates.notes, *rounding_notes]
 
 
-def _note_rounding(files: tuple, aligned: list, stiffness, unit: float, shape) -> list:
+def _note_rounding(names: list, aligned: list, stiffness, unit: float, shape) -> list:
     """Return a note about each matrix whose rounded numbers make the lowest frequency uncertain.
 
     The uncertainty of the square of the frequency is two standard deviations of shape^T A shape, with
@@ -184,7 +163,7 @@ def _note_rounding(files: tuple, aligned: list, stiffness, unit: float, shape) -
     """
     notes = []
     square = shape @ (stiffness @ shape)
-    for file, matrix, scale in zip(files, aligned, (square, 1.0)):
+    for name, key, matrix, scale in zip(names, MATRIX_KEYS, aligned, (square, 1.0)):
         rounding = matrices.estimate_rounding(matrix.values)
         if rounding is None or not square:
             continue
@@ -192,7 +171,7 @@ def _note_rounding(files: tuple, aligned: list, stiffness, unit: float, shape) -
         uncertainty = deviation / unit / scale
         if uncertainty > MIN_REPORTED_UNCERTAINTY:
             notes.append(
-                f"{file.path.name} stores the {file.key} in {rounding.digits}, which leaves the lowest "
+                f"{name} stores the {key} in {rounding.digits}, which leaves the lowest "
                 f"frequency of the structure uncertain by {format_number(100 * uncertainty, 2)} %; write the "
                 "file in double precision"
             )
@@ -217,13 +196,8 @@ def check_reduction(folder: Path, table, *, is_base_driven: bool) -> None:
         If they cannot be used.
     """
     files = _find_files(table, folder.__truediv__)
-    matrix_list = [_read_matrix(file) for file in files]
+    matrix_list = [read_matrix(path, key) for key, path in files.items()]
     _locate_coordinates(matrix_list, table.boundary, table.moved, is_base_driven)
-
-
-def check_matrix(path: Path, key: str) -> None:
-    """Raise PatchfemError if a matrix file cannot be read."""
-    _read_matrix(_find_file(key, path))
 
 
 def _locate_coordinates(

@@ -60,6 +60,7 @@ PUBLIC = {
     ),
     "keys.types": ("Key", "list_keys"),
     "lines": (
+        "find_scene_value",
         "locate_key",
         "number_items_from_one",
         "split_assignment",

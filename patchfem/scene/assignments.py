@@ -20,7 +20,7 @@ from .keys import quantities
 from .keys.lookup import LIMITS_BY_ERROR_TYPE, validate_value
 from .keys.types import Key, list_keys, list_required_keys
 from .lines import split_assignment, split_key
-from .reader import read_set_value
+from .reader import is_toml, read_set_value
 from .suggestions import require_key
 
 # keys of a length and of a force whose values `read_positive_values` reads, with an example
@@ -39,7 +39,7 @@ _QUANTITY_PATTERN = re.compile(rf"{_NUMBER_PATTERN}\s*(.*)")
 _TOLERANCE_PATTERN = re.compile(
     rf"({_NUMBER_PATTERN})\s*(.*?)\s*(?:\+/?-|±)\s*([0-9.]+(?:[eE][-+]?[0-9]+)?)\s*(.*)"
 )
-_OPENING_BRACKETS = {"]": "[", "}": "{"}
+_CLOSING_SIGNS = {"[": "]", "{": "}", '"': '"', "'": "'"}
 
 
 class Form(NamedTuple):
@@ -93,52 +93,45 @@ class Axis:
         return re.sub(r"\W", "_", self.key)
 
 
-class Interval(NamedTuple):
-    """Range of values as it is written.
-
-    - text: both ends.
-    - low, high: ends in `unit`; `low` is the first one.
-    - unit: unit of the scene; "" for a plain number.
-    - count: number of values; 0 if none is given.
-    - is_log: whether the values are spaced logarithmically.
-    """
-
-    text: str
-    low: float
-    high: float
-    unit: str
-    count: int
-    is_log: bool
-
-    def list_texts(self, fractions: Iterable[float]) -> list[str]:
-        """Return the values at the given fractions of the range, as a scene writes them."""
-        if self.is_log:
-            numbers = (self.low ** (1 - part) * self.high**part for part in fractions)
-        else:
-            numbers = (self.low * (1 - part) + self.high * part for part in fractions)
-        return [_format_with_unit(number, self.unit) for number in numbers]
-
-
 @dataclass(frozen=True, slots=True)
 class Range:
-    """Key with the range in which its value is drawn or fitted.
+    """Key with the range in which its value is drawn or fitted, or over which the values of a sweep are spread.
 
     - key: dotted key of the scene.
-    - low, high: ends in SI.
+    - low, high: ends in SI; `low` is the first one.
     - kind: kind of quantity; None for a plain number.
-    - interval: the range as it is written, from which random values are drawn; None if none are.
+    - ends: both ends in `written_unit`, "" for plain numbers; () if the range was not written.
+    - count: number of values; 0 if none is given.
+    - is_log: whether the values are spaced logarithmically.
     """
 
     key: str
     low: float
     high: float
     kind: str | None
-    interval: Interval | None = None
+    ends: tuple[float, ...] = ()
+    written_unit: str = ""
+    count: int = 0
+    is_log: bool = False
 
     @property
     def unit(self) -> str:
         """SI unit of the key, or "1" for a number without unit."""
         return quantities.find_si_unit(self.kind)
+
+    @property
+    def text(self) -> str:
+        """Both ends as a scene writes them."""
+        return "..".join(self.list_texts((0, 1)))
+
+    def list_texts(self, fractions: Iterable[float]) -> list[str]:
+        """Return the values at the given fractions of the range, as a scene writes them."""
+        first, last = self.ends
+        if self.is_log:
+            numbers = (first ** (1 - part) * last**part for part in fractions)
+        else:
+            numbers = (first * (1 - part) + last * part for part in fractions)
+        return [_format_with_unit(number, self.written_unit) for number in numbers]
 
     def format_assignment(self, value: float) -> str:
         """Return the assignment that sets the key to a value in SI units."""
@@ -147,7 +140,7 @@ class Range:
 
     def make_axis(self, fractions: Iterable[float]) -> Axis:
         """Return the key with the values at the given fractions of its range."""
-        texts = self.interval.list_texts(fractions)
+        texts = self.list_texts(fractions)
         values = array("d", map(_ValueReader(self.key, texts).read, texts))
         return Axis(self.key, texts, values, self.unit)
 
@@ -287,9 +280,10 @@ def read_values(key: str, text: str, form: Form = LISTS) -> Axis | Range:
             "is not a number that can vary; only quantities and plain numbers can be free"
         )
     if form.has_ranges and len(pieces) == 1:
-        interval = reader.parse_interval(text.strip())
-        if interval is not None:
-            return reader.make_range(interval, form)
+        spread = reader.parse_range(text.strip())
+        if spread is not None:
+            reader.check_range(spread, form)
+            return spread
     if not form.has_lists:
         raise ValueError(f"{text}: a range is needed, {form.usage}")
     return make_axis(key, chain.from_iterable(_collect(reader.list_texts, pieces)))
@@ -364,16 +358,16 @@ class _ValueReader:
             raise ValueError(
                 f"{piece}: write this range as {about}:9 for 9 values in it, or as {about} with --random"
             )
-        interval = self.parse_interval(piece)
-        if interval is None:
+        spread = self.parse_range(piece)
+        if spread is None:
             return [piece]
-        if not 2 <= interval.count <= MAX_RANGE_VALUES:
+        if not 2 <= spread.count <= MAX_RANGE_VALUES:
             raise ValueError(
-                f"{interval.text}: give the number of values after a colon, from 2 to {MAX_RANGE_VALUES}, such as :9"
+                f"{spread.text}: give the number of values after a colon, from 2 to {MAX_RANGE_VALUES}, such as :9"
             )
-        return interval.list_texts(k / (interval.count - 1) for k in range(interval.count))
+        return spread.list_texts(k / (spread.count - 1) for k in range(spread.count))
 
-    def parse_interval(self, piece: str) -> Interval | None:
+    def parse_range(self, piece: str) -> Range | None:
         """Parse a range such as ``1..9 mm:5`` or ``5 mm +- 1 mm``; return None for any other text."""
         if not self.is_number:
             return None
@@ -382,49 +376,43 @@ class _ValueReader:
         match = _RANGE_PATTERN.fullmatch(piece)
         if match is None:
             return None
-        low, high, count, spacing = match.groups()
-        text = f"{low}..{high}"
+        first, last, count, spacing = match.groups()
         # A bare number before the dots has the unit of the number after them, as in 1..9 mm.
-        units = [_QUANTITY_PATTERN.fullmatch(end) for end in (low, high)]
-        if all(units) and units[1][1] and not units[0][1]:
-            low = f"{low} {units[1][1]}"
+        with_unit = _QUANTITY_PATTERN.fullmatch(last)
+        if with_unit and re.fullmatch(_NUMBER_PATTERN, first):
+            first = f"{first} {with_unit[1]}".rstrip()
+        low, high = map(self.read, (first, last))
 
         # Both ends in the unit of the first one.
         kind = self.known.kind
+        factor = 1.0
         unit = ""
-        if kind is None:
-            ends = [str(quantities.read_percentage(end)) for end in (low, high)]
-            if None in (re.fullmatch(quantities.NUMBER_PATTERN, end) for end in ends):
-                raise ValueError(f"{text}: both ends of this range must be plain numbers")
-        else:
-            in_si = [quantities.parse_quantity(end, kind) for end in (low, high)]
-            number, unit = quantities.split_quantity(low)
+        if kind is not None:
+            _, unit = quantities.split_quantity(first)
             factor = quantities.UNIT_FACTORS[kind][quantities.normalize_unit(unit)]
-            ends = [number, in_si[1] / factor]
-        low, high = (_round_digits(float(end)) for end in ends)
-        if low == high:
-            raise ValueError(f"{text}: both ends are the same value")
-        return Interval(text, low, high, unit, int(count or 0), _is_log(low, high, spacing))
+        ends = tuple(_round_digits(end / factor) for end in (low, high))
+        if ends[0] == ends[1]:
+            raise ValueError(f"{piece}: both ends are the same value")
+        is_log = _is_log(*ends, spacing)
+        return Range(self.key, low, high, kind, ends, unit, int(count or 0), is_log)
 
-    def make_range(self, interval: Interval, form: Form) -> Range:
-        """Return the range in which the key varies; raise ValueError if the key does not accept it."""
+    def check_range(self, spread: Range, form: Form) -> None:
+        """Raise ValueError for a range in which the key cannot vary."""
         if not self.takes_float:
             raise ValueError(
-                f"{interval.text}: a key that takes whole numbers takes no range; list the values, such as 1,2,3"
+                f"{spread.text}: a key that takes whole numbers takes no range; list the values, such as 1,2,3"
             )
-        if interval.count:
+        if spread.count:
             raise ValueError(
-                f"{interval.text}:{interval.count}: the values lie anywhere between the ends; leave out "
-                f":{interval.count}"
+                f"{spread.text}:{spread.count}: the values lie anywhere between the ends; leave out "
+                f":{spread.count}"
             )
-        texts = interval.list_texts((0, 1))
-        low, high = map(self.read, texts)
         if not form.has_lists:
-            if not low < high:
-                raise ValueError(f"{interval.text}: the low bound must lie below the high bound")
-            for text, value in zip(texts, (low, high)):
-                validate_value(self.key, text if interval.unit else value)
-        return Range(self.key, low, high, self.known.kind, interval)
+            if not spread.low < spread.high:
+                raise ValueError(f"{spread.text}: the low bound must lie below the high bound")
+            texts = spread.list_texts((0, 1)) if spread.kind else (spread.low, spread.high)
+            for value in texts:
+                validate_value(self.key, value)
 
 
 def _find_value_key(key: str, texts: Sequence[str]) -> Key:
@@ -492,29 +480,18 @@ def _flatten_table(table: dict, table_key: str = "") -> list[tuple[str, Any]]:
 
 
 def _split_at_commas(text: str) -> list[str]:
-    """Split a text at commas outside brackets and quotes.
-
-    A quote opens at the start of a value or inside brackets; anywhere else it is a character like others.
-    """
+    """Split a text at commas outside of arrays, inline tables and quoted texts of TOML."""
     pieces = []
-    brackets = []
-    quote = ""
-    start = 0
-    is_escaped = False
-    for index, sign in enumerate(text):
-        if quote:
-            quote = "" if sign == quote and not is_escaped else quote
-            is_escaped = sign == "\\" and quote == '"' and not is_escaped
-        elif sign in "\"'" and (brackets or not text[start:index].strip()):
-            quote = sign
-        elif sign in "[{":
-            brackets.append(sign)
-        elif sign in _OPENING_BRACKETS and brackets and brackets[-1] == _OPENING_BRACKETS[sign]:
-            brackets.pop()
-        elif sign == "," and not brackets:
-            pieces.append(text[start:index].strip())
-            start = index + 1
-    return [*pieces, text[start:].strip()]
+    opened = ""
+    for part in text.split(","):
+        opened += part
+        closing = _CLOSING_SIGNS.get(opened.strip()[:1])
+        if closing is None or (closing in part and is_toml(opened)):
+            pieces.append(opened.strip())
+            opened = ""
+        else:
+            opened += ","
+    return [*pieces, opened[:-1].strip()] if opened else pieces
 
 
 def _format_with_unit(value: float, unit: str) -> str:

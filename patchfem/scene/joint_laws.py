@@ -17,28 +17,6 @@ GUIDE_SECTION = 'patchfem/scene/guide/friction.md, "Which law for my joint?"'
 COMMENT_WIDTH = 120  # width of a scene file in characters
 NOTHING = "nothing"  # word of KNOWLEDGE that excludes the others
 
-# Words that a user may answer, with their meanings.
-KNOWLEDGE = {
-    "damping": "damping of the joint at several amplitudes",
-    "loop": "a measured loop of force over slide",
-    "material": "shapes and materials of the pieces",
-    "roughness": "a trace of the faces, or their rms height, slope and curvature",
-    "stiffness": "stiffness before slip, or the bond length",
-    "coefficient": "friction coefficient",
-    "speed": "friction force at several sliding speeds",
-    "rest": "friction force after rests of several durations",
-    NOTHING: "none of these",
-}
-WISHES = {
-    "loss": "energy dissipated per cycle",
-    "force-limit": "force at which the joint slips",
-    "reversal": "force just after a reversal, small loops",
-    "ageing": "force after a rest",
-    "squeal": "vibration that begins by itself, stick-slip",
-    "smooth": "friction as a smooth function of the speed, as other programs have it",
-    "averaging": "friction from the pressure averaged over a neighbourhood (Oden and Pires)",
-}
-
 
 class JointLaw(NamedTuple):
     """Friction law, with the questions about a joint that it answers.
@@ -63,6 +41,9 @@ class JointLaw(NamedTuple):
 
 _ROWS = tomllib.loads((TEMPLATE_FOLDER.parent / "joint_laws.toml").read_text(encoding="utf-8"))
 JOINT_LAWS = tuple(JointLaw(**row) for row in _ROWS["law"])
+# Words that a user may answer, with their meanings.
+KNOWLEDGE: dict[str, str] = _ROWS["knowledge"]
+WISHES: dict[str, str] = _ROWS["wishes"]
 
 
 class Choice(NamedTuple):

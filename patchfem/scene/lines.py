@@ -46,11 +46,40 @@ def split_assignment(text: str) -> tuple[str, str]:
     return key.strip(), values.strip()
 
 
-def find_item(names: Sequence[Any], piece: str) -> int | None:
+def list_item_names(items: Sequence[Any]) -> list[Any]:
+    """Return the name of each table of an array, read or not, or None for an item without it."""
+    return [find_part(item, "name") for item in items]
+
+
+def find_item(items: Sequence[Any], piece: str) -> int | None:
     """Return the index of the item with a name, or with a number counted from 0; None if there is none."""
+    names = list_item_names(items)
     if piece in names:
         return names.index(piece)
     return int(piece) if piece.isdecimal() and int(piece) < len(names) else None
+
+
+def find_part(holder: Any, name: str) -> Any:
+    """Return the value of a key of a table, read or not, or None if there is none."""
+    return holder.get(name) if isinstance(holder, dict) else getattr(holder, name, None)
+
+
+def find_scene_value(scene: Any, key: str) -> tuple[str, Any]:
+    """Find the value of a dotted key in a scene or in its plain values.
+
+    Returns the key with items by number, and the value or None.
+    """
+    value = scene
+    pieces = []
+    for piece in split_key(key):
+        if isinstance(value, list | tuple):
+            index = find_item(value, piece)
+            piece = piece if index is None else str(index)
+            value = None if index is None else value[index]
+        else:
+            value = find_part(value, piece)
+        pieces.append(piece)
+    return ".".join(pieces), value
 
 
 def number_items_from_one(text: str) -> str:
@@ -70,12 +99,18 @@ def locate_key(path: str | Path, text: str, key: str) -> str:
     text : str
         Its content.
     key : str
-        Dotted key. Its table stands in for a key that is not written; without its table there is no line.
+        Dotted key. The nearest table above stands in for a key that is not written; without any there is no line.
     """
-    lines = find_key_lines(text)
-    line = lines.get(key) or lines.get(key.rpartition(".")[0])
+    line = find_line(find_key_lines(text), key)
     place = f"{path}:{line}" if line else path
     return f"{place}: {number_items_from_one(key)}"
+
+
+def find_line(lines: dict[str, int], key: str) -> int:
+    """Return the line of a key, or of the nearest table above it that has one; 0 if there is none."""
+    while key and key not in lines:
+        key = key.rpartition(".")[0]
+    return lines.get(key, 0)
 
 
 class TooManyKeyParts(ValueError):

@@ -15,11 +15,12 @@ import numpy as np
 from ..effects import find_waveform
 from .files import list_named_files, require_files
 from .keys.contact import MAX_SMALL_ANGLE
-from .lines import find_item, find_key_lines, split_key
+from .lines import find_key_lines, find_scene_value
 from .reader import apply_set
 from .rules.contact import find_max_load
 from .rules.scene_draft import SceneDraft
 from .rules.structure import MAX_USUAL_DAMPING
+from .rules.together import holds
 from .rules.view import TableView
 from .scene import Scene, finish_scene
 
@@ -44,6 +45,20 @@ PLAIN_KEYS = {
     "structure.mode.frequency": inf,
     "structure.mode.damping": MAX_USUAL_DAMPING,
 }
+
+
+# Scenes in which PLAIN_KEYS holds, as conditions of `rules.together`: a loaded patch, alone or in a rig, or a rig with one
+# contact point. The rig has modes and a sinusoidal base motion.
+_LOADED_PATCH = "!wear & contact.load & !contact.load_line & !contact.strips & !contact.grooves & !contact.holder"
+_MOVED_BASE = (
+    "kind=rig & !wear & structure.mode & !structure.interface & !structure.measured=stuck & drive.kind=base & "
+    "!drive.duration & !friction.temperature & !friction.spread"
+)
+PLAIN_SCENES = (
+    f"kind=patch & {_LOADED_PATCH}",
+    f"{_MOVED_BASE} & {_LOADED_PATCH} & !structure.bonded",
+    f"{_MOVED_BASE} & normal & !normal.grooves",
+)
 
 
 class BaseScene:
@@ -107,7 +122,7 @@ class BaseScene:
             "friction", {}
         )
         is_reduced = scene.structure is not None and scene.structure.reduced is not None
-        if has_own_kinetic or is_reduced or not _is_plain(scene):
+        if has_own_kinetic or is_reduced or not _is_plain(self._draft, scene):
             return None
         limits = dict(_find_plain_key(scene, key) for key in keys)
         # Two keys may name the same number, one of them by the name of its mode.
@@ -162,50 +177,13 @@ def _replace_number(holder: Any, pieces: list[str], value: Any) -> Any:
     return holder.model_copy(update={name: new})
 
 
-def find_scene_value(scene: Scene, key: str) -> tuple[str, Any]:
-    """Find the value of a dotted key; return the key with items by number, and the value or None."""
-    value: Any = scene
-    pieces = []
-    for piece in split_key(key):
-        if isinstance(value, tuple):
-            index = find_item([getattr(item, "name", None) for item in value], piece)
-            piece = piece if index is None else str(index)
-            value = None if index is None else value[index]
-        else:
-            value = getattr(value, piece, None)
-        pieces.append(piece)
-    return ".".join(pieces), value
-
-
-def _is_plain(scene: Scene) -> bool:
-    """Return whether PLAIN_KEYS holds in a scene.
-
-    Such a scene is a loaded patch, alone or in a rig, or a rig with one contact point. The rig has modes and a sinusoidal
-    base motion. There is no wear, load line, holder, strip or groove, no law with a temperature, and no file, but for that
-    of [measured] with a patch.
-    """
-    contact = TableView(scene.contact)
+def _is_plain(draft: SceneDraft, scene: Scene) -> bool:
+    """Return whether PLAIN_KEYS holds in a scene that is read from a draft."""
     names = [key for key, _ in list_named_files(scene)]
-    has_files = names not in ([], ["measured.file"]) or (names and scene.normal)
-    if scene.kind not in ("patch", "rig") or scene.wear or has_files:
+    if names not in ([], ["measured.file"]) or (names and scene.normal):
         return False
-    if scene.normal:
-        is_loaded = scene.kind == "rig" and not scene.contact and not scene.normal.grooves
-    else:
-        is_coupled = contact.load_line or contact.strips or contact.grooves or contact.holder
-        is_loaded = contact.load and not is_coupled
-    if scene.kind == "patch" or not is_loaded:
-        return bool(is_loaded)
-
-    # The motion of the rig.
-    law = TableView(scene.friction)
-    structure = scene.structure
-    drive = scene.drive
-    has_modes = structure.mode and not structure.interface and structure.measured == "free"
-    has_sine = drive.kind == "base" and find_waveform(drive).is_sine and drive.duration is None
-    is_linear = scene.normal or not structure.bonded
-    has_plain_law = law.law and not law.temperature and not law.spread
-    return bool(has_modes and has_sine and is_linear and has_plain_law)
+    is_moved_by_sine = scene.kind == "patch" or find_waveform(scene.drive).is_sine
+    return is_moved_by_sine and any(holds(draft, scene.kind, row) for row in PLAIN_SCENES)
 
 
 def _find_plain_key(scene: Scene, key: str) -> tuple[str | None, float]:

@@ -16,8 +16,14 @@ from .keys.lookup import (
 )
 from .keys.tables import Tables
 from .keys.types import Key, Table, advise_on_name, build_table, list_keys, list_required_keys
-from .lines import find_item, number_items_from_one, split_assignment, split_key
-from .rules.scene_draft import SceneDraft, list_item_names
+from .lines import (
+    find_item,
+    list_item_names,
+    number_items_from_one,
+    split_assignment,
+    split_key,
+)
+from .rules.scene_draft import SceneDraft
 from .suggestions import describe_unknown_key
 
 # Numbers such as .3 and 5., which people write but TOML does not allow.
@@ -182,15 +188,14 @@ def _find_item(draft: SceneDraft, items: list[Any], path: str, written_key: str)
         The whole key as it was written: a number in brackets counts from 1, a number behind a dot from 0.
     """
     above, _, item_name = path.rpartition(".")
-    names = list_item_names(items)
-    index = find_item(names, item_name)
+    index = find_item(items, item_name)
     if index is not None:
         return index
     is_number = item_name.isdecimal()
     table = number_items_from_one(above)
     displayed_key = number_items_from_one(path)
     description = "such item" if is_number else f"'{item_name}'"
-    known = [name for name in names if isinstance(name, str)]
+    known = [name for name in list_item_names(items) if isinstance(name, str)]
     advice = f"{table} has {len(items)}, numbered from 1 as in {table}[1]"
     if known:
         advice = advise_on_name(item_name, known)
@@ -212,19 +217,19 @@ def read_set_value(key: str, text: str) -> Any:
     except (ValueError, RecursionError):
         return float(text) if _BARE_POINT_PATTERN.fullmatch(text) and not is_text_key else text
     value = content["value"]
-    if _is_cut_by_comment(text) or len(content) > 1:  # as in "26#", where '#' is part of the value
+    # TOML takes the end of "26#" for a comment.
+    is_cut = "#" in text and not is_toml(f"[{text}]")
+    if is_cut or len(content) > 1:
         return text
     if not isinstance(value, str | bool | int | float | list | dict):
         return text
     return text if is_text_key and isinstance(value, int | float) else value
 
 
-def _is_cut_by_comment(text: str) -> bool:
-    """Return whether TOML would take the end of a value for a comment."""
-    if "#" not in text:
-        return False
+def is_toml(text: str) -> bool:
+    """Return whether a text is a value of TOML."""
     try:
-        tomllib.loads(f"value = [{text}]")
+        tomllib.loads(f"value = {text}")
     except (ValueError, RecursionError):
-        return True
-    return False
+        return False
+    return True

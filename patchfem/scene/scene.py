@@ -16,7 +16,7 @@ from . import assignments
 from .defaults import complete_tables
 from .files import list_absent_files, make_relative_file_sets, require_files
 from .keys import tables
-from .lines import locate_key, split_assignment
+from .lines import find_scene_value, locate_key, split_assignment
 from .reader import apply_set, read_tables
 from .rules.check import check_scene
 from .rules.scene_draft import SceneDraft, SceneError
@@ -185,7 +185,7 @@ def loads(
         swept = [axis for axis in _read_axes(draft, raw.pop("sweep")) if axis.key not in fixed]
     # A key that only [sweep] holds gets its first value.
     for axis in swept:
-        if not draft.has_set_key(axis.key):
+        if find_scene_value(raw, axis.key)[1] is None:
             draft.swept_key = f"sweep.{axis.key}"
             apply_set(draft, f"{axis.key}={axis.texts[0]}")
     draft.swept_key = ""

@@ -1,7 +1,8 @@
 """Sentences about an unknown key: the key or table that was probably meant, and what became of removed ones."""
 
 from collections.abc import Collection
-from difflib import SequenceMatcher
+from difflib import get_close_matches
+from itertools import chain
 from typing import Any, NamedTuple
 
 from ..effects import join_words
@@ -18,6 +19,10 @@ from .keys.types import (
     list_required_keys,
 )
 from .lines import split_key
+
+# Rating of a table of a similar name, of which 1 is that of a table that knows all keys inside.
+SIMILAR_NAME_RATING = 0.75
+MIN_RATING = 0.5  # rating above which a table is suggested
 
 
 class UnknownKey(NamedTuple):
@@ -89,7 +94,7 @@ def describe_unknown_key(
     keys = list_keys(model)
     suggestion = _suggest_name(model, raw, table_key, key, sets)
     if suggestion:
-        is_near = key in suggestion or _compare_names(key, suggestion) >= MIN_NAME_SIMILARITY
+        is_near = key in suggestion or _list_similar(key, [suggestion])
         advice = "" if is_near else f" {wrong_table}".rstrip()
         # Almost any value is a number or a text, so that without a unit only the name shows what was meant.
         guess = keys.get(suggestion)
@@ -123,8 +128,9 @@ def _suggest_name(
     model: type[Table], raw: dict[str, Any], table_key: str, key: str, sets: Collection[str]
 ) -> str:
     """Return the key or table that was probably meant by an unknown one, or "" if none is similar."""
-    is_table = _is_table(raw[key])
-    if not table_key and not is_table:
+    if _is_table(raw[key]):
+        return _suggest_table(model, key, raw[key])
+    if not table_key:
         # --set may name a key without its table; the key then belongs to a table that has a key of this name.
         owners = _list_tables_with_key(key)
         present = [name for name in owners if name.partition(".")[0] in raw]
@@ -136,14 +142,45 @@ def _suggest_name(
     path = f"{table_key}.".lstrip(".")
     is_set = f"{path}{key}" in sets
     written = {name for name in raw if not is_set or f"{path}{name}" in sets}
-    if is_table:
-        return _find_best(_rate_tables(model, key, raw[key]))
-    ratings = _rate_keys(model, key, raw[key], written)
-    lacking = [name for name in _list_missing_keys(model, raw, written) if name in ratings]
-    lacking = [name for name in lacking if ratings[name] >= 1]
-    if lacking and (len(lacking) == 1 or not is_set):
-        ratings[lacking[0]] = max(ratings[lacking[0]], 1.5)
-    return _find_best({name: rating for name, rating in ratings.items() if rating != 1})
+    free = [name for name in list_keys(model) if name not in written]
+    fitting = [name for name in free if _accepts_value(model, name, raw[key])]
+    lacking = [name for name in _list_needed_keys(model, raw) if name in fitting]
+    words = set(key.lower().split("_"))
+    related = [name for name in fitting if words & set(name.split("_"))]
+    begun = [name for name in fitting if name.startswith(key.lower())]
+    return next(
+        chain(
+            _list_similar(key, fitting),
+            related,
+            begun,
+            lacking if len(lacking) == 1 or not is_set else (),
+            _list_similar(key, free),
+            _list_similar(key, written & list_keys(model).keys()),
+        ),
+        "",
+    )
+
+
+def _suggest_table(model: type[Table], key: str, value: Any) -> str:
+    """Return the table of the same or a similar name, or one that knows most of the keys inside; "" for none."""
+    inside = set(value[0] if isinstance(value, list) else value)
+    inner = list_inner_tables(model)
+    tables = {name: inner[name] for name in inner if name.count(".") <= 1}
+    similar = _list_similar(key, tables)
+
+    def rate(name: str) -> float:
+        """Return the fraction of the keys inside that a table knows, and more for a similar name."""
+        known = len(inside & list_keys(tables[name]).keys()) / max(len(inside), 1)
+        return known + SIMILAR_NAME_RATING * (name in similar)
+
+    same_name = [name for name in tables if name.rpartition(".")[2] == key]
+    likely = [name for name in (*similar, *tables) if rate(name) > MIN_RATING]
+    return max(same_name or likely, key=rate, default="")
+
+
+def _list_similar(key: str, names: Collection[str]) -> list[str]:
+    """Return the names that are similar to a key, the most similar one first."""
+    return get_close_matches(key, names, len(names) or 1, MIN_NAME_SIMILARITY)
 
 
 def _write_header(table_key: str) -> str:
@@ -156,70 +193,16 @@ def _name_item(table_key: str) -> str:
     return f"{table_key}.NAME" if find_key(table_key).is_array else table_key
 
 
-def _find_best(ratings: dict[str, float]) -> str:
-    """Return the first name with the largest rating, or "" if no rating is above 0."""
-    best = max(ratings, key=ratings.get, default="")
-    return best if best and ratings[best] > 0 else ""
-
-
-def _compare_names(key: str, name: str) -> float:
-    """Return the similarity of a key to a known name, from 0 to 1."""
-    return SequenceMatcher(None, name, key).ratio()
-
-
-def _rate_keys(
-    model: type[Table], key: str, value: Any, written: Collection[str]
-) -> dict[str, float]:
-    """Rate how probably each key of a table was meant by an unknown key with a value.
-
-    A key that accepts the value has 3 to 4 if its name is similar, 2 if it has a word or its beginning in common, and
-    else 1. A key of a similar name that does not accept the value, or is written already, has 0 to 1.
-    """
-    ratings = {}
-    for name in list_keys(model):
-        similarity = _compare_names(key, name)
-        near = similarity if similarity >= MIN_NAME_SIMILARITY else 0.0
-        shares_word = bool(set(key.lower().split("_")) & set(name.split("_")))
-        if name in written or not _accepts_value(model, name, value):
-            ratings[name] = near / 2 if name in written else 0.99 * near
-        elif near:
-            ratings[name] = 3 + near
-        else:
-            ratings[name] = 2.0 if shares_word or name.startswith(key.lower()) else 1.0
-    return ratings
-
-
-def _rate_tables(model: type[Table], key: str, value: Any) -> dict[str, float]:
-    """Rate how probably each table inside a table was meant by an unknown table.
-
-    The same name has 4. A similar name counts 1, and the fraction of the keys inside that the table knows another 1.
-    """
-    inside = set(value[0] if isinstance(value, list) else value)
-    ratings = {}
-    for name, inner in list_inner_tables(model).items():
-        if name.count(".") > 1:
-            continue
-        shared = len(inside & list_keys(inner).keys()) / max(len(inside), 1)
-        similarity = _compare_names(key, name)
-        near = similarity if similarity >= MIN_NAME_SIMILARITY else 0.0
-        ratings[name] = near + shared if near or shared > 0.5 else 0.0
-        if name.rpartition(".")[2] == key:
-            ratings[name] = 4.0
-    return ratings
-
-
 def _accepts_value(model: type[Table], key: str, value: object) -> bool:
     """Return whether a key accepts a value."""
     return list_keys(model)[key].attribute in validate_values(model, {key: value})[0]
 
 
-def _list_missing_keys(
-    model: type[Table], raw: dict[str, Any], written: Collection[str]
-) -> list[str]:
-    """Return the keys that a table lacks: those needed always or by a selector."""
+def _list_needed_keys(model: type[Table], raw: dict[str, Any]) -> list[str]:
+    """Return the keys that a table needs always or by one of its selectors."""
     needed = list(list_required_keys(model))
     for selector in find_selectors(model):
         value = raw.get(selector.key, "")
         if isinstance(value, str) and value in selector.choices:
             needed += split_keys(selector.choices[value][0])
-    return [key for key in needed if key not in written]
+    return needed

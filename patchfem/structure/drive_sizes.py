@@ -175,9 +175,9 @@ def choose_samples_per_cycle(drive, cycles: float, *, needs_history: bool = Fals
 
 
 def _build_sine(drive: DriveKeys) -> SineDrive:
-    """Build the drive signal for waveform "sine"."""
+    """Build the drive signal for waveform "sine"; its numbers may be arrays, with a value for each case."""
     omega = 2 * np.pi * drive.keys.frequency
-    return SineDrive(float(drive.acceleration(omega)), float(omega), drive.moving)
+    return SineDrive(drive.acceleration(omega), omega, drive.moving)
 
 
 # The sine is the only drive of this module, so that a run with a sine does not import the others.

@@ -125,11 +125,7 @@ class SweepDrive:
     displacement: float | None = None
     logarithmic: bool = False
     moving: bool = True
-
-    @property
-    def segments(self) -> tuple:
-        """Empty, because the response to a sweep has no closed form."""
-        return ()
+    segments = ()  # the response to a sweep has no closed form
 
     @property
     def breaks(self) -> np.ndarray:
@@ -194,17 +190,14 @@ class RecordedDrive:
     period: float
     moving: bool = True
     is_periodic: bool = False
+    segments = ()  # a recorded signal does not consist of constants and sines
+    max_frequency_ratio = 1.0  # its cycle is that of the rig
 
     def __post_init__(self):
         if len(self.time) < 2 or self.time[0] != 0 or not np.all(np.diff(self.time) > 0):
             raise PatchfemError(
                 "drive.file: at least two rows with times that rise from 0 s are needed"
             )
-
-    @property
-    def segments(self) -> tuple:
-        """Empty, because a recorded signal does not consist of constants and sines."""
-        return ()
 
     @property
     def breaks(self) -> np.ndarray:
@@ -215,11 +208,6 @@ class RecordedDrive:
     def max_acceleration(self) -> float:
         """Largest acceleration [m s-2]."""
         return float(np.abs(self.value).max())
-
-    @property
-    def max_frequency_ratio(self) -> float:
-        """Ratio 1, because a recorded drive signal has the same cycle as the rig."""
-        return 1.0
 
     @property
     def duration(self) -> float:

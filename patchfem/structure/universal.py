@@ -6,8 +6,13 @@ from typing import NamedTuple
 import numpy as np
 
 from ..core import PatchfemError
-from ..inputs.units import CHANNEL_UNITS, normalize_unit
-from ..inputs.universal import FunctionType, OrdinateType, find_quantity, read_datasets
+from ..inputs.universal import (
+    FunctionType,
+    OrdinateType,
+    find_axis_scale,
+    find_unit_factors,
+    read_datasets,
+)
 from . import modal_fit
 from .places import DIRECTION_NAMES, MeasuredModes
 
@@ -20,17 +25,9 @@ DERIVATIVE_ORDERS = {
     OrdinateType.ACCELERATION: 2,
 }
 FORCE_TYPES = (OrdinateType.EXCITATION_FORCE, OrdinateType.FORCE)  # ordinate types of a force
-UNSTATED_LABELS = ("", "none")  # axis labels that state no unit; the values are in SI
 # Largest relative difference between the frequencies of two responses; it allows for single
 # precision
 MAX_FREQUENCY_CHANGE = 1e-6
-
-
-class _UnitFactors(NamedTuple):
-    """Units of length and force in a file per SI unit, from dataset 164."""
-
-    length: float = 1.0
-    force: float = 1.0
 
 
 class _Mode(NamedTuple):
@@ -63,10 +60,7 @@ def read_universal(path: Path) -> MeasuredModes:
     datasets = read_datasets(path)
     modes = [dataset for dataset in datasets if _is_mode(dataset)]
     responses = [dataset for dataset in datasets if dataset.get("type") == 58]
-    units = [dataset for dataset in datasets if dataset.get("type") == 164]
-    factors = _UnitFactors()
-    if units:
-        factors = _UnitFactors(units[0]["length"], units[0]["force"])
+    factors = find_unit_factors(path, datasets)
     if modes:
         return _read_modes(modes, factors)
     if responses:
@@ -84,8 +78,9 @@ def _is_mode(dataset: dict) -> bool:
     return is_shape and dataset.get("analysis_type") in (NORMAL_MODE_TYPE, *COMPLEX_MODE_TYPES)
 
 
-def _read_modes(datasets: list, factors: _UnitFactors) -> MeasuredModes:
+def _read_modes(datasets: list, factors: dict | None) -> MeasuredModes:
     """Read modes of dataset 55 and scale them to unit modal mass."""
+    mass_unit = 1.0 if factors is None else factors["length"] / factors["force"]
     modes = []
     columns = []
     for number, dataset in enumerate(datasets, 1):
@@ -95,7 +90,7 @@ def _read_modes(datasets: list, factors: _UnitFactors) -> MeasuredModes:
             mode = _read_normal_mode(number, dataset, values)
         else:
             mode = _read_complex_mode(number, dataset, values.astype(complex))
-        modal_mass = mode.modal_mass * factors.length / factors.force
+        modal_mass = mode.modal_mass * mass_unit
         if not modal_mass > 0:
             raise PatchfemError(
                 f"mode {number} ({mode.frequency:.5g} Hz) has no modal mass, so its shape has no "
@@ -170,7 +165,7 @@ def _rotate_to_real(values):
     return values * np.exp(-0.5j * np.angle(np.sum(values**2)))
 
 
-def _fit_responses(datasets: list, factors: _UnitFactors) -> MeasuredModes:
+def _fit_responses(datasets: list, factors: dict | None) -> MeasuredModes:
     """Fit modes to frequency responses of dataset 58."""
     kinds = {str(dataset["func_type"]) for dataset in datasets}
     datasets = [
@@ -182,6 +177,7 @@ def _fit_responses(datasets: list, factors: _UnitFactors) -> MeasuredModes:
             f"types: {', '.join(sorted(kinds))}"
         )
     notes = []
+    default_unit = "SI" if factors is None else "those of dataset 164"
     frequency = np.asarray(datasets[0]["x"], float)
     measured = {}
     for dataset in datasets:
@@ -192,9 +188,13 @@ def _fit_responses(datasets: list, factors: _UnitFactors) -> MeasuredModes:
         derivative = _check_response(dataset, name, frequency)
         sign_out, place = _find_direction(dataset["rsp_node"], dataset["rsp_dir"])
         sign_in, reference = _find_direction(dataset["ref_node"], dataset["ref_dir"])
-        unit_out = _find_unit_factor(dataset, "ordinate", notes)
-        unit_in = _find_unit_factor(dataset, "orddenom", notes)
-        scale = sign_out * sign_in * (unit_out / unit_in) * (factors.force / factors.length)
+        scale_out = find_axis_scale(dataset, "ordinate", factors)
+        scale_in = find_axis_scale(dataset, "orddenom", factors)
+        for axis in (scale_out, scale_in):
+            note = f"structure.file: the unit label '{axis.unit}' is not known; the values are taken as {default_unit}"
+            if axis.unit and not axis.is_stated and note not in notes:
+                notes.append(note)
+        scale = sign_out * sign_in * scale_out.factor / scale_in.factor
         measured[place, reference] = (scale * np.asarray(dataset["data"]), derivative)
     return modal_fit.identify_modes(frequency, measured, notes)
 
@@ -219,18 +219,6 @@ def _check_response(dataset: dict, name: str, frequency) -> int:
     if not np.isfinite(dataset["data"]).all() or not np.iscomplexobj(dataset["data"]):
         raise PatchfemError(f"{name} contains values that are not finite or not complex")
     return DERIVATIVE_ORDERS[kind]
-
-
-def _find_unit_factor(dataset: dict, axis: str, notes: list) -> float:
-    """Return the SI units per unit of an axis; append a note on an unknown label of the axis to `notes`."""
-    label = (dataset[f"{axis}_axis_units_lab"] or "").strip()
-    quantity = find_quantity(dataset[f"{axis}_spec_data_type"])
-    factor = CHANNEL_UNITS[quantity].get(normalize_unit(label))
-    if factor is None and label.lower() not in UNSTATED_LABELS:
-        note = f"structure.file: the unit label '{label}' is not known; the values are taken as SI"
-        if note not in notes:
-            notes.append(note)
-    return factor or 1.0
 
 
 def _find_direction(node: int, direction: int) -> tuple:

@@ -89,7 +89,7 @@ def test_refuses_empty_matrices():
     [
         ("a.csv", measured.read_table, "more than 64 MiB of text"),
         ("a.msh", meshes.read_pieces, "more than 256 MiB"),
-        ("a.uff", universal.read_universal, "more than 256 MiB"),
+        ("a.uff", universal.read_universal, "more than 512 MiB"),
         ("a.mat", arrays.read_arrays, "more than 512 MiB"),
         ("a.csv", read_path_table, "more than 64 MiB of text"),
     ],

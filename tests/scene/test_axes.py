@@ -109,7 +109,7 @@ def test_refuses_invalid_axis(text, says):
 def test_exact_sampled_values_lie_within_range():
     """Sampled values lie between the ends of a range, on a logarithmic or a linear scale."""
     log_range = read_axis("contact.tilt.angle=1 mrad..100 mrad", RANDOM)
-    assert isinstance(log_range, Range) and log_range.interval.is_log
+    assert isinstance(log_range, Range) and log_range.is_log
     np.testing.assert_allclose(
         log_range.make_axis([0, 0.25, 0.5, 1]).values, [1e-3, 10**-2.5, 1e-2, 1e-1], rtol=1e-14
     )
@@ -158,8 +158,8 @@ def test_always_values_of_all_axes_select_one_case():
 def test_exact_value_with_tolerance_is_uniform_range(text, low, high, unit):
     """A value with a tolerance, such as 0.3 +- 15 %, is a uniform range, which is described in a note."""
     (axis,), wrong = read_assignments([text], RANDOM)
-    assert not wrong and (axis.low, axis.high, axis.interval.unit) == (low, high, unit)
-    assert not axis.interval.is_log
+    assert not wrong and (axis.low, axis.high, axis.written_unit) == (low, high, unit)
+    assert not axis.is_log
     (note,) = describe_ranges([text])
     ends = note.partition(" is drawn evenly from ")[2].split("..")
     assert [float(end.removesuffix(unit)) for end in ends] == [low, high]

@@ -171,7 +171,7 @@ def test_refuses_kinetic_for_laws_with_one_coefficient(law):
 
 def test_refuses_unbreakable_initial_bonds_with_shear():
     """Initial bonds that no force can break are refused with [contact.shear]."""
-    assert "gives points that no force can move" in get_only_mistake(
+    assert "whose bonds at rest no force can move" in get_only_mistake(
         RIG, "contact.shear={}", "friction.reading=report", "friction.order=-0.5"
     )
     sets = [

@@ -24,7 +24,10 @@ WEAR = "wear.coefficient=1e-14_m^2/N wear.cycles=1000"
 SETS = {
     "accuracy.harmonics": "accuracy.harmonics=9",
     "accuracy.method=harmonic": "accuracy.method=harmonic",
+    "accuracy.quadrature=recursion": "accuracy.quadrature=recursion",
     "accuracy.quadrature=merged": f"{BONDS} {{law}}.reading=report accuracy.quadrature=merged",
+    "bonds that no force can move": f"{BONDS} {{law}}.reading=report {{law}}.order=-0.5",
+    "bonds of a given stiffness": "{law}.law=elastic-plastic {law}.stiffness=1e7_N/m",
     "changing load": "{change}",
     "contact.grooves": GROOVES,
     "drive other than a sine": "drive.waveform=step",
@@ -46,6 +49,7 @@ SETS = {
     "mode with heave or pitch": "structure.mode.second.pitch=1_rad/m",
     "mode with yaw": "structure.mode.second.yaw=1_rad/m",
     "named method of the sum": f"{BONDS} accuracy.quadrature=direct",
+    "no friction": "{law}.static=0",
     "normal.amplitude": "normal.amplitude=5_N normal.frequency=50_Hz",
     "normal.grooves": GROOVES,
     "partial slip": "{patch}.shear={{}}",
@@ -66,6 +70,10 @@ SETS = {
     "shape on the lower piece": (
         "{patch}.tilt.angle=0.1_mrad {patch}.tilt.on=lower"
     ),
+    "shapes on different pieces": (
+        "{patch}.tilt.angle=0.1_mrad {patch}.crown.radius=1_m {patch}.crown.on=lower"
+    ),
+    "single contact point": "",
     "spread of the bonds": f"{BONDS} {{law}}.spread=1_um",
     "structure.bonded.wavelength": (
         "structure.bonded.stiffness=1e5_N/m structure.bonded.wavelength=80_um"
@@ -84,6 +92,7 @@ SINGLE = PAIR[: PAIR.rindex("[[structure.interface]]")]
 PROPERTY = re.compile(r"\\\{.*?\}")
 # More assignments for rows whose scene has, with the assignments of its features alone, those of another row, too.
 MORE_SETS = {
+    "structure.measured=stuck, mode with yaw": "{patch}.strips.count=4",
     "grooves, patch.strips, partial slip": "{law}.law=coulomb",
     "accuracy.harmonics, accuracy.method=harmonic, grooves": "{law}.law=coulomb",
     "wear, patch.strips, partial slip": "{law}.law=coulomb",
@@ -94,7 +103,7 @@ REDUCED = POINT_RIG[: POINT_RIG.index("[structure]")] + (
     '[structure.reduced]\nstiffness = "k.mtx"\nmass = "m.mtx"\nboundary = [1, 2]\nslide = [1, 0]\n'
     + LINEAR[LINEAR.index("[drive]") :]
 )
-POINT_FEATURES = {"load on a point", "normal.amplitude", "normal.grooves"}
+POINT_FEATURES = {"load on a point", "single contact point", "normal.amplitude", "normal.grooves"}
 MASS_FEATURES = {"interface", "several interfaces", "structure.interface", "patches of interfaces"}
 
 

@@ -86,6 +86,18 @@ def complex_modes(scales=(1.0, 2j, 0.8 + 0.6j)):
     return sets
 
 
+UNITS_MM = {
+    "type": 164,
+    "units_code": 5,
+    "units_description": "mm",
+    "temp_mode": 1,
+    "length": 1000.0,
+    "force": 1000.0,
+    "temp": 1.0,
+    "temp_offset": 0.0,
+}
+
+
 def make_responses(response_type=12, noise=0.0, signs=(1, 1, 1), spacing=0.5, **change):
     """Return datasets 58 of the responses of the rig to a force at node 13."""
     frequency = np.arange(20.0, 250.0, spacing)
@@ -147,16 +159,7 @@ def test_exact_complex_modes_are_made_real_with_note(tmp_path):
 
 def test_exact_units_of_dataset_164_are_applied(tmp_path):
     """The units of dataset 164 scale shapes and responses, for mm and mN and for inches."""
-    units = {
-        "type": 164,
-        "units_code": 5,
-        "units_description": "mm",
-        "temp_mode": 1,
-        "length": 1000.0,
-        "force": 1000.0,
-        "temp": 1.0,
-        "temp_offset": 0.0,
-    }
+    units = UNITS_MM
     check_modes(
         universal.read_universal(write_universal(tmp_path / "a.uff", [units, *normal_modes()])),
         FILE_RTOL,
@@ -177,6 +180,16 @@ def test_exact_units_of_dataset_164_are_applied(tmp_path):
     np.testing.assert_allclose(
         np.abs(modes.motion[11, 1]), np.abs(RIG.shapes[0]) / np.sqrt(175.126835), rtol=1e-5
     )
+
+
+def test_exact_label_of_a_response_counts_before_dataset_164(tmp_path):
+    """Responses in mm/N, whose labels and dataset 164 both say so, are converted once."""
+    units = UNITS_MM | {"force": 1.0}
+    responses = make_responses(8, ordinate_axis_units_lab="mm", orddenom_axis_units_lab="N")
+    responses = [response | {"data": 1000 * response["data"]} for response in responses]
+    modes = universal.read_universal(write_universal(tmp_path / "a.uff", [units, *responses]))
+    check_modes(modes, 1e-6, 1e-6)
+    assert not modes.notes
 
 
 @pytest.mark.parametrize("response_type", [8, 12])

@@ -17,7 +17,8 @@ from ...identify.least_squares import Fit, Problem
 from ...model.model import Model, build
 from ...runs.patch import mesh_levels
 from ...scene.assignments import BOUNDS, Range, read_assignments
-from ...scene.overrides import BaseScene, find_scene_value
+from ...scene.lines import find_scene_value
+from ...scene.overrides import BaseScene
 from ...scene.scene import Scene, SceneError, add_sets
 
 # Largest ratio high/low of a range whose middle is the arithmetic mean; the middle of a wider range

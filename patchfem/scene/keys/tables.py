@@ -6,7 +6,7 @@ and the reference of keys are made from it. `scene.rules` says which keys need o
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal
+from typing import Any, Literal
 
 from pydantic import Field, field_validator
 
@@ -33,6 +33,7 @@ from .types import (
     Table,
     Text,
     Title,
+    array,
     key,
     number,
     optional,
@@ -329,7 +330,7 @@ class Reduced(Table):
         "interfaces, or a file of the damping matrix; default: no damping",
     )
     boundary: key(
-        Annotated[tuple[Coordinate, ...], Field(min_length=1)],
+        array(Coordinate),
         "coordinates that are kept as boundary coordinates: row numbers of the matrices, or node:direction, such as "
         "1201:x, if the files name nodes; interfaces, `drive.mass` and `structure.output_mass` refer to the boundary "
         "coordinates by number, counted from 1",
@@ -343,7 +344,7 @@ class Reduced(Table):
         "structure, with residual attachment modes, which need fewer modes if the interfaces slide",
     ) = "craig-bampton"
     moved: optional(
-        Annotated[tuple[Coordinate, ...], Field(min_length=1)],
+        array(Coordinate),
         "coordinates that a base drive moves along x: row numbers, ranges of rows (a..b:n means n evenly spaced rows "
         "from a to b), nodes or directions; default: all coordinates in direction x, or all coordinates if the files "
         "name no directions",
@@ -364,11 +365,11 @@ class Start(Table):
     """Displacements and velocities at t = 0, one for each mode or mass."""
 
     displacement: optional(
-        Annotated[tuple[quantity("length"), ...], Field(min_length=1)],
+        array(quantity("length")),
         "displacements at t = 0, one for each mode or mass; default: 0",
     )
     velocity: optional(
-        Annotated[tuple[quantity("velocity"), ...], Field(min_length=1)],
+        array(quantity("velocity")),
         "velocities at t = 0, one for each mode or mass; default: 0",
     )
 
@@ -382,7 +383,7 @@ class Structure(Table):
         Length,
         "displacement at which the flexure meets its stop; a larger displacement ends the run; default: no stop",
     )
-    mode: Annotated[tuple[Mode, ...], Field(max_length=MAX_COORDINATES)] = ()
+    mode: array(Mode, least=0, most=MAX_COORDINATES) = ()
     measured: key(
         Literal["free", "stuck"],
         "'free': the modes are those of the rig without the joint; 'stuck': frequencies and damping were measured "
@@ -397,7 +398,7 @@ class Structure(Table):
     stiffening: Stiffening | None = None
     bonded: Bonded | None = None
     masses: optional(
-        Annotated[tuple[Mass, ...], Field(min_length=1, max_length=MAX_COORDINATES)],
+        array(Mass, most=MAX_COORDINATES),
         "masses that are connected by springs; these masses replace the modes",
     )
     output_mass: optional(
@@ -471,20 +472,20 @@ class Drive(Table):
         "with kind `free`, unless [structure.start] is given; with kind `base`, as `acceleration`",
     )
     levels: optional(
-        Annotated[tuple[quantity("acceleration", ge=0), ...], Field(min_length=1)],
+        array(quantity("acceleration", ge=0)),
         "amplitudes of the base acceleration, or of the force with kind 'force', applied one after the other; "
         "each level starts from the final state of the previous level",
     )
     frequencies: optional(
-        Annotated[tuple[Frequency, ...], Field(min_length=2, max_length=100)],
+        array(Frequency, least=2, most=100),
         "frequencies of the sines of waveform 'tones', which act at the same time",
     )
     accelerations: optional(
-        Annotated[tuple[quantity("acceleration", ge=0), ...], Field(min_length=2)],
+        array(quantity("acceleration", ge=0), least=2),
         "amplitude of the base acceleration of each sine, zero to peak",
     )
     phases: optional(
-        Annotated[tuple[quantity("angle"), ...], Field(min_length=2)],
+        array(quantity("angle"), least=2),
         "phase of each sine at the start of the run; default: 0",
     )
     onset: key(
@@ -537,16 +538,16 @@ class WornFriction(Table):
     constant beyond the last depth."""
 
     depth: key(
-        Annotated[tuple[quantity("length", ge=0), ...], Field(min_length=2)],
+        array(quantity("length", ge=0), least=2),
         "mean worn depths, rising from "
         "0; the mean worn depth is the worn volume of both pieces divided by the area of the patch",
     )
     coefficient_factor: optional(
-        Annotated[tuple[Positive, ...], Field(min_length=2)],
+        array(Positive, least=2),
         "factor on `static` and `kinetic` at each depth; must be 1 at depth 0",
     )
     bond_length_factor: optional(
-        Annotated[tuple[Positive, ...], Field(min_length=2)],
+        array(Positive, least=2),
         "factor on `bond_length` at each depth; must be 1 at depth 0",
     )
 

@@ -147,6 +147,19 @@ def whole_number(low: int, high: int) -> Any:
     return Annotated[int, Strict(), Field(ge=low, le=high)]
 
 
+def array(kind: Any, least: int = 1, most: int | None = None) -> Any:
+    """Return the type of a key that holds an array.
+
+    Parameters
+    ----------
+    kind
+        Type of a value, or class of a table.
+    least, most : int
+        Smallest and largest number of items; None for any.
+    """
+    return Annotated[tuple[kind, ...], Field(min_length=least or None, max_length=most)]
+
+
 def _require_printable(value: str) -> str:
     """Return a text; raise ValueError for characters that results files cannot hold."""
     for sign in value:

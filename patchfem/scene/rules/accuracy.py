@@ -8,7 +8,6 @@ from ...effects import LAWS, law_has_trait, needs_bond_list
 from ..keys.accuracy import Accuracy
 from ..keys.tables import Tables
 from .contact import iterate_patches
-from .facts import TableFacts
 from .methods import MotionFeatures, find_motion_features
 from .scene_draft import SceneDraft
 
@@ -58,28 +57,13 @@ def list_fixed_settings(accuracy: Accuracy) -> list[str]:
 
 
 def check_quadrature(draft: SceneDraft, kind: str) -> None:
-    """Report a quadrature that does not fit the sum over bonds; add a remark if there is no such sum."""
-    accuracy = TableFacts(draft, "accuracy", draft.tables.accuracy)
-    quadrature = accuracy.quadrature
-    if not quadrature or quadrature == "auto":
-        return
-    law = draft.values.friction
-    if not law_has_trait(law.law, "bonds") or kind not in ("bench", "rig"):
-        accuracy.add_remark(
-            "quadrature", f"= '{quadrature}' has no meaning without law 'nonlocal' and is not used"
-        )
-        return
-    has_recursion = law.reading == "stretch" and law.order == 1
-    if quadrature == "recursion" and not has_recursion:
-        accuracy.add_mistake(
-            "quadrature",
-            "'recursion' can be used only with reading = 'stretch' and order = 1; use 'auto' or 'merged'",
-        )
-    if quadrature != "recursion" and has_recursion and accuracy.compliance:
-        accuracy.add_mistake(
-            "quadrature",
-            f"'{quadrature}' cannot be used with {accuracy.compliance}, because each point of the interface then slips "
-            "differently; use 'recursion' or 'auto'",
+    """Add a remark on a quadrature if there is no sum over bonds."""
+    quadrature = draft.values.accuracy.quadrature
+    is_summed = law_has_trait(draft.values.friction.law, "bonds") and kind in ("bench", "rig")
+    if quadrature and quadrature != "auto" and not is_summed:
+        draft.add_remark(
+            "accuracy.quadrature",
+            f"= '{quadrature}' has no meaning without law 'nonlocal' and is not used",
         )
 
 

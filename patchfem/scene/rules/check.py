@@ -14,7 +14,8 @@ from .friction import check_laws
 from .grooves import check_grooves
 from .needed_keys import check_needed_keys
 from .scene_draft import SceneDraft
-from .structure import MODES_ADVICE, check_energy_gain, check_structure
+from .structure import check_energy_gain, check_structure
+from .together import check_together
 from .wear import check_wear
 
 RUN_TABLES = ("contact", "normal", "friction", "slide", "structure", "drive", "wear")
@@ -28,15 +29,16 @@ def check_scene(draft: SceneDraft) -> str:
     check_structure(draft)
     check_drive(draft)
     _check_small_tables(draft)
+    check_wear(draft)
+    check_grooves(draft)
     kind = _find_kind(draft)
     for check_table in (
+        check_together,
         check_quadrature,
         check_settings,
         _remark_unused,
         _check_sliding,
         check_length,
-        check_wear,
-        check_grooves,
         check_energy_gain,
     ):
         check_table(draft, kind)
@@ -46,8 +48,6 @@ def check_scene(draft: SceneDraft) -> str:
 def _check_small_tables(draft: SceneDraft) -> None:
     """Report mistakes inside [normal], [slide] and [measured]."""
     scene = draft.values
-    if scene.normal and draft.has("normal.width") and not draft.has("friction.spread"):
-        draft.add_remark("normal.width", "has no meaning without friction.spread and is not used")
     reading = scene.measured.reading
     if (
         reading in ("fundamental", "rms", "lowpass")
@@ -71,89 +71,21 @@ def _check_small_tables(draft: SceneDraft) -> None:
 
 
 def _find_kind(draft: SceneDraft) -> str:
-    """Return the kind of run that the tables define; report missing and conflicting tables."""
+    """Return the kind of run that the tables define, "" if they define none."""
     tables = {name for name in RUN_TABLES if draft.has(name)}
     if draft.has("structure.interface"):
-        for name in sorted(tables & {"friction", "normal", "contact"}):
-            instead = ""
-            if name == "contact":
-                instead = (
-                    "; move [contact] into the interface that it presses, as [structure.interface.contact] in place "
-                    "of `load`"
-                )
-            draft.add_mistake(
-                name,
-                f"[{name}] and [[structure.interface]] exclude each other: each interface has its own law and load"
-                f"{instead}",
-            )
-        # Each interface holds a law and a load, which count here as the
-        # tables [friction] and [normal].
+        # Each interface holds a law and a load, which count here as the tables [friction] and [normal].
         tables = tables - {"contact"} | {"friction", "normal"}
-    if {"contact", "normal"} <= tables:
-        draft.add_mistake(
-            "normal",
-            "[contact] and [normal] exclude each other: keep one source of the normal load",
-        )
+    if "contact" in tables:
         tables.discard("normal")
     has_rig = bool(tables & {"structure", "drive"})
-    if "slide" in tables and has_rig:
-        draft.add_mistake(
-            "slide",
-            "[slide] prescribes the motion, but [structure] with [drive] computes the motion: keep only [slide], or "
-            "only [structure] with [drive]",
-        )
+    if not tables or ("slide" in tables and has_rig):
         return ""
     if tables == {"contact"}:
         return "patch"
-    _require_tables(draft, tables)
-    if not tables:
-        return ""
     if "slide" in tables:
         return "bench"
     return "linear" if tables == {"structure", "drive"} else "rig"
-
-
-def _require_tables(draft: SceneDraft, tables: set[str]) -> None:
-    """Report tables that a run lacks, and masses that cannot rub."""
-    has_rig = bool(tables & {"structure", "drive"})
-    others = ", ".join(f"[{name}]" for name in sorted(tables))
-    needed = {
-        "drive": "[structure] needs this table" if has_rig else "",
-        "structure": "[drive] needs this table" if has_rig else "",
-    }
-    if tables - {"structure", "drive"}:
-        needed["friction"] = f"a run with {others} also needs this table"
-        if not tables & {"contact", "normal"}:
-            needed["contact"] = "friction needs a normal load, [contact] or [normal]"
-        if not has_rig:
-            needed["slide"] = (
-                "friction needs a motion, [slide] or [structure] with [drive]; only `patchfem backbone` needs neither"
-            )
-    elif not tables:
-        needed["contact"] = (
-            "a scene needs [contact] (pressed pieces), or [structure] with [drive] (a vibrating structure); with "
-            "[friction] a scene needs a load and a motion"
-        )
-    for name, reason in needed.items():
-        if reason and name not in tables:
-            draft.add_missing_table(name, reason)
-
-    # Friction between masses belongs to an interface.
-    rubs = bool(tables - {"structure", "drive"})
-    if not rubs or not draft.has("structure.masses") or draft.has("structure.interface"):
-        return
-    if "contact" in tables:
-        draft.add_mistake(
-            "structure.masses",
-            f"structure.masses cannot be used with [contact]; {MODES_ADVICE}, or keep the masses, write the friction "
-            "law in [[structure.interface]] and the patch in [structure.interface.contact]",
-        )
-    else:
-        draft.add_missing(
-            "structure.interface",
-            "friction between masses needs an interface: write [[structure.interface]] with `law` and `load` instead "
-            "of [friction]",
-        )
 
 
 def _remark_unused(draft: SceneDraft, kind: str) -> None:
@@ -162,7 +94,6 @@ def _remark_unused(draft: SceneDraft, kind: str) -> None:
         patch = TableFacts(draft, "contact", draft.tables.contact)
         shapes = patch.table.shapes.items() if patch.table is not None else ()
         keys = [f"{name}.on" for name, shape in shapes if shape.on == "lower" and name != "tilt"]
-        keys += filter(patch.has, ["holder.tangential_stiffness"])
         for key in keys:
             patch.add_remark(
                 key, "has no meaning in a patch scene, where nothing slides, and is not used"

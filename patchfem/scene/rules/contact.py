@@ -43,7 +43,6 @@ def check_patches(draft: SceneDraft) -> None:
         _check_mesh(patch, flat_length)
         _check_strips(patch)
         _check_load_line(patch, flat_length / 2)
-        _check_asperities(patch)
         _check_coatings(patch)
         _check_shapes_have_a_piece(patch)
 
@@ -72,7 +71,7 @@ def _check_sizes(patch: TableFacts, flat_length: float) -> None:
 
 
 def _check_mesh(patch: TableFacts, flat_length: float) -> None:
-    """Report elements of an impossible size, and keys that do not fit to a mesh file."""
+    """Report elements of an impossible size."""
     size = patch.element_size
     if size > flat_length:
         name = "contact.length =" if flat_length == patch.length else "the interface length of"
@@ -83,32 +82,12 @@ def _check_mesh(patch: TableFacts, flat_length: float) -> None:
             f"elements of {size:g} m on a length of {patch.length:g} m are more than {MAX_ELEMENTS}; use at least "
             f"{patch.length / MAX_ELEMENTS:.3g} m, or leave this key out",
         )
-    if size and patch.mesh:
-        patch.add_remark(
-            "element_size", "is not used, because the file of contact.mesh gives the elements"
-        )
-    if patch.has("mesh_unit") and not patch.has("mesh"):
-        patch.add_mistake(
-            "mesh_unit",
-            "is the unit of the file of contact.mesh, which is missing: leave mesh_unit out",
-        )
 
 
 def _check_strips(patch: TableFacts) -> None:
     """Report a load line over the width that the strips cannot carry."""
     if not (patch.strips and patch.has("strips.offset")):
         return
-    if patch.has("strips.roll"):
-        patch.add_mistake(
-            "strips.offset",
-            "`offset` leaves the rotation about x free, but contact.strips.roll prescribes this rotation: keep only "
-            "one of these two keys",
-        )
-    if patch.has("approach"):
-        patch.add_mistake(
-            "strips.offset",
-            "a load line needs a load: use contact.load in place of [contact.approach]",
-        )
     if patch.strips.count < 2:
         patch.add_mistake(
             "strips.offset",
@@ -125,17 +104,11 @@ def _check_strips(patch: TableFacts) -> None:
 
 
 def _check_load_line(patch: TableFacts, half_length: float) -> None:
-    """Report a load line outside the patch, and a rotation that is both free and prescribed."""
+    """Report a load line outside the patch, and an approach of a piece that can rotate."""
     if patch.approach and (patch.has("load_line") or patch.holder.rotational_stiffness):
         name = "approach of a piece that can rotate"
         patch.add_mistake("approach", describe_removed(name, f"an {name}"))
     line = patch.load_line
-    if line and patch.has("tilt.angle") and not patch.has("holder"):
-        patch.add_mistake(
-            "load_line",
-            "cannot be used with contact.tilt.angle unless [contact.holder] is given: a piece that is free to rotate "
-            "has no prescribed angle; leave out one of these two keys, or add the spring of [contact.holder]",
-        )
     if abs(line.offset) >= half_length:
         patch.add_mistake(
             "load_line.offset",
@@ -146,24 +119,6 @@ def _check_load_line(patch: TableFacts, half_length: float) -> None:
             "load_line.moment",
             f"{line.moment} N m divided by the load {patch.load} N puts the load line outside the patch: |moment|/load "
             f"< length/2 = {half_length} m is needed",
-        )
-
-
-def _check_asperities(patch: TableFacts) -> None:
-    """Report what [contact.asperities] lacks: a trace for its cutoff, or its stiffness at first touch."""
-    layer = patch.asperities
-    has_trace = patch.has("profile", "asperities.from", "asperities.rms_height")
-    if layer and patch.has("asperities.cutoff") and not has_trace:
-        patch.add_mistake(
-            "asperities.cutoff",
-            "separates the long waves of a trace from the short ones, but the scene has no trace: add "
-            "[contact.profile] or `from`, or leave this key out",
-        )
-    if patch.approach and layer.law == "exponential" and not layer.normal_stiffness:
-        patch.add_missing(
-            "asperities.normal_stiffness",
-            "law 'exponential' with [contact.approach] needs this stiffness at first touch, because the approach is "
-            "measured from first touch",
         )
 
 

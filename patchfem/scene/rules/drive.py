@@ -13,19 +13,6 @@ MIN_CYCLES = 0.25
 def check_drive(draft: SceneDraft) -> None:
     """Report mistakes inside [drive]."""
     drive = TableFacts(draft, "drive", draft.tables.drive)
-    has_start = draft.has("structure.start")
-    if drive.kind == "free" and drive.has("displacement") == has_start:
-        if has_start:
-            draft.add_mistake(
-                "structure.start",
-                "[structure.start] and drive.displacement exclude each other: keep one",
-            )
-        else:
-            drive.add_missing(
-                "displacement",
-                "kind 'free' needs this key, the displacement from which the structure is released; instead you can "
-                "give [structure.start]",
-            )
     if drive.kind in ("base", "force"):
         _check_waveform(drive)
 

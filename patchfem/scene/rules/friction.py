@@ -2,29 +2,24 @@
 
 from __future__ import annotations
 
-from ...effects import law_has_trait, law_takes_key, law_takes_stiffness_or_length
+from ...effects import law_has_trait, law_takes_key
 from ..keys.tables import Friction
 from .facts import TableFacts
-from .methods import find_climbed_grooves
 from .scene_draft import SceneDraft
 from .view import TableView
 
 
 def check_laws(draft: SceneDraft) -> None:
     """Report mistakes inside [friction] and inside the laws of interfaces."""
-    if draft.tables.friction is not None:
-        _check_law(TableFacts(draft, "friction", draft.tables.friction), draft.values.contact)
+    laws = {"friction": draft.tables.friction}
     for index, interface in enumerate(draft.values.structure.interface):
-        law = TableFacts(draft, f"structure.interface.{index}", interface.table)
-        _check_law(law, interface.contact)
-
-
-def _check_law(law: TableFacts, contact: TableView) -> None:
-    """Report mistakes inside one friction law."""
-    unused = find_unused_law_keys(law.table)
-    _check_coefficients(law, unused)
-    _check_bonds(law, unused)
-    _check_stiffness(law, contact)
+        laws[f"structure.interface.{index}"] = interface.table
+    for table_key, table in laws.items():
+        if table is not None:
+            law = TableFacts(draft, table_key, table)
+            unused = find_unused_law_keys(table)
+            _check_coefficients(law, unused)
+            _check_bonds(law, unused)
 
 
 def _check_coefficients(law: TableFacts, unused: list[str]) -> None:
@@ -41,12 +36,6 @@ def _check_coefficients(law: TableFacts, unused: list[str]) -> None:
     if law.static == 0 and law.stiffness and law_takes_key(law.table.law, "stiffness"):
         law.add_mistake(
             "static", f"must be > 0 with law '{law.law}', whose springs need a slip force"
-        )
-    if law.static == 0 and law.compliance:
-        law.add_mistake(
-            "static",
-            f"must be > 0 with {law.compliance}, because at static = 0 no point carries friction; raise static or "
-            f"leave out {law.compliance}",
         )
 
 
@@ -77,24 +66,6 @@ def _check_bonds(law: TableFacts, unused: list[str]) -> None:
     if law.spread and law_takes_key(law.table.law, "spread") and is_spread_of_point:
         if not law.draft.has("normal.width"):
             law.draft.add_missing("normal.width", "friction.spread needs this key")
-
-
-def _check_stiffness(law: TableFacts, contact: TableView) -> None:
-    """Report a stiffness of a law whose number of springs depends on an unknown or changing load."""
-    if not (law_takes_stiffness_or_length(law.table.law) and law.stiffness):
-        return
-    if change := law.load_change or find_climbed_grooves(law.draft.tables):
-        law.add_mistake(
-            "stiffness",
-            f"{change} changes the load, and the number of springs in contact changes with the load; give bond_length "
-            "in place of stiffness",
-        )
-    elif contact.approach and not contact.load:
-        law.add_mistake(
-            "stiffness",
-            "needs a known load, but [contact.approach] prescribes a distance; give bond_length in place of stiffness, "
-            "or contact.load in place of [contact.approach]",
-        )
 
 
 def find_unused_law_keys(law: Friction) -> list[str]:

@@ -22,19 +22,11 @@ def find_steepest_slope(grooves: TableView) -> float:
     return 2 * pi / grooves.wavelength * grooves.amplitude
 
 
-def check_grooves(draft: SceneDraft, kind: str) -> None:
+def check_grooves(draft: SceneDraft) -> None:
     """Report mistakes in the grooves of a scene."""
     grooves = find_grooves(draft)
-    if grooves is None or not kind:
-        return
-    if kind not in ("bench", "rig"):
-        draft.add_mistake(
-            grooves.table_key,
-            f"[{grooves.table_key}] needs a sliding motion: add [friction] and [slide], or [structure] with [drive]",
-        )
-        return
     static = draft.values.friction.static
-    if not draft.values.friction.law:
+    if grooves is None or not draft.values.friction.law:
         return
     slope = find_steepest_slope(grooves)
     if static * slope >= 1:
@@ -44,9 +36,4 @@ def check_grooves(draft: SceneDraft, kind: str) -> None:
             f"{grooves.amplitude:.6g} m gives flanks of slope {slope:.6g}, on which the pieces lock with static = "
             f"{static:g}: no force can move one piece over the flanks of the other; an amplitude below wavelength/(2 "
             f"pi static) = {max_amplitude:.6g} m is needed, or a smaller `static`",
-        )
-    if kind == "bench" and grooves.lifted_mass:
-        grooves.add_remark(
-            "lifted_mass",
-            "has no meaning with [slide], because a prescribed slide has no inertia, and is not used",
         )

@@ -109,8 +109,6 @@ ENGINE_SUPPORT = {
     ),
     "harmonic": EngineSupport("", "no-law parts grooves spring faces levels"),
 }
-# Support of the maps of a period by which method "harmonic" finds steady motions exactly.
-EXACT_SUPPORTS = (ENGINE_SUPPORT["exact"], ENGINE_SUPPORT["piecewise"])
 METHOD_KEY = "accuracy.method"
 
 
@@ -280,29 +278,30 @@ def describe_load_change(key: str) -> str:
 
 def _find_obstacle(method: str, motion: MotionFeatures) -> str:
     """Return why a value of accuracy.method cannot compute a motion, or "" if it can."""
+    limits = {name: find_unsupported_feature(row, motion) for name, row in ENGINE_SUPPORT.items()}
     if method == "harmonic":
-        return _find_harmonic_obstacle(motion)
-    in_steps = find_unsupported_feature(ENGINE_SUPPORT["march"], motion)
-    by_events = find_unsupported_feature(ENGINE_SUPPORT["hybrid"], motion)
+        return _find_harmonic_obstacle(motion, limits)
+    by_events = limits["hybrid"]
+    in_steps = limits["march"]
     without_events = f"the motion cannot be computed from event to event {by_events}"
-    if method == "auto" and in_steps and by_events:
-        return f"{without_events}, nor in time steps {in_steps}; use another law"
-    if method == "exact" and by_events:
-        return f"{without_events}; use 'march' or leave `method` out"
-    if method != "march":
-        return ""
-    if in_steps:
-        return f"'march' {in_steps} is not supported yet; leave `method` out"
     law = motion.joints[0].law.law if motion.joints else None
-    if motion.compliance or not motion.has_grooves or not law_has_trait(law, "memoryless"):
-        return ""
-    return (
-        f"the motion over grooves under law '{law}' is computed from event to event; use 'exact' or leave "
-        "`method` out"
-    )
+    is_climbing = motion.has_grooves and not motion.compliance and law_has_trait(law, "memoryless")
+    obstacles = {
+        "auto": in_steps
+        and by_events
+        and f"{without_events}, nor in time steps {in_steps}; use another law",
+        "exact": by_events and f"{without_events}; use 'march' or leave `method` out",
+        "march": in_steps and f"'march' {in_steps} is not supported yet; leave `method` out",
+    }
+    if method == "march" and is_climbing and not in_steps:
+        return (
+            f"the motion over grooves under law '{law}' is computed from event to event; use 'exact' or leave "
+            "`method` out"
+        )
+    return obstacles[method]
 
 
-def _find_harmonic_obstacle(motion: MotionFeatures) -> str:
+def _find_harmonic_obstacle(motion: MotionFeatures, limits: dict[str, str]) -> str:
     """Return why harmonic balance cannot find the steady motion, or "" if it can."""
     wave = motion.waveform
     drive = TableView(motion.drive)
@@ -316,22 +315,16 @@ def _find_harmonic_obstacle(motion: MotionFeatures) -> str:
             "'harmonic' needs a constant acceleration over a sweep; give drive.acceleration in place of "
             "drive.displacement"
         )
-    if feature := find_unsupported_feature(ENGINE_SUPPORT["harmonic"], motion):
+    feature = limits["harmonic"]
+    # The steady motion over grooves is found by the map of a period from event to event.
+    if not feature and motion.has_grooves and limits["hybrid"]:
+        feature = f"with {motion.spring} {limits['hybrid']}"
+    if feature:
         return describe_unsupported(f"'harmonic' {feature}", "march")
-    if motion.has_grooves:
-        # The steady motion over grooves is found by the map of a period from event to event.
-        feature = find_unsupported_feature(ENGINE_SUPPORT["hybrid"], motion)
-        return feature and describe_unsupported(
-            f"'harmonic' with {motion.spring} {feature}", "march"
-        )
-    is_exact = not all(find_unsupported_feature(support, motion) for support in EXACT_SUPPORTS)
-    if not motion.joints or is_exact:
+    if motion.has_grooves or not (motion.joints and limits["exact"] and limits["piecewise"]):
         return ""
-    return _find_harmonic_law_obstacle(motion)
 
-
-def _find_harmonic_law_obstacle(motion: MotionFeatures) -> str:
-    """Return why harmonic balance cannot use the law of a rig, or "" if it can."""
+    # What harmonic balance lacks where no map of a period solves the motion exactly.
     law = motion.joints[0].law
     beside = ""
     remedy = "march"

@@ -39,31 +39,16 @@ def check_outlines(patch: TableFacts) -> None:
             f"the pieces are {lengths[0]} and {lengths[1]} m long; the difference is less than 1e-5 of the length: "
             "write the same length for both pieces",
         )
-    if len(written) == 2 and patch.has("length"):
-        patch.add_remark(
-            "length", "is not used: [contact.upper] and [contact.lower] set their own lengths"
-        )
 
 
 def _check_piece(patch: TableFacts, name: str) -> None:
-    """Report ends that do not fit into the length and height of a piece, or stand beside a mesh file."""
+    """Report ends that do not fit into the length and height of a piece."""
     piece = patch[name]
     length = find_piece_length(patch, name)
     height = piece.height or patch.height
     coating = piece.coating or patch.coating
     thickness = getattr(coating, "thickness", None) or 0.0
-    for key in ("length", *END_KEYS):
-        path = f"{name}.{key}"
-        if not patch.has(path):
-            continue
-        if patch.mesh:
-            patch.add_mistake(
-                path,
-                "cannot be used with contact.mesh, because the mesh file gives the shape of the pieces: leave one of "
-                "the two keys out",
-            )
-        if key == "length":
-            continue
+    for key in END_KEYS:
         end = piece[key]
         if 2 * end >= length:
             sentence = (
@@ -76,4 +61,4 @@ def _check_piece(patch: TableFacts, name: str) -> None:
             sentence = f"{end} m and a coating of {thickness} m do not fit into the height {height} m of the piece"
         else:
             continue
-        patch.add_mistake(path, sentence)
+        patch.add_mistake(f"{name}.{key}", sentence)

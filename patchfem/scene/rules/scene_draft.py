@@ -11,7 +11,7 @@ from ...exceptions import PatchfemError
 from ..keys.lookup import describe_missing_key, find_key
 from ..keys.tables import Tables
 from ..keys.types import build_table
-from ..lines import find_item, number_items_from_one, split_key
+from ..lines import find_line, number_items_from_one
 from .view import TableView
 
 # Sort order of mistakes in --set, which are listed after those of all lines of a file.
@@ -87,16 +87,6 @@ class SceneDraft:
         """Return the value at a dotted key as the user wrote it, or None if there is none."""
         return find_value(self.raw, key)
 
-    def has_set_key(self, key: str) -> bool:
-        """Return whether the scene contains a key in the form of --set, with items by name or number."""
-        value: Any = self.raw
-        for piece in split_key(key):
-            if isinstance(value, list):
-                value = dict(enumerate(value)).get(find_item(list_item_names(value), piece))
-            else:
-                value = value.get(piece) if isinstance(value, dict) else None
-        return value is not None
-
     def add_mistake(self, key: str, message: str) -> None:
         """Add a mistake at the line of a key or, if the key is missing, of the nearest table above it."""
         order, location = self._locate(key)
@@ -153,11 +143,9 @@ class SceneDraft:
 
     def _locate(self, key: str) -> tuple[int, str]:
         """Return the sort order of a mistake and the text that locates it, such as FILE:LINE."""
-        pieces = key.split(".")
-        paths = [".".join(pieces[:count]) for count in range(len(pieces), 0, -1)]
-        if self.sets.intersection(paths):
+        if find_line(dict.fromkeys(self.sets, 1), key):
             return SET_MISTAKE_ORDER, "--set"
-        line = next((self.lines[path] for path in paths if path in self.lines), 0)
+        line = find_line(self.lines, key)
         return line, f"{self.path}:{line}" if line else self.path
 
     def _add(self, order: int, location: str, text: str) -> None:
@@ -176,11 +164,6 @@ def find_value(value: Any, key: str) -> Any:
         else:
             return None
     return value
-
-
-def list_item_names(items: list[Any]) -> list[Any]:
-    """Return the key `name` of each item of an array read from TOML, or None for an item without it."""
-    return [item.get("name") if isinstance(item, dict) else None for item in items]
 
 
 @lru_cache(4096)

@@ -27,8 +27,6 @@ MODES_ADVICE = (
     "with [contact], describe these masses and springs by their modes: give structure.moving_mass, and for each mode a "
     "[[structure.mode]] with its frequency (sqrt(k/m)/(2 pi) for one mass on one spring)"
 )
-# Keys that describe a rig; a scene has one of them.
-DESCRIPTION_KEYS = ("mode", "masses", "file", "reduced")
 
 
 def check_structure(draft: SceneDraft) -> None:
@@ -36,7 +34,8 @@ def check_structure(draft: SceneDraft) -> None:
     structure = TableFacts(draft, "structure", draft.tables.structure)
     if draft.tables.structure is None:
         return
-    _check_description(structure)
+    if not structure.has("moving_mass", "masses", "file", "reduced"):
+        structure.add_missing("moving_mass")
     _check_modes(structure)
     _check_numbered_places(structure)
     if structure.file:
@@ -45,41 +44,6 @@ def check_structure(draft: SceneDraft) -> None:
         _check_reduced(structure)
     _check_joint(structure)
     _check_start(structure)
-
-
-def _check_description(structure: TableFacts) -> None:
-    """Report keys that do not belong to the description of the rig by modes, masses or a file."""
-    drive = structure.scene.drive
-    if drive.mass and drive.kind != "base" and structure.has("mode"):
-        structure.draft.add_mistake(
-            "drive.mass",
-            "applies only to structure.masses, but a structure of [[structure.mode]] is driven at its output point: "
-            "leave drive.mass out",
-        )
-    descriptions = list(filter(structure.has, DESCRIPTION_KEYS))
-    if not structure.has("moving_mass") and descriptions in ([], ["mode"]):
-        structure.add_missing("moving_mass")
-    if structure.has("moving_mass") and descriptions in (["masses"], ["reduced"]):
-        structure.add_remark(
-            "moving_mass", f"has no meaning with structure.{descriptions[0]} and is not used"
-        )
-
-    # Keys of masses without masses, and places in a file without a file.
-    for key in ("spring", "damper"):
-        if not structure.has(key) or structure.has("masses"):
-            continue
-        if structure.draft.has("contact"):
-            structure.add_mistake(
-                key, f"joins masses, which cannot be used with [contact]; {MODES_ADVICE}"
-            )
-        else:
-            structure.add_missing("masses", f"structure.{key} needs this key")
-    for key in LOCATION_KEYS:
-        if structure.has(key) and not structure.has("file"):
-            structure.add_mistake(
-                key,
-                "names a place in a file of modes or responses, but the scene has no such file; give structure.file",
-            )
 
 
 def _check_file(structure: TableFacts) -> None:
@@ -115,25 +79,13 @@ def _check_file(structure: TableFacts) -> None:
 
 
 def _check_joint(structure: TableFacts) -> None:
-    """Report a bonded spring without a single contact, and a measured joint that the scene does not have."""
+    """Report a bonded spring without a single contact."""
     n_interfaces = len(tuple(structure.interface))
     if structure.bonded and structure.table.masses is not None and n_interfaces != 1:
         structure.add_mistake(
             "bonded",
             f"applies only to a single contact, but there are {n_interfaces} interfaces; instead write a "
             "[[structure.spring]] between the masses of the interface",
-        )
-    if structure.measured_joint and structure.measured != "stuck":
-        structure.add_mistake(
-            "measured_joint",
-            'names the joint that is subtracted from the modes, but nothing is subtracted; add measured = "stuck" or '
-            "leave `measured_joint` out",
-        )
-    if structure.measured == "stuck" and not (structure.scene.friction or structure.interface):
-        structure.add_mistake(
-            "measured",
-            "'stuck' subtracts the stiffness of the joint from the modes, but this scene has no joint; add [friction] "
-            "and its load, or leave `measured` out",
         )
 
 
@@ -159,18 +111,8 @@ def _check_reduced(structure: TableFacts) -> None:
                 "reduced.boundary", f"names {name} twice; name each coordinate once"
             )
             break
-    if reduced.moved and structure.scene.drive.kind in ("force", "free"):
-        structure.add_remark(
-            "reduced.moved", "is not used, because it applies only to a base drive"
-        )
-    if structure.has("interface"):
-        if reduced.slide:
-            structure.add_mistake(
-                "reduced.slide",
-                "applies only to [friction]; a [[structure.interface]] names its two sides with the key `between`: "
-                "leave structure.reduced.slide out",
-            )
-    elif structure.draft.has("friction") and not structure.has("reduced.slide"):
+    is_rubbing = structure.draft.has("friction") and not structure.has("interface")
+    if is_rubbing and not structure.has("reduced.slide"):
         structure.add_missing(
             "reduced.slide",
             "which two boundary coordinates rub against each other, such as slide = [1, 0] for coordinate 1 against "

@@ -21,6 +21,7 @@ from ...effects import (
     law_has_trait,
     law_supports,
     law_takes_key,
+    law_takes_stiffness_or_length,
     needs_bond_list,
     suggest_laws,
 )
@@ -129,6 +130,22 @@ class Joint(TableFacts):
         lower = list_lower_shapes(self.contact.table, self.patch_key) if self.contact else []
         return lower[0] if lower and len(lower) == len(shapes) else ""
 
+    @cached_property
+    def opposite_shape(self) -> str:
+        """Key of a shape on another piece than the shapes before it, the last one that is written; "" for none."""
+        shapes = self.contact.table.shapes if self.contact else {}
+        placed = {name: shape.on for name, shape in shapes.items() if shape.on}
+        sides = {f"{self.patch_key}.{name}.on": side for name, side in placed.items()}
+        if len(set(sides.values())) < 2:
+            return ""
+        return next(filter(self.draft.has, reversed(sides)), next(iter(sides)))
+
+    @property
+    def has_unbounded_bonds(self) -> bool:
+        """Whether no force can move the bonds at rest: in the law as printed (R/eps)^order is unbounded for them."""
+        is_unbounded = self.has_trait("bonds") and self.reading == "report" and -1 < self.order < 0
+        return bool(is_unbounded and self.initial_bonds)
+
     @property
     def can_slip_in_strips(self) -> bool:
         """Whether partial slip is supported in each strip separately.
@@ -188,6 +205,11 @@ FEATURES = {
     "bench": Feature(lambda j: j.kind == "bench"),
     "rig": Feature(lambda j: j.kind == "rig"),
     "load on a point": Feature(lambda j: j.scene.normal),
+    "single contact point": Feature(
+        lambda j: j.kind == "rig" and not j.is_interface and not j.contact,
+        "",
+        "a single contact point",
+    ),
     "drive other than a sine": Feature(
         lambda j: j.wave.name and not j.wave.is_sine,
         "drive.waveform",
@@ -210,8 +232,17 @@ FEATURES = {
         "{table_key}.kinetic",
         "{kinetic:g} below static = {static:g}",
     ),
+    "no friction": Feature(lambda j: j.static == 0, "{table_key}.static", "static = 0"),
+    "bonds of a given stiffness": Feature(
+        lambda j: j.stiffness and law_takes_stiffness_or_length(j.law), "{table_key}.stiffness"
+    ),
     "spread of the bonds": Feature(
         lambda j: j.spread and law_takes_key(j.law, "spread"), "{table_key}.spread"
+    ),
+    "bonds that no force can move": Feature(
+        lambda j: j.has_unbounded_bonds,
+        "{table_key}.initial_bonds",
+        "{initial_bonds:g} with order = {order:g} (reading 'report'), whose bonds at rest no force can move,",
     ),
     # the sum over bonds
     "sum over all bonds": Feature(lambda j: j.needs_list, "{table_key}.{key_preventing_recursion}"),
@@ -229,6 +260,12 @@ FEATURES = {
     "partial slip": Feature(lambda j: j.compliance, "{compliance}"),
     "shape on the lower piece": Feature(
         lambda j: j.lower_shape, "{lower_shape}", "a shape on the lower piece"
+    ),
+    "patch without strips": Feature(
+        lambda j: not (j.contact and j.contact.strips), "", "a patch without [contact.strips]"
+    ),
+    "shapes on different pieces": Feature(
+        lambda j: j.opposite_shape, "{opposite_shape}", "shapes on different pieces"
     ),
     "strips that slip together": Feature(lambda j: not j.can_slip_in_strips),
     "mode with yaw": Feature(lambda j: j.yaw, "{yaw}"),
@@ -311,7 +348,9 @@ COMBINATIONS = {
         "shape on the lower piece, interface",
         "shape on the lower piece, grooves",
     ),
+    "use 'auto' or 'merged'": ("accuracy.quadrature=recursion, sum over all bonds",),
     "use 'recursion' or 'auto'": (
+        "named method of the sum, sum by recursion, partial slip",
         "named method of the sum, rig, sum by recursion, shape on the lower piece",
         "named method of the sum, grooves",
     ),
@@ -322,6 +361,19 @@ COMBINATIONS = {
     f"leave out {{compliance}}, or {suggest_laws('pieces', 'shear')}": (
         "law without elements, partial slip",
     ),
+    "give bond_length in place of stiffness": (
+        "bonds of a given stiffness, changing load",
+        "bonds of a given stiffness, normal.amplitude",
+        "bonds of a given stiffness, grooves",
+        "bonds of a given stiffness, patch.approach",
+    ),
+    "raise static or leave out {compliance}": ("no friction, partial slip",),
+    "put all shapes on one piece": ("shapes on different pieces",),
+    "add [contact.strips], whose strips slide independently": (
+        "mode with yaw, rig, patch without strips",
+    ),
+    "use [contact] in place of [normal]": ("mode with heave or pitch, single contact point",),
+    "set initial_bonds = 0 or use order >= 0": ("bonds that no force can move, partial slip",),
     "{joints_advice}": (
         "mode with yaw, patch.strips, rig, law for one interface",
         "law for one interface, several interfaces",
@@ -387,10 +439,6 @@ def check_combinations(draft: SceneDraft, kind: str) -> None:
         table = interface.table
         joints.append(Joint(draft, f"structure.interface.{index}", table, table.contact, kind))
     for joint in joints:
-        if joint.is_read:
-            _check_shape_sides(joint)
-            _check_modes(joint)
-            _check_initial_bonds(joint)
         # Many rows name the same feature, which is looked for only once.
         is_there = cache(lambda name, joint=joint: find_feature(name).is_there(joint))
         reported: set[str] = set()  # one mistake for each key is enough
@@ -414,45 +462,3 @@ def name_feature(name: str) -> str:
     if "=" in name:
         return f"{feature.key} = {feature.words}"
     return feature.words or feature.key
-
-
-def _check_shape_sides(joint: Joint) -> None:
-    """Report shapes on different pieces."""
-    shapes = joint.contact.table.shapes if joint.contact else {}
-    sides = {f"{joint.patch_key}.{name}.on": shape.on for name, shape in shapes.items() if shape.on}
-    if len(set(sides.values())) > 1:
-        key = next((key for key in reversed(sides) if joint.draft.has(key)), next(iter(sides)))
-        names = " and ".join(f"contact.{key.split('.')[-2]}" for key in sides)
-        message = describe_unsupported(
-            f"{names} on different pieces", "put all shapes on one piece"
-        )
-        joint.draft.add_mistake(key, message)
-
-
-def _check_modes(joint: Joint) -> None:
-    """Report modes that rotate or lift a patch that cannot follow."""
-    if joint.kind != "rig":
-        return
-    if joint.yaw and not joint.contact.strips:
-        joint.draft.add_mistake(
-            joint.yaw,
-            "`yaw` rotates the patch about its normal; add [contact.strips], whose strips slide independently",
-        )
-    is_point = not joint.is_interface and not joint.contact
-    if is_point and joint.heave_key:
-        joint.draft.add_mistake(
-            joint.heave_key,
-            "a single contact point cannot heave or pitch: use [contact] in place of [normal]",
-        )
-
-
-def _check_initial_bonds(joint: Joint) -> None:
-    """Report bonds at rest that no force can move."""
-    is_unbounded = joint.has_trait("bonds") and joint.reading == "report" and -1 < joint.order < 0
-    if is_unbounded and joint.compliance and joint.initial_bonds:
-        joint.add_mistake(
-            "initial_bonds",
-            f"{joint.initial_bonds:g} with order = {joint.order:g} and {joint.compliance} gives points that no force can "
-            "move: in the law as printed in the report, (R/eps)^order is unbounded for bonds at rest; set "
-            "initial_bonds = 0 or use order >= 0",
-        )

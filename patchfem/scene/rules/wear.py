@@ -1,4 +1,4 @@
-"""Rules of [wear]: what wear needs."""
+"""Rules of [wear.friction]."""
 
 from itertools import pairwise
 
@@ -9,48 +9,12 @@ from .scene_draft import SceneDraft
 from .view import UNKNOWN_VALUE
 
 
-def check_wear(draft: SceneDraft, kind: str) -> None:
+def check_wear(draft: SceneDraft) -> None:
     """Report mistakes in [wear]."""
     wear = TableFacts(draft, "wear", draft.tables.wear)
-    if draft.tables.wear is None:
-        return
-    if kind == "patch":
-        draft.add_mistake(
-            "wear",
-            "wear needs a slide: add [friction] with [slide], or with [structure] and [drive]",
-        )
     if wear.friction:
         _check_friction(wear)
         _check_law(wear)
-    if wear.scene.normal:
-        _check_point(wear)
-        return
-    contact = wear.scene.contact
-    has_coating = contact.coating or contact.upper.coating or contact.lower.coating
-    if wear.has("upper_share") and find_grooves(draft) is None and not has_coating:
-        wear.add_remark(
-            "upper_share",
-            "has no effect on the measures without grooves or a coating: the measure worn_depth is the depth worn off "
-            "both pieces together",
-        )
-
-
-def _check_point(wear: TableFacts) -> None:
-    """Report keys that need a worn depth, which a contact point does not have."""
-    if wear.friction:
-        wear.add_mistake(
-            "friction",
-            "a [normal] contact has no area, so its wear has no depth: use [contact]",
-        )
-    if wear.has("start"):
-        wear.add_mistake(
-            "start",
-            "[normal] is a point and has no worn depth to start from: use [contact], or leave wear.start out and add "
-            "the worn volumes of both runs",
-        )
-    for key in ("jumps", "upper_share"):
-        if wear.has(key):
-            wear.add_remark(key, "has no meaning without [contact] and is not used")
 
 
 def _check_friction(wear: TableFacts) -> None:
@@ -78,11 +42,6 @@ def _check_law(wear: TableFacts) -> None:
         wear.add_mistake(
             "friction.bond_length_factor",
             f"law '{law.law}' has no bond_length; leave this key out, or use {name_laws_with_key('bond_length')}",
-        )
-    elif wear.friction.bond_length_factor and law.stiffness:
-        wear.add_mistake(
-            "friction.bond_length_factor",
-            "has no meaning with friction.stiffness; give friction.bond_length in place of friction.stiffness",
         )
     if wear.friction.coefficient_factor and law.static == 0:
         wear.add_remark("friction.coefficient_factor", "has no effect, because static = 0")
