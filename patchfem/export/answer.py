@@ -126,7 +126,14 @@ def make_columns(dims: str, columns: dict[str, tuple]) -> Data:
 
 
 def encode(dimension: str, texts: list[str], description: str = "") -> Variable:
-    """Return texts over one dimension as codes with meanings."""
+    """Return texts over one dimension as codes with meanings.
+
+    Parameters
+    ----------
+    dimension : str
+    texts : list of str
+    description : str, optional
+    """
     meanings, codes = np.unique(np.asarray(texts, str), return_inverse=True)
     codes = codes.astype(np.int8)
     return Variable((dimension,), codes, "", description, tuple(meanings.tolist()))

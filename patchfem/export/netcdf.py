@@ -58,6 +58,13 @@ def write_arrays(data: Data, attributes: dict, path: Path) -> None:
     """Write variables and attributes as a netCDF4 file, which replaces an older one when it is complete.
 
     HDF5 writes through `open_lossy`, because it would crash on a full disk; the error is raised when the file is closed.
+
+    Parameters
+    ----------
+    data : dict of str to Variable
+    attributes : dict
+        Attributes of the file.
+    path : Path
     """
     with (
         write_atomically(path) as partial,
@@ -90,7 +97,15 @@ def _write_variable(file: h5netcdf.File, name: str, variable: Variable) -> None:
 def read_netcdf(path: Path) -> tuple[Data, dict]:
     """Read variables, in the order in which they were written, and attributes of a file of `write_arrays`.
 
-    Dimensions without a coordinate have no entry.
+    Parameters
+    ----------
+    path : Path
+
+    Returns
+    -------
+    data : dict of str to Variable
+        Dimensions without a coordinate have no entry.
+    attributes : dict
 
     Raises
     ------
@@ -111,7 +126,15 @@ def read_netcdf(path: Path) -> tuple[Data, dict]:
 
 
 def make_variable(dims: tuple[str, ...], values: np.ndarray, attributes: Mapping) -> Variable:
-    """Return the variable with the attributes of `variable_attributes`."""
+    """Return the variable that is stored with the attributes of `variable_attributes`.
+
+    Parameters
+    ----------
+    dims : tuple of str
+    values : ndarray
+    attributes : mapping
+        `units`, `long_name` and `flag_meanings`, as far as they exist.
+    """
     unit, text, meanings = (
         str(attributes.get(key, "")) for key in ("units", "long_name", "flag_meanings")
     )

@@ -26,7 +26,7 @@ from .answer import Data, Variable, encode, make_columns
 SAME_FREQUENCY = 0.5
 MEANINGS = {"status": ("open", "stick", "slip"), "event_kind": tuple(EVENT_KIND_NAMES)}
 STUCK_TEXT = "state of the interface"
-READINGS = {"acceleration": "m s-2", "displacement": "m"}  # of the sensors, and their units
+READINGS = {"acceleration": "m s-2", "displacement": "m"}  # quantities of the sensors, and units
 FRICTIONLESS = ("slide", "slide_velocity", "friction_force")  # histories that a linear run has not
 
 
@@ -414,10 +414,10 @@ def _levels(result: Result) -> Data:
         columns["level_outcome"] = (outcomes, "", "outcome of the level")
     for name in LEVEL_MEASURES:
         if any(name in level.values for level in levels):
-            unit, text = TABLE[name].unit, TABLE[name].text
+            unit = TABLE[name].unit
             values = [level.values.get(name, np.nan) for level in levels]
             errors = [level.errors.get(name, np.nan) for level in levels]
-            columns[f"level_{name}"] = (values, unit, text)
+            columns[f"level_{name}"] = (values, unit, TABLE[name].text)
             columns[f"level_{name}_error"] = (errors, unit, f"error of level_{name}")
     data = make_columns("level", columns)
     data["level_stuck"] = replace(data["level_stuck"], meanings=("slips", "sticks"))

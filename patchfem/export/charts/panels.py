@@ -160,7 +160,8 @@ def _select(data: Data, chart: Chart) -> Data:
     keep = _find_span(data, chart.span, x_name)
     if keep is None:
         return data
-    return _take(data, "time" if chart.span == "cycles" else x_name, keep) if keep.size else {}
+    dimension = "time" if chart.span == "cycles" else x_name
+    return _take(data, dimension, keep) if keep.size else {}
 
 
 def _find_span(data: Data, span: str, x_name: str) -> np.ndarray | None:
@@ -185,12 +186,12 @@ def _find_span(data: Data, span: str, x_name: str) -> np.ndarray | None:
 
 def _take(data: Data, dimension: str, indices: np.ndarray) -> Data:
     """Return the variables at some indices of a dimension; those without this dimension are unchanged."""
-    return {
-        name: replace(one, values=np.take(one.values, indices, axis=one.dims.index(dimension)))
-        if dimension in one.dims
-        else one
-        for name, one in data.items()
-    }
+    taken = {}
+    for name, one in data.items():
+        if dimension in one.dims:
+            values = np.take(one.values, indices, axis=one.dims.index(dimension))
+            taken[name] = replace(one, values=values)
+    return data | taken
 
 
 def _make_curves(data: Data, chart: Chart, source: str, axes: tuple[Axis, Axis]) -> list[Curve]:

@@ -16,7 +16,7 @@ DASHES = ("solid", "dash", "dot", "dashdot")
 SYMBOLS = ("circle", "diamond", "square", "x")
 BAND_OPACITY = 0.18
 FRAME_MILLISECONDS = 120  # duration of a frame of a film
-ABOVE = {"x": 0, "xanchor": "left", "y": 1.02, "yanchor": "bottom"}  # place of a menu
+MENU_PLACE = {"x": 0, "xanchor": "left", "y": 1.02, "yanchor": "bottom"}  # above the chart
 
 
 def draw(panel: Panel) -> dict:
@@ -178,7 +178,7 @@ def _add_menu(figure: dict, choices: list[Panel]) -> None:
     figure["layout"] |= {
         # the legend is below, because the menu is above
         "legend": {"orientation": "h", "x": 0, "y": -0.3, "yanchor": "top"},
-        "updatemenus": [ABOVE | {"buttons": buttons}],
+        "updatemenus": [MENU_PLACE | {"buttons": buttons}],
     }
 
 
@@ -200,7 +200,7 @@ def _add_slider(figure: dict, names: list[str]) -> None:
     ]
     play, stop, *steps = buttons
     slider = {"steps": steps, "active": 0, "pad": {"t": 40}, "currentvalue": {"prefix": "t = "}}
-    menu = ABOVE | {"type": "buttons", "direction": "right", "buttons": [play, stop]}
+    menu = MENU_PLACE | {"type": "buttons", "direction": "right", "buttons": [play, stop]}
     figure["layout"] |= {"sliders": [slider], "updatemenus": [menu]}
 
 
