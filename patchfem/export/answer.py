@@ -5,7 +5,7 @@ page, `charts` pictures and `show` the lines on the screen.
 """
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields, is_dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -97,28 +97,61 @@ class Variable:
     meanings: tuple[str, ...] = ()
 
 
-def make_columns(dimension: str, columns: dict[str, tuple]) -> dict[str, Variable]:
-    """Return variables over one dimension.
+# arrays by name, and measures by name
+Data = dict[str, Variable]
+Quantities = dict[str, Quantity]
+
+
+def make_columns(dims: str, columns: dict[str, tuple]) -> Data:
+    """Return variables over the same dimensions.
+
+    Parameters
+    ----------
+    dims : str
+        Names separated by spaces; an array with fewer dimensions has the last ones.
+    columns : dict
+        Name -> (values, unit) or (values, unit, description). A number that is None becomes NaN; without a description it
+        is the name in words.
+    """
+    names = dims.split()
+    variables = {}
+    for name, (values, unit, *text) in columns.items():
+        array = np.asarray(values)
+        if array.dtype == object:
+            array = array.astype(float)
+        description = text[0] if text else name.replace("_", " ")
+        own_dims = tuple(names[len(names) - array.ndim :])
+        variables[name] = Variable(own_dims, array, unit, description)
+    return variables
+
+
+def encode(dimension: str, texts: list[str], description: str = "") -> Variable:
+    """Return texts over one dimension as codes with meanings.
 
     Parameters
     ----------
     dimension : str
-    columns : dict
-        Name -> (values, unit). A number that is None becomes NaN; the name in words is the description.
+    texts : list of str
+    description : str, optional
     """
-    variables = {}
-    for name, (values, unit) in columns.items():
-        array = np.asarray(values)
-        if array.dtype == object:
-            array = array.astype(float)
-        variables[name] = Variable((dimension,), array, unit, name.replace("_", " "))
-    return variables
+    meanings, codes = np.unique(np.asarray(texts, str), return_inverse=True)
+    codes = codes.astype(np.int8)
+    return Variable((dimension,), codes, "", description, tuple(meanings.tolist()))
 
 
-def encode(dimension: str, texts: list[str]) -> Variable:
-    """Return texts over one dimension as codes with meanings."""
-    meanings, codes = np.unique(texts, return_inverse=True)
-    return Variable((dimension,), codes.astype(np.int8), "", meanings=tuple(meanings.tolist()))
+def to_plain(content):
+    """Return content of a JSON file: arrays as lists, records as objects, and numbers that are not finite as None."""
+    if isinstance(content, np.ndarray | np.generic):
+        content = content.tolist()
+    elif is_dataclass(content):
+        content = {one.name: getattr(content, one.name) for one in fields(content)}
+    elif hasattr(content, "_asdict"):
+        content = content._asdict()
+    if isinstance(content, dict):
+        return {key: to_plain(one) for key, one in content.items()}
+    if isinstance(content, list | tuple):
+        return [to_plain(one) for one in content]
+    return _finite_or_none(content) if isinstance(content, float) else content
 
 
 @dataclass(frozen=True, slots=True)
@@ -146,7 +179,8 @@ class Answer:
         Arrays by name. NAME_error is the error band of NAME, NAME_low and NAME_high are the ends of its interval.
     remarks : Remarks
     details : dict
-        JSON keys of the verb: further keys of summary.json for a run; the content of NAME.json for another verb.
+        JSON keys of the verb: further keys of summary.json for a run; the content of NAME.json for another verb. Records and
+        arrays become objects and lists, as in `to_plain`.
     origin : dict
         Where the answer comes from: `patchfem` (version), `scene` (text as written), `resolved` (scene with all defaults),
         `command` (how to repeat it), `driven` (drive in words) and `versions` (package -> version), as far as they exist.
@@ -155,11 +189,14 @@ class Answer:
     kind: str
     title: str
     verdict: tuple[str, ...]
-    quantities: dict[str, Quantity] = field(default_factory=dict)
-    data: dict[str, Variable] = field(default_factory=dict)
+    quantities: Quantities = field(default_factory=dict)
+    data: Data = field(default_factory=dict)
     remarks: Remarks = Remarks()
     details: dict = field(default_factory=dict)
     origin: dict = field(default_factory=dict)
+
+    def __post_init__(self):
+        object.__setattr__(self, "details", to_plain(self.details))
 
     @property
     def is_run(self) -> bool:
@@ -167,4 +204,5 @@ class Answer:
         return self.kind in RUN_KINDS
 
 
+Answers = dict[str, Answer]  # by their name in a legend
 RUN_KINDS = ("patch", "bench", "rig", "linear")

@@ -10,9 +10,9 @@ from ..campaigns.backbone.request import BackboneCases, BackboneRequest, compute
 from ..core import PatchfemError
 from ..formatting import format_number, format_quantity
 from . import quantities
-from .answer import Answer, Quantity, Remarks, Variable, make_columns
-from .charts import axes, panels
-from .charts.table import CHARTS
+from .answer import Answer, Data, Quantities, Quantity, Remarks, Variable, make_columns
+from .charts import axes
+from .netcdf import from_dataset
 from .runs import make_origin
 
 COLUMNS = (
@@ -95,19 +95,15 @@ def backbone_axes(dataset, ax=None):
     PatchfemError
         If the Dataset has no curve of a backbone.
     """
-    data = {}
-    for name, array in getattr(dataset, "variables", {}).items():
-        texts = (array.attrs.get("units", "1"), array.attrs.get("long_name", ""))
-        data[name] = Variable(array.dims, array.values, *texts)
-    drawn = panels.make_panels({"": Answer("backbone", "", (), data=data)}, CHARTS["backbone"])
-    if not drawn:
+    axes_of_chart = axes.draw_charts(from_dataset(dataset, "backbone"), (), ax, "plot.backbone")
+    if axes_of_chart is None:
         raise PatchfemError(
             "plot.backbone: a Dataset returned by pf.backbone is needed, with at least one curve"
         )
-    return axes.make_figure(drawn).axes[0] if ax is None else axes.draw(drawn[0], ax)
+    return axes_of_chart
 
 
-def _make_quantities(backbone: Backbone) -> dict[str, Quantity]:
+def _make_quantities(backbone: Backbone) -> Quantities:
     """Return frequencies, ends of the recommended curve, exponents and the amplitude of flutter."""
     frequencies = backbone.frequencies
     out = {}
@@ -137,7 +133,7 @@ def _take(curve: Curve, name: str, k: int) -> Quantity:
     return Quantity(getattr(curve, name)[k], UNITS[name], getattr(curve, f"{name}_error")[k])
 
 
-def _make_verdict(backbone: Backbone, measures: dict[str, Quantity]) -> tuple[str, ...]:
+def _make_verdict(backbone: Backbone, measures: Quantities) -> tuple[str, ...]:
     """Return the ends of the recommended curve, natural frequencies, largest damping, and which curve to use."""
 
     def show(name: str) -> str:
@@ -180,7 +176,7 @@ def _make_verdict(backbone: Backbone, measures: dict[str, Quantity]) -> tuple[st
     return (headline, natural, extreme, *backbone.advice[:1])
 
 
-def _make_data(backbone: Backbone) -> dict[str, Variable]:
+def _make_data(backbone: Backbone) -> Data:
     """Return the curves of all methods, the recommended one first, and the band of tests around it.
 
     The band has variables of its own and, for the charts, is the interval of the recommended curve.
@@ -211,14 +207,9 @@ def _make_details(backbone: Backbone) -> dict:
     frequencies = backbone.frequencies
     band = backbone.band
 
-    def list_columns(record, names: tuple[str, ...]) -> dict[str, list[float | None]]:
-        """Return some columns of a curve or of the band as lists; None for an unknown number."""
-        return {
-            name: [
-                None if np.isnan(number) else number for number in getattr(record, name).tolist()
-            ]
-            for name in names
-        }
+    def list_columns(record, names: tuple[str, ...]) -> dict[str, np.ndarray]:
+        """Return some columns of a curve or of the band."""
+        return {name: getattr(record, name) for name in names}
 
     return {
         "mode": backbone.mode,
@@ -228,7 +219,7 @@ def _make_details(backbone: Backbone) -> dict:
         "stuck_frequency_error": frequencies.stuck_error,
         "curves": {name: list_columns(one, COLUMNS) for name, one in backbone.curves.items()},
         "missing": backbone.missing,
-        "exponent": backbone.exponents._asdict(),
+        "exponent": backbone.exponents,
         "flutter_amplitude": backbone.flutter,
         "notes": list(backbone.notes),
         "method": band and band.method,
@@ -273,7 +264,7 @@ def _make_cases_answer(cases: BackboneCases) -> Answer:
     )
 
 
-def _make_cases_data(cases: BackboneCases) -> dict[str, Variable]:
+def _make_cases_data(cases: BackboneCases) -> Data:
     """Return the recommended curves of all values of the key at common amplitudes; NaN where one has no motion."""
     data = {"case": Variable(("case",), np.array(cases.axis.texts), "", cases.axis.key)}
     for method in METHODS:
@@ -298,7 +289,7 @@ def _make_cases_data(cases: BackboneCases) -> dict[str, Variable]:
     return data
 
 
-def _compare_ends(cases: BackboneCases) -> tuple[tuple[str, ...], dict[str, Quantity]]:
+def _compare_ends(cases: BackboneCases) -> tuple[tuple[str, ...], Quantities]:
     """Return the sentences on what the change of the key from its first to its last value does, and the changes.
 
     They hold at the amplitude with the largest sum of both changes beyond the numerical errors, each over its maximum.

@@ -1,6 +1,5 @@
 """The answer of `cost`: numerical error against CPU time, for several tolerances or values of a setting."""
 
-from dataclasses import asdict
 from typing import NamedTuple
 
 from ..campaigns.cost import (
@@ -18,7 +17,7 @@ from ..campaigns.cost import (
 from ..formatting import format_number
 from ..model.model import Model
 from . import quantities
-from .answer import Answer, Quantity, Remarks, Variable, encode, make_columns
+from .answer import Answer, Data, Quantities, Quantity, Remarks, encode, make_columns, to_plain
 from .runs import make_origin
 
 # columns of cost.csv that every run has: attribute -> heading and unit
@@ -114,7 +113,7 @@ def describe_runs(knob: str, runs: list[Cost], tolerance: float) -> dict:
             "meets_tolerance": judge_run(run, names, run.tolerance) is Judgement.MEETS,
             "remedies": list(run.remedies),
         }
-        entries.append(asdict(run) | entry)
+        entries.append(to_plain(run) | entry)
     is_setting = knob != TOLERANCE
     return {
         "runs": entries,
@@ -168,7 +167,7 @@ def _find_unit(name: str) -> str:
     return definition.unit if definition else "1"
 
 
-def _make_quantities(row: Row, main: str, tolerance: float) -> dict[str, Quantity]:
+def _make_quantities(row: Row, main: str, tolerance: float) -> Quantities:
     """Return CPU time and error of a run, the tolerance of the scene, and the main measure."""
     run = row.run
     out = {
@@ -183,7 +182,7 @@ def _make_quantities(row: Row, main: str, tolerance: float) -> dict[str, Quantit
     return out
 
 
-def _make_data(rows: list[Row], main: str, tolerance: float) -> dict[str, Variable]:
+def _make_data(rows: list[Row], main: str, tolerance: float) -> Data:
     """Return a row for each run: the columns of cost.csv, which the charts and the table of the page show too."""
     runs = [row.run for row in rows]
     columns = {"knob": ([row.knob for row in rows], "")}

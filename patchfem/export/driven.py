@@ -1,6 +1,5 @@
-"""Description of the drive signal of a run, and the command that repeats the run."""
+"""Description of the drive signal of a run, and of the keys that the command line has changed."""
 
-import shlex
 from pathlib import Path
 from textwrap import shorten
 
@@ -126,23 +125,4 @@ def list_changed_keys(sets: tuple) -> str:
             for key, _, value in (assignment.partition("=") for assignment in sets)
         ),
         160,
-    )
-
-
-def run_command(path: Path, sets: tuple) -> str:
-    """Return the command line that repeats a run.
-
-    sets: `key=value` strings as given; files are named without their folder.
-    """
-    assignments = [
-        f"{key}={Path(value).name if value.startswith('/') else value}"
-        for key, _, value in (assignment.partition("=") for assignment in sets)
-    ]
-    return shlex.join(
-        [
-            "patchfem",
-            "run",
-            Path(path).name,
-            *(word for assignment in assignments for word in ("--set", assignment)),
-        ]
     )

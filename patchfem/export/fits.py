@@ -23,7 +23,7 @@ from ..model.model import build, write_resolved
 from ..scene.assignments import Range
 from ..scene.scene import Scene, add_sets, move_scene
 from . import page, store
-from .answer import Answer, Quantity, Remarks, Variable, encode, make_columns
+from .answer import Answer, Data, Quantities, Quantity, Remarks, encode, make_columns
 from .folder import STARTS, Folder
 from .quantities import format_quantity
 from .runs import make_origin
@@ -99,8 +99,8 @@ class Parts(NamedTuple):
 
     residual: str
     details: dict
-    scores: dict[str, Quantity]
-    data: dict[str, Variable]
+    scores: Quantities
+    data: Data
 
 
 def make_answer(fit: AnyFit, scene: Scene) -> Answer:
@@ -113,34 +113,35 @@ def make_answer(fit: AnyFit, scene: Scene) -> Answer:
         Scene before the fit.
     """
     parts = _DESCRIBE[type(fit)](fit)
-    search = {} if isinstance(fit, FittedCoefficient) else _describe_search(fit)
-    details = {
-        "patchfem": __version__,
-        "title": scene.title,
-        "outcome": "done",
-        "values": _describe_values(fit),
-    }
-    details |= search | parts.details
+    details = {"patchfem": __version__, "title": scene.title, "outcome": "done"}
+    details["values"] = _describe_values(fit)
+    if not isinstance(fit, FittedCoefficient):
+        details |= _describe_search(fit)
+    details |= parts.details
 
-    fitted = dict(details["values"])
-    fitted |= {f"offset_{name}": entry for name, entry in details.get("offsets", {}).items()}
+    # fitted values, and offsets of the record, with their intervals
+    fitted = details["values"] | {
+        f"offset_{name}": entry for name, entry in details.get("offsets", {}).items()
+    }
     measures = {}
     for name, entry in fitted.items():
         reason = "" if entry["interval"] else "the measurement does not determine an interval"
-        ends = {"low": entry["low"], "high": entry["high"]}
+        ends = {end: entry[end] for end in ("low", "high")}
         measures[name] = Quantity(entry["value"], entry["unit"], **ends, reason=reason)
     pairs = _collect_pairs(details.get("correlation", []), list(fitted))
-    verdict = (_make_headline(details, measures), parts.residual)
-    if pairs and abs(pairs["correlation"].values[0]) >= MIN_NAMED_CORRELATION:
-        names = pairs["pair"].values[0].replace(", ", " and ")
-        verdict += (
-            f"{names} are correlated by {pairs['correlation'].values[0]:.2f}: the measurement determines a combination of "
-            "them better than each one.",
-        )
+    verdict = [_make_headline(details, measures), parts.residual]
+    if pairs:
+        correlation = pairs["correlation"].values[0]
+        if abs(correlation) >= MIN_NAMED_CORRELATION:
+            names = pairs["pair"].values[0].replace(", ", " and ")
+            verdict.append(
+                f"{names} are correlated by {correlation:.2f}: the measurement determines a combination of them better than "
+                "each one."
+            )
     return Answer(
         kind="fit",
         title=scene.title,
-        verdict=verdict,
+        verdict=tuple(verdict),
         quantities=measures | parts.scores,
         data=parts.data | pairs,
         remarks=Remarks(tuple(details["warnings"]), tuple(details.get("notes", ()))),
@@ -149,7 +150,7 @@ def make_answer(fit: AnyFit, scene: Scene) -> Answer:
     )
 
 
-def _make_headline(details: dict, measures: dict[str, Quantity]) -> str:
+def _make_headline(details: dict, measures: Quantities) -> str:
     """Return a sentence with the first fitted values and their intervals."""
     keys = list(details["values"])
     named = keys[:MAX_NAMED_VALUES]
@@ -164,51 +165,44 @@ def _make_headline(details: dict, measures: dict[str, Quantity]) -> str:
     return f"Fitted to {source}: {text}."
 
 
-def _collect_pairs(correlation: list[list[float | None]], names: list[str]) -> dict[str, Variable]:
+def _collect_pairs(correlation: np.ndarray, names: list[str]) -> Data:
     """Return the correlation of each pair of fitted values, the strongest first; {} for a single value."""
     if len(names) < 2:
         return {}
     first, second = np.triu_indices(len(names), 1)
-    values = np.array(correlation, float)[first, second]
+    values = np.asarray(correlation, float)[first, second]
     order = np.argsort(-np.abs(np.nan_to_num(values)), kind="stable")
     texts = [f"{names[first[k]]}, {names[second[k]]}" for k in order]
-    columns = {
-        "pair": (texts, ""),
-        "correlation": (values[order], "1"),
-    }
-    return make_columns("pair", columns)
-
-
-def _replace_unknown(values) -> list:
-    """Return numbers as nested lists, or a single number, with None for those that are not finite."""
-    return np.where(np.isfinite(values), values, None).tolist()
+    return make_columns("pair", {"pair": (texts, ""), "correlation": (values[order], "1")})
 
 
 def _describe_values(fit: AnyFit) -> dict[str, dict]:
     """Return all fitted values by scene key, as written in fit.json."""
     if isinstance(fit, FittedCoefficient):
-        ends = {"low": fit.low, "high": fit.high, "interval": [fit.low, fit.high]}
-        bounds = [fit.bounds.low, fit.bounds.high]
-        return {COEFFICIENT_KEY: {"value": fit.value, "unit": WEAR_UNIT, **ends, "bounds": bounds}}
-    keys = fit.keys
-    return {bound.key: _describe_value(bound, keys.fit, k) for k, bound in enumerate(keys.ranges)}
+        value = {"value": fit.value, "unit": WEAR_UNIT, "low": fit.low, "high": fit.high}
+        ends = {"interval": [fit.low, fit.high], "bounds": [fit.bounds.low, fit.bounds.high]}
+        return {COEFFICIENT_KEY: value | ends}
+    return {
+        bound.key: _describe_value(bound, fit.keys.fit, k)
+        for k, bound in enumerate(fit.keys.ranges)
+    }
 
 
 def _describe_value(bound: Range, fit: Fit, k: int) -> dict:
     """Return fitted value k with its confidence interval and range, as written in fit.json."""
-    ends = fit.intervals.ends[k].tolist()
+    ends = fit.intervals.ends[k]
     interval = ends if np.isfinite(ends).all() else None
-    low, high = interval or (None, None)
+    low, high = (None, None) if interval is None else interval.tolist()
     return {
         "value": float(fit.values[k]),
         "unit": bound.unit,
         "low": low,
         "high": high,
-        "interval": interval,
+        "interval": None if interval is None else [low, high],
         "method": fit.intervals.methods[k],
         "bounds": [bound.low, bound.high],
         "at_bound": fit.at_bound[k] or None,
-        "sensitivity": float(fit.intervals.sensitivity[k]),
+        "sensitivity": fit.intervals.sensitivity[k],
     }
 
 
@@ -218,13 +212,11 @@ def _describe_search(fit: FittedLoop | FittedCurve | FittedRows) -> dict:
     intervals = keys.fit.intervals
     names = [bound.key for bound in keys.ranges]
     names += [offset.range.key for offset in getattr(fit, "offsets", ())]
+    unknown = [dict(zip(names, row, strict=True)) for row in intervals.unknown.tolist()]
     return {
         "outcome": str(keys.outcome),
-        "unknown": [
-            {name: part for name, part in zip(names, row, strict=True) if part}
-            for row in intervals.unknown.tolist()
-        ],
-        "correlation": _replace_unknown(intervals.correlation),
+        "unknown": [{name: part for name, part in row.items() if part} for row in unknown],
+        "correlation": intervals.correlation,
         "evaluations": keys.fit.counts.evaluations,
         "failures": keys.fit.counts.failures,
         "descents_agreed": keys.fit.n_agreed,
@@ -236,7 +228,6 @@ def _describe_search(fit: FittedLoop | FittedCurve | FittedRows) -> dict:
 def describe_loop_fit(fit: FittedLoop) -> Parts:
     """Return the parts of a fit to a friction loop."""
     loop = fit.loop
-    fitted = fit.keys.fit
     unit = LOOP_UNITS[loop.quantity]
     peak = float(np.abs(loop.reading).max())
     n_rows = int((~fit.held_out).sum())
@@ -245,16 +236,14 @@ def describe_loop_fit(fit: FittedLoop) -> Parts:
         "residual_fraction": Quantity(fit.rms / peak),
     }
     text = format_quantity("residual_rms", scores["residual_rms"])
-    residual = (
-        f"The residual of {n_rows} rows is {text} rms, {100 * fit.rms / peak:.2g} % of the peak."
-    )
+    share = f"{100 * fit.rms / peak:.2g} %"
+    residual = f"The residual of {n_rows} rows is {text} rms, {share} of the peak."
     if loop.quantity == "force":
         works = np.trapezoid([loop.reading, fit.model], loop.displacement)
         scores["work_measured"], scores["work_fitted"] = (Quantity(work, "J") for work in works)
         share = format_number(100 * works[1] / works[0], 4)
         residual += f" The fitted loop dissipates {share} % of the measured work."
 
-    # rows that are held out are drawn and scored apart
     columns = {
         "slide": (loop.displacement, "m"),
         loop.quantity: (loop.reading, unit),
@@ -266,38 +255,31 @@ def describe_loop_fit(fit: FittedLoop) -> Parts:
     if loop.time is not None:
         columns["time"] = (loop.time, "s")
     held = None
-    if fit.held_out_rms is not None:
-        held = {"rows": int(fit.held_out.sum()), "rms": fit.held_out_rms}
+    if fit.held_out_rms is not None:  # these rows are drawn and scored apart
+        held = {"rows": fit.held_out.sum(), "rms": fit.held_out_rms}
         scores["held_out_rms"] = Quantity(fit.held_out_rms, unit)
-        shown = np.where(fit.held_out, loop.reading, np.nan)
-        columns["held_out"] = (shown, unit)
-    return Parts(
-        residual=residual,
-        details={
-            "measured": loop.path.name,
-            "quantity": loop.quantity,
-            "offsets": {
-                offset.name: _describe_value(offset.range, fitted, k)
-                for k, offset in enumerate(fit.offsets, len(fit.keys.ranges))
-            },
-            "unit": unit,
-            "rows": n_rows,
-            "effective_rows": _replace_unknown(fitted.intervals.rows),
-            "rms": fit.rms,
-            "held": held,
-            "peak": peak,
-            "step_error": fit.step_error,
-            "steps_between_rows": fit.steps_per_row,
-        },
-        scores=scores,
-        data=make_columns("row", columns),
-    )
+        columns["held_out"] = (np.where(fit.held_out, loop.reading, np.nan), unit)
+    offsets = enumerate(fit.offsets, len(fit.keys.ranges))
+    details = {
+        "measured": loop.path.name,
+        "quantity": loop.quantity,
+        "offsets": {one.name: _describe_value(one.range, fit.keys.fit, k) for k, one in offsets},
+        "unit": unit,
+        "rows": n_rows,
+        "effective_rows": fit.keys.fit.intervals.rows,
+        "rms": fit.rms,
+        "held": held,
+        "peak": peak,
+        "step_error": fit.step_error,
+        "steps_between_rows": fit.steps_per_row,
+    }
+    return Parts(residual, details, scores, make_columns("row", columns))
 
 
 def describe_curve_fit(fit: FittedCurve) -> Parts:
     """Return the parts of a fit to measured frequency and damping against amplitude."""
     measured = fit.measured
-    n_rows = int(measured.amplitude.size)
+    n_rows = measured.amplitude.size
     errors = 2 * measured.error  # half the width of a 95 % interval
     columns = {"amplitude": (measured.amplitude, "m")}
     curve = {"curve_amplitude": (fit.beyond[0], "m")}
@@ -314,25 +296,25 @@ def describe_curve_fit(fit: FittedCurve) -> Parts:
         }
         curve[f"curve_{name}"] = (fit.beyond[k + 1], unit)
         curve[f"curve_{name}_error"] = (fit.beyond[k + 3], unit)
-    assumed = ""
-    if measured.assumed.any():
-        assumed = " The errors of the measured values are their scatter around the fit."
     percent = {name: f"{100 * value:.2g} %" for name, value in rms.items()}
-    return Parts(
-        residual=f"At {n_rows} amplitudes the residual is {percent['frequency']} rms of the frequency and "
-        f"{percent['damping']} of the damping ratio, by method {fit.method}.{assumed}",
-        details={
-            "measured": fit.path.name,
-            "quantity": "decay",
-            "method": fit.method,
-            "rows": n_rows,
-            "rms": rms,
-            "notes": list(fit.notes),
-            "evaluations": fit.n_computed,
-        },
-        scores={f"{name}_residual_rms": Quantity(value) for name, value in rms.items()},
-        data=make_columns("row", columns) | make_columns("curve_amplitude", curve),
+    residual = (
+        f"At {n_rows} amplitudes the residual is {percent['frequency']} rms of the frequency and "
+        f"{percent['damping']} of the damping ratio, by method {fit.method}."
     )
+    if measured.assumed.any():
+        residual += " The errors of the measured values are their scatter around the fit."
+    details = {
+        "measured": fit.path.name,
+        "quantity": "decay",
+        "method": fit.method,
+        "rows": n_rows,
+        "rms": rms,
+        "notes": list(fit.notes),
+        "evaluations": fit.n_computed,
+    }
+    scores = {f"{name}_residual_rms": Quantity(value) for name, value in rms.items()}
+    data = make_columns("row", columns) | make_columns("curve_amplitude", curve)
+    return Parts(residual, details, scores, data)
 
 
 def describe_rows_fit(fit: FittedRows) -> Parts:
@@ -345,87 +327,83 @@ def describe_rows_fit(fit: FittedRows) -> Parts:
     totals = {name: score["all"] for name, score in scores.items() if score is not None}
     texts = [f"{name.replace('_', ' ')} {value:.3f}" for name, value in totals.items() if value]
     names = [bound.key for bound in fit.keys.ranges]
-    starts = []
-    for first, last, rms in zip(
-        search.starts, search.ends, _replace_unknown(search.rms), strict=True
-    ):
-        begin, end = (dict(zip(names, values.tolist(), strict=True)) for values in (first, last))
-        starts.append({"from": begin, "to": None if rms is None else end, "training": rms})
+    starts = [
+        {
+            "from": dict(zip(names, first, strict=True)),
+            "to": dict(zip(names, last, strict=True)) if np.isfinite(rms) else None,
+            "training": rms,
+        }
+        for first, last, rms in zip(search.starts, search.ends, search.rms, strict=True)
+    ]
     instrument = {
         name: getattr(fit.models.instrument, name, default) for name, default in INSTRUMENT.items()
     }
-    for name, value in zip(names, fit.keys.fit.values.tolist(), strict=True):
+    for name, value in zip(names, fit.keys.fit.values, strict=True):
         table, _, key = name.partition(".")
         if table == "measured":
             instrument[key] = value
     rows, data = _collect_rows(fit)
-    return Parts(
-        residual=f"The rms of ln(computed/measured) is {', '.join(texts)}; {search.n_best} of {search.rms.size} starts led "
-        "to within 1 % of the best.",
-        details={
-            "measured": fit.cells.path.name,
-            "quantity": "rows",
-            "scores": scores,
-            "scores_stable": fit.compute_scores(only_stable=True),
-            "unstable": fit.options.unstable,
-            "reading": instrument,
-            "readings": int((~fit.held_out).sum()),
-            "held": int(fit.held_out.sum()),
-            "rms": fit.keys.fit.rms,
-            "seed": fit.options.seed,
-            "starts": starts,
-            "rows": rows,
-            "motions": fit.n_motions,
-            "notes": [fit.advice] if fit.advice else [],
-        },
-        scores={f"score_{name}": Quantity(value) for name, value in totals.items()},
-        data=data,
+    details = {
+        "measured": fit.cells.path.name,
+        "quantity": "rows",
+        "scores": scores,
+        "scores_stable": fit.compute_scores(only_stable=True),
+        "unstable": fit.options.unstable,
+        "reading": instrument,
+        "readings": (~fit.held_out).sum(),
+        "held": fit.held_out.sum(),
+        "rms": fit.keys.fit.rms,
+        "seed": fit.options.seed,
+        "starts": starts,
+        "rows": rows,
+        "motions": fit.n_motions,
+        "notes": [fit.advice] if fit.advice else [],
+    }
+    residual = (
+        f"The rms of ln(computed/measured) is {', '.join(texts)}; {search.n_best} of {search.rms.size} starts led to within "
+        "1 % of the best."
     )
+    scores = {f"score_{name}": Quantity(value) for name, value in totals.items()}
+    return Parts(residual, details, scores, data)
 
 
-def _collect_rows(fit: FittedRows) -> tuple[list[dict], dict[str, Variable]]:
+def _collect_rows(fit: FittedRows) -> tuple[list[dict], Data]:
     """Return measured and computed readings of each row: as written in fit.json, and as arrays with their ratios."""
     cells = fit.cells
-    count = len(cells.rows)
-    is_held = np.zeros(count, bool)
-    is_held[cells.row[fit.held_out]] = True
     entries = [asdict(row) for row in cells.rows]
-    uses = [
-        ("held out" if held else "fitted") + ", unstable in the test" * ("U" in row["flag"])
-        for held, row in zip(is_held, entries, strict=True)
-    ]
-    data = {
-        "use": encode("row", uses),
-        "drive": encode("row", [f"{row['frequency']:.6g} Hz" for row in entries]),
-    }
+    is_held = np.zeros(len(entries), bool)
+    is_held[cells.row[fit.held_out]] = True
     columns = {
         name: ([row[name] for row in entries], unit)
         for name, unit in (("frequency", "Hz"), ("input", "m s-2"), ("flag", ""))
     }
     columns["held"] = (is_held.astype(np.int8), "")
+    data = {}
     for part, (name, unit) in enumerate(KINDS.items()):
         # a row without a reading has no computed one
         is_kind = cells.is_acceleration == (name == "acceleration")
         places = cells.row[is_kind]
-        computed = np.full(count, np.nan)
+        computed = np.full(len(entries), np.nan)
         computed[places] = fit.computed[part, cells.condition[is_kind]]
-        held = np.full(count, None)
+        held = np.full(len(entries), None)
         held[places] = fit.held_out[is_kind]
         measured = np.array([row[name] for row in entries], float)
-        for k, number in enumerate(_replace_unknown(computed)):
-            reading = entries[k][name]
-            entries[k][name] = {"measured": reading, "computed": number, "held": held[k]}
+        for row, number, is_held_out in zip(entries, computed, held, strict=True):
+            row[name] = {"measured": row[name], "computed": number, "held": is_held_out}
         ratio = computed / np.where(measured > 0, measured, np.nan)
-        columns |= {
-            name: (measured, unit),
-            f"computed_{name}": (computed, unit),
-            f"{name}_ratio": (ratio, "1"),
-        }
+        columns |= {name: (measured, unit), f"computed_{name}": (computed, unit)}
+        columns[f"{name}_ratio"] = (ratio, "1")
         # ends of the line on which both are equal
         known = np.concatenate([measured[measured > 0], computed[computed > 0]])
         ends = [known.min(), known.max()] if known.size else []
         data |= make_columns(f"equal_{name}", {f"equal_{name}": (ends, unit)})
-    return entries, data | make_columns("row", columns)
+    uses = [
+        ("held out" if held else "fitted") + ", unstable in the test" * ("U" in row["flag"])
+        for held, row in zip(is_held, entries, strict=True)
+    ]
+    drives = [f"{row['frequency']:.6g} Hz" for row in entries]
+    codes = {"use": encode("row", uses), "drive": encode("row", drives)}
+    return entries, codes | data | make_columns("row", columns)
 
 
 def describe_wear_fit(fit: FittedCoefficient) -> Parts:
@@ -434,29 +412,24 @@ def describe_wear_fit(fit: FittedCoefficient) -> Parts:
     ends = {"value": measured.value, "low": measured.low, "high": measured.high}
     name = measured.name.replace("_", " ")
     text = format_quantity(measured.name, Quantity(unit="m", **ends))
-    points = {
-        "coefficient": ([fit.value], WEAR_UNIT),
-        "depth": ([measured.value], "m"),
-        "depth_low": ([measured.low], "m"),
-        "depth_high": ([measured.high], "m"),
-    }
+    points = {"coefficient": ([fit.value], WEAR_UNIT)}
+    for end, value in ends.items():
+        points[f"depth_{end}".removesuffix("_value")] = ([value], "m")
     coefficients, depths = fit.curve[:, fit.curve[0] <= EXTENT * fit.high]
-    curve = {
-        "curve_coefficient": (coefficients, WEAR_UNIT),
-        "curve_depth": (depths, "m"),
+    curve = {"curve_coefficient": (coefficients, WEAR_UNIT), "curve_depth": (depths, "m")}
+    details = {
+        "measured": Path(measured.source).name,
+        "quantity": measured.name,
+        "runs": fit.runs,
+        "model": fit.model,
+        "data": ends,
+        "warnings": [],
     }
     return Parts(
-        residual=f"The interval is that of the measured {name}, {text}.",
-        details={
-            "measured": Path(measured.source).name,
-            "quantity": measured.name,
-            "runs": fit.runs,
-            "model": fit.model,
-            "data": ends,
-            "warnings": [],
-        },
-        scores={"fitted_depth": Quantity(fit.model, "m")},
-        data=make_columns("point", points) | make_columns("curve_coefficient", curve),
+        f"The interval is that of the measured {name}, {text}.",
+        details,
+        {"fitted_depth": Quantity(fit.model, "m")},
+        make_columns("point", points) | make_columns("curve_coefficient", curve),
     )
 
 

@@ -14,7 +14,7 @@ from ..disk.atomic_write import RESUMABLE_FOLDERS, explain_mkdir_error, is_parti
 from ..disk.exchange import defer_signals, make_old_folder_path, replace_folder, restore_folder
 from ..disk.lock import FolderLock
 from . import store
-from .charts.table import CURVES
+from .charts.table import CSV_FILES
 
 # files of all verbs; a folder that contains any other file is never replaced
 FILES = frozenset(
@@ -26,7 +26,7 @@ FILES = frozenset(
         "result.nc",
         *store.DATA_FILES.values(),
         *store.DETAIL_FILES.values(),
-        *(name for files in CURVES.values() for name in files),
+        *(name for files in CSV_FILES.values() for name in files),
         "interfaces",
         "fields.pvd",
         "fields_frames",

@@ -4,6 +4,7 @@ The import of xarray takes longer than most runs, so only `to_dataset` imports i
 """
 
 import json
+from collections.abc import Mapping
 from pathlib import Path
 
 import h5netcdf
@@ -11,7 +12,7 @@ import h5py
 import numpy as np
 
 from ..disk.atomic_write import open_lossy, write_atomically
-from .answer import Answer, Variable
+from .answer import Answer, Data, Variable
 
 MIN_COMPRESSED_VALUES = 100  # arrays with fewer values are stored without compression
 
@@ -49,10 +50,21 @@ def variable_attributes(variable: Variable) -> dict:
 
 
 def write_netcdf(answer: Answer, path: Path) -> None:
-    """Write the arrays of an answer as a netCDF4 file.
+    """Write the arrays of an answer as a netCDF4 file."""
+    write_arrays(answer.data, make_attributes(answer), path)
 
-    The file replaces an older one when it is complete. HDF5 writes through `open_lossy`, because it would crash on a full
-    disk; the error is raised when the file is closed.
+
+def write_arrays(data: Data, attributes: dict, path: Path) -> None:
+    """Write variables and attributes as a netCDF4 file, which replaces an older one when it is complete.
+
+    HDF5 writes through `open_lossy`, because it would crash on a full disk; the error is raised when the file is closed.
+
+    Parameters
+    ----------
+    data : dict of str to Variable
+    attributes : dict
+        Attributes of the file.
+    path : Path
     """
     with (
         write_atomically(path) as partial,
@@ -60,8 +72,8 @@ def write_netcdf(answer: Answer, path: Path) -> None:
         h5py.File(opened, "w", track_order=True) as store,
         h5netcdf.File(store, "w") as file,
     ):
-        file.attrs.update(make_attributes(answer))
-        for name, variable in answer.data.items():
+        file.attrs.update(attributes)
+        for name, variable in data.items():
             _write_variable(file, name, variable)
 
 
@@ -82,8 +94,8 @@ def _write_variable(file: h5netcdf.File, name: str, variable: Variable) -> None:
     stored.attrs.update(variable_attributes(variable))
 
 
-def read_netcdf(path: Path) -> dict[str, Variable]:
-    """Read the variables of a file of `write_netcdf` in the order in which they were written.
+def read_netcdf(path: Path) -> tuple[Data, dict]:
+    """Read variables, in the order in which they were written, and attributes of a file of `write_arrays`.
 
     Parameters
     ----------
@@ -91,8 +103,9 @@ def read_netcdf(path: Path) -> dict[str, Variable]:
 
     Returns
     -------
-    dict of str to Variable
+    data : dict of str to Variable
         Dimensions without a coordinate have no entry.
+    attributes : dict
 
     Raises
     ------
@@ -106,18 +119,27 @@ def read_netcdf(path: Path) -> dict[str, Variable]:
             if bytes(stored.attrs.get("NAME", b"")).startswith(b"This is a netCDF dimension"):
                 continue
             dims = (name,) if stored.is_scale else tuple(axis[0].name[1:] for axis in stored.dims)
-            attributes = stored.attrs
             is_text = stored.dtype.kind == "O"
             values = np.asarray(stored.asstr()[...], str) if is_text else stored[...]
-            meanings = str(attributes.get("flag_meanings", "")).split()
-            data[name] = Variable(
-                dims=dims,
-                values=values,
-                unit=str(attributes.get("units", "")),
-                text=str(attributes.get("long_name", "")),
-                meanings=tuple(meaning.replace("_", " ") for meaning in meanings),
-            )
-    return data
+            data[name] = make_variable(dims, values, stored.attrs)
+        return data, dict(file.attrs)
+
+
+def make_variable(dims: tuple[str, ...], values: np.ndarray, attributes: Mapping) -> Variable:
+    """Return the variable that is stored with the attributes of `variable_attributes`.
+
+    Parameters
+    ----------
+    dims : tuple of str
+    values : ndarray
+    attributes : mapping
+        `units`, `long_name` and `flag_meanings`, as far as they exist.
+    """
+    unit, text, meanings = (
+        str(attributes.get(key, "")) for key in ("units", "long_name", "flag_meanings")
+    )
+    names = tuple(name.replace("_", " ") for name in meanings.split())
+    return Variable(dims, values, unit, text, names)
 
 
 def to_dataset(answer: Answer):
@@ -128,3 +150,13 @@ def to_dataset(answer: Answer):
     for name, variable in answer.data.items():
         variables[name] = (variable.dims, variable.values, variable_attributes(variable))
     return xr.Dataset(variables, attrs=make_attributes(answer))
+
+
+def from_dataset(dataset, kind: str) -> Answer:
+    """Return the answer of a kind that has the arrays of an xarray.Dataset; without arrays for any other object."""
+    variables = getattr(dataset, "variables", {})
+    data = {
+        str(name): make_variable(tuple(map(str, one.dims)), np.asarray(one.values), one.attrs)
+        for name, one in variables.items()
+    }
+    return Answer(kind, "", (), data=data)

@@ -16,9 +16,10 @@ from ..core import PatchfemError
 from ..disk.atomic_write import explain_write_error, write_text
 from ..formatting import format_number
 from . import quantities, several, store
-from .answer import Answer, Quantity
+from .answer import Answer, Answers, Quantity
 from .charts import panels, plotly
-from .charts.table import CHARTS, TABLES, Column
+from .charts.table import CHARTS, TABLES, Column, parse_columns
+from .columns import list_rows, make_quantity
 
 FILE_TEXTS = {
     "fields.vtkhdf": "fields of both pieces and their interface, frame by frame (ParaView 5.13 or newer)",
@@ -114,7 +115,7 @@ def make_page(folders: list[Path]) -> str:
     return _template().render(content)
 
 
-def _read_all(folders: list[Path]) -> dict[str, Answer]:
+def _read_all(folders: list[Path]) -> Answers:
     """Return the answers in folders by their names in legends, such as "load 4 kN"; "" for a single answer."""
     if not folders:
         raise PatchfemError("report: at least one results folder is needed")
@@ -134,7 +135,7 @@ def _read_all(folders: list[Path]) -> dict[str, Answer]:
     return answers
 
 
-def _describe(answers: dict[str, Answer]) -> dict:
+def _describe(answers: Answers) -> dict:
     """Return the parts of a page that are text: title, verdict, tiles, measures, notes and origin."""
     is_single = len(answers) == 1
     first = next(iter(answers.values()))
@@ -190,7 +191,7 @@ def _describe(answers: dict[str, Answer]) -> dict:
     }
 
 
-def _label_all(answers: dict[str, Answer], get_sentences) -> list[str]:
+def _label_all(answers: Answers, get_sentences) -> list[str]:
     """Return the sentences of all answers, each with the name of its answer if there are several."""
     return [
         f"{name}: {sentence}" if name else sentence
@@ -232,7 +233,7 @@ def _format_entry(name: str, answer: Answer, first: Answer) -> str:
     return several.format_entry(name, answer.quantities.get(name), first.quantities.get(name))
 
 
-def _explain(name: str, answers: dict[str, Answer]) -> str:
+def _explain(name: str, answers: Answers) -> str:
     """Return the definition of a measure, and why it has no value in an answer."""
     found = [answer.quantities[name] for answer in answers.values() if name in answer.quantities]
     kind = next(iter(answers.values())).kind
@@ -244,94 +245,61 @@ def _explain(name: str, answers: dict[str, Answer]) -> str:
 
 def make_tables(answer: Answer) -> list[dict]:
     """Return the tables of an answer that have rows: `title`, `headings` and `rows` of strings."""
-    tables = _make_case_table(answer) if answer.kind == "sweep" else []
+    tables = _list_cases(answer) if answer.kind == "sweep" else []
     for table in TABLES.get(answer.kind, ()):
-        rows = _find_rows(answer, table.source)
-        if not rows:
-            continue
-        columns = [column for column in table.columns if any(column.key in row for row in rows)]
+        rows = list_rows(answer, table.source)
+        columns = parse_columns(table.columns)
         tables.append(
-            {
-                "title": table.title,
-                "headings": [column.title for column in columns],
-                "rows": [[_format_cell(row, column) for column in columns] for row in rows],
-            }
+            _make_table(table.title, rows, [one for one in columns if _has_cells(rows, one.name)])
         )
-    return tables
+    return [table for table in tables if table["rows"]]
 
 
-def _make_case_table(answer: Answer) -> list[dict]:
+def _has_cells(rows: list[dict], name: str) -> bool:
+    """Return whether a row of a table has a cell with this name."""
+    return any(name in row for row in rows)
+
+
+def _make_table(title: str, rows: list[dict], columns: list[Column]) -> dict:
+    """Return a table as `title`, `headings` and `rows` of strings."""
+    return {
+        "title": title,
+        "headings": [column.heading.replace("_", " ") for column in columns],
+        "rows": [[_format_cell(row, column) for column in columns] for row in rows],
+    }
+
+
+def _list_cases(answer: Answer) -> list[dict]:
     """Return a table of the main measures of each case, for a sweep of few cases over one key; else no table."""
     dims = {variable.dims for variable in answer.data.values() if variable.dims}
     key = next(iter(dims))[0] if len(dims) == 1 else ""
-    rows = _find_rows(answer, key) if key in answer.data else []
-    if not 0 < len(rows) <= MAX_LISTED_CASES:
+    rows = list_rows(answer, key) if key in answer.data else []
+    if len(rows) > MAX_LISTED_CASES:
         return []
     known = [
         name
         for name in quantities.KEY
-        if any(row.get(name, {}).get("value") is not None for row in rows)
+        if any(name in row and row[name].value is not None for row in rows)
     ]
     names = [key, *known][: quantities.MAX_TILES]
-    columns = [Column(name, name.replace("_", " ")) for name in names]
-    cells = [[_format_cell(row, column) for column in columns] for row in rows]
-    return [{"title": "Cases", "headings": [column.title for column in columns], "rows": cells}]
-
-
-def _find_rows(answer: Answer, source: str) -> list[dict]:
-    """Return the rows of a table: a list or objects by name in the details, or the variables of a dimension."""
-    content = answer.details
-    for key in source.split("/"):
-        content = content.get(key) if isinstance(content, dict) else None
-    if isinstance(content, list):
-        # the quantities of an object may be in an object of their own
-        return [row | row.get("measures", {}) for row in content]
-    if isinstance(content, dict):
-        return [{"name": name.replace("_", " "), **row} for name, row in content.items()]
-    variables = {name: one for name, one in answer.data.items() if one.dims == (source,)}
-    size = len(next(iter(variables.values())).values) if variables else 0
-    return [{name: _make_cell(variables, name, k) for name in variables} for k in range(size)]
-
-
-def _make_cell(variables: dict, name: str, index: int) -> str | dict:
-    """Return one value of a variable: a string, or a quantity as an object with its error."""
-    variable = variables[name]
-    value = variable.values[index]
-    if variable.meanings:
-        return variable.meanings[int(value)]
-    if isinstance(value, str):
-        return value
-    numbers = {"value": float(value)}
-    for end in ("error", "low", "high"):
-        if f"{name}_{end}" in variables:
-            numbers[end] = float(variables[f"{name}_{end}"].values[index])
-    finite = {key: number if np.isfinite(number) else None for key, number in numbers.items()}
-    return finite | {"unit": variable.unit}
+    return [_make_table("Cases", rows, [Column(name, name) for name in names])]
 
 
 def _format_cell(row: dict, column: Column) -> str:
     """Return a cell of a table as text; a missing value is a dash."""
-    value = row.get(column.key)
-    if value is None:
-        return "-"
+    cell = row.get(column.name)
+    if cell is not None and column.style == "quantity":
+        cell = make_quantity(row)
     if column.style == "rounded":
-        number = value["value"] if isinstance(value, dict) else value
+        number = getattr(cell, "value", cell)
         return "-" if number is None else format_number(number, 3)
-    if isinstance(value, dict):
-        known = {key: value.get(key) for key in ("value", "error", "low", "high")}
-        return quantities.format_quantity(
-            column.key, Quantity(unit=value.get("unit", "1"), **known)
-        )
-    if isinstance(value, float):
-        if column.style == "quantity":
-            ends = (row.get(key) for key in ("error", "low", "high"))
-            return quantities.format_quantity(
-                column.key, Quantity(value, row.get("unit", "1"), *ends)
-            )
-        if column.style == "percent":
-            return f"{100 * value:+.3g} %"
-        return format_number(value, 6)
-    return str(value).replace("_", " ") if column.style == "name" else str(value)
+    if cell is None:
+        return "-"
+    if isinstance(cell, Quantity):
+        return quantities.format_quantity(column.name, cell)
+    if isinstance(cell, float):
+        return f"{100 * cell:+.3g} %" if column.style == "percent" else format_number(cell, 6)
+    return str(cell).replace("_", " ") if column.style == "name" else str(cell)
 
 
 def _draw_films(folder: Path) -> list[dict]:

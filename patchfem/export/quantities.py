@@ -14,7 +14,7 @@ from ..formatting import (
 from ..response import rows
 from ..runs.results import patch_rows
 from . import surface_definitions
-from .answer import Definition, Quantity
+from .answer import Definition, Quantities, Quantity
 
 MAX_TILES = 10  # largest number of key quantities on a page and on the screen
 MEASURED_DIGITS = 4  # of quantities of measured surfaces without an error; traces have no more
@@ -28,70 +28,18 @@ LADDERS = UNIT_LADDERS | {
 }
 DEGREES = ("deg", 57.29577951308232)
 
-KEY = (
-    "frequency_at_smallest_amplitude",
-    "frequency_at_largest_amplitude",
-    "damping_at_smallest_amplitude",
-    "damping_at_largest_amplitude",
-    "force_at_smallest_amplitude",
-    "force_at_largest_amplitude",
-    "largest_damping",
-    "amplitude_of_largest_damping",
-    "compared_amplitude",
-    "frequency_change",
-    "damping_change",
-    "force_change",
-    "free_frequency",
-    "stuck_frequency",
-    "cpu_time",
-    "largest_error",
-    "worn_depth_mean",
-    "worn_depth_max",
-    "worn_area",
-    "worn_volume",
-    "track_width",
-    "track_depth",
-    "wear_coefficient",
-    "amplitude_ratio",
-    "slope_ratio",
-    "Ra",
-    "Rq",
-    "Rz",
-    "RSm",
-    "Rsk",
-    "Rk",
-    "Pa",
-    "Pq",
-    "Pt",
-    "Sa",
-    "Sq",
-    "Sz",
-    "Ssk",
-    "Sdr",
-    "Sal",
-    "relative_displacement_amplitude",
-    "relative_displacement_rms",
-    "absolute_acceleration_peak",
-    "absolute_acceleration_rms",
-    "response_frequency",
-    "response_damping",
-    "slip_amplitude",
-    "equivalent_stiffness",
-    "equivalent_damping",
-    "loop_area",
-    "friction_power",
-    "friction_force_peak",
-    "friction_ratio_peak",
-    "flutter_amplitude",
-    "onset_level",
-    "jump_level",
-    "contact_fraction",
-    "pressure_peak",
-    "contact_half_width",
-    "normal_load",
-    "approach",
-    "normal_stiffness",
-    "tangential_stiffness",
+KEY = tuple(
+    """
+    frequency_at_smallest_amplitude frequency_at_largest_amplitude damping_at_smallest_amplitude
+    damping_at_largest_amplitude force_at_smallest_amplitude force_at_largest_amplitude largest_damping
+    amplitude_of_largest_damping compared_amplitude frequency_change damping_change force_change free_frequency
+    stuck_frequency cpu_time largest_error worn_depth_mean worn_depth_max worn_area worn_volume track_width
+    track_depth wear_coefficient amplitude_ratio slope_ratio Ra Rq Rz RSm Rsk Rk Pa Pq Pt Sa Sq Sz Ssk Sdr Sal
+    relative_displacement_amplitude relative_displacement_rms absolute_acceleration_peak absolute_acceleration_rms
+    response_frequency response_damping slip_amplitude equivalent_stiffness equivalent_damping loop_area
+    friction_power friction_force_peak friction_ratio_peak flutter_amplitude onset_level jump_level
+    contact_fraction pressure_peak contact_half_width normal_load approach normal_stiffness tangential_stiffness
+    """.split()
 )
 
 
@@ -335,7 +283,7 @@ def is_zero(name: str, quantity: Quantity) -> bool:
     return format_quantity(name, quantity).partition(" ")[0] == "0"
 
 
-def choose_key(quantities: dict[str, Quantity]) -> dict[str, Quantity]:
+def choose_key(quantities: Quantities) -> Quantities:
     """Return the quantities for the tiles: those of KEY that are present, at most MAX_TILES; none that is missing or 0."""
     names = [name for name in KEY if name in quantities]
     # the quantities of a verb without key names are shown in their own order

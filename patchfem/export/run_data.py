@@ -5,6 +5,7 @@ new row. What has to be computed or selected first has a function of its own.
 """
 
 import tomllib
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -19,11 +20,13 @@ from ..response.rows import TABLE
 from ..runs.accuracy_curve import compute_accuracy_curve
 from ..runs.results.result import Result, patch_surface
 from ..structure import drive_sizes
-from .answer import Variable
+from .answer import Data, Variable, encode, make_columns
 
 # a measured row belongs to a run if its frequency differs by no more than this [Hz]
 SAME_FREQUENCY = 0.5
 MEANINGS = {"status": ("open", "stick", "slip"), "event_kind": tuple(EVENT_KIND_NAMES)}
+STUCK_TEXT = "state of the interface"
+READINGS = {"acceleration": "m s-2", "displacement": "m"}  # quantities of the sensors, and units
 FRICTIONLESS = ("slide", "slide_velocity", "friction_force")  # histories that a linear run has not
 
 
@@ -32,12 +35,14 @@ class Row(NamedTuple):
 
     dims: its dimensions; the last ones of them for an array with fewer. unit: SI unit, "" for codes and names. text:
     description. places: where a Result has it, as dotted names of attributes, keys and indices; the first that exists.
+    has_error: whether the variable NAME_error has its error, from a place that ends in _error.
     """
 
     dims: str
     unit: str
     text: str
     places: str
+    has_error: bool = False
 
 
 VARIABLES = {
@@ -141,43 +146,32 @@ VARIABLES = {
         "extra.curve.level",
     ),
     "curve_amplitude": Row(
-        "curve_point", "m", "half the peak-to-peak motion at the output", "extra.curve.amplitude"
-    ),
-    "curve_amplitude_error": Row(
-        "curve_point", "m", "error of curve_amplitude", "extra.curve.amplitude_error"
+        "curve_point",
+        "m",
+        "half the peak-to-peak motion at the output",
+        "extra.curve.amplitude",
+        True,
     ),
     "curve_acceleration_peak": Row(
-        "curve_point", "m s-2", "largest absolute acceleration", "extra.curve.acceleration_peak"
-    ),
-    "curve_acceleration_peak_error": Row(
         "curve_point",
         "m s-2",
-        "error of curve_acceleration_peak",
-        "extra.curve.acceleration_peak_error",
+        "largest absolute acceleration",
+        "extra.curve.acceleration_peak",
+        True,
     ),
     "curve_acceleration_fundamental": Row(
         "curve_point",
         "m s-2",
         "first harmonic of the absolute acceleration",
         "extra.curve.acceleration_fundamental",
-    ),
-    "curve_acceleration_fundamental_error": Row(
-        "curve_point",
-        "m s-2",
-        "error of curve_acceleration_fundamental",
-        "extra.curve.acceleration_fundamental_error",
+        True,
     ),
     "curve_acceleration_distortion": Row(
         "curve_point",
         "1",
         "third over first harmonic of the absolute acceleration",
         "extra.curve.acceleration_distortion",
-    ),
-    "curve_acceleration_distortion_error": Row(
-        "curve_point",
-        "1",
-        "error of curve_acceleration_distortion",
-        "extra.curve.acceleration_distortion_error",
+        True,
     ),
     "curve_multiplier": Row(
         "curve_point", "1", "largest Floquet multiplier", "extra.curve.multiplier"
@@ -236,28 +230,37 @@ FIELDS = {
 }
 
 
-def collect_data(result: Result) -> dict[str, Variable]:
+def collect_data(result: Result) -> Data:
     """Return all arrays of a run, in SI units."""
     data = {}
     for name, row in VARIABLES.items():
-        found = (_look_up(result, place) for place in row.places.split())
-        values = next((one for one in found if one is not None), None)
-        if values is not None and np.size(values):
-            data[name] = _make_variable(name, row, values)
+        data |= _read_row(result, name, row)
+        if row.has_error:
+            error = Row(row.dims, row.unit, f"error of {name}", f"{row.places}_error")
+            data |= _read_row(result, f"{name}_error", error)
     if result.plan.kind == "linear":
         data = {name: one for name, one in data.items() if name not in FRICTIONLESS}
     data |= _motion(result) | _loop(result) | _patch(result)
     for face in result.faces:
         data |= _face(face)
-    for key, collect in {
-        "levels": _levels,
-        "curve": _curve,
-        "spectra": _response,
-        "wear": _wear,
-    }.items():
+    for key, collect in COLLECTORS.items():
         if key in result.extra:
             data |= collect(result)
     return data | _measured_readings(result) | _accuracy(result)
+
+
+def _read_row(result: Result, name: str, row: Row) -> Data:
+    """Return the variable of a row; codes become small integers, names become strings. {} without values."""
+    found = (_look_up(result, place) for place in row.places.split())
+    values = next((one for one in found if one is not None), None)
+    if values is None or not np.size(values):
+        return {}
+    if name in MEANINGS:
+        values = np.asarray(values, np.int8)
+    elif row.unit == "":
+        values = np.array([str(value) for value in values])
+    variables = make_columns(row.dims, {name: (values, row.unit, row.text)})
+    return {name: replace(variables[name], meanings=MEANINGS.get(name, ()))}
 
 
 def _look_up(value, place: str):
@@ -265,90 +268,65 @@ def _look_up(value, place: str):
     for name in place.split("."):
         if isinstance(value, dict):
             value = value.get(name)
-        elif name.isdigit():
-            value = value[int(name)]
         else:
-            value = getattr(value, name, None)
+            value = value[int(name)] if name.isdigit() else getattr(value, name, None)
         if value is None:
             return None
     return value
 
 
-def _make_variable(name: str, row: Row, values) -> Variable:
-    """Return the variable of a row; codes become small integers, names become strings."""
-    if name == "event_kind":
-        values = np.asarray(values, np.int8)
-    elif row.unit == "":
-        values = np.array([str(value) for value in values])
-    values = np.asarray(values)
-    dims = row.dims.split()
-    dims = tuple(dims[len(dims) - values.ndim :])
-    return Variable(dims, values, row.unit, row.text, MEANINGS.get(name, ()))
-
-
-def _motion(result: Result) -> dict[str, Variable]:
+def _motion(result: Result) -> Data:
     """Return the modal coordinates of a rig, and the normal load over time, which may be constant."""
     response = result.response
     if response is None:
         return {}
-    text = "normal load on the interface"
+    data = {}
     if result.plan.kind == "bench":
-        return {"normal_load": Variable(("time",), np.asarray(response.load), "N", text)}
-    rig = result.plan.model.rig
-    motions = structure.compute_named_motions(rig.modes, response.modal)
-    data = {"modal_coordinate": Variable(("time", "mode"), motions, "m", "modal coordinate")}
-    if result.plan.kind != "rig":
-        return data
-    count = response.time.size
-    if rig.friction.names:
-        loads = np.array([interface.load for interface in rig.friction.interfaces])
-        values = np.repeat(loads[:, None], count, axis=1)
+        loads = response.load
     else:
-        constant = np.full(count, result.measures["normal_load"].value)
-        values = np.asarray(response.extra.get("normal_load", constant))
-    data["normal_load"] = Variable(("interface", "time")[-values.ndim :], values, "N", text)
-    return data
+        rig = result.plan.model.rig
+        motions = structure.compute_named_motions(rig.modes, response.modal)
+        columns = {"modal_coordinate": (motions, "m", "modal coordinate")}
+        data = make_columns("time mode", columns)
+        if result.plan.kind != "rig":
+            return data
+        if rig.friction.names:
+            loads = np.array([[interface.load] for interface in rig.friction.interfaces])
+        else:
+            loads = response.extra.get("normal_load", result.measures["normal_load"].value)
+    loads = np.broadcast_to(loads, (*np.shape(loads)[:-1], response.time.size))
+    columns = {"normal_load": (loads, "N", "normal load on the interface")}
+    return data | make_columns("interface time", columns)
 
 
-def _loop(result: Result) -> dict[str, Variable]:
+def _loop(result: Result) -> Data:
     """Return the friction loop of the last cycle, of each interface for a rig of masses; and a measured loop."""
     window = result.window
     if window is None or not np.any(window.force) or np.ptp(window.slide) == 0:
         return {}
-    dims = ("loop_point",)
     slide = window.slide
     force = window.force
-    period = result.extra.get("period")
-    keep = np.ones(window.time.size, bool)
-    if period and result.plan.kind != "bench":
-        keep = window.time >= window.time[-1] - period * (1 + 1e-9)
     if result.plan.model.rig is not None and "slides" in window.extra:
-        dims = ("interface", "loop_point")
         slide = window.extra["slides"].T
         force = window.extra["forces"].T
-    slide = slide[..., keep]
-    force = force[..., keep]
+    period = result.extra.get("period")
+    if period and result.plan.kind != "bench":
+        keep = window.time >= window.time[-1] - period * (1 + 1e-9)
+        slide = slide[..., keep]
+        force = force[..., keep]
     if result.plan.model.sticks_rigidly and slide.ndim == 1:
-        slide, force = _insert_jumps(slide, force)
-    data = {
-        "loop_slide": Variable(dims, slide, "m", "slide of the interface in the last cycle"),
-        "loop_friction_force": Variable(dims, force, "N", "friction force in the last cycle"),
+        # the force of a sample acts from this sample on, so it jumps at the slide of the sample before
+        before = np.flatnonzero(np.diff(np.sign(force)))
+        slide = np.insert(slide, before + 1, slide[before])
+        force = np.insert(force, before + 1, force[before + 1])
+    columns = {
+        "loop_slide": (slide, "m", "slide of the interface in the last cycle"),
+        "loop_friction_force": (force, "N", "friction force in the last cycle"),
     }
-    return data | _measured_loop(result)
+    return make_columns("interface loop_point", columns) | _measured_loop(result)
 
 
-def _insert_jumps(slide: np.ndarray, force: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return a loop with the jumps of the force of a rigid interface.
-
-    The force of a sample acts from this sample on, so it jumps at the slide of the sample before.
-    """
-    before = np.flatnonzero(np.diff(np.sign(force)))
-    places = np.insert(np.arange(slide.size), before + 1, before)
-    forces = np.insert(np.arange(slide.size), before + 1, before + 1)
-    return slide[places], force[forces]
-
-
-def _measured_loop(result: Result) -> dict[str, Variable]:
+def _measured_loop(result: Result) -> Data:
     """Return slide and force of the file that prescribes the slide of a bench, if the file contains forces."""
     source = result.plan.model.source
     slide = tomllib.loads(source.resolved).get("slide", {})
@@ -363,14 +341,14 @@ def _measured_loop(result: Result) -> dict[str, Variable]:
     load = 1.0
     if loop.quantity != "force":
         load = np.interp(loop.time, result.response.time, result.response.load)
-    dims = ("measured_sample",)
-    return {
-        "measured_slide": Variable(dims, loop.displacement, "m", "measured slide"),
-        "measured_force": Variable(dims, loop.reading * load, "N", "measured friction force"),
+    columns = {
+        "measured_slide": (loop.displacement, "m", "measured slide"),
+        "measured_force": (loop.reading * load, "N", "measured friction force"),
     }
+    return make_columns("measured_sample", columns)
 
 
-def _patch(result: Result) -> dict[str, Variable]:
+def _patch(result: Result) -> Data:
     """Return the fields along the interface of a solved patch; the states of wear have frames of their own."""
     surface = patch_surface(result.patch, result.fields)
     if surface is None:
@@ -381,141 +359,126 @@ def _patch(result: Result) -> dict[str, Variable]:
         shown = result.extra["wear_shown"]
         count = shown["states"]
         cycles = fields["time"][: count + 1] / shown["period"]
-        data["wear_frame"] = Variable(("wear_frame",), cycles, "1", "cycles")
+        data = make_columns("wear_frame", {"wear_frame": (cycles, "1", "cycles")})
         for name in ("normal_stress", "worn_depth"):
             data[f"wear_{name}"] = _make_field(name, fields[name][: count + 1], "wear_frame")
         fields = {name: values[count:] for name, values in fields.items()}
         fields["time"] = fields["time"] - fields["time"][0]
-    gap = np.asarray(surface.unloaded_gap)
     text = "gap of the unloaded surfaces, wear included"
-    data["unloaded_gap"] = Variable(("strip", "x")[-gap.ndim :], gap, "m", text)
+    data |= make_columns("strip x", {"unloaded_gap": (surface.unloaded_gap, "m", text)})
     return data | _frames(fields, surface)
 
 
-def _frames(fields: dict, surface) -> dict[str, Variable]:
+def _frames(fields: dict, surface, frame: str = "frame") -> Data:
     """Return positions and areas of the nodes, and the fields along x in all frames."""
     area = "area of the interface that belongs to a node, summed over all pairs of pieces"
-    data = {
-        "x": Variable(("x",), np.asarray(surface.x), "m", "position along the sliding direction"),
-        "weight": Variable(("x",), np.asarray(surface.weight), "m2", area),
-        "frame_time": Variable(("frame",), fields["time"], "s", "time of the frame"),
+    nodes = {
+        "x": (surface.x, "m", "position along the sliding direction"),
+        "weight": (surface.weight, "m2", area),
     }
-    return data | {name: _make_field(name, fields[name]) for name in FIELDS if name in fields}
+    data = make_columns("x", nodes)
+    data |= make_columns(frame, {f"{frame}_time": (fields["time"], "s", "time of the frame")})
+    return data | {n: _make_field(n, fields[n], frame) for n in FIELDS if n in fields}
 
 
-def _make_field(name: str, values, frame: str = "frame") -> Variable:
+def _make_field(name: str, values, frame: str) -> Variable:
     """Return a field along x over frames, and over strips if it has three dimensions."""
     unit, text = FIELDS[name]
-    dims = (frame, "x") if np.ndim(values) == 2 else (frame, "strip", "x")
+    dims = (frame, *("strip", "x")[3 - np.ndim(values) :])
     return Variable(dims, np.asarray(values), unit, text, MEANINGS.get(name, ()))
 
 
-def _face(face) -> dict[str, Variable]:
+def _face(face) -> Data:
     """Return the fields of the patch of one interface; their names end in the number of the interface, from 1."""
     number = face.number + 1
     frame = "frame" if face.fields["time"].size > 1 else "frame_at_rest"
-    renamed = {"x": f"x_{number}", "frame": frame}
     data = {}
-    for name, variable in _frames(face.fields, face.surface).items():
-        dims = tuple(renamed.get(dimension, dimension) for dimension in variable.dims)
-        new_name = {"frame_time": f"{frame}_time"}.get(name, f"{name}_{number}")
-        data[new_name] = Variable(
-            dims, variable.values, variable.unit, variable.text, variable.meanings
-        )
+    for name, variable in _frames(face.fields, face.surface, frame).items():
+        dims = tuple(f"x_{number}" if one == "x" else one for one in variable.dims)
+        shown = name if name == f"{frame}_time" else f"{name}_{number}"
+        data[shown] = replace(variable, dims=dims)
     return data
 
 
-def _levels(result: Result) -> dict[str, Variable]:
+def _levels(result: Result) -> Data:
     """Return the results at the end of each level of the drive."""
     levels = result.extra["levels"]
-    dims = ("level",)
     unit = levels[0].unit
     drive_text = "force" if unit == "N" else "acceleration of the base"
-    stuck = np.array([level.stuck for level in levels], np.int8)
-    data = {
-        "level_drive": Variable(
-            dims, np.array([level.drive for level in levels]), unit, drive_text
-        ),
-        "level_stuck": Variable(dims, stuck, "", "state of the interface", ("slips", "sticks")),
+    columns = {
+        "level_drive": ([level.drive for level in levels], unit, drive_text),
+        "level_stuck": (np.array([level.stuck for level in levels], np.int8), "", STUCK_TEXT),
     }
     if any(level.outcome for level in levels):
-        outcomes = np.array([str(level.outcome) for level in levels])
-        data["level_outcome"] = Variable(dims, outcomes, "", "outcome of the level")
+        outcomes = [str(level.outcome) for level in levels]
+        columns["level_outcome"] = (outcomes, "", "outcome of the level")
     for name in LEVEL_MEASURES:
         if any(name in level.values for level in levels):
-            for suffix, sources in (("", "values"), ("_error", "errors")):
-                column = [getattr(level, sources).get(name, np.nan) for level in levels]
-                text = TABLE[name].text if not suffix else f"error of level_{name}"
-                data[f"level_{name}{suffix}"] = Variable(
-                    dims, np.array(column), TABLE[name].unit, text
-                )
+            unit = TABLE[name].unit
+            values = [level.values.get(name, np.nan) for level in levels]
+            errors = [level.errors.get(name, np.nan) for level in levels]
+            columns[f"level_{name}"] = (values, unit, TABLE[name].text)
+            columns[f"level_{name}_error"] = (errors, unit, f"error of level_{name}")
+    data = make_columns("level", columns)
+    data["level_stuck"] = replace(data["level_stuck"], meanings=("slips", "sticks"))
     return data
 
 
-def _curve(result: Result) -> dict[str, Variable]:
+def _curve(result: Result) -> Data:
     """Return the regimes and the folds of a curve of steady motions."""
     curve = result.extra["curve"]
-    names, codes = np.unique(np.asarray(curve["regime"], str), return_inverse=True)
-    text = "regime of the steady motion"
-    meanings = tuple(names.tolist())
-    data = {"curve_regime": Variable(("curve_point",), codes.astype(np.int8), "", text, meanings)}
-    if len(curve.get("folds", ())):
-        unit = "Hz" if np.ptp(curve["frequency"]) > 0 else "m s-2"
-        folds = np.asarray(curve["folds"], float)
-        data["curve_fold"] = Variable(("fold",), folds, unit, "where the curve turns back")
-    return data
+    regimes = encode("curve_point", curve["regime"], "regime of the steady motion")
+    folds = np.asarray(curve.get("folds", ()), float)
+    unit = "Hz" if np.ptp(curve["frequency"]) > 0 else "m s-2"
+    columns = {"curve_fold": (folds, unit, "where the curve turns back")} if folds.size else {}
+    return {"curve_regime": regimes} | make_columns("fold", columns)
 
 
-def _response(result: Result) -> dict[str, Variable]:
+def _response(result: Result) -> Data:
     """Return magnitude and phase of the frequency response H1 of a random drive."""
     gain = np.asarray(result.extra["spectra"].gain)
     text = "of H1, displacement of the output over base acceleration"
-    return {
-        "gain": Variable(("frequency",), np.abs(gain), "s2", f"magnitude {text}"),
-        "phase": Variable(("frequency",), np.angle(gain), "rad", f"phase {text}"),
+    columns = {
+        "gain": (np.abs(gain), "s2", f"magnitude {text}"),
+        "phase": (np.angle(gain), "rad", f"phase {text}"),
     }
+    return make_columns("frequency", columns)
 
 
-def _wear(result: Result) -> dict[str, Variable]:
+def _wear(result: Result) -> Data:
     """Return the measures over the cycles of wear."""
-    return {
-        f"wear_{name}": Variable(
-            ("wear_cycle",),
-            np.asarray(values),
-            result.measures[name].unit,
-            result.measures[name].text,
-        )
+    columns = {
+        f"wear_{name}": (values, result.measures[name].unit, result.measures[name].text)
         for name, values in result.extra["wear"].items()
         if name in result.measures
     }
+    return make_columns("wear_cycle", columns)
 
 
-def _measured_readings(result: Result) -> dict[str, Variable]:
+# what is collected for each key of `Result.extra`
+COLLECTORS = {"levels": _levels, "curve": _curve, "spectra": _response, "wear": _wear}
+
+
+def _measured_readings(result: Result) -> Data:
     """Return the measured readings at the drive frequency, and what the sensors would indicate in the computed motion."""
     readings = find_readings(result)
     if readings is None:
         return {}
     rows, computed = readings
-    dims = ("measured_row",)
-    data = {
-        "measured_input": Variable(dims, np.array([row.input for row in rows]), "m s-2", "input")
-    }
+    measured_columns = {"measured_input": ([row.input for row in rows], "m s-2", "input")}
     level = drive_sizes.find_max_acceleration(result.plan.model.rig.drive.signal)
     text = "largest acceleration of the drive"
-    data["computed_input"] = Variable(("computed",), np.array([float(level)]), "m s-2", text)
-    for name, unit in (("acceleration", "m s-2"), ("displacement", "m")):
-        values = [np.nan if getattr(row, name) is None else getattr(row, name) for row in rows]
-        data[f"measured_{name}"] = Variable(dims, np.array(values), unit, f"measured {name}")
+    columns = {"computed_input": ([float(level)], "m s-2", text)}
+    for name, unit in READINGS.items():
+        values = [getattr(row, name) for row in rows]
+        measured_columns[f"measured_{name}"] = (np.array(values, float), unit, f"measured {name}")
         if name in computed:
             value, error = computed[name]
             text = f"{name} that the sensor would indicate"
-            data[f"computed_{name}"] = Variable(("computed",), np.array([value]), unit, text)
+            columns[f"computed_{name}"] = ([value], unit, text)
             if error is not None:
-                error_text = f"error of computed_{name}"
-                data[f"computed_{name}_error"] = Variable(
-                    ("computed",), np.array([error]), unit, error_text
-                )
-    return data
+                columns[f"computed_{name}_error"] = ([error], unit, f"error of computed_{name}")
+    return make_columns("measured_row", measured_columns) | make_columns("computed", columns)
 
 
 def find_readings(result: Result) -> tuple[list, dict] | None:
@@ -531,49 +494,38 @@ def find_readings(result: Result) -> tuple[list, dict] | None:
     if model.measured is None or model.rig is None or model.rig.drive.frequency is None:
         return None
     path, gains, kind, cutoff = model.measured
-    rows = [
-        row
-        for row in measured.read_table(path)
-        if abs(row.frequency - model.rig.drive.frequency) <= SAME_FREQUENCY
-    ]
+    frequency = model.rig.drive.frequency
+    table = measured.read_table(path)
+    rows = [row for row in table if abs(row.frequency - frequency) <= SAME_FREQUENCY]
     if not rows:
         return None
 
-    factors = {"acceleration": gains[0], "displacement": gains[1]}
-    names = {
-        "acceleration": "absolute_acceleration_peak",
-        "displacement": "relative_displacement_amplitude",
-    }
-    peak = result.measures.get(names["acceleration"])
+    names = ("absolute_acceleration_peak", "relative_displacement_amplitude")
+    measures = dict(zip(READINGS, map(result.measures.get, names), strict=True))
+    factors = dict(zip(READINGS, gains))
+    peak = measures["acceleration"]
     signal = model.rig.drive.signal
     if kind != "peak" and isinstance(signal, SineDrive) and peak is not None and peak.value:
         reading = spectrum.read_instrument(result.window, signal, peak.value, kind, cutoff)
         factors["acceleration"] *= reading / peak.value
     computed = {}
-    for name, measure_name in names.items():
-        measure = result.measures.get(measure_name)
+    for name, measure in measures.items():
         if measure is not None and measure.value is not None:
             error = None if measure.error is None else measure.error * factors[name]
             computed[name] = measure.value * factors[name], error
     return rows, computed
 
 
-def _accuracy(result: Result) -> dict[str, Variable]:
+def _accuracy(result: Result) -> Data:
     """Return the error of the run and of its coarser runs over their CPU time, if the time steps limit the accuracy."""
     curve = compute_accuracy_curve(result)
     if curve is None:
         return {}
-    settings = [*curve.coarser[::-1], curve.present]
-    dims = ("accuracy_run",)
+    runs = [*curve.coarser[::-1], curve.present]
+    text = "largest error of the main measures, as the tolerance that it meets"
     columns = {
-        "accuracy_steps": ("1", "steps per cycle", [one.steps for one in settings]),
-        "accuracy_seconds": ("s", "CPU time of the motion", [one.seconds for one in settings]),
-        "accuracy_error": (
-            "1",
-            "largest error of the main measures, as the tolerance that it meets",
-            [one.error for one in settings],
-        ),
+        "accuracy_steps": ([run.steps for run in runs], "1", "steps per cycle"),
+        "accuracy_seconds": ([run.seconds for run in runs], "s", "CPU time of the motion"),
+        "accuracy_error": ([run.error for run in runs], "1", text),
     }
-    return {
-        name: Variable(dims, np.array(v), unit, text) for name, (unit, text, v) in columns.items()
-    }
+    return make_columns("accuracy_run", columns)

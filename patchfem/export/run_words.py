@@ -18,9 +18,10 @@ from ..response.outcome import OPEN_LOOP
 from ..response.rows import remove_interface_number
 from ..runs.results.patch_rows import find_unknown_measures
 from ..runs.results.result import Result
+from ..structure import drive_sizes
 from . import quantities
-from .answer import Quantity
-from .run_data import find_readings
+from .answer import Quantities, Quantity
+from .run_data import READINGS, find_readings
 
 CHECKS = ("energy_balance", "work_check")  # measures that only check a run
 MAX_LISTED = 3  # largest number of interfaces or contact regions that are listed one by one
@@ -69,7 +70,7 @@ HEADLINES = {
 MAX_PARTS = 3
 
 
-def make_verdict(result: Result, measures: dict[str, Quantity], details: dict) -> tuple[str, ...]:
+def make_verdict(result: Result, measures: Quantities, details: dict) -> tuple[str, ...]:
     """Return the sentences about a run, the headline first.
 
     Parameters
@@ -77,21 +78,21 @@ def make_verdict(result: Result, measures: dict[str, Quantity], details: dict) -
     result : Result
     measures : dict of str to Quantity
     details : dict
-        Further keys of summary.json: `cycles`, `contact`, `loop` and `run_away`, as far as they exist.
+        Further keys of summary.json: `cycles`, `contact`, `loop`, `measured` and `run_away`, as far as they exist.
     """
     release, decay = describe_release(result)
     outcome = describe_outcome(result, measures, details)
     headline = release or _headline(result, measures, details)
     if result.outcome in (Outcome.NO_CONTACT, Outcome.NOT_CONVERGED) or not headline:
         return (outcome,)
-    sentences = [headline, decay, outcome, _compare_with_readings(result)]
+    sentences = [headline, decay, outcome, _compare_with_readings(details)]
     if result.plan.kind != "patch":
         sentences.append(_describe_place(details.get("contact")))
     sentences.append(describe_accuracy(result, measures))
     return tuple([sentence for sentence in sentences if sentence][:4])
 
 
-def _headline(result: Result, measures: dict[str, Quantity], details: dict) -> str:
+def _headline(result: Result, measures: Quantities, details: dict) -> str:
     """Return the sentence with the key numbers of a run; "" if it has none."""
     kind = _choose_headline(result, measures)
     parts = []
@@ -112,7 +113,7 @@ def _headline(result: Result, measures: dict[str, Quantity], details: dict) -> s
     return f"{text[0].upper()}{text[1:]}."
 
 
-def _choose_headline(result: Result, measures: dict[str, Quantity]) -> str:
+def _choose_headline(result: Result, measures: Quantities) -> str:
     """Return the key of HEADLINES for a run."""
     if "worn_volume" in measures or "worn_depth_max" in measures:
         return "wear"
@@ -121,12 +122,12 @@ def _choose_headline(result: Result, measures: dict[str, Quantity]) -> str:
     return {"patch": "patch", "bench": "bench"}.get(result.plan.kind, "rig")
 
 
-def _is_known(measures: dict[str, Quantity], name: str) -> bool:
+def _is_known(measures: Quantities, name: str) -> bool:
     """Return whether a measure has a value."""
     return name in measures and measures[name].value is not None
 
 
-def _interface_parts(result: Result, measures: dict[str, Quantity], text: str) -> list[str]:
+def _interface_parts(result: Result, measures: Quantities, text: str) -> list[str]:
     """Return the dissipated energy of the interface, or of each of a few interfaces."""
     names = [name for name in measures if remove_interface_number(name) == "loop_area"]
     names = [
@@ -148,7 +149,7 @@ def _interface_parts(result: Result, measures: dict[str, Quantity], text: str) -
     return [text.format(f"{', '.join(values[:-1])} and {values[-1]}") + " at the interfaces"]
 
 
-def describe_outcome(result: Result, measures: dict[str, Quantity], details: dict) -> str:
+def describe_outcome(result: Result, measures: Quantities, details: dict) -> str:
     """Return the sentence on how a run ended.
 
     `stuck` refers to the interface as a whole: if its last cycles dissipate or slip more than their error, a part slips.
@@ -185,7 +186,7 @@ def describe_outcome(result: Result, measures: dict[str, Quantity], details: dic
     )
 
 
-def _bench_outcome(measures: dict[str, Quantity], details: dict) -> str:
+def _bench_outcome(measures: Quantities, details: dict) -> str:
     """Return the sentence on slip and loss factor of a bench."""
     slip = measures.get("slip_amplitude")
     if (
@@ -216,7 +217,7 @@ def _no_slip(has_patch: bool, cycles: str) -> str:
     return f"The interface sticks: no slip in the last {cycles}{limit * has_patch}."
 
 
-def _stuck_outcome(result: Result, measures: dict[str, Quantity]) -> str:
+def _stuck_outcome(result: Result, measures: Quantities) -> str:
     """Return the sentence for an interface that sticks as a whole."""
     has_patch = "contact_fraction" in measures
     part = "part of the patch slips" if has_patch else "part of it slips"
@@ -257,17 +258,15 @@ def _describe_place(contact: dict | None, form: str = "In contact: {}.") -> str:
     return form.format(f"x = {' and '.join(texts)} {unit}")
 
 
-def _compare_with_readings(result: Result) -> str:
+def _compare_with_readings(details: dict) -> str:
     """Return a sentence on the ratio of computed and measured readings at the drive of the run; "" without a measurement."""
-    parts = []
-    for reading in list_readings(result):
-        if "repeat" not in reading["reading"]:
-            ratio = format_number(reading["ratio"], 3)
-            parts.append(f"the {reading['reading']} is {ratio} times the measured one")
-    if not parts:
-        return ""
+    parts = [
+        f"the {one['reading']} is {format_number(one['ratio'], 3)} times the measured one"
+        for one in details.get("measured", ())
+        if "repeat" not in one["reading"]
+    ]
     text = " and ".join(parts)
-    return f"{text[0].upper()}{text[1:]}."
+    return f"{text[0].upper()}{text[1:]}." if parts else ""
 
 
 def list_readings(result: Result) -> list[dict]:
@@ -279,8 +278,6 @@ def list_readings(result: Result) -> list[dict]:
         Keys `reading` (what, with "repeat run" where it is one), `measured` and `computed` (objects with value, unit and
         error, in SI) and `ratio`.
     """
-    from ..structure import drive_sizes
-
     readings = find_readings(result)
     if readings is None:
         return []
@@ -288,11 +285,9 @@ def list_readings(result: Result) -> list[dict]:
     level = drive_sizes.find_max_acceleration(result.plan.model.rig.drive.signal)
     listed = []
     for row in rows:
-        if abs(row.input - level) > 0.01 * row.input:
-            continue
-        for name, unit in (("acceleration", "m s-2"), ("displacement", "m")):
+        for name, unit in READINGS.items():
             value = getattr(row, name)
-            if not value or name not in computed:
+            if abs(row.input - level) > 0.01 * row.input or not value or name not in computed:
                 continue
             reading, error = computed[name]
             listed.append(
@@ -365,7 +360,7 @@ def _describe_gain_peak(result: Result) -> str:
     return f"{sentence[0].upper()}{sentence[1:]} (95 % interval over records of the random drive)."
 
 
-def describe_accuracy(result: Result, measures: dict[str, Quantity]) -> str:
+def describe_accuracy(result: Result, measures: Quantities) -> str:
     """Return a sentence that all errors are within the tolerance, with the largest; "" if a warning says more."""
     tolerance = result.plan.model.accuracy.tolerance
     if result.outcome is Outcome.GROWS and result.response is not None:
@@ -394,7 +389,7 @@ def describe_accuracy(result: Result, measures: dict[str, Quantity]) -> str:
     )
 
 
-def _format(name: str, measures: dict[str, Quantity]) -> str:
+def _format(name: str, measures: Quantities) -> str:
     """Return a measure as text with its error."""
     return quantities.format_quantity(name, measures[name])
 

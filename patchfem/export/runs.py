@@ -13,7 +13,7 @@ from ..effects import EFFECTS
 from ..runs.patch import values
 from ..runs.results.result import Result, collect_used_settings, engine_by_measure
 from ..runs.rig import plan as rig_plan
-from .answer import Answer, Quantity, Remarks
+from .answer import Answer, Quantities, Quantity, Remarks
 from .driven import describe_drive, list_changed_keys
 from .run_data import collect_data
 from .run_words import list_readings, make_captions, make_verdict
@@ -43,7 +43,7 @@ def make_answer(result: Result) -> Answer:
     )
 
 
-def make_quantities(measures: dict[str, Measure]) -> dict[str, Quantity]:
+def make_quantities(measures: dict[str, Measure]) -> Quantities:
     """Return the measures of a run as quantities."""
     quantities = {}
     for name, one in measures.items():

@@ -5,7 +5,7 @@ from textwrap import shorten
 from typing import Any
 
 from ..formatting import format_number
-from .answer import Answer, Quantity
+from .answer import Answers, Quantity
 from .quantities import KEY, format_quantity
 
 MAX_SENTENCES = 5  # largest number of measures that are compared in words
@@ -52,7 +52,7 @@ def format_entry(name: str, quantity: Quantity | None, first: Quantity | None) -
     return f"{text} ({100 * change:+.{1 if abs(change) > 0.01 else 2}f} %)"
 
 
-def compare_measures(answers: dict[str, Answer]) -> list[str]:
+def compare_measures(answers: Answers) -> list[str]:
     """Return a sentence for each of at most five measures that differ by more than their errors, key measures first."""
     first_name, *others = answers
     first = answers[first_name].quantities
@@ -76,7 +76,7 @@ def compare_measures(answers: dict[str, Answer]) -> list[str]:
     return sentences
 
 
-def list_scene_differences(answers: dict[str, Answer]) -> list[dict]:
+def list_scene_differences(answers: Answers) -> list[dict]:
     """Return a table of the keys in which the resolved scenes differ, as `page.make_tables` does; [] without any."""
     scenes = {
         name: _flatten(tomllib.loads(answer.origin.get("resolved", "")))

@@ -4,7 +4,7 @@ import shlex
 from pathlib import Path
 
 from . import quantities, store
-from .answer import Answer, Quantity
+from .answer import Answer, Quantities
 
 
 def make_lines(answer: Answer, is_verbose: bool = False) -> list[str]:
@@ -22,7 +22,7 @@ def make_lines(answer: Answer, is_verbose: bool = False) -> list[str]:
     return lines + format_quantities(shown)
 
 
-def list_quantities(shown: dict[str, Quantity]) -> list[tuple[str, str]]:
+def list_quantities(shown: Quantities) -> list[tuple[str, str]]:
     """Return name and text of each quantity, with the reason for a missing value or error."""
     return [
         (
@@ -34,7 +34,7 @@ def list_quantities(shown: dict[str, Quantity]) -> list[tuple[str, str]]:
     ]
 
 
-def format_quantities(shown: dict[str, Quantity]) -> list[str]:
+def format_quantities(shown: Quantities) -> list[str]:
     """Return an aligned line for each quantity."""
     rows = list_quantities(shown)
     width = max((len(name) for name, _ in rows), default=0)

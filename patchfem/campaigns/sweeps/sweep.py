@@ -46,9 +46,6 @@ class WorkerData:
         index of the CaseResults.
     keep : callable, optional
         keep(number, Result) is called after each run.
-    write : callable, optional
-        write(numbers, results, extras) returns whether it has written the CaseResults to the
-        folder of the sweep, so that they are not sent back.
     meshes : SharedMeshes or None
         Meshes common to all cases, from `choose_shared_meshes`.
     """
@@ -57,7 +54,6 @@ class WorkerData:
     cases: Cases
     extract: Callable | None = None
     keep: Callable | None = None
-    write: Callable | None = None
     meshes: SharedMeshes | None = None
 
 
@@ -73,8 +69,8 @@ def compute_chunk(
     numbers: Sequence[int],
     say: Callable | None = None,
     rewrite: Callable[[str], str] = str,
-) -> tuple[float, tuple[CaseResults | None, list]]:
-    """Compute the results of a chunk of cases, and write them to the folder of the sweep if possible.
+) -> tuple[float, tuple[CaseResults, list]]:
+    """Compute the results of a chunk of cases.
 
     Parameters
     ----------
@@ -90,7 +86,7 @@ def compute_chunk(
     -------
     tuple
         Elapsed time [s] without compilation, and a tuple of CaseResults and a list of the data that
-        `work.extract` returns for each case; it is (None, []) if `work.write` has written them.
+        `work.extract` returns for each case.
     """
     begin = perf_counter() - compiled.COMPILE_SECONDS[0]
     models = _build_similar_models(work, numbers)
@@ -104,8 +100,6 @@ def compute_chunk(
         for case, (number, model) in enumerate(zip(numbers, models)):
             extras.append(work.extract(number, model, results, case))
     seconds = perf_counter() - compiled.COMPILE_SECONDS[0] - begin
-    if work.write is not None and work.write(numbers, results, extras):
-        return seconds, (None, [])
     return seconds, (results, extras)
 
 
@@ -253,7 +247,7 @@ def iterate_chunks(
     Yields
     ------
     tuple
-        (numbers, CaseResults or None, extras) of a chunk; `extras` is None for a case that is abandoned,
+        (numbers, CaseResults, extras) of a chunk; `extras` is None for a case that is abandoned,
         because it ends its worker.
     """
     if not len(numbers):

@@ -9,8 +9,8 @@ import numpy as np
 from ...core import PatchfemError
 from ...disk.atomic_write import write_atomically
 from ..answer import Answer
-from .panels import Panel, make_panels
-from .plotly import BAND_OPACITY, CODE_COLOURS, COLOURS, choose_colour
+from .panels import Curve, Panel, make_panels
+from .plotly import BAND_OPACITY, CODE_COLOURS, choose_colour
 from .table import CHARTS
 
 LINE_STYLES = ("-", "--", ":", "-.")
@@ -47,71 +47,45 @@ def draw(panel: Panel, axes):
         return draw(panel.choices[0], axes)
     if panel.style in ("map", "film"):
         _draw_map(panel, axes)
-    elif panel.style == "bars":
-        _draw_bars(panel, axes)
     else:
-        _draw_curves(panel, axes)
+        for number, curve in enumerate(panel.curves):
+            _draw_curve(curve, panel.style, choose_colour(curve, number), axes)
     for position in panel.marks:
         axes.axvline(position, color="0.5", lw=1, ls=":")
     axes.set(title=panel.title, xlabel=panel.x.label, ylabel=panel.y.label)
-    if panel.x.is_log:
-        axes.set_xscale("log")
-    if panel.y.is_log:
-        axes.set_yscale("log")
+    axes.set(**{f"{name}scale": "log" for name in "xy" if getattr(panel, name).is_log})
     if sum(bool(curve.name) for curve in panel.curves) > 1 and panel.style != "map":
         axes.legend()
     return axes
 
 
-def _draw_curves(panel: Panel, axes) -> None:
-    """Draw curves with error bars (points) or bands (lines)."""
-    second = axes.twinx() if panel.y2 is not None else axes
-    if panel.y2 is not None:
-        second.set_ylabel(panel.y2.label)
-    for number, curve in enumerate(panel.curves):
-        target = second if curve.on_second_axis else axes
-        colour = choose_colour(curve, number)
-        if panel.style not in ("points", "dots") or curve.is_line:
-            target.plot(
-                curve.x,
-                curve.y,
-                color=colour,
-                label=curve.name,
-                ls=":" if curve.on_second_axis else LINE_STYLES[curve.dash % len(LINE_STYLES)],
-            )
-            if curve.low is not None:
-                target.fill_between(
-                    curve.x, curve.low, curve.high, color=colour, alpha=BAND_OPACITY, lw=0
-                )
-            if panel.style == "area":
-                target.fill_between(curve.x, curve.y, color=colour, alpha=BAND_OPACITY, lw=0)
-            continue
-        if panel.style == "dots":
-            target.plot(curve.x, curve.y, color=colour, lw=1)
-        bars = None
-        if curve.low is not None:
-            bars = np.nan_to_num([curve.y - curve.low, curve.high - curve.y])
-        target.errorbar(curve.x, curve.y, bars, fmt="none", ecolor=colour)
+def _draw_curve(curve: Curve, style: str, colour: str, axes) -> None:
+    """Draw bars, points with error bars, or a line with its band."""
+    interval = None
+    if curve.low is not None:
+        interval = np.nan_to_num([curve.y - curve.low, curve.high - curve.y])
+    if style == "bars":
+        names = [str(name) for name in curve.x]
+        axes.barh(names, curve.y, xerr=interval, color=colour, label=curve.name)
+    elif style in ("points", "dots") and not curve.is_line:
+        if style == "dots":
+            axes.plot(curve.x, curve.y, color=colour, lw=1)
+        axes.errorbar(curve.x, curve.y, interval, fmt="none", ecolor=colour)
         symbols = np.full(curve.x.size, "circle") if curve.symbols is None else curve.symbols
         # the first symbol has the entry of the legend, and is drawn above the others
         for zorder, (symbol, (marker, face)) in zip((4, 3, 3), MARKERS.items()):
             is_drawn = symbols == symbol
             label = curve.name if symbol == "circle" else None
             options = {"color": colour, "mfc": face or colour, "label": label, "zorder": zorder}
-            target.plot(curve.x[is_drawn], curve.y[is_drawn], marker, **options)
-
-
-def _draw_bars(panel: Panel, axes) -> None:
-    """Draw horizontal bars with their intervals."""
-    for number, curve in enumerate(panel.curves):
-        bars = None if curve.low is None else [curve.y - curve.low, curve.high - curve.y]
-        axes.barh(
-            [str(name) for name in curve.x],
-            curve.y,
-            xerr=bars,
-            color=COLOURS[number],
-            label=curve.name,
-        )
+            axes.plot(curve.x[is_drawn], curve.y[is_drawn], marker, **options)
+    else:
+        dash = LINE_STYLES[curve.dash % len(LINE_STYLES)]
+        axes.plot(curve.x, curve.y, color=colour, label=curve.name, ls=dash)
+        filling = {"color": colour, "alpha": BAND_OPACITY, "lw": 0}
+        if curve.low is not None:
+            axes.fill_between(curve.x, curve.low, curve.high, **filling)
+        if style == "area":
+            axes.fill_between(curve.x, curve.y, **filling)
 
 
 def _draw_map(panel: Panel, axes) -> None:
@@ -152,12 +126,6 @@ def make_figure(panels: list[Panel]):
     return figure
 
 
-def write_picture(panels: list[Panel], path) -> None:
-    """Write panels as .png, .svg or .pdf."""
-    with write_atomically(path) as partial:
-        _save(make_figure(panels), partial, Path(path).suffix[1:].lower())
-
-
 def _save(figure, target, ending: str) -> None:
     """Write a figure into a file or a stream; equal figures give equal files."""
     from matplotlib import rc_context
@@ -183,12 +151,15 @@ def write_plot(answer: Answer, path) -> None:
     Missing
         If the file cannot be written.
     """
-    if Path(path).suffix.lower() not in PICTURE_ENDINGS:
+    ending = Path(path).suffix.lower()
+    if ending not in PICTURE_ENDINGS:
         raise PatchfemError(f"{path}: a picture is written as {', '.join(PICTURE_ENDINGS)}")
     panels = make_panels({"": answer}, CHARTS[answer.kind])
     if not panels:
         raise PatchfemError(f"{path}: this answer has no chart")
-    write_picture(panels[: PICTURE_CHARTS.get(answer.kind, 1)], path)
+    with write_atomically(path) as partial:
+        figure = make_figure(panels[: PICTURE_CHARTS.get(answer.kind, 1)])
+        _save(figure, partial, ending[1:])
 
 
 def draw_charts(answer: Answer, titles: tuple[str, ...], axes=None, verb: str = "plot"):
@@ -198,14 +169,14 @@ def draw_charts(answer: Answer, titles: tuple[str, ...], axes=None, verb: str = 
     ----------
     answer : Answer
     titles : tuple of str
-        Titles in the table of charts.
+        Titles in the table of charts; () for all charts.
     axes : matplotlib Axes, optional
         Where to draw the first chart alone; by default a new figure has all of them.
     verb : str
         Function that the message about a wrong `axes` names.
     """
-    charts = tuple(chart for chart in CHARTS[answer.kind] if chart.title in titles)
-    panels = make_panels({"": answer}, charts)
+    charts = [chart for chart in CHARTS[answer.kind] if not titles or chart.title in titles]
+    panels = make_panels({"": answer}, tuple(charts))
     if not panels:
         return None
     check_axes(axes, verb)

@@ -19,6 +19,11 @@ class Axis:
     scale: float = 1.0
     is_log: bool = False
 
+    @property
+    def unit(self) -> str:
+        """Unit of the label, in which the values are displayed."""
+        return self.label.partition("[")[2].rstrip("]")
+
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Curve:
@@ -36,7 +41,6 @@ class Curve:
         Vertical positions of a map.
     meanings : tuple of str
         Names of the codes of a map.
-    on_second_axis : bool
     is_line : bool
         Whether the curve is a line in a chart of points.
     colour, dash : int
@@ -52,7 +56,6 @@ class Curve:
     high: np.ndarray | None = None
     rows: np.ndarray | None = None
     meanings: tuple[str, ...] = ()
-    on_second_axis: bool = False
     is_line: bool = False
     colour: int = -1
     dash: int = 0
@@ -68,8 +71,6 @@ class Panel:
     title, style, caption : str
     x, y : Axis
     curves : list of Curve
-    y2 : Axis or None
-        Second vertical axis.
     marks : list of float
         Positions of vertical lines.
     choices : list of Panel
@@ -84,7 +85,6 @@ class Panel:
     y: Axis
     curves: list[Curve]
     caption: str = ""
-    y2: Axis | None = None
     marks: list[float] = field(default_factory=list)
     choices: list["Panel"] = field(default_factory=list)
     colour_label: str = ""
@@ -94,11 +94,10 @@ class Panel:
         """Text alternative of the chart: its axes, and the range of each curve."""
         ranges = []
         for curve in self.curves[:4]:
-            finite = np.asarray(curve.y, float)[np.isfinite(np.asarray(curve.y, float))]
+            finite = np.asarray(curve.y, float)
+            finite = finite[np.isfinite(finite)]
             if finite.size:
-                low, high = (
-                    format_number(float(value), 4) for value in (finite.min(), finite.max())
-                )
+                low, high = (format_number(float(end(finite)), 4) for end in (np.min, np.max))
                 ranges.append(f"{curve.name or self.y.label} from {low} to {high}")
         return f"{self.title}: {self.y.label} against {self.x.label}; {'; '.join(ranges)}."
 

@@ -11,39 +11,40 @@ COLOURS = (
     *("#7a4b2a", "#5b6fd6", "#97b02e", "#d98cb3"),
 )
 CODE_COLOURS = ("#c9ced6", "#2a78c0", "#d1592a", "#2f9e63", "#9166c9")  # open, stick, slip, ...
+OVERLAY_COLOURS = ((158, 178, 200), (42, 120, 192), (209, 89, 42))  # first, middle and last curve
 DASHES = ("solid", "dash", "dot", "dashdot")
 SYMBOLS = ("circle", "diamond", "square", "x")
 BAND_OPACITY = 0.18
 FRAME_MILLISECONDS = 120  # duration of a frame of a film
+MENU_PLACE = {"x": 0, "xanchor": "left", "y": 1.02, "yanchor": "bottom"}  # above the chart
 
 
 def draw(panel: Panel) -> dict:
     """Return the figure of a panel: `title`, `data`, `layout`, `caption`, `description`, and `frames` of a film."""
+    figure = {"title": panel.title, "caption": panel.caption, "description": panel.description}
+    figure |= {"data": _make_traces(panel), "layout": _make_layout(panel)}
+    if panel.choices:
+        _add_menu(figure, panel.choices)
+    elif panel.style == "film":
+        _add_slider(figure, [curve.name for curve in panel.curves])
+    return figure
+
+
+def _make_layout(panel: Panel) -> dict:
+    """Return the layout of a panel: its axes, vertical lines, and whether it has a legend."""
+    is_film = panel.style == "film"
     layout = {
         "xaxis": _axis_layout(panel.x),
         "yaxis": _axis_layout(panel.y),
-        "showlegend": sum(bool(curve.name) for curve in panel.curves) > 1,
+        "showlegend": not is_film and sum(bool(curve.name) for curve in panel.curves) > 1,
     }
-    if panel.y2 is not None:
-        layout["yaxis2"] = _axis_layout(panel.y2) | {"overlaying": "y", "side": "right"}
     if panel.marks:
-        layout["shapes"] = [_mark(position) for position in panel.marks]
-    figure = {
-        "title": panel.title,
-        "caption": panel.caption,
-        "description": panel.description,
-        "data": [],
-        "layout": layout,
-    }
-    if panel.choices:
-        return _add_menu(figure, panel)
-    if panel.style == "film":
-        return _add_film(figure, panel)
-    figure["data"] = _make_traces(panel)
-    if panel.style == "map" and panel.y.label.startswith("y"):
+        layout["shapes"] = list(map(_mark, panel.marks))
+    if is_film or (panel.style == "map" and panel.y.label.startswith("y")):
+        # equal scales of both axes, which end at the edges of the map
         layout["yaxis"] |= {"scaleanchor": "x", "constrain": "domain"}
         layout["xaxis"]["constrain"] = "domain"
-    return figure
+    return layout
 
 
 def _axis_layout(axis) -> dict:
@@ -54,27 +55,26 @@ def _axis_layout(axis) -> dict:
 def _mark(position: float) -> dict:
     """Return a dotted vertical line over the whole height."""
     line = {"color": "#8a8f98", "width": 1, "dash": "dot"}
-    return {
-        "type": "line",
-        "yref": "paper",
-        "x0": position,
-        "x1": position,
-        "y0": 0,
-        "y1": 1,
-        "line": line,
-    }
+    ends = {"x0": position, "x1": position, "y0": 0, "y1": 1}
+    return {"type": "line", "yref": "paper", "line": line} | ends
 
 
 def _make_traces(panel: Panel) -> list[dict]:
-    """Return the traces of a panel."""
+    """Return the traces of a panel; those of a film have the same range of colours."""
+    if panel.style in ("map", "film"):
+        traces = [_map_trace(curve, panel.colour_label) for curve in panel.curves]
+        if panel.style == "film":
+            largest = float(max(np.nanmax(curve.y) for curve in panel.curves))
+            traces = [trace | {"zmin": 0.0, "zmax": largest} for trace in traces]
+        return traces
     traces = []
     for number, curve in enumerate(panel.curves):
         colour = choose_colour(curve, number)
         if panel.style == "overlay":
-            colour = _blend(number / max(len(panel.curves) - 1, 1))
-        if panel.style == "map":
-            traces.append(_map_trace(curve, panel.colour_label))
-        elif panel.style == "bars":
+            place = number / max(len(panel.curves) - 1, 1)
+            mixed = [np.interp(place, (0, 0.5, 1), part) for part in zip(*OVERLAY_COLOURS)]
+            colour = "rgb({:.0f},{:.0f},{:.0f})".format(*mixed)
+        if panel.style == "bars":
             traces.append(_bar_trace(curve, colour))
         else:
             traces += _curve_traces(curve, "line" if curve.is_line else panel.style, colour)
@@ -86,45 +86,34 @@ def choose_colour(curve: Curve, number: int) -> str:
     return COLOURS[(number if curve.colour < 0 else curve.colour) % len(COLOURS)]
 
 
-def _blend(fraction: float) -> str:
-    """Return a colour between grey-blue (first curve) and orange (last curve)."""
-    ends = ((158, 178, 200), (42, 120, 192), (209, 89, 42))
-    place = fraction * (len(ends) - 1)
-    first = min(int(place), len(ends) - 2)
-    mixed = [
-        a + (b - a) * (place - first) for a, b in zip(ends[first], ends[first + 1], strict=True)
-    ]
-    return "rgb({:.0f},{:.0f},{:.0f})".format(*mixed)
-
-
 def _curve_traces(curve: Curve, style: str, colour: str) -> list[dict]:
     """Return the trace of a curve, and that of its error band if it is drawn as a line."""
+    dash = DASHES[curve.dash % len(DASHES)]
+    symbol = SYMBOLS[curve.dash % len(SYMBOLS)]
+    if curve.symbols is not None:
+        symbol = [str(one) for one in curve.symbols]
     trace = {
         "x": pack(curve.x),
         "y": pack(curve.y),
         "name": curve.name,
         "mode": {"points": "markers", "dots": "lines+markers"}.get(style, "lines"),
-        "line": {"color": colour, "width": 1.7, "dash": DASHES[curve.dash % len(DASHES)]},
-        "marker": {"color": colour, "size": 7, "symbol": SYMBOLS[curve.dash % len(SYMBOLS)]},
+        "line": {"color": colour, "width": 1.7, "dash": dash},
+        "marker": {"color": colour, "size": 7, "symbol": symbol},
     }
-    if curve.symbols is not None:
-        trace["marker"]["symbol"] = [str(symbol) for symbol in curve.symbols]
-    if curve.on_second_axis:
-        trace |= {"yaxis": "y2", "line": {"color": colour, "width": 1.7, "dash": "dot"}}
     if style == "area":
         trace["fill"] = "tozeroy"
-    if curve.low is None:
-        return [trace]
     if style in ("points", "dots"):
-        distances = {"array": pack(curve.high - curve.y), "arrayminus": pack(curve.y - curve.low)}
-        trace["error_y"] = distances | {"symmetric": False, "thickness": 1.2, "color": colour}
+        bars = _error_bars(curve)
+        return [trace | ({"error_y": bars | {"color": colour}} if bars else {})]
+    if curve.low is None:
         return [trace]
 
     # the band is a closed line around the points whose ends are known
     known = np.isfinite(curve.low) & np.isfinite(curve.high)
+    x, low, high = (values[known] for values in (curve.x, curve.low, curve.high))
     band = {
-        "x": pack(np.concatenate([curve.x[known], curve.x[known][::-1]])),
-        "y": pack(np.concatenate([curve.high[known], curve.low[known][::-1]])),
+        "x": pack(np.concatenate([x, x[::-1]])),
+        "y": pack(np.concatenate([high, low[::-1]])),
         "mode": "lines",
         "fill": "toself",
         "fillcolor": colour,
@@ -133,25 +122,23 @@ def _curve_traces(curve: Curve, style: str, colour: str) -> list[dict]:
         "hoverinfo": "skip",
         "showlegend": False,
     }
-    if curve.on_second_axis:
-        band["yaxis"] = "y2"
     return [band, trace]
+
+
+def _error_bars(curve: Curve) -> dict:
+    """Return the distances of the ends of an interval from the values; {} without an interval."""
+    if curve.low is None:
+        return {}
+    ends = {"array": pack(curve.high - curve.y), "arrayminus": pack(curve.y - curve.low)}
+    return ends | {"symmetric": False, "thickness": 1.2}
 
 
 def _bar_trace(curve: Curve, colour: str) -> dict:
     """Return horizontal bars with their intervals; `x` has the names of the bars."""
-    trace = {
-        "type": "bar",
-        "orientation": "h",
-        "x": pack(curve.y),
-        "y": [str(name) for name in curve.x],
-        "name": curve.name,
-        "marker": {"color": colour},
-    }
-    if curve.low is not None:
-        distances = {"array": pack(curve.high - curve.y), "arrayminus": pack(curve.y - curve.low)}
-        trace["error_x"] = distances | {"symmetric": False, "thickness": 1.2}
-    return trace
+    trace = {"type": "bar", "orientation": "h", "x": pack(curve.y), "y": list(map(str, curve.x))}
+    bars = _error_bars(curve)
+    trace |= {"name": curve.name, "marker": {"color": colour}}
+    return trace | ({"error_x": bars} if bars else {})
 
 
 def _map_trace(curve: Curve, label: str) -> dict:
@@ -164,83 +151,57 @@ def _map_trace(curve: Curve, label: str) -> dict:
         return trace | {"zmin": -0.5, "zmax": count - 0.5, "colorscale": steps, "colorbar": bar}
     low = float(np.nanmin(curve.y))
     high = float(np.nanmax(curve.y))
-    bar = {"title": {"text": label, "side": "right"}}
+    scale = "Viridis"
+    ends = (min(low, 0.0), high)
     if low < 0 < high:
-        limit = max(-low, high)
-        return trace | {"zmin": -limit, "zmax": limit, "colorscale": "RdBu", "colorbar": bar}
-    return trace | {"zmin": min(low, 0.0), "zmax": high, "colorscale": "Viridis", "colorbar": bar}
+        scale = "RdBu"
+        ends = (-max(-low, high), max(-low, high))
+    bar = {"title": {"text": label, "side": "right"}}
+    return trace | {"zmin": ends[0], "zmax": ends[1], "colorscale": scale, "colorbar": bar}
 
 
-def _add_menu(figure: dict, panel: Panel) -> dict:
+def _add_menu(figure: dict, choices: list[Panel]) -> None:
     """Add a menu that shows one of several panels at a time."""
-    groups = [_make_traces(choice) for choice in panel.choices]
+    groups = [_make_traces(choice) for choice in choices]
     buttons = []
-    for number, choice in enumerate(panel.choices):
+    for number, choice in enumerate(choices):
         visible = [k == number for k, group in enumerate(groups) for _ in group]
-        axes = {
-            "xaxis.title.text": choice.x.label,
-            "yaxis.title.text": choice.y.label,
-            "xaxis.type": "log" if choice.x.is_log else "-",
-            "yaxis.type": "log" if choice.y.is_log else "-",
-            "shapes": [_mark(position) for position in choice.marks],
-        }
-        buttons.append(
-            {"label": choice.title, "method": "update", "args": [{"visible": visible}, axes]}
-        )
-    for number, group in enumerate(groups):
-        for trace in group:
-            trace["visible"] = number == 0
-            figure["data"].append(trace)
-    first = panel.choices[0]
+        changes = {"shapes": list(map(_mark, choice.marks))}
+        for name, axis in (("xaxis", choice.x), ("yaxis", choice.y)):
+            layout = _axis_layout(axis)
+            changes |= {f"{name}.title.text": axis.label, f"{name}.type": layout["type"]}
+        arguments = [{"visible": visible}, changes]
+        buttons.append({"label": choice.title, "method": "update", "args": arguments})
+    figure["data"] = [
+        trace | {"visible": number == 0} for number, group in enumerate(groups) for trace in group
+    ]
     figure["layout"] |= {
-        "xaxis": _axis_layout(first.x),
-        "yaxis": _axis_layout(first.y),
-        "showlegend": sum(bool(curve.name) for curve in first.curves) > 1,
         # the legend is below, because the menu is above
         "legend": {"orientation": "h", "x": 0, "y": -0.3, "yanchor": "top"},
-        "updatemenus": [
-            {"buttons": buttons, "x": 0, "xanchor": "left", "y": 1.02, "yanchor": "bottom"}
-        ],
+        "updatemenus": [MENU_PLACE | {"buttons": buttons}],
     }
-    return figure
 
 
-def _add_film(figure: dict, panel: Panel) -> dict:
-    """Add the frames of a film with a slider and a button; each curve of the panel is one frame of the map."""
-    largest = float(max(np.nanmax(curve.y) for curve in panel.curves))
-    traces = [
-        _map_trace(curve, panel.colour_label) | {"zmin": 0.0, "zmax": largest}
-        for curve in panel.curves
-    ]
-    move = {
-        "frame": {"duration": FRAME_MILLISECONDS, "redraw": True},
-        "transition": {"duration": 0},
-        "mode": "immediate",
-    }
+def _add_slider(figure: dict, names: list[str]) -> None:
+    """Turn the traces of a figure into frames with names, with a slider and a button."""
+    traces = figure["data"]
     figure["data"] = traces[:1]
-    if len(traces) > 1:
-        names = [curve.name for curve in panel.curves]
-        figure["frames"] = [
-            {"name": name, "data": [{"z": trace["z"]}]}
-            for name, trace in zip(names, traces, strict=True)
-        ]
-        steps = [{"label": name, "method": "animate", "args": [[name], move]} for name in names]
-        stop = {"label": "stop", "method": "animate", "args": [[None], move]}
-        play = {"label": "play", "method": "animate", "args": [None, move]}
-        figure["layout"] |= {
-            "sliders": [
-                {"steps": steps, "active": 0, "pad": {"t": 40}, "currentvalue": {"prefix": "t = "}}
-            ],
-            "updatemenus": [
-                {"type": "buttons", "direction": "right", "buttons": [play, stop]}
-                | {"x": 0, "xanchor": "left", "y": 1.02, "yanchor": "bottom"}
-            ],
-        }
-    # equal scales of both axes, which end at the edges of the map
-    figure["layout"]["yaxis"] |= {"scaleanchor": "x", "constrain": "domain"}
-    figure["layout"]["xaxis"]["constrain"] = "domain"
-    figure["layout"]["showlegend"] = False
-    return figure
+    if len(traces) == 1:
+        return
+    figure["frames"] = [
+        {"name": name, "data": [{"z": trace["z"]}]}
+        for name, trace in zip(names, traces, strict=True)
+    ]
+    frame = {"duration": FRAME_MILLISECONDS, "redraw": True}
+    move = {"frame": frame, "transition": {"duration": 0}, "mode": "immediate"}
+    buttons = [
+        {"label": label, "method": "animate", "args": [target, move]}
+        for label, target in [("play", None), ("stop", [None]), *((name, [name]) for name in names)]
+    ]
+    play, stop, *steps = buttons
+    slider = {"steps": steps, "active": 0, "pad": {"t": 40}, "currentvalue": {"prefix": "t = "}}
+    menu = MENU_PLACE | {"type": "buttons", "direction": "right", "buttons": [play, stop]}
+    figure["layout"] |= {"sliders": [slider], "updatemenus": [menu]}
 
 
 def pack(values: np.ndarray) -> dict | list:
@@ -249,7 +210,7 @@ def pack(values: np.ndarray) -> dict | list:
     if values.dtype.kind in "UO":
         return values.tolist()
     kind = "i1" if values.dtype == np.int8 else "f4"
-    values = np.ascontiguousarray(values, np.int8 if kind == "i1" else np.float32)
+    values = np.ascontiguousarray(values, kind)
     content = {"dtype": kind, "bdata": base64.b64encode(values.tobytes()).decode()}
     if values.ndim > 1:
         content["shape"] = ",".join(map(str, values.shape))

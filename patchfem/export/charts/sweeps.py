@@ -14,7 +14,7 @@ import numpy as np
 from ...campaigns.sweeps.changes import MAIN_MEASURES
 from ...campaigns.sweeps.limits import NEGLIGIBLE_CHANGE
 from ...campaigns.sweeps.sweep_table import FINAL_OUTCOMES, MeasureColumn
-from ..answer import Answer, Variable
+from ..answer import Answer, Answers, Data
 from ..quantities import format_value
 from .panel import Axis, Curve, Panel, join_names, make_axis, thin
 from .table import Chart
@@ -41,7 +41,7 @@ class SweepView(NamedTuple):
         Variables of the other keys of a grid; [] if the cases are rows.
     """
 
-    data: dict[str, Variable]
+    data: Data
     details: dict
     axis: str
     others: list[str]
@@ -110,7 +110,7 @@ def list_keys(answer: Answer) -> list[str]:
     return [re.sub(r"\W", "_", key) for key in answer.details["of"]["keys"]]
 
 
-def list_measures(answers: dict[str, Answer]) -> list[str]:
+def list_measures(answers: Answers) -> list[str]:
     """Return the measures that have a value in at least one case.
 
     The main ones that change come first, in the order of the verdict, then the others.
@@ -133,7 +133,7 @@ def spread_indices(size: int, count: int) -> np.ndarray:
     return np.unique(np.linspace(0, size - 1, min(size, count)).astype(int))
 
 
-def make_relative(answers: dict[str, Answer], chart: Chart) -> Panel | None:
+def make_relative(answers: Answers, chart: Chart) -> Panel | None:
     """Return the main measures relative to their first case along the only key, with the band of 5 %."""
     curves = []
     for title, answer in answers.items():
@@ -141,7 +141,7 @@ def make_relative(answers: dict[str, Answer], chart: Chart) -> Panel | None:
         if view.others or not view.is_grid:
             continue
         x_axis, x = view.scale(view.axis)
-        for name in chart.y:
+        for name in chart.y.split():
             values = view.split_lines(name).ravel()
             if values.size > 1 and abs(values[0]) > 0:  # False for NaN
                 keep = thin(values, MAX_DRAWN_CASES // 2)
@@ -159,7 +159,7 @@ def make_relative(answers: dict[str, Answer], chart: Chart) -> Panel | None:
     return Panel(chart.title, chart.style, x_axis, axis, curves, chart.caption)
 
 
-def make_menu(answers: dict[str, Answer], chart: Chart) -> Panel | None:
+def make_menu(answers: Answers, chart: Chart) -> Panel | None:
     """Return a panel for each measure against a key, between which a menu chooses."""
     names = list_measures(answers)
     return _add_choices(chart, [make_measure_panel(answers, name) for name in names])
@@ -173,7 +173,7 @@ def _add_choices(chart: Chart, panels: list[Panel]) -> Panel | None:
     return replace(panel, style=chart.style, choices=panels) if len(panels) > 1 else panel
 
 
-def make_measure_panel(answers: dict[str, Answer], name: str) -> Panel:
+def make_measure_panel(answers: Answers, name: str) -> Panel:
     """Return a measure against a swept key, a line for each combination of the other keys.
 
     Random cases are points against the key with the largest share of the variance of the measure.
@@ -208,7 +208,7 @@ def make_measure_panel(answers: dict[str, Answer], name: str) -> Panel:
     return Panel(name.replace("_", " "), "dots" if view.is_grid else "points", *axes, curves)
 
 
-def make_map_menu(answers: dict[str, Answer], chart: Chart) -> Panel | None:
+def make_map_menu(answers: Answers, chart: Chart) -> Panel | None:
     """Return a map of each measure over two keys, between which a menu chooses."""
     view = view_sweep(next(iter(answers.values())))
     if len(answers) > 1 or len(view.others) != 1:
@@ -228,7 +228,7 @@ def make_map_menu(answers: dict[str, Answer], chart: Chart) -> Panel | None:
     return _add_choices(chart, panels)
 
 
-def make_shares(answers: dict[str, Answer], chart: Chart) -> Panel | None:
+def make_shares(answers: Answers, chart: Chart) -> Panel | None:
     """Return bars of the shares of the variance with their intervals, with a menu of the measures."""
     panels = []
     ranking = next(iter(answers.values())).details.get("ranking", {})

@@ -8,6 +8,7 @@ from ...core import Missing, PatchfemError
 from ...disk.atomic_write import write_atomically, write_text
 from .. import store
 from ..answer import Answer
+from ..columns import format_csv
 from . import universal
 from .universal import Column
 
@@ -107,7 +108,4 @@ def write_matlab(path: Path, answer: Answer) -> None:
 
 def format_columns(columns: list[Column]) -> str:
     """Return columns of equal length as CSV with units in the header and all digits."""
-    lines = [",".join(f"{column.label} [{column.unit}]" for column in columns)]
-    rows = zip(*(column.values.tolist() for column in columns), strict=True)
-    lines += [",".join(map(repr, row)) for row in rows]
-    return "\n".join(lines) + "\n"
+    return format_csv({f"{one.label} [{one.unit}]": one.values.tolist() for one in columns})

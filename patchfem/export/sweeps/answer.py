@@ -18,7 +18,7 @@ from ...campaigns.sweeps.sweep_table import SweepTable, SweptKey
 from ...core import PatchfemError
 from ...runs.results.result import describe_measure
 from ...scene.keys.lookup import find_key
-from ..answer import Answer, Quantity, Remarks, Variable
+from ..answer import Answer, Data, Quantities, Quantity, Remarks, Variable
 from ..runs import list_versions
 from .tables import sort_measures
 from .words import describe_place, make_peak_quantities, make_verdict
@@ -122,7 +122,7 @@ def _make_quantile_row(values: np.ndarray, unit: str) -> dict:
     return {name: Quantity(value, unit).as_json() for name, value in zip(names, values.tolist())}
 
 
-def _make_quantities(table: SweepTable, analysis: SweepAnalysis) -> dict[str, Quantity]:
+def _make_quantities(table: SweepTable, analysis: SweepAnalysis) -> Quantities:
     """Return the peak if there is only one, the limits of the key, and the ends of the largest ranges."""
     quantities = {}
     if len(analysis.peaks) == 1:
@@ -149,7 +149,7 @@ def _make_quantities(table: SweepTable, analysis: SweepAnalysis) -> dict[str, Qu
     return quantities
 
 
-def _make_data(table: SweepTable, case_folders: Sequence[str]) -> dict[str, Variable]:
+def _make_data(table: SweepTable, case_folders: Sequence[str]) -> Data:
     """Return the variables of sweep.nc: keys, measures with errors and floors, outcome, messages.
 
     There is a dimension for each swept key, or the dimension `case` if the cases are rows.

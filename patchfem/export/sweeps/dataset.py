@@ -1,12 +1,10 @@
 """The answer of a sweep as xarray.Dataset, and the plot of one of its measures."""
 
-from __future__ import annotations
-
-import numpy as np
+from dataclasses import replace
 
 from ...core import PatchfemError
 from .. import netcdf
-from ..answer import Answer, Variable
+from ..answer import Answer
 from ..charts import axes as drawing
 from ..charts.sweeps import list_keys, make_measure_panel
 
@@ -35,7 +33,8 @@ def sweep_axes(dataset, measure: str, axes=None):
     PatchfemError
         If the dataset is not that of a sweep, or does not have this measure.
     """
-    names = [str(name) for name in getattr(dataset, "data_vars", ()) if f"{name}_error" in dataset]
+    answer = netcdf.from_dataset(dataset, "sweep")
+    names = [name for name in answer.data if f"{name}_error" in answer.data]
     if measure not in names:
         listed = ", ".join(sorted(names)) or "none; give a Dataset returned by pf.sweep"
         raise PatchfemError(f"plot.sweep: no measure {measure!r}; there are {listed}", "")
@@ -43,16 +42,7 @@ def sweep_axes(dataset, measure: str, axes=None):
         from matplotlib.figure import Figure
 
         axes = Figure(figsize=drawing.PANEL_SIZE, layout="constrained").subplots()
-    data = {
-        str(name): Variable(
-            tuple(map(str, variable.dims)),
-            np.asarray(variable.values),
-            variable.attrs.get("units", ""),
-            variable.attrs.get("long_name", ""),
-        )
-        for name, variable in dataset.variables.items()
-    }
     keys = [str(name) for name in dataset.coords if name != "case"]
     details = {"of": {"keys": keys}, "tolerance": dataset.attrs.get("tolerance")}
-    answer = Answer("sweep", "", (), data=data, details=details)
-    return drawing.draw(make_measure_panel({"": answer}, measure), axes)
+    panel = make_measure_panel({"": replace(answer, details=details)}, measure)
+    return drawing.draw(panel, axes)

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import json
 import os
-import secrets
 import shutil
 from collections.abc import Sequence
 from contextlib import suppress
@@ -19,7 +18,7 @@ import numpy as np
 
 from ...campaigns.sweeps.cases import Cases
 from ...core import Missing, PatchfemError
-from ...disk.atomic_write import WriteError, explain_mkdir_error, write_bytes, write_text
+from ...disk.atomic_write import WriteError, explain_mkdir_error, write_text
 from ...disk.lock import FolderLock
 from ...effects import EFFECTS
 from ...model.model import Model
@@ -47,8 +46,6 @@ class Writer:
         Names of the cases.
     keep : str
         As in `run.SweepTarget`.
-    token : str
-        Name of a file by which the folder is identified.
     """
 
     cases: Cases
@@ -56,7 +53,6 @@ class Writer:
     shown: Path
     names: np.ndarray
     keep: str
-    token: str
 
     def make_summary(
         self, number: int, model: Model | PatchfemError, results: CaseResults, case: int
@@ -122,16 +118,6 @@ class Writer:
         if self.keep == "pages":
             write_run_page(written, folder.target)
 
-    def __call__(self, numbers: Sequence[int], results: CaseResults, texts: Sequence[str]) -> bool:
-        """Write results as `put` does; return False if the folder is not accessible or the disk is full."""
-        try:
-            is_accessible = (self.target / CHUNKS / self.token).is_file()
-            if is_accessible:
-                self.put(numbers, results, texts)
-            return is_accessible
-        except Missing:  # the process that requested the cases writes them and reports the error
-            return False
-
     def put(self, numbers: Sequence[int], results: CaseResults, texts: Sequence[str]) -> None:
         """Write the summaries of cases, then their chunk.
 
@@ -188,7 +174,6 @@ class Folder:
         self.shown = target
         self.is_shared = is_shared
         self.claim = FolderLock(self.target / LOCK, target, "sweep")
-        self.token = f".{secrets.token_hex(8)}"
         self.chunks = Chunks(self.target / CHUNKS, names)
 
     def __enter__(self) -> Folder:
@@ -207,11 +192,9 @@ class Folder:
                 if not self.claim.path.exists():  # otherwise the folder belongs to another process
                     self._remove_empty()
                 raise
-        write_bytes(self.target / CHUNKS / self.token, b"")
         return self
 
     def __exit__(self, fault, *_) -> None:
-        (self.target / CHUNKS / self.token).unlink(missing_ok=True)
         if not self.is_shared:
             self.claim.release()
             if fault is not None:
@@ -280,7 +263,7 @@ class Folder:
         """
         self.chunks.merge_files(removes_others=removes_others)
         own = set() if keep == "none" else set(self.case_folder_names())
-        stored = {*self.chunks.list_files(), self.target / CHUNKS / self.token}
+        stored = set(self.chunks.list_files())
         stored |= {self.target / CASES / name for name in own}
         for folder in (CHUNKS, CASES):
             for path in (self.target / folder).glob("*"):

@@ -104,13 +104,12 @@ def sweep_into(
 
         abandoned = []
         write = partial(write_tables, sweep_scene, cases, folder, place.page, abandoned)
-        writer = Writer(cases, folder.target, folder.shown, folder.chunks.names, keep, folder.token)
+        writer = Writer(cases, folder.target, folder.shown, folder.chunks.names, keep)
         work = WorkerData(
             sweep_scene,
             cases,
             None if keep == "none" else writer.make_summary,
             writer.write_results if keep in ("results", "pages") else None,
-            writer,
         )
         n_done = int(is_stored.sum())
         report_progress(n_done, requested.size)
@@ -122,7 +121,7 @@ def sweep_into(
                     texts is None
                 ):  # these cases are not stored, so that a resumed sweep tries them again
                     abandoned.append((chunk, results))
-                elif results is not None:  # the worker cannot write them, or the disk is full
+                else:
                     writer.put(chunk, results, texts)
                 folder.remove_tables()  # they are outdated once a case is computed
                 n_done += len(chunk)

@@ -1,24 +1,22 @@
 """Results of cases in `chunks/`: one netCDF file for each chunk, which is complete or does not exist.
 
-A file has the dimensions `measure` and `case`: `values` (float64), `errors` and `floors` (float32) in
-SI; `name`, a hash that identifies a case in any sweep of its scene; `outcome` as CF flags; and the
-attributes `units` and `messages` (JSON: message of each failed case by its place in the file). It is
-written under another name and renamed. A file that cannot be read holds no cases.
+A file has the dimensions `measure` and `case`: `values` (float64), `errors` and `floors` (float32) in SI; `name`, a hash
+that identifies a case in any sweep of its scene; `outcome` as CF flags; and the attributes `measures` (JSON: unit of each
+measure) and `messages` (JSON: message of each failed case by its place in the file). A file that cannot be read holds no
+cases.
 """
 
 from __future__ import annotations
 
 import json
 from collections.abc import Iterator
-from io import BytesIO
 from pathlib import Path
 
-import h5netcdf
-import h5py
 import numpy as np
 
-from ...disk.atomic_write import write_bytes
 from ...runs.batch.case_results import CaseResults, join_case_results
+from ..answer import Variable, encode
+from ..netcdf import read_netcdf, write_arrays
 
 CHUNKS = "chunks"
 SUFFIX = ".nc"
@@ -41,53 +39,39 @@ def write_chunk(folder: Path, names: np.ndarray, results: CaseResults) -> Path:
     OSError or WriteError
         If there is no space.
     """
-    words, codes = np.unique(results.outcome.astype(str), return_inverse=True)
-    # h5py stores a file in memory with fewer overheads than in a folder on a network.
-    with h5py.File("chunk", "w", driver="core", backing_store=False, libver="latest") as memory:
-        with h5netcdf.File(memory, "w") as file:
-            file.dimensions = {"measure": len(results.units), "case": len(names)}
-            file.attrs["measures"] = json.dumps(results.units)
-            file.attrs["messages"] = json.dumps(results.messages, ensure_ascii=False)
-            file.create_variable("name", ("case",), data=np.asarray(names, np.uint64))
-            outcome = file.create_variable("outcome", ("case",), data=codes.astype(np.uint8))
-            outcome.attrs["flag_values"] = np.arange(len(words), dtype=np.uint8)
-            outcome.attrs["flag_meanings"] = " ".join(words)
-            for part, kind in TABLE_TYPES.items() if results.units else ():
-                columns = [getattr(results, part)[measure] for measure in results.units]
-                file.create_variable(
-                    part,
-                    ("measure", "case"),
-                    data=np.array(columns, kind),
-                    chunks=(1, len(names)),
-                    compression="gzip",
-                    compression_opts=1,
-                    shuffle=True,
-                    fletcher32=True,
-                )
-        memory.flush()
-        image = memory.id.get_file_image()
+    data = {
+        "name": Variable(("case",), np.asarray(names, np.uint64), ""),
+        "outcome": encode("case", results.outcome),
+    }
+    for part, kind in TABLE_TYPES.items() if results.units else ():
+        columns = [getattr(results, part)[measure] for measure in results.units]
+        data[part] = Variable(("measure", "case"), np.array(columns, kind), "")
+    attributes = {
+        "measures": json.dumps(results.units),
+        "messages": json.dumps(results.messages, ensure_ascii=False),
+    }
     path = folder / f"{int(names[0]):016x}-{int(names[-1]):016x}-{len(names)}{SUFFIX}"
-    write_bytes(path, image)
+    write_arrays(data, attributes, path)
     return path
 
 
 def read_chunk(path: Path) -> tuple[np.ndarray, CaseResults]:
     """Return the names (n,) and the results of the cases in a file; none if it is damaged."""
     try:
-        with h5py.File(BytesIO(path.read_bytes()), "r") as file:
-            names = file["name"][...]
-            words = str(file["outcome"].attrs["flag_meanings"]).split()
-            results = CaseResults(np.array(words, object)[file["outcome"][...]])
-            results.units.update(json.loads(file.attrs["measures"]))
-            messages = json.loads(file.attrs["messages"])
-            results.messages.update({int(case): text for case, text in messages.items()})
-            for part in TABLE_TYPES if results.units else ():
-                columns = zip(results.units, file[part][...], strict=True)
-                getattr(results, part).update(columns)
+        data, attributes = read_netcdf(path)
+        outcome = data["outcome"]
+        words = [word.replace(" ", "_") for word in outcome.meanings]
+        results = CaseResults(np.array(words, object)[outcome.values])
+        results.units.update(json.loads(attributes["measures"]))
+        messages = json.loads(attributes["messages"])
+        results.messages.update({int(case): text for case, text in messages.items()})
+        for part in TABLE_TYPES if results.units else ():
+            columns = zip(results.units, data[part].values, strict=True)
+            getattr(results, part).update(columns)
+        return data["name"].values, results
     except (OSError, ValueError, LookupError, RuntimeError, TypeError, AttributeError):
-        # HDF5 checks the sums of its blocks, so that most changes of a byte end here.
+        # HDF5 checks its compressed blocks, so that most changes of a byte end here
         return np.empty(0, np.uint64), CaseResults.blank(0)
-    return names, results
 
 
 class Chunks:
@@ -153,16 +137,15 @@ class Chunks:
         """Write the contents of several files into one, and then remove these files."""
         if len(group) < 2:
             return
-        names = np.concatenate([names for names, _ in group.values()])
-        starts = np.cumsum([0, *(len(part) for part, _ in group.values())])
-        parts = [
-            (start + np.arange(len(part)), one)
-            for start, (part, one) in zip(starts, group.values())
-        ]
-        new = write_chunk(self.folder, names, join_case_results(len(names), parts))
-        for path in group:
-            if path != new:
-                path.unlink()
+        parts = []
+        start = 0
+        for names, results in group.values():
+            parts.append((start + np.arange(len(names)), results))
+            start += len(names)
+        all_names = np.concatenate([names for names, _ in group.values()])
+        new = write_chunk(self.folder, all_names, join_case_results(start, parts))
+        for path in group.keys() - {new}:
+            path.unlink()
 
 
 def case_folder_name(name: int) -> str:

@@ -12,7 +12,7 @@ from ...campaigns.sweeps.sweep_table import SweepTable
 from ...core import Outcome
 from ...formatting import format_number
 from ...response import rows
-from ..answer import Quantity
+from ..answer import Quantities, Quantity
 from ..quantities import choose_scale, format_quantity, format_value
 
 SMALLEST_SHARE = 0.01  # fraction of the variance below which a key is not named
@@ -107,7 +107,7 @@ def describe_place(table: SweepTable, entry: PeakOnLine) -> str:
     )
 
 
-def make_peak_quantities(entry: PeakOnLine, unit: str) -> dict[str, Quantity]:
+def make_peak_quantities(entry: PeakOnLine, unit: str) -> Quantities:
     """Return frequency, height and width of a peak, whose height has this unit."""
     peak = entry.peak
     reason = "" if np.isfinite(peak.width) else "the cases do not show it"
