@@ -14,6 +14,7 @@ from ..results.notes import (
     note_on_growth,
     note_on_heating,
     warn_of_bonds,
+    warn_of_created_energy,
     warn_of_work_check,
 )
 from ..results.result import (
@@ -57,7 +58,9 @@ def run_prescribed(inputs: RunInputs) -> Result:
         *inputs.warnings,
         *warn_of_bonds(model, model.speed_scale, measures, Outcome.DONE),
         *_warn_of_kept_pressure(model),
-        *_warn_of_created_energy(model, fine),
+        *warn_of_created_energy(
+            model, fine.values["energy_created"], float(np.abs(np.diff(fine.ledger[0])).sum())
+        ),
         *note_on_heating(model, patch, fine),
         *warn_of_work_check(measures, steps),
         *_warn_of_open_loop(model, fine),
@@ -108,19 +111,6 @@ def _warn_of_kept_pressure(model) -> list:
         "in the law as printed in the report, a bond keeps the pressure at which it formed, "
         "so while the load falls the friction force may exceed mu_s N; set friction.reading "
         '= "stretch" to avoid this'
-    ]
-
-
-def _warn_of_created_energy(model, fine) -> list:
-    """Return a list with a warning if the law of the 1985 report has created energy."""
-    created = fine.values["energy_created"]
-    exchanged = np.abs(np.diff(fine.ledger[0])).sum()
-    if model.friction.reading != "report" or created <= 1e-6 * exchanged:
-        return []
-    return [
-        f"the law as printed in the report created {created:.3g} J, "
-        f"which is {100 * created / exchanged:.2g} % of the work exchanged; with friction.reading = "
-        '"stretch" no energy is created'
     ]
 
 

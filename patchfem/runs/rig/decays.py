@@ -116,7 +116,10 @@ def make_laws_on_mesh(model, patch, meshed: tuple = ()):
         ).group
     return forces.LawGroup(
         rig.modes,
-        list(enumerate(interface.make_interface_elements(model, meshed))),
+        [
+            (k, joint.make_element(rig.speed_scale))
+            for k, joint in enumerate(interface.list_joints(model, None, meshed))
+        ],
     )
 
 
