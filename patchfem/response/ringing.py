@@ -11,7 +11,6 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from scipy.optimize import least_squares
 
 # Smallest number of ringing periods in a stick interval; with fewer, frequency and decay are correlated.
 MIN_PERIODS = 1.5
@@ -405,6 +404,8 @@ def _initial_guesses(time, value, forced, poles, residual) -> list:
 
 def _refine_poles(time, value, forced, poles) -> _Fit:
     """Fit decaying sinusoids from given poles (2 r,) by the Levenberg-Marquardt method."""
+    from scipy.optimize import least_squares  # only runs that ring need it
+
     scale = np.abs(poles) + 1 / time[-1]
     fit = least_squares(
         lambda x: _project(time, value, forced, x * scale).residual,
