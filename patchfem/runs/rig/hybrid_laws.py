@@ -16,7 +16,7 @@ from ...hybrid.laws.masing import from_elements, has_many_elements, with_all_rev
 from ...hybrid.records import LawNumbers
 from ...model.model import Model
 from ..bench import averaged_law
-from . import interface
+from .joints import list_joints
 from .numerics import Numerics
 
 STUCK_SLIP = 1e-3  # largest slip per cycle of an interface that counts as stuck, relative to its elastic length
@@ -27,7 +27,7 @@ class Joints(NamedTuple):
 
     - laws: (LawNumbers, Load) of each interface.
     - elements: stiffness [N/m] and yield displacement [m] (e,) of the elements of each interface; () for other laws.
-    - contact: interface.Joint of the only patch, if it slips part by part, or None.
+    - contact: joints.Joint of the only patch, if it slips part by part, or None.
     - stick_tolerance: largest slip per cycle [m] at which the interfaces count as stuck.
     """
 
@@ -63,7 +63,7 @@ def make_joints(model: Model, numerics: Numerics, patch) -> Joints:
     if model.friction is None:
         return Joints()
     speed = rig.speed_scale
-    joints = interface.list_joints(model, patch, numerics.meshed)
+    joints = list_joints(model, patch, numerics.meshed)
     is_soft = bool(model.partial_slip or rig.friction.has_partial_slip)
     if not (is_soft or rig.friction.names or rig.friction.strips_slide_apart):
         laws = [_make_whole_law(model, patch)]
@@ -110,8 +110,8 @@ def _make_load(model: Model, patch) -> Load:
 
 
 def list_elements(model: Model, numerics: Numerics, patch) -> list[tuple[np.ndarray, np.ndarray]]:
-    """Return stiffness [N/m] and yield displacement [m] (e,) of the elements of each interface (`interface.Joint`)."""
-    joints = interface.list_joints(model, patch, numerics.meshed)
+    """Return stiffness [N/m] and yield displacement [m] (e,) of the elements of each interface (`joints.Joint`)."""
+    joints = list_joints(model, patch, numerics.meshed)
     return [joint.list_elements(model.rig.speed_scale) for joint in joints]
 
 
