@@ -425,7 +425,6 @@ class MeasureDefinition(NamedTuple):
       returns their size from the measures of the same interface; otherwise None. The tolerance times this size is added
       to the floor.
     - order: order of the sampling error of an exact motion in the sample spacing.
-    - needs_run: whether the function uses the histories of the whole run, which the coarse runs then store as well.
     - minimum: smallest possible value.
     - flags: sets to which the measure belongs, separated by blanks: "main" (the tolerance of a run applies to it),
       "interface" (one value per interface), "level" (one value per drive level), "curve" (a column of a response
@@ -445,7 +444,6 @@ class MeasureDefinition(NamedTuple):
     group: str = "motion"
     larger_term: tuple[str, Callable] | None = None
     order: float = 1.0
-    needs_run: bool = False
     minimum: float = -np.inf
     flags: str = ""
     friction_scale: Callable | None = None

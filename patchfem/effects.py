@@ -24,8 +24,7 @@ Traits of laws:
 - `timeless`: the force does not depend on the sliding speed;
 - `memoryless`: the force depends only on the current motion;
 - `creeps`: the interface never sticks;
-- `cells`: a continuous distribution of elements is discretised into cells;
-- `overshoots`: after a reversal, the force exceeds that of steady sliding for less than one time step.
+- `cells`: a continuous distribution of elements is discretised into cells.
 
 `runs.rig.interface` and `points.laws` have their own lists of supported laws.
 
@@ -260,7 +259,6 @@ EFFECTS = {
         "(mu_s - mu_k) N exp(-(v/v_s)^2) (Canudas de Wit; Dahl: mu_k = mu_s, no damping)",
         ("stiffness stribeck_speed", "kinetic micro_damping viscous"),
         "joints harmonic march",
-        "overshoots",
     ),
     "friction.reading=stretch": Effect(
         "patchfem.friction.bonds.point_kernels", "phi: (|u|/eps)^p exp(-int dR/eps)/Gamma(p+1)"

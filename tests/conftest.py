@@ -18,7 +18,6 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import pytest
 from hypothesis import HealthCheck, settings
 
-from patchfem import compiled
 from patchfem.compiled import UNCACHED_FUNCTIONS, cache_folder
 
 HERE = Path(__file__).parent
@@ -29,9 +28,6 @@ os.environ.setdefault("NUMBA_CACHE_DIR", str(cache_folder()))
 # Folders whose tests compile code run first, folders that use this code again run last, all others in between.
 COMPILING = ("dynamics", "export", "model", "campaigns", "response", "runs", "commands", "friction")
 LATER = ("structure", "wear", "scene", "identify", "torture", "studies")
-
-# Short runs, which plain Python would compute otherwise, use compiled code in the tests too.
-compiled.MAX_PYTHON_SECONDS = -1.0
 
 if sys.dont_write_bytecode:
     # Otherwise each of hundreds of child processes translates all modules that it imports.

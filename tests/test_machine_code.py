@@ -247,8 +247,6 @@ def test_always_argument_kinds_distinguish_types():
 MOTIONS = """
 import json, sys
 import patchfem as pf
-from patchfem import compiled
-compiled.MAX_PYTHON_SECONDS = -1.0
 rig = '[normal]\\nload = "40 N"\\n[friction]\\nlaw = "LAW"\\nstatic = 0.3\\nMORE\\n' \\
     '[structure]\\nmoving_mass = "1 kg"\\n' \\
     '[[structure.mode]]\\nname = "a"\\nfrequency = "100 Hz"\\ndamping = 0.01\\nslide = 1.0\\n' \\

@@ -2,17 +2,16 @@
 
 `load` returns a kernel module by name as a `KernelModule`, and `instantiate` returns a variant of it in which some
 imports are replaced. The module, and with it numba, is imported only if a function is called whose machine code is not
-stored. `jit` contains the decorator `njit` of all kernels, `machine` stores and loads machine code, `no_jit` runs
-kernels as Python, `prebuilt` finds the machine code of a wheel, `cache_files` and `cache_limit` manage the cache. Read
-`load`, `instantiate` and `KernelFunction` first.
+stored. `jit` contains the decorator `njit` of all kernels, `machine` stores and loads machine code, `prebuilt` finds the
+machine code of a wheel, `cache_files` and `cache_limit` manage the cache. Read `load`, `instantiate` and
+`KernelFunction` first.
 
 The cache of numba detects a change of the file of a function, but not of the modules whose functions it calls, and it
 stores no function that takes another function as an argument. So the folder is named by a hash of all kernel sources,
 and a loop for any friction law is written out once per law by `instantiate`, with the import of the law replaced.
 
 NUMBA_DISABLE_JIT=1 runs every kernel as Python for debuggers and coverage tools. NUMBA_BOUNDSCHECK=1 compiles all
-kernels again with checks of every index. If the caller of a function predicts its cost as Python
-(`KernelFunction.add_python_cost`), the function runs as Python as long as this is cheaper than compiling it.
+kernels again with checks of every index.
 
 The optimisation level is 3, the default of numba. Levels 2 and 1 save no compile time: the rig and five laws took 64
 and 61 CPU seconds instead of 63, most of it in the Python code of numba. At level 2 the loop of Iwan's law takes 10.1
@@ -30,19 +29,15 @@ from contextlib import contextmanager
 from functools import cache
 from importlib import import_module
 from importlib.util import module_from_spec, spec_from_file_location, spec_from_loader
-from math import inf
 from operator import add, mul, neg, pos, sub, truediv
 from pathlib import Path
 from threading import RLock
 from time import monotonic, sleep
 
-import numpy as np
-
 from ..disk import user_cache
 from ..disk.atomic_write import describe_space_shortage
 from ..disk.installed import find_package_version
 from . import cache_limit, machine, prebuilt
-from .no_jit import load_uncompiled
 
 # Names that other folders use, by module.
 PUBLIC = {
@@ -71,10 +66,6 @@ TUPLE_MODULES = (
 # State of the environment variable that makes numba run all kernels as Python.
 IS_JIT_DISABLED = os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0")
 MIN_FREE_BYTES = 1 << 21  # disk space in bytes that the machine code of a run needs
-# Largest time [CPU s] that a function may take as Python in this process before it is
-# compiled; this is about a tenth of the compile time (10 to 30 s), because later
-# processes reuse the machine code.
-MAX_PYTHON_SECONDS = 2.0
 # Time to wait for another process that compiles [s]: ten times the longest compilation.
 MAX_LOCK_WAIT = 300.0
 # Time between two attempts to take the lock [s], short compared with a compilation.
@@ -269,8 +260,7 @@ def lock_exclusively(path: Path):
 class KernelFunction:
     """Function of a kernel module.
 
-    A call runs its stored machine code. If there is none, numba compiles the function, or it runs as Python if its
-    predicted cost is small.
+    A call runs its stored machine code. If there is none, numba compiles the function.
 
     Parameters
     ----------
@@ -288,15 +278,6 @@ class KernelFunction:
         self.converter = machine.ArgumentConverter()
         # Loaded function for each tuple of type codes; False if numba runs the function itself.
         self.loaded_functions = {}
-        self.python_seconds = inf  # predicted cost of all calls as Python [CPU s]
-
-    def add_python_cost(self, seconds: float) -> None:
-        """Add the predicted cost of calls as Python [CPU s].
-
-        The estimate must be the same in every process, so that all of them choose the same form of the function.
-        """
-        known = self.python_seconds if self.python_seconds < inf else 0.0
-        self.python_seconds = known + seconds
 
     def bind_arguments(self, *arguments) -> tuple:
         """Convert the last arguments of many calls once, for `call_with_bound_args`.
@@ -349,9 +330,6 @@ class KernelFunction:
         """Load or compile the code for arguments of these types, and return the result of the call."""
         path = _prepare_cache() / "code" / self._make_file_name(type_codes)
         function = machine.load_file(path) or _load_prebuilt(path)
-        if function is None and self.python_seconds <= MAX_PYTHON_SECONDS:
-            with np.errstate(all="ignore"):
-                return getattr(load_uncompiled(self.module.__name__), self.name)(*arguments)
         if function is None:
             with measure_compile_time():
                 function = self._build_machine_code(path, arguments)

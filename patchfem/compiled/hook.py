@@ -23,11 +23,9 @@ from patchfem.compiled import hash_sources, prebuilt
 if not prebuilt.is_cpu_sufficient():
     raise SystemExit('this CPU lacks instruction sets of the machine code')
 print(prebuilt.COMMON_CPUS[platform.machine()].name, prebuilt.compute_key(hash_sources))"""
-# Program that compiles every kernel that it calls, even if running it as Python would cost less.
+# Program that compiles every kernel that it calls.
 COMPILE_PROGRAM = """import sys
-from patchfem import compiled
 from patchfem.__main__ import main
-compiled.MAX_PYTHON_SECONDS = -1.0
 main(sys.argv[1:])"""
 RIG_TEXT = """
 [normal]

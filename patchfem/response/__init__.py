@@ -48,7 +48,6 @@ PUBLIC = {
         "join_events",
         "sort_events",
     ),
-    "inside_steps": ("add_substep_samples",),
     "levels": (
         "Level",
         "MIN_JUMP_FACTOR",
@@ -108,7 +107,6 @@ PUBLIC = {
     ),
     "ringing": (
         "MIN_PERIODS",
-        "MIN_REFINED_FRACTION",
         "compute_stuck_vibration",
         "make_ringing_measures",
         "measure_ringing",
@@ -119,7 +117,6 @@ PUBLIC = {
         "STEADY_AMPLITUDE",
         "INTERNAL_VALUES",
         "LastCycles",
-        "ROWS_NEEDING_RUN",
         "TABLE",
         "add_interface_number",
         "compute_measures",

@@ -8,12 +8,9 @@ are fitted, and the one with the largest energy is the ringing. Without a sinuso
 """
 
 from dataclasses import dataclass
-from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
-
-from .. import compiled
 
 # Smallest number of ringing periods in a stick interval; with fewer, frequency and decay are correlated.
 MIN_PERIODS = 1.5
@@ -29,15 +26,11 @@ MAX_RESIDUAL = 0.1
 MAX_DAMPING_RATIO = 0.5  # Largest damping ratio that counts as ringing [1].
 # A fit with a relative residual below this value is accepted without further initial guesses.
 EXACT_RESIDUAL = 1e-9
-FLOAT_EPSILON = float(np.finfo(float).eps)
-# CPU time of a residual evaluation in Python per sample and squared number of columns [s].
-SECONDS_PER_TERM = 8e-7
-EVALUATIONS_PER_FIT = 2.0  # Number of evaluations per fit in the cost estimate.
-KERNELS_MODULE = "response.ringing_kernels"
-MAX_STEPS = 60  # Largest number of iteration steps of a fit.
-# Smallest number of periods of a sinusoid that is refined to round-off, relative to MIN_PERIODS; a slower one
-# is not accepted as ringing.
-MIN_REFINED_FRACTION = 0.9
+MAX_EVALUATIONS = 60  # Largest number of evaluations of the residual in a fit.
+POLE_TOL = 1e-13  # Relative change of the poles at which a fit ends.
+MAX_EXPONENT = 50.0  # Largest exponent of a sinusoid that grows during a fit.
+# Columns whose part that is independent of the others is smaller than this fraction have no coefficient.
+MIN_INDEPENDENT = 1e-12
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -94,14 +87,14 @@ def fit_ringing(time, value, omega: float = 0.0, size: float | None = None) -> R
             ),
         )
         time, value, columns, unforced = (
-            part[::stride][:MAX_SAMPLES].copy() for part in (time, value, columns, unforced)
+            part[::stride][:MAX_SAMPLES] for part in (time, value, columns, unforced)
         )
     span = time[-1]
     fit = _fit_all_sinusoids(time, value, columns, unforced)
     if fit is None:
         return None
     poles, sigma, _ = fit
-    residual, sinusoids = _subtract_sinusoids(time, value, columns, poles)
+    residual, sinusoids, _ = _project(time, value, columns, poles)
     k = int(np.argmax([np.sum(part**2) for part in sinusoids]))
     ring_omega, rate = poles[2 * k : 2 * k + 2]
     amplitude = float(np.abs(sinusoids[k]).max())
@@ -126,9 +119,7 @@ def fit_ringing(time, value, omega: float = 0.0, size: float | None = None) -> R
         return None
     thinned_poles = poles
     if time.size >= 2 * MIN_SAMPLES:
-        thinned_poles = _refine_poles(
-            time[::2].copy(), value[::2].copy(), columns[::2], poles
-        ).poles
+        thinned_poles = _refine_poles(time[::2], value[::2], columns[::2], poles).poles
     pole_errors = np.abs(thinned_poles - poles)[2 * k : 2 * k + 2] + 2 * sigma[2 * k : 2 * k + 2]
     return Ringing(
         float(ring_omega / (2 * np.pi)),
@@ -319,42 +310,45 @@ class _Fit(NamedTuple):
     rms: float
 
 
-def _fit_poles(time, value, forced, poles, *ends) -> tuple:
-    """Fit the poles (2 r,) of decaying sinusoids to a signal, or evaluate their residual.
+class _Projection(NamedTuple):
+    """Projection of a signal on a forced part and decaying sinusoids.
 
-    The poles are changed in place to the best ones. Without termination limits `ends`, only the residual is
-    evaluated. Returns the number of evaluations, the sum of squares of the residual, and the workspace of
-    `ringing_kernels.fit_sinusoids`, which is valid until the next call.
+    - residual (k,): part of the signal that they do not contain.
+    - sinusoids: fitted sinusoid (k,) of each pair of poles.
+    - jacobian (k, 2 r): derivatives of the residual with respect to the poles.
     """
-    workspace = _fit_workspace(forced.shape[1] + poles.size, poles.size, time.size)
-    workspace[0][0, : forced.shape[1]] = forced.T
-    fit = compiled.get_kernel_module(KERNELS_MODULE).fit_sinusoids
-    fit.add_python_cost(
-        EVALUATIONS_PER_FIT * SECONDS_PER_TERM * time.size * (forced.shape[1] + poles.size) ** 2
-    )
-    ends = np.array([*ends, MAX_STEPS] if ends else [0.0] * 4)
-    return *fit(time, value, poles, np.abs(poles) + 1 / time[-1], ends, workspace), workspace
+
+    residual: np.ndarray
+    sinusoids: list
+    jacobian: np.ndarray
 
 
-@lru_cache(maxsize=16)
-def _fit_workspace(count: int, n_sinusoids: int, samples: int) -> tuple:
-    """Return the cached workspace for a fit with a given number of poles."""
-    return (
-        np.empty((3, count, samples)),
-        np.empty((count + 2, count)),
-        np.empty((n_sinusoids, samples)),
-        np.zeros((n_sinusoids, n_sinusoids + 1)),
-        np.empty((n_sinusoids + 2, n_sinusoids)),
-    )
+def _project(time, value, forced, poles) -> _Projection:
+    """Project a signal on the columns of given poles (2 r,).
 
+    The Jacobian is that of Kaufman (1975): the derivative of the columns times their coefficients, without its part in
+    the space of the columns.
+    """
+    omegas, rates = poles.reshape(-1, 2).T
+    decay = np.exp(np.clip(-np.outer(time, rates), -MAX_EXPONENT, MAX_EXPONENT))
+    cosine = decay * np.cos(np.outer(time, omegas))
+    sine = decay * np.sin(np.outer(time, omegas))
+    columns = np.hstack([forced, cosine, sine])
 
-def _subtract_sinusoids(time, value, forced, poles) -> tuple:
-    """Return the residual of a signal and the fitted sinusoids (k,) for given poles."""
-    n = forced.shape[1]
-    columns, coefficients, *_ = _fit_poles(time, value, forced, poles)[2]
-    return columns[2, 0].copy(), [
-        coefficients[-1, k : k + 2] @ columns[0, k : k + 2] for k in range(n, n + poles.size, 2)
-    ]
+    # Least squares by an orthonormal basis of the columns.
+    basis, sizes, rows = np.linalg.svd(columns, full_matrices=False)
+    is_known = sizes > MIN_INDEPENDENT * sizes[0]
+    basis = basis[:, is_known]
+    parts = basis.T @ value
+    coefficients = rows[is_known].T @ (parts / sizes[is_known])
+    residual = value - basis @ parts
+
+    # d/d omega and d/d rate of a exp(-rate t) cos(omega t) + b exp(-rate t) sin(omega t).
+    a, b = coefficients[forced.shape[1] :].reshape(2, -1)
+    sinusoids = a * cosine + b * sine
+    slopes = np.stack([b * cosine - a * sine, -sinusoids], axis=2) * time[:, None, None]
+    slopes = slopes.reshape(time.size, poles.size)
+    return _Projection(residual, list(sinusoids.T), basis @ (basis.T @ slopes) - slopes)
 
 
 def _fit_all_sinusoids(time, value, forced, signal) -> _Fit | None:
@@ -368,9 +362,7 @@ def _fit_all_sinusoids(time, value, forced, signal) -> _Fit | None:
         poles = best.poles if best is not None else np.empty(0)
         fits = []
         for start in _initial_guesses(time, value, forced, poles, signal):
-            fits.append(
-                _refine_poles(time, value, forced, np.append(poles, start), EXACT_RESIDUAL * scale)
-            )
+            fits.append(_refine_poles(time, value, forced, np.append(poles, start)))
             if fits[-1].rms < EXACT_RESIDUAL * scale:
                 break
         best_fit = min(fits, key=lambda fit: fit.rms)
@@ -381,7 +373,7 @@ def _fit_all_sinusoids(time, value, forced, signal) -> _Fit | None:
         last_rms = best_fit.rms
         if last_rms < 1e-6 * scale or time.size < 8 * (len(best.poles) + 2):
             break
-        signal = _subtract_sinusoids(time, value, forced, best.poles)[0]
+        signal = _project(time, value, forced, best.poles).residual
     return best
 
 
@@ -405,30 +397,26 @@ def _initial_guesses(time, value, forced, poles, residual) -> list:
     residuals = []
     for omega in near:
         candidate = np.append(poles, (omega, 0.5 / span))
-        residuals.append(_fit_poles(time, value, forced, candidate)[1])
+        residuals.append(np.linalg.norm(_project(time, value, forced, candidate).residual))
     omega = near[int(np.argmin(residuals))] if near else line
     return [np.array([omega, decay / span]) for decay in (0.1, 2.0)]
 
 
-def _refine_poles(time, value, forced, poles, max_slow_rms: float = 0.0) -> _Fit:
-    """Fit decaying sinusoids from given poles by the Levenberg-Marquardt method.
+def _refine_poles(time, value, forced, poles) -> _Fit:
+    """Fit decaying sinusoids from given poles (2 r,) by the Levenberg-Marquardt method."""
+    from scipy.optimize import least_squares  # only runs that ring need it
 
-    The iteration ends if the residual or its reduction in a step is round-off, or if the rms of the residual
-    is below `max_slow_rms` and the sinusoids are too slow to be ringing.
-    """
     scale = np.abs(poles) + 1 / time[-1]
-    poles = poles.copy()
-    min_omega = MIN_REFINED_FRACTION * 2 * np.pi * MIN_PERIODS / time[-1]
-    _, sum_of_squares, (*_, normal, _) = _fit_poles(
-        time,
-        value,
-        forced,
-        poles,
-        (4 * FLOAT_EPSILON) ** 2 * (value @ value),
-        time.size * max_slow_rms**2,
-        min_omega,
+    fit = least_squares(
+        lambda x: _project(time, value, forced, x * scale).residual,
+        poles / scale,
+        lambda x: _project(time, value, forced, x * scale).jacobian * scale,
+        method="lm",
+        ftol=POLE_TOL,
+        xtol=POLE_TOL,
+        gtol=POLE_TOL,
+        max_nfev=MAX_EVALUATIONS,
     )
-    rms = float(np.sqrt(sum_of_squares / time.size))
-    return _Fit(
-        poles, np.sqrt(np.maximum(np.diag(np.linalg.pinv(normal[:, :-1])), 0)) * rms * scale, rms
-    )
+    rms = float(np.sqrt(np.mean(fit.fun**2)))
+    covariance = np.linalg.pinv(fit.jac.T @ fit.jac)
+    return _Fit(fit.x * scale, np.sqrt(np.maximum(np.diag(covariance), 0)) * rms * scale, rms)

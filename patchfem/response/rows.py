@@ -52,12 +52,7 @@ class LastCycles:
     - reversal_rule: rule for the friction force at a reversal of the displacement (see
       `loops.find_reversals`).
     - slide_round_off: largest half range of the relative displacement that is round-off [m].
-    - add_substeps: function (window, index of the interface) that returns the window with samples
-      inside the time steps; None if these are not needed.
     - is_single_interface: whether the interfaces are parts of a single one.
-    - interface: index of the interface.
-    - run: histories of the whole run from t = 0, at equally spaced times and each reversal; None if
-      they were not stored.
     """
 
     window: Response
@@ -72,21 +67,12 @@ class LastCycles:
     ledger: np.ndarray | None = None
     reversal_rule: str = "rate"
     slide_round_off: float = 0.0
-    add_substeps: Callable | None = None
     is_single_interface: bool = False
-    interface: int = 0
-    run: Response | None = None
 
     @cached_property
     def span(self) -> float:
         """Duration of the window [s]."""
         return self.window.time[-1] - self.window.time[0]
-
-    @cached_property
-    def samples(self) -> Response:
-        """Samples of the window, with those inside the time steps if the engine provides them."""
-        window = self.window
-        return window if self.add_substeps is None else self.add_substeps(window, self.interface)
 
     @cached_property
     def has_full_cycle(self) -> bool:
@@ -102,7 +88,7 @@ class LastCycles:
             loop = self.integrated.loops[0]
             values = {"slip_amplitude": loop.slip_range / 2}
             return values | {"stick_fraction": stick_fraction(loop.stuck_time, self.span)}
-        window = self.samples
+        window = self.window
         steps = max(1, round((window.time.size - 1) * self.drive.period / self.span))
         values = compute_slip_measures(window, self.drive, steps)
         if not self.is_sine:
@@ -114,7 +100,7 @@ class LastCycles:
         """Smallest and largest `Reversal` of the displacement in each complete cycle."""
         if self.integrated.reversals:
             return [tuple(Reversal(*end) for end in pair) for pair in self.integrated.reversals]
-        w = self.samples
+        w = self.window
         return find_reversals(
             w.time, w.slide, w.slide_rate, w.force, self.drive.period, self.reversal_rule
         )
@@ -204,7 +190,6 @@ class LastCycles:
                     window=window,
                     integrated=IntegratedMeasures(),
                     is_sine=False,
-                    interface=k,
                     loop=(0j, 0j, work * self.drive.period / max(self.span, 1e-300)),
                 )
             )
@@ -296,7 +281,7 @@ ROWS = (
             if s.load is None
             else s.integrated.loops[0].max_force
             if s.integrated.loops
-            else compute_peak(s.samples.force)
+            else compute_peak(s.window.force)
         ),
         group="friction",
         flags="interface level loop",
@@ -632,7 +617,6 @@ INTERNAL_ROWS = (
     ),
 )
 INTERNAL_VALUES = tuple(row.name for row in INTERNAL_ROWS)
-ROWS_NEEDING_RUN = tuple(row for row in ROWS if row.needs_run)
 TABLE = {row.name: row for row in (*ROWS, *INTERNAL_ROWS)}
 
 
@@ -658,7 +642,7 @@ def compute_measures(last_cycles: LastCycles) -> dict:
     for row in TABLE.values():
         if row.name in known:
             values[row.name] = known[row.name]
-        elif row.function is not None and (last_cycles.run is not None or not row.needs_run):
+        elif row.function is not None:
             values[row.name] = row.function(last_cycles)
     for number, interface in enumerate(last_cycles.further_interfaces(), 1):
         for name in INTERFACE_MEASURES:

@@ -5,22 +5,21 @@ what would run, `run` runs it. A module imports only its own entry of this list 
 it:
 
 1.  `results`  what every run returns, with its notes
-2.  `sizes`  unknowns and memory of a run
-3.  `patch`  a static patch: its grids, its pressure, its measures with error estimates
-4.  `bench`  a patch or a point under a prescribed displacement
-5.  `joint`  removal of a joint from modes that were measured with it
-6.  `rig`  a driven structure with friction
-7.  `wear`  wear of a patch in a bench or a rig over many cycles
-8.  `refine`  repetition of a run with finer meshes or more steps until it meets the tolerance
-9.  `findings`  measures that miss the tolerance, and the advice that reduces their errors
-10. `accuracy_curve`  accuracy of a motion against its computing time
-11. `memory`  the memory that a run may use
-12. `plan`  what would run: engine, sizes, stiffnesses
-13. `balances`  equilibrium of a patch and energy of a bench
-14. `run`  from a plan to its result
-15. `probe`  one run without error estimates, with its measured time
-16. `pieces`  displacement and stress inside both pieces, and where they yield
-17. `batch`  many models in one batch
+2.  `patch`  a static patch: its grids, its pressure, its measures with error estimates
+3.  `bench`  a patch or a point under a prescribed displacement
+4.  `joint`  removal of a joint from modes that were measured with it
+5.  `rig`  a driven structure with friction
+6.  `wear`  wear of a patch in a bench or a rig over many cycles
+7.  `refine`  repetition of a run with finer meshes or more steps until it meets the tolerance
+8.  `findings`  measures that miss the tolerance, and the advice that reduces their errors
+9.  `accuracy_curve`  accuracy of a motion against its computing time
+10. `plan`  what would run: engine, unknowns, stiffnesses
+11. `memory`  the memory of a run, and the memory that it may use
+12. `balances`  equilibrium of a patch and energy of a bench
+13. `run`  from a plan to its result
+14. `probe`  one run without error estimates, with its measured time
+15. `pieces`  displacement and stress inside both pieces, and where they yield
+16. `batch`  many models in one batch
 """
 
 # names that other folders use, by module

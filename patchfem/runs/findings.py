@@ -17,7 +17,6 @@ from ..model.gap import longest_loaded_cell
 from ..model.model import Model
 from ..response import rows
 from . import refine
-from .patch import mesh_levels
 from .results import notes, patch_rows
 from .results.interfaces import Face, merge_findings
 from .results.result import Advice, Finding
@@ -215,7 +214,7 @@ def _advise_mesh(
     name : str
         Name of the mesh: static measures and motion may use different meshes.
     is_at_limit : bool
-        Whether the mesh cannot be refined further.
+        Whether the missed measures are those on which the mesh is refined.
     """
     n_nodes = max(patches[0].x.size for _, patches in solved)
     cause = f"the {name} ({n_nodes} interface nodes) causes this error; "
@@ -227,46 +226,22 @@ def _advise_mesh(
         limit = _round_up(MAX_SECONDS_MARGIN * missed.next_seconds)
         text = f"{cause}set accuracy.max_seconds = {format_number(limit, 2)} for finer meshes"
         return Advice(text, "accuracy.max_seconds", limit)
-    tolerances = []
-    if not is_at_limit:
-        tolerance = missed.model.accuracy.tolerance
-        tolerances = [_find_tolerance_for_finer_mesh(*place, tolerance) for place in solved]
-    tolerance = min(filter(None, tolerances), default=None)
-    if tolerance:
-        text = f"{cause}set accuracy.tolerance = {tolerance:.3g} for a finer mesh"
-        return Advice(text, "accuracy.tolerance", tolerance)
-
-    seconds = max(mesh_levels.predict_next_mesh_seconds(patches[0]) for _, patches in solved)
-    patch_model = solved[0][0]
-    limit = mesh_levels.max_condensing_seconds(patch_model)
-    if seconds > limit and not patch_model.mesh.n_finer:
-        cause += (
-            f"the next mesh would take about {format_number(seconds, 2)} CPU s, and at most {limit:g} CPU s are spent "
-            "on a mesh of this scene; "
+    if any(patch_model.mesh.shared is not None for patch_model, _ in solved):
+        return Advice(f"{cause}run this case by itself, so that its mesh is refined")
+    # The main measures have decided on the mesh; another measure needs a smaller tolerance.
+    if is_at_limit or refine.is_main(missed.worst):
+        return Advice(
+            f"{cause}a finer mesh does not reduce it or is too expensive; {USE_ERROR_ADVICE}"
         )
-    return Advice(f"{cause}no accuracy.tolerance leads to a finer mesh; {USE_ERROR_ADVICE}")
+    tolerance = PROPOSED_TOLERANCE_RATIO * missed.model.accuracy.tolerance
+    text = f"{cause}set accuracy.tolerance = {tolerance:.3g} for a finer mesh"
+    return Advice(text, "accuracy.tolerance", tolerance)
 
 
 def _round_up(value: float) -> float:
     """Return a value rounded up to two significant digits."""
     unit = 10.0 ** (floor(log10(value)) - 1)
     return unit * ceil(value / unit)
-
-
-def _find_tolerance_for_finer_mesh(patch_model, patches, tolerance: float) -> float | None:
-    """Return the tolerance at which a patch would get a finer mesh; None if there is none.
-
-    If the coarser meshes are not available, it is the tolerance for one more halving.
-    """
-    is_shared = patch_model.mesh.shared is not None
-    seconds = mesh_levels.predict_next_mesh_seconds(patches[0])
-    if is_shared and seconds > mesh_levels.max_condensing_seconds(patch_model):
-        return None
-    if is_shared or not any(patches[1:]):
-        return PROPOSED_TOLERANCE_RATIO * tolerance
-    return mesh_levels.tolerance_for_finer_mesh(
-        patch_model, patches, patch_model.mesh.tolerance or tolerance
-    )
 
 
 def _advise_on_motion(missed: Missed) -> Advice:

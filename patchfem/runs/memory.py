@@ -1,24 +1,164 @@
-"""Memory that this process may use, and the refusal of runs that need more.
+"""Memory of a run, the memory that this process may use, and the refusal of runs that need more.
 
-In: the memory contributions of a plan. Out: the available memory, and the reason for a refusal with
-the scene key to change.
+In: a Plan. Out: the contributions to its memory, the available memory, and the reason for a refusal with the scene key to
+change.
 """
 
 import os
 from pathlib import Path
+from typing import NamedTuple
 
 from ..core import Missing
+from ..points import checkpoint, time_march
+from .plan import Plan
+from .rig import engines, numerics
 
 # Address space [bytes] that packages and the compiler map in addition to the memory in use.
 MAPPED_BYTES = 210e6
-KEY_ADVICE = {
-    "contact.element_size": "make contact.element_size larger",
-    "contact.mesh": "give contact.mesh fewer nodes on the interface",
-    "accuracy.tail": "raise accuracy.tail or accuracy.merge",
-    "structure": "give fewer modes",
-    "slide.file": "give fewer rows in slide.file",
-    "drive.file": "give fewer rows in drive.file",
-}
+FIXED_BYTES = 160e6  # packages and compiled code [bytes]
+NODE_BYTES = 4.6e3  # per node of the pieces, to condense them [bytes]
+FRAME_NODE_BYTES = 3.5e3  # per node of the pieces, for the frames of a motion [bytes]
+STRIP_NODE_BYTES = 3e3  # per strip and interface node [bytes]
+SHEAR_NODE_BYTES = 24.0  # per shear mode and interface node [bytes]
+SLIDE_SAMPLE_BYTES = 250.0  # per sample of a prescribed slide [bytes]
+MODE_PAIR_BYTES = 125.0  # per pair of modes: matrices, mode shapes and eigenvalue solver [bytes]
+HARMONIC_PAIR_BYTES = 94.0  # per pair of unknowns of harmonic balance: Jacobian and factors [bytes]
+DRIVE_ROW_BYTES = 400.0  # per row of a recorded drive [bytes]
+SAMPLES_PER_CYCLE = 400  # stored samples of a cycle of the engine `hybrid`
+# Expected number of reversals per cycle, which are also stored for the cycles before the window.
+REVERSALS_PER_CYCLE = 4.0
+
+
+class MemoryPart(NamedTuple):
+    """Contribution to the peak memory of a run.
+
+    - bytes: [bytes].
+    - what: what needs it.
+    - remedy: how it becomes smaller; "" if the scene does not determine it.
+    """
+
+    bytes: float
+    what: str
+    remedy: str = ""
+
+
+class HistoryBytes(NamedTuple):
+    """Memory of the histories that an engine stores.
+
+    - sample: per value of a stored sample, with derived arrays [bytes]; measured: 0.8 to 1.2 times this for random records
+      of 4e5 to 2e6 samples.
+    - cycle: per cycle of a run and its coarse runs [bytes]; measured: 0.8 to 1.3 times this over 1e6 to 1e7 cycles.
+    - turn: per value of a reversal that is stored before the window [bytes]; measured: 0.8 to 1.5 times this.
+    """
+
+    sample: float
+    cycle: float
+    turn: float
+
+
+HYBRID_HISTORY = HistoryBytes(80.0, 140.0, 16.0)
+MARCH_HISTORY = HistoryBytes(45.0, 50.0, 18.0)
+
+
+def list_parts(plan: Plan) -> list[MemoryPart]:
+    """Return the contributions to the memory of a run, from the largest to the smallest."""
+    model = plan.model
+    counts = plan.unknowns
+    points = counts.get("interface_points", 0)
+    patches = [model.patch]
+    if model.rig is not None:
+        patches += [interface.patch for interface in model.rig.friction.interfaces]
+    patches = [patch for patch in patches if patch is not None]
+    layers = [patch.interface.strips for patch in patches]
+    strips = max((1 if layer is None else layer.count for layer in layers), default=0)
+    finer = "make contact.element_size larger"
+    if any(patch.mesh.file for patch in patches):
+        finer = "give contact.mesh fewer nodes on the interface"
+    node_bytes = NODE_BYTES + (FRAME_NODE_BYTES if model.kind != "patch" else 0.0)
+    n_bonds = counts.get("bond_list_about")
+    list_bytes = time_march.count_list_bytes(n_bonds) if n_bonds else 0.0
+    n_shear = counts.get("shear_modes", 0)
+    parts = [
+        MemoryPart(FIXED_BYTES, "packages and compiled code"),
+        MemoryPart(
+            node_bytes * counts.get("elastic_unknowns_about", 0) / 2,
+            f"{points} nodes of the interface",
+            finer,
+        ),
+        MemoryPart(
+            STRIP_NODE_BYTES * strips * points,
+            f"{strips} strips of them",
+            "lower contact.strips.count",
+        ),
+        MemoryPart(list_bytes, "the list of bonds", "raise accuracy.tail or accuracy.merge"),
+        MemoryPart(
+            SHEAR_NODE_BYTES * n_shear * points,
+            f"{n_shear} shear modes",
+            "lower accuracy.shear_modes",
+        ),
+    ]
+    if model.rig is not None:
+        parts += _list_parts_of_motion(plan)
+    elif model.slide is not None:
+        remedy = _advise_fewer_samples(model, "slide.cycles")
+        if model.slide.kind == "file":
+            remedy = "give fewer rows in slide.file"
+        parts.append(
+            MemoryPart(
+                SLIDE_SAMPLE_BYTES * plan.samples, f"{plan.samples} samples of the slide", remedy
+            )
+        )
+    return sorted(parts, reverse=True)
+
+
+def _list_parts_of_motion(plan: Plan) -> list[MemoryPart]:
+    """Return the contributions of modes, drive, histories and harmonic balance of a rig."""
+    model = plan.model
+    rig = model.rig
+    drive = rig.drive
+    n_modes = plan.unknowns["modes"]
+    n_interfaces = len(rig.friction.interfaces)
+    n_rows = 0 if drive.signal.segments else len(getattr(drive.signal, "breaks", ()))
+    parts = [
+        MemoryPart(MODE_PAIR_BYTES * n_modes**2, f"{n_modes} modes", "give fewer modes"),
+        MemoryPart(
+            DRIVE_ROW_BYTES * n_rows,
+            f"{n_rows} rows of the drive",
+            "give fewer rows in drive.file, or lower drive.duration",
+        ),
+    ]
+    if engines.ENGINES[plan.engine].finds_periodic_motion:
+        harmonics = model.accuracy.harmonics or 0
+        n_unknowns = 2.0 * harmonics * max(1, n_interfaces)
+        size = HARMONIC_PAIR_BYTES * n_unknowns**2
+        return [*parts, MemoryPart(size, f"{harmonics} harmonics", "lower accuracy.harmonics")]
+
+    # Histories: all samples of the last cycles, and reversals and extremes of the cycles before.
+    settings = numerics.choose_numerics(model)
+    is_march = plan.engine == "march"
+    history = MARCH_HISTORY if is_march else HYBRID_HISTORY
+    samples = max(2, settings.window) * (settings.steps if is_march else SAMPLES_PER_CYCLE)
+    width = 2.0 * n_modes + 12 + 6 * n_interfaces
+    turns = min(REVERSALS_PER_CYCLE * drive.cycles, checkpoint.MAX_EARLY_SAMPLES)
+    length = "drive.duration" if drive.waveform.is_random else "drive.cycles"
+    return [
+        *parts,
+        MemoryPart(
+            history.sample * width * samples,
+            f"{samples} samples of the last cycles",
+            _advise_fewer_samples(model, length),
+        ),
+        MemoryPart(
+            history.cycle * drive.cycles + history.turn * width * turns,
+            f"the histories of {drive.cycles:.3g} cycles",
+            f"lower {length}",
+        ),
+    ]
+
+
+def _advise_fewer_samples(model, length: str) -> str:
+    """Return the advice for the number of samples, which follows from a length of the run if the scene sets no steps."""
+    return f"lower {'accuracy.steps_per_cycle' if model.accuracy.steps_per_cycle else length}"
 
 
 def free_bytes() -> float:
@@ -116,25 +256,21 @@ def _remaining_bytes(folder: Path) -> float:
     return float(max_bytes - used_bytes + int(inactive))
 
 
-def reason_for_refusal(parts: tuple) -> str:
-    """Return why a run needs more memory than is free, or "" if it does not.
-
-    The reason gives the required and the free memory, and the largest contribution with its scene
-    key.
-    """
+def reason_for_refusal(plan: Plan) -> str:
+    """Return why a run needs more memory than is free, or "" if it does not."""
+    parts = list_parts(plan)
     free = free_bytes()
     total = sum(part.bytes for part in parts)
     if total <= free:
         return ""
-    largest = next((part for part in parts if part.key), None)
     text = f"about {total / 1e9:.3g} GB of memory are needed, but only {max(free, 0.0) / 1e9:.2g} GB are free"
-    if largest is None or largest.bytes < 0.1 * total:
+    largest = next(part for part in parts if part.remedy)
+    if largest.bytes < 0.1 * total:
         return f"{text}; free some memory, or run on a machine with more memory"
-    advice = KEY_ADVICE.get(largest.key, f"lower {largest.key}")
-    return f"{text}; {largest.bytes / 1e9:.3g} GB of these are for {largest.what}: {advice}"
+    return f"{text}; {largest.bytes / 1e9:.3g} GB of these are for {largest.what}: {largest.remedy}"
 
 
-def refuse_insufficient_memory(parts: tuple) -> None:
+def refuse_insufficient_memory(plan: Plan) -> None:
     """Raise Missing if a run would need more memory than is free."""
-    if text := reason_for_refusal(parts):
+    if text := reason_for_refusal(plan):
         raise Missing(text, "")

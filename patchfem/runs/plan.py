@@ -21,9 +21,7 @@ from .bench import engine as of_bench
 from .patch import plan as patch_plan
 from .rig import engines
 from .rig import plan as of_rig
-from .sizes import MemoryPart, RunSizes
 
-PACKAGE_BYTES = 80e6  # Memory of the packages that every run imports [bytes].
 SKIPPING_ENGINES = (
     "march",
     "hybrid",
@@ -68,7 +66,9 @@ class Plan:
     - model, kind: model, and the kind of its run.
     - effects: names of the effects in the scene.
     - not_in_scene: effects that the scene does not contain.
-    - sizes: unknowns and contributions to the memory, from the largest to the smallest.
+    - engine: name of the engine; "static" for a patch without motion.
+    - unknowns: numbers of unknowns of mesh and motion by name.
+    - samples: number of samples that a bench keeps; 0 for other runs.
     - chain: stiffness [N/m], or "rigid", of each element in series between modes and interface.
     - groups: dimensionless groups by name.
     - verdict: sentences on the run.
@@ -78,20 +78,12 @@ class Plan:
     kind: str
     effects: tuple
     not_in_scene: tuple
-    sizes: RunSizes
+    engine: str
+    unknowns: dict
+    samples: int
     chain: dict
     groups: dict
     verdict: tuple
-
-    @property
-    def engine(self) -> str:
-        """Name of the engine; "static" for a patch without motion."""
-        return self.sizes.engine or "static"
-
-    @property
-    def unknowns(self) -> dict:
-        """Numbers of unknowns of mesh and motion by name."""
-        return self.sizes.unknowns
 
     def __repr__(self) -> str:
         sizes = []
@@ -190,10 +182,23 @@ def _make_plan(model: Model) -> Plan:
             patch_sentences.append(
                 patch_plan.describe_shear(interface.patch, slip_length, rig.friction.names[number])
             )
-    sizes = _count_sizes(model)
-    law_sentences += sizes.sentences
+    unknowns = {}
+    if model.patch is not None or model.has_interface_patches:
+        unknowns = patch_plan.count_unknowns(model)
+    engine = "static"
+    samples = 0
+    if rig is not None:
+        engine = engines.choose_engine(model).name
+        unknowns |= of_rig.count_unknowns(model)
+        law_sentences += of_rig.describe_method(model)
     if model.kind == "bench":
+        engine, counts, samples = of_bench.count_bench_sizes(
+            model, unknowns.get("interface_points", 1)
+        )
+        unknowns |= counts
         groups = of_bench.compute_dimensionless_groups(model) | groups
+    if model.wear is not None and model.patch is not None:
+        law_sentences.append(_describe_wear(model))
     if model.friction is not None:
         chain |= _interface_stiffnesses(model)
         groups |= _compute_law_groups(model)
@@ -201,7 +206,7 @@ def _make_plan(model: Model) -> Plan:
     if rig is not None:
         motion_sentences += of_rig.describe_stick(rig, groups, chain)
     if (
-        sizes.engine in SKIPPING_ENGINES
+        engine in SKIPPING_ENGINES
         and drive_sizes.is_sinusoidal(rig.drive.signal)
         and rig.drive.cycles >= MIN_SKIPPED_CYCLES
     ):
@@ -219,30 +224,13 @@ def _make_plan(model: Model) -> Plan:
         model.kind,
         model.source.effects,
         model.absent,
-        sizes,
+        engine,
+        unknowns,
+        samples,
         chain,
         groups,
         tuple(sentences),
     )
-
-
-def _count_sizes(model: Model) -> RunSizes:
-    """Count the unknowns and the memory of a run.
-
-    The memory contributions are sorted from the largest to the smallest.
-    """
-    sizes = RunSizes(parts=(MemoryPart(PACKAGE_BYTES, "packages"),))
-    if model.patch is not None or model.has_interface_patches:
-        sizes += patch_plan.count_patch_sizes(model)
-    points = sizes.unknowns.get("interface_points", 1)
-    if model.rig is not None:
-        sizes += of_rig.count_rig_sizes(model, points)
-    elif model.kind == "bench":
-        sizes += of_bench.count_bench_sizes(model, points)
-    if model.wear is not None and model.patch is not None:
-        sizes += RunSizes(sentences=(_describe_wear(model),))
-    parts = sorted((part for part in sizes.parts if part.bytes > 0), reverse=True)
-    return replace(sizes, parts=tuple(parts))
 
 
 def _describe_wear(model: Model) -> str:

@@ -5,8 +5,9 @@ In: a Plan. Out: a `Probe`, whose sentences say how the time grows with each set
 
 from typing import NamedTuple
 
-from .patch import faces
+from ..response import rows
 from .plan import Plan
+from .results.patch_rows import TABLE
 from .run import run
 
 # Ratio of the times of the contact on a mesh with half the element size and on the mesh itself (measured: 3.2 to 5.8).
@@ -48,7 +49,12 @@ def run_probe(plan: Plan) -> Probe:
         ", ".join([f"a run without error estimates took {seconds['total']:.2g} s", *stages])
     ]
     sentences += _describe_factors(plan, has_motion=bool(motion), has_contact=bool(contact))
-    return Probe(seconds, faces.static_measures_without_errors(plan.model), tuple(sentences))
+    static = {}
+    for name, measure in result.measures.items():
+        row = TABLE.get(rows.remove_interface_number(name))
+        if row is not None and row.group == "patch":
+            static[name] = measure.value
+    return Probe(seconds, static, tuple(sentences))
 
 
 def _describe_factors(plan: Plan, *, has_motion: bool, has_contact: bool) -> list[str]:

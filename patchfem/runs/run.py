@@ -86,7 +86,7 @@ def run(
     """
     runnable = runnable if isinstance(runnable, Plan) else plan(runnable)
     with locate_errors(runnable.model.source):
-        memory.refuse_insufficient_memory(runnable.sizes.parts)
+        memory.refuse_insufficient_memory(runnable)
         if fresh:
             store.clear_cache()
         begin = process_time()

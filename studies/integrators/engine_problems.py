@@ -122,7 +122,7 @@ def problem(name: str) -> Problem:
         model,
         choose_numerics(model),
         solve_with_coarser(model.patch, model.accuracy.tolerance, False)[0],
-    ).element
+    )
     k, y = element.numbers[2:].reshape(2, -1)
     numbers = {
         "omega": modes.omega,

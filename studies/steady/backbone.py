@@ -94,7 +94,7 @@ def case(name: str, shares=SHARES, steps: int = 4000) -> Row:
         if model.patch is not None
         else None
     )
-    element = make_single_law(model, choose_numerics(model), patch).element
+    element = make_single_law(model, choose_numerics(model), patch)
     amplitude = size * np.asarray(shares)
     group = LawGroup(modes, element)
     free = []

@@ -50,7 +50,7 @@ def test_refuses_large_run_before_allocation_with_key(text, sets, key, monkeypat
     monkeypatch.setattr(memory, "free_bytes", lambda: GIGABYTE)
     tracemalloc.start()
     run_plan = plan_text(text, *sets)
-    reason = memory.reason_for_refusal(run_plan.sizes.parts)
+    reason = memory.reason_for_refusal(run_plan)
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
     assert reason.startswith("about ") and f"{key}" in reason and "1 GB are free" in reason

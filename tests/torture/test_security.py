@@ -41,8 +41,6 @@ HARMLESS = {
     ),  # numba's format of machine code, in a folder of the user
     ("compiled", "compile()"),
     ("compiled", "exec()"),  # a loop of the package in which its friction law is inserted
-    ("compiled.no_jit", "compile()"),
-    ("compiled.no_jit", "exec()"),  # an unchanged module of the package
     ("__main__", "shell=shell"),
 }
 FINE = "re.compile('x'); from .http import x; np.load(a, allow_pickle=False); json.load(f)"

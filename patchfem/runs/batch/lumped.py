@@ -39,7 +39,7 @@ from ...response.reasons import (
     STICKS_AT_REVERSAL_REASON,
     find_missing,
 )
-from ...response.ringing import MIN_PERIODS, MIN_REFINED_FRACTION
+from ...response.ringing import MIN_PERIODS
 from ...response.rows import (
     AMPLITUDE,
     INTERNAL_VALUES,
@@ -81,6 +81,8 @@ MAX_STICK_SLIP = 1e-3
 # Largest product of micro-damping and a typical speed relative to the kinetic friction, with which the power of the LuGre
 # law is not negative
 MAX_MICRO_DAMPING = 4.0
+# Smallest length of a stick in which a free vibration is fitted, relative to the shortest one that shows it.
+STICK_FRACTION = 0.9
 MIN_RING_STEPS = 24  # smallest number of steps per period of a free vibration
 RIGID_SECANT = "secant_stiffness"
 
@@ -468,7 +470,7 @@ def add_ringing(
     march, columns = refined.march, cases.parameters.T
     stiffness = columns[Number.STIFFNESS] + scales.stick_stiffness * columns[Number.MOBILITY]
     omega = np.sqrt(stiffness)
-    may_ring = omega * march.longest_stick >= 2 * np.pi * MIN_REFINED_FRACTION * MIN_PERIODS
+    may_ring = omega * march.longest_stick >= 2 * np.pi * STICK_FRACTION * MIN_PERIODS
     may_ring &= (scales.stick_stiffness > 0) & ~is_done
     may_ring &= ~(march.repeats & (march.values["stick_fraction"] == 1))
     steps = np.maximum(refined.steps, MIN_RING_STEPS * omega / columns[Number.OMEGA])

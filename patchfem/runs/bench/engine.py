@@ -1,6 +1,6 @@
 """Method and sizes of a bench run.
 
-In: a model with [slide]. Out: `BenchEngine`, steps per cycle and `RunSizes`. A law without memory has a
+In: a model with [slide]. Out: `BenchEngine`, steps per cycle and `BenchSizes`. A law without memory has a
 closed form. Recursion, bond lists and parallel elements use the compiled kernels of the rigs. If
 the pressure at a point changes during the motion, an object of the law is evaluated sample by sample.
 """
@@ -8,6 +8,7 @@ the pressure at a point changes during the motion, an object of the law is evalu
 from dataclasses import dataclass, replace
 from enum import Enum
 from math import ceil
+from typing import NamedTuple
 
 import numpy as np
 
@@ -15,12 +16,9 @@ from ...core import Missing
 from ...effects import law_has_trait, needs_bond_list
 from ...friction.bonds import engines as bond_engines
 from ...friction.bonds import parameters
-from ...points import time_march
-from ..sizes import COMPILED_CODE, MemoryPart, RunSizes
 
 MAX_GROOVE_STEPS = 200_000  # Largest number of steps per cycle over grooves.
 N_SAMPLES_PER_RADIAN = 20  # Number of samples per radian of the groove phase.
-BYTES_PER_SAMPLE = 250.0  # Memory per sample of the histories [bytes].
 # Ratio of the passes through a bond list per time step to those in a rig. A prescribed displacement
 # needs no iteration for the displacement increment.
 LIST_PASS_RATIO = 1 / 3
@@ -224,8 +222,21 @@ def uses_parallel_elements(model) -> bool:
     )
 
 
-def count_bench_sizes(model, n_points: int) -> RunSizes:
-    """Count the unknowns and the memory of a bench run.
+class BenchSizes(NamedTuple):
+    """Sizes of a bench run.
+
+    - engine: name of the engine.
+    - unknowns: entries of a list of bonds, by name.
+    - samples: number of samples that the run and its comparison runs keep.
+    """
+
+    engine: str
+    unknowns: dict
+    samples: int
+
+
+def count_bench_sizes(model, n_points: int) -> BenchSizes:
+    """Count the unknowns and the samples of a bench run.
 
     Parameters
     ----------
@@ -240,29 +251,10 @@ def count_bench_sizes(model, n_points: int) -> RunSizes:
     engine = choose_bench_engine(model, slide, n_points)
     # The comparison runs keep their samples; a cell density needs one run more.
     has_cells = law_has_trait(model.friction.law, "cells") and engine.method is Method.ELEMENTS
-    n_samples = (3 if has_cells else 2) * time.size // 2
-    parts = [
-        COMPILED_CODE,
-        MemoryPart(
-            BYTES_PER_SAMPLE * n_samples,
-            f"{n_samples} samples of the slide",
-            _find_sample_count_key(model),
-        ),
-    ]
     unknowns = {}
     if engine.choice is not None and engine.choice.strips:
-        unknowns["bond_list_about"] = strips = int(engine.choice.strips)
-        parts.append(
-            MemoryPart(time_march.count_list_bytes(strips), "the list of bonds", "accuracy.tail")
-        )
-    return RunSizes(unknowns, tuple(parts), engine=engine.name)
-
-
-def _find_sample_count_key(model) -> str:
-    """Return the scene key that sets the number of samples of a bench run."""
-    if model.slide.kind == "file":
-        return "slide.file"
-    return "accuracy.steps_per_cycle" if model.accuracy.steps_per_cycle else "slide.cycles"
+        unknowns["bond_list_about"] = int(engine.choice.strips)
+    return BenchSizes(engine.name, unknowns, (3 if has_cells else 2) * time.size // 2)
 
 
 def compute_dimensionless_groups(model) -> dict:

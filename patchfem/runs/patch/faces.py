@@ -11,13 +11,10 @@ import numpy as np
 
 from ...core import PatchfemError
 from ...friction import record
-from ...model.source import locate_errors
-from ...response import rows
 from ...slip import fields as slip_fields
 from ..results.interfaces import Face
 from ..results.result import SlipRule, collect_rest_frame, make_interface_frames
 from . import jenkins_elements, mesh_levels, store
-from .values import compute_static_values
 
 
 def solve_interface_patches(model) -> Iterator[Face]:
@@ -136,16 +133,3 @@ def has_error_meshes(model) -> bool:
     """Return whether all patches with partial slip have a coarser mesh for the error estimate."""
     slipping_faces = (face for face in solve_interface_patches(model) if face.partial_slip)
     return all(face.patches[1] is not None for face in slipping_faces)
-
-
-def static_measures_without_errors(model) -> dict:
-    """Return the static measures of all patches of a model by name, without error estimates."""
-    values = {}
-    with locate_errors(model.source):
-        if model.patch is not None:
-            patches = mesh_levels.solve_with_coarser(model.patch, model.accuracy.tolerance, False)
-            return compute_static_values(patches[0])
-        for face in solve_interface_patches(model):
-            for name, value in compute_static_values(face.patch).items():
-                values[rows.add_interface_number(name, face.number)] = value
-    return values

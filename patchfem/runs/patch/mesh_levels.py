@@ -13,7 +13,7 @@ from ...model.pieces import make_piece_meshes
 from . import profile_points, slip_zones, store
 from .condensed import condense, condense_on_shared_meshes
 from .grids import MAX_CONDENSING_SECONDS, MIN_LEVELS, make_base_grids, predict_condensing_seconds
-from .measures import estimate_static_measures, max_mesh_error_ratio, with_static_measures
+from .measures import max_mesh_error_ratio, with_static_measures
 from .press import solve_patch_contact
 
 # Tolerance at which a patch with prescribed partial slip may take as much CPU time as a patch in a
@@ -22,8 +22,6 @@ from .press import solve_patch_contact
 SLIP_REFERENCE_TOL = 1e-3
 # Largest number of columns of a mesh that has no coarser mesh.
 MAX_COLUMNS_WITHOUT_COARSER = 8
-# Largest number of decades by which the tolerance is lowered in the search for a finer mesh.
-MAX_DECADES = 6
 
 
 def solve_with_coarser(patch_model, tolerance: float, estimate: bool = True) -> tuple:
@@ -210,17 +208,14 @@ def _meets_tolerance(patches: tuple, tolerance: float, points) -> bool:
     return max_mesh_error_ratio(fine.measures, tolerance) <= 1
 
 
-def max_condensing_seconds(patch_model, tolerance: float | None = None) -> float:
+def max_condensing_seconds(patch_model, tolerance: float) -> float:
     """Return the CPU time [s] that condensing the finest mesh of a patch may take.
 
     The motion under a prescribed displacement is cheap, so that a small tolerance allows a finer
-    mesh, up to the limit of a static patch. With tolerance None, the result is the largest limit at
-    any tolerance.
+    mesh, up to the limit of a static patch.
     """
     if patch_model.mesh.slip is None:
         return MAX_CONDENSING_SECONDS[patch_model.mesh.is_static]
-    if tolerance is None:
-        return MAX_CONDENSING_SECONDS[True]
     return min(
         MAX_CONDENSING_SECONDS[True],
         MAX_CONDENSING_SECONDS[False] * max(1.0, (SLIP_REFERENCE_TOL / tolerance) ** 0.5),
@@ -266,41 +261,3 @@ def resolves_slip_work(patch_model, patches, tolerance: float) -> bool:
         return True
     solved = [patch for patch in patches if patch is not None]
     return slip_zones.max_slip_error_ratio(solved, slip, tolerance) <= 1
-
-
-def tolerance_for_finer_mesh(patch_model, patches, tolerance: float) -> float | None:
-    """Return the largest tolerance/10^k at which the patch would get a finer mesh.
-
-    Parameters
-    ----------
-    patch_model : PatchModel
-    patches : sequence of Patch
-        Result of `solve_on_refined_meshes` at the present tolerance.
-    tolerance : float
-
-    Returns
-    -------
-    float or None
-        None if the next mesh is too expensive or no tolerance needs it.
-    """
-    seconds = predict_next_mesh_seconds(patches[0])
-    if seconds > max_condensing_seconds(patch_model):
-        return None
-    solved = [patch for patch in patches if patch is not None]
-    if patches[0].points is not None:
-        is_within = max_mesh_error_ratio(patches[0].measures, tolerance) <= 1
-        return tolerance / 10 if is_within else None
-    for decade in range(1, MAX_DECADES + 1):
-        tighter = tolerance * 10.0**-decade
-        measures = estimate_static_measures(*solved, tolerance=tighter)
-        is_within = max_mesh_error_ratio(measures, tighter) <= 1
-        is_done = is_within and resolves_slip_work(patch_model, solved, tighter)
-        if not is_done and seconds <= max_condensing_seconds(patch_model, tighter):
-            return tighter
-    return None
-
-
-def predict_next_mesh_seconds(patch) -> float:
-    """Predict the CPU time [s] of condensing the pieces of a patch on the next finer mesh."""
-    meshes = filter(None, patch.pair.meshes)
-    return predict_condensing_seconds([mesh.refine() for mesh in meshes])

@@ -1,6 +1,6 @@
 """Mesh size, stiffness and dimensionless groups of a patch before it is solved.
 
-In: a `PatchModel` or a Model. Out: `RunSizes`, stiffnesses in series, and sentences for
+In: a `PatchModel` or a Model. Out: numbers of unknowns, stiffnesses in series, and sentences for
 the plan.
 """
 
@@ -9,7 +9,6 @@ from math import sqrt
 from ...formatting import format_length
 from ...model.model import Model
 from ...model.pieces import make_piece_meshes
-from ..sizes import MemoryPart, RunSizes
 from . import skin, store
 from .grids import (
     MAX_CONDENSING_SECONDS,
@@ -19,10 +18,6 @@ from .grids import (
 )
 from .mesh_levels import make_comparison_meshes
 
-PACKAGE_BYTES = 2e7  # Memory of the packages that a run with elastic pieces imports [bytes].
-BYTES_PER_NODE = 4.6e3  # Memory of condensing a piece per node [bytes].
-FRAME_BYTES_PER_NODE = 3.5e3  # Memory of the frames of a motion per node [bytes].
-BYTES_PER_STRIP_NODE = 3000.0  # Memory per strip and interface node [bytes].
 # Tolerance below which a contact that ends inside the interface or at a step needs another
 # refinement level.
 TIGHT_TOL = 2e-3
@@ -56,43 +51,21 @@ def _predict_mesh_levels(patch_model, tolerance: float) -> list:
     return levels
 
 
-def count_patch_sizes(model: Model) -> RunSizes:
-    """Count the unknowns and the memory of all patches of a model.
-
-    Equal patches of several interfaces are solved once.
-    """
-    interface_patches = {}
-    if model.rig is not None:
+def count_unknowns(model: Model) -> dict:
+    """Count the unknowns of all patches of a model; equal patches of several interfaces are solved once."""
+    patches = {} if model.patch is None else {"contact": model.patch}
+    if model.has_interface_patches:
         for interface in model.rig.friction.interfaces:
             if interface.patch is not None:
-                interface_patches[store.content_key(interface.patch)] = interface.patch
-    patches = [*([] if model.patch is None else [model.patch]), *interface_patches.values()]
-    if not patches:
-        return RunSizes()
-
+                patches[store.content_key(interface.patch)] = interface.patch
     points = 0
     nodes = 0
-    n_bytes = 0.0
-    for patch in patches:
+    for patch in patches.values():
         tolerance = patch.mesh.tolerance or model.accuracy.tolerance
         finest = [body for body in _predict_mesh_levels(patch, tolerance)[0] if body is not None]
-        n_nodes = sum(body.n_nodes for body in finest)
         points += finest[0].x.size
-        nodes += n_nodes
-        frame_bytes = 0.0 if patch.mesh.is_static else FRAME_BYTES_PER_NODE
-        n_bytes += PACKAGE_BYTES + (BYTES_PER_NODE + frame_bytes) * n_nodes
-    layers = [patch.interface.strips for patch in patches]
-    strips = max(1 if layer is None else layer.count for layer in layers)
-    key = "contact.mesh" if any(patch.mesh.file for patch in patches) else "contact.element_size"
-    parts = (
-        MemoryPart(n_bytes, f"{points} nodes of the interface", key),
-        MemoryPart(
-            BYTES_PER_STRIP_NODE * strips * points,
-            f"{strips} strips of them",
-            "contact.strips.count",
-        ),
-    )
-    return RunSizes({"interface_points": points, "elastic_unknowns_about": int(2 * nodes)}, parts)
+        nodes += sum(body.n_nodes for body in finest)
+    return {"interface_points": points, "elastic_unknowns_about": 2 * nodes}
 
 
 def stiffness_chain(patch_model) -> dict:

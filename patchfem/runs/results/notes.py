@@ -16,6 +16,8 @@ from .result import Advice
 
 # Largest relative difference of the friction works from samples and from energies without a
 # warning.
+# Smallest ratio of created to exchanged energy of which a warning tells.
+MIN_CREATED_FRACTION = 1e-6
 MAX_WORK_CHECK = 1e-3
 # Largest ratio of the slip during the formation of a bond to the bond length without a warning.
 MAX_FORMING_RATIO = 0.3
@@ -245,3 +247,22 @@ def _motion_period(model) -> float | None:
     if model.rig is not None:
         return 1 / model.rig.drive.frequency if model.rig.drive.frequency else None
     return model.slide.period
+
+
+def warn_of_created_energy(model, created: float, exchanged: float) -> list:
+    """Return a list with a warning if the law of the 1985 report has created energy.
+
+    Parameters
+    ----------
+    model : Model
+    created, exchanged : float
+        Energy created, and integral of the absolute friction power [J].
+    """
+    if model.friction is None or model.friction.reading != "report":
+        return []
+    if created <= MIN_CREATED_FRACTION * exchanged:
+        return []
+    return [
+        f"the law as printed in the report created {created:.3g} J, which is {100 * created / exchanged:.2g} % of the work "
+        'exchanged; with friction.reading = "stretch" no energy is created'
+    ]

@@ -1,6 +1,6 @@
 """Steps and CPU times of the engines of a rig, for the choice of an engine and for refusals, and memory of histories.
 
-In: a Model. Out: numbers of steps, CPU times, `MemoryPart`s, and reasons for a time integration with constant steps
+In: a Model. Out: numbers of steps, CPU times, and reasons for a time integration with constant steps
 instead of steps from event to event.
 
 The steps of the engine `hybrid` follow from the fastest vibration of the modes, also with stuck interfaces, from the lengths
@@ -9,7 +9,6 @@ over which a law forgets, and from the events of friction elements.
 
 from functools import lru_cache
 from math import inf, log2, pi, sqrt
-from typing import NamedTuple
 
 import numpy as np
 
@@ -18,12 +17,10 @@ from ...core import Missing
 from ...effects import law_has_trait
 from ...model import patch as patch_model
 from ...model.model import Model
-from ...points import checkpoint
 from ...structure.drive_sizes import (
     find_max_acceleration,
     find_max_frequency_ratio,
 )
-from ..sizes import MemoryPart
 
 # Largest CPU time [s] of a motion from event to event if a time integration, which has larger errors, takes less.
 MAX_HYBRID_SECONDS = 5.0
@@ -55,36 +52,6 @@ MARCH_SETTINGS = (
 # where r is the ratio of drive force to friction limit. Fractions of 0.5 at r = 1.07 and 0.1 at r =
 # 1.26 were measured.
 STIFF_TIME_EXPONENT = 9.0
-# Engines whose number of stored samples per cycle does not depend on their steps.
-RESAMPLING_ENGINES = ("hybrid",)
-SAMPLES_PER_CYCLE = 400  # Number of samples of a stored cycle, as in `dynamics.cycles`.
-# Expected number of reversals per cycle, which are also stored for the cycles before the window.
-REVERSALS_PER_CYCLE = 4.0
-
-
-class HistoryBytes(NamedTuple):
-    """Memory [bytes] per sample, cycle and reversal of the histories that an engine stores.
-
-    Attributes
-    ----------
-    sample : float
-        Bytes per value of a stored sample, including derived arrays. Measured: 0.8 to 1.2 times
-        this for random records of 4e5 to 2e6 samples.
-    cycle : float
-        Bytes per cycle of a run and its coarse runs, for extremes, Fourier coefficients and
-        positions. Measured: 0.8 to 1.3 times this for single modes over 1e6 to 1e7 cycles.
-    turn : float
-        Bytes per value of a reversal that is stored for the cycles before the window. Measured: 0.8
-        to 1.5 times this for runs of 1e5 to 1e6 cycles.
-    """
-
-    sample: float
-    cycle: float
-    turn: float
-
-
-HYBRID_HISTORY = HistoryBytes(80.0, 140.0, 16.0)
-MARCH_HISTORY = HistoryBytes(45.0, 50.0, 18.0)
 
 
 def required_steps_per_cycle(model: Model) -> int:
@@ -307,33 +274,3 @@ def refuse_long_hybrid_run(model: Model) -> None:
             f"elements{march}",
             "",
         )
-
-
-def count_stored_samples(numerics) -> float:
-    """Return the number of samples of the last cycles that a run stores."""
-    each = SAMPLES_PER_CYCLE if numerics.engine in RESAMPLING_ENGINES else numerics.steps
-    return float(max(2, numerics.window) * each)
-
-
-def count_history_memory(model: Model, numerics, history: HistoryBytes) -> tuple[MemoryPart, ...]:
-    """Return the contributions of the histories that a run stores to its memory.
-
-    Parameters
-    ----------
-    model : Model
-    numerics : Numerics
-    history : HistoryBytes
-    """
-    rig = model.rig
-    samples = count_stored_samples(numerics)
-    width = 2.0 * len(rig.structure.frequencies) + 12 + 6 * len(rig.friction.interfaces)
-    length_key = "drive.duration" if rig.drive.waveform.is_random else "drive.cycles"
-    key = "accuracy.steps_per_cycle" if model.accuracy.steps_per_cycle else length_key
-    turns = min(REVERSALS_PER_CYCLE * rig.drive.cycles, checkpoint.MAX_EARLY_SAMPLES)
-    early = history.cycle * rig.drive.cycles + history.turn * width * turns
-    return (
-        MemoryPart(
-            history.sample * width * samples, f"{samples:.0f} samples of the last cycles", key
-        ),
-        MemoryPart(early, f"the histories of {rig.drive.cycles:.3g} cycles", length_key),
-    )

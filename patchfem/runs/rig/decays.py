@@ -24,7 +24,8 @@ from ...response.decay_curve import (
 from ...response.errors import MAX_ORDER, convergence_error
 from ...slip.mesh_correction import SPREAD_FACTOR, spread_elements
 from ..patch import faces
-from . import interface, numerics
+from . import numerics
+from .joints import list_joints
 from .solution import Solution
 from .steady import balance
 
@@ -116,7 +117,10 @@ def make_laws_on_mesh(model, patch, meshed: tuple = ()):
         ).group
     return forces.LawGroup(
         rig.modes,
-        list(enumerate(interface.make_interface_elements(model, meshed))),
+        [
+            (k, joint.make_element(rig.speed_scale))
+            for k, joint in enumerate(list_joints(model, None, meshed))
+        ],
     )
 
 

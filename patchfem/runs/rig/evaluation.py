@@ -4,15 +4,12 @@ In: a run of an engine. Out: its Solution. Subclasses of `RunEvaluator` override
 quantities that their engine computes more accurately than from samples.
 """
 
-from dataclasses import replace
-
 import numpy as np
 
 from ...core import IntegratedMeasures, Outcome
 from ...effects import law_has_trait
 from ...friction import path_work
 from ...response import run_events
-from ...response.errors import convergence_error
 from ...response.levels import LEVEL_MEASURES, Level
 from ...response.loops import reversal_force_rule
 from ...response.measures import (
@@ -21,8 +18,8 @@ from ...response.measures import (
     window_end_values,
 )
 from ...response.outcome import estimate_steady
-from ...response.rows import AMPLITUDE, ROWS_NEEDING_RUN, LastCycles, compute_measures
-from ...structure.drive_sizes import choose_samples_per_cycle, is_sinusoidal
+from ...response.rows import AMPLITUDE, LastCycles, compute_measures
+from ...structure.drive_sizes import is_sinusoidal
 from .solution import Solution, find_release_amplitude, first_interface_load, first_mode_stiffness
 
 
@@ -108,7 +105,6 @@ class RunEvaluator:
             "window": run.window,
             "run_energies": run.ledger,
             "integrated": self.compute_integrated_measures(run, drive, stuck=stuck),
-            "run": self.find_uniform_histories(run, drive),
         }
         if self.has_friction:
             fields |= {"reversal_rule": reversal_force_rule(model), "ledger": ledger}
@@ -155,43 +151,6 @@ class RunEvaluator:
             Measures by name.
         """
         return {}
-
-    def find_uniform_histories(self, run, drive):
-        """Return the histories of the whole run if they are uniformly sampled; None otherwise."""
-        histories = getattr(run, "response", None)
-        is_uniform = (
-            ROWS_NEEDING_RUN
-            and histories is not None
-            and choose_samples_per_cycle(drive, self.numerics.cycles, needs_history=True)
-        )
-        return histories if is_uniform and histories.time.size and histories.time[0] == 0 else None
-
-    def estimate_history_sampling_errors(self, run, drive, values: dict) -> dict:
-        """Estimate the sampling errors of measures that depend on all cycles of a run.
-
-        The changes without the even samples and without the odd samples are added, because the
-        neighbours of a reversal are all even or all odd.
-
-        Parameters
-        ----------
-        run
-            Run of the engine.
-        drive
-            Drive of the run.
-        values : dict
-            Measures by name.
-        """
-        rows = [row for row in ROWS_NEEDING_RUN if row.name in values]
-        if not rows:
-            return {}
-        errors = dict.fromkeys([row.name for row in rows], 0.0)
-        for parity in (0, 1):
-            thinned = replace(run, response=_thin_between_reversals(run.response, parity))
-            coarse_values = self.evaluate_measures(thinned, drive)
-            for row in rows:
-                change = values[row.name] - coarse_values[row.name]
-                errors[row.name] += convergence_error(change, order=row.order)
-        return errors
 
     def collect_solution_fields(self, run, drive) -> dict:
         """Return fields of the Solution that only this engine provides."""
@@ -242,9 +201,7 @@ class RunEvaluator:
             seconds=seconds,
             contact=self.contact,
             stick_tolerance=self.stick_tolerance,
-            run_errors=ring_errors
-            | self.estimate_run_errors(run, drive, values)
-            | self.estimate_history_sampling_errors(run, drive, values),
+            run_errors=ring_errors | self.estimate_run_errors(run, drive, values),
             extremes=run.extremes,
             **(fields | other_fields),
         )
@@ -269,18 +226,6 @@ class RunEvaluator:
         if relative_error:
             errors = {name: relative_error * abs(value) for name, value in values.items()}
         return Level(level, self.is_stuck(run), values, errors)
-
-
-def _thin_between_reversals(histories, parity: int):
-    """Remove every second sample of histories except the first, the last and the reversals.
-
-    Samples whose index modulo 2 is `parity` (0 or 1) remain.
-    """
-    step = np.diff(histories.slide)
-    is_retained = np.arange(histories.time.size) % 2 == parity
-    is_retained[1:-1] |= step[1:] * step[:-1] < 0
-    is_retained[[0, -1]] = True
-    return histories.select(is_retained)
 
 
 def thin_samples(window):

@@ -36,7 +36,7 @@ from ...response.events import (
 )
 from ...response.measures import MIN_SLIDE_RANGE, compute_harmonic
 from ...response.ringing import compute_stuck_vibration, make_ringing_measures, select_strongest
-from ...response.rows import AMPLITUDE, ROWS_NEEDING_RUN, find_definition, select_names
+from ...response.rows import AMPLITUDE, find_definition, select_names
 from ...structure.drive_sizes import (
     choose_samples_per_cycle,
     find_drive_omega,
@@ -261,7 +261,7 @@ class LumpedEvaluator(RunEvaluator):
         end = cycles * period
         window_start = max(0.0, end - self.numerics.window * period)
         first = max(0.0, min(window_start, end - MIN_SAMPLED_CYCLES * period))
-        even = choose_samples_per_cycle(drive, cycles, needs_history=bool(ROWS_NEEDING_RUN))
+        even = choose_samples_per_cycle(drive, cycles)
         count = even or max(1, min(EARLY_SAMPLES_PER_CYCLE, MAX_EARLY_SAMPLES // max(cycles, 1)))
         if not self.numerics.whole:
             first = window_start

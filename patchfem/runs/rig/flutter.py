@@ -114,7 +114,7 @@ def _find_limit_cycles(model, numerics, patch) -> LimitCycles:
     load = patch.pressure.load if patch is not None else model.point.load
     if reason := find_obstacle_of_map("harmonic", model):
         return LimitCycles([], f"limit cycles cannot be computed {reason}")
-    element = make_single_law(model, numerics, patch).element
+    element = make_single_law(model, numerics, patch)
     try:
         if element is not None and element.form == "rigid":
             if rig.springs.is_nonlinear:

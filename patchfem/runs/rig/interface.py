@@ -3,8 +3,6 @@
 In: a Model, its Numerics and its Patch. Out: a `points.contacts.Contact`, or the Elements of the interfaces.
 """
 
-from typing import NamedTuple
-
 import numpy as np
 
 from ...contact import contact_sets
@@ -13,16 +11,14 @@ from ...friction.laws import coulomb
 from ...friction.laws.elastic_plastic import parallel_element
 from ...friction.laws.stretch import points_element
 from ...friction.protocol import Element
-from ...friction.record import make_law
-from ...model.law import InterfaceLaw, make_bond_parameters
 from ...model.model import Model
 from ...points import contacts
 from ...slip import fields, shear_modes
 from ...structure.drive_sizes import find_drive_omega
 from ..bench import averaged_law, shear
-from ..patch import faces, jenkins_elements, store
-from . import strips
+from ..patch import store
 from .bond_lists import choose_bond_summation
+from .joints import list_joints
 from .numerics import Numerics
 
 # Largest ratio of the error of the backbone curve to the tolerance, in the reduction to few modes
@@ -30,17 +26,6 @@ from .numerics import Numerics
 REDUCTION_TOL_FRACTION = 1e-3
 # Pressure that is added to each node in the weights of shear modes under a changing load, relative to the mean pressure.
 MIN_PRESSURE_FRACTION = 1.0
-
-
-class SingleLaw(NamedTuple):
-    """Law of one interface without internal degrees of freedom, or of a patch as parallel elements.
-
-    - element: Element, or None for bonds that are no single element
-    - reduction: JenkinsSet of a patch, or None
-    """
-
-    element: Element | None
-    reduction: object = None
 
 
 def make_contact(model: Model, numerics: Numerics, patch) -> contacts.Contact:
@@ -66,7 +51,8 @@ def make_contact(model: Model, numerics: Numerics, patch) -> contacts.Contact:
         springs.append(contacts.make_cubic_spring(rig.springs.cubic, rig.modes.output))
     scale = rig.modes.mass * find_drive_omega(rig.drive.signal) * rig.speed_scale
     if len(rows) > 1:
-        elements = _make_independent_elements(model, numerics, patch)
+        joints = list_joints(model, patch, numerics.meshed)
+        elements = [joint.make_element(rig.speed_scale) for joint in joints]
         return contacts.make_contact(elements, rows, springs, scale)
     if model.friction is None:
         return contacts.make_contact([], rows[:0], springs, scale)
@@ -87,59 +73,15 @@ def _make_own_contact(model: Model, numerics: Numerics, patch, row) -> contacts.
         choice = choose_bond_summation(model, numerics)
         if model.partial_slip or choice.engine != "recursion" or numerics.per_point:
             return _make_bond_contact(model, numerics, patch, load, row)
-    single = make_single_law(model, numerics, patch)
-    contact = contacts.make_contact([single.element], [row])
-    return contacts.with_elements(contact, single.reduction)
+    contact = contacts.make_contact([make_single_law(model, numerics, patch)], [row])
+    reduction = None
+    if not law_has_trait(law, "bonds"):
+        reduction = list_joints(model, patch, numerics.meshed)[0].reduction
+    return contacts.with_elements(contact, reduction)
 
 
-def _make_independent_elements(model: Model, numerics: Numerics, patch) -> list:
-    """Return the friction elements of interfaces or strips that slide independently."""
-    if patch is None:
-        return make_interface_elements(model, numerics.meshed)
-    f = model.friction
-    if model.partial_slip:
-        length = make_law(f, patch.pressure.load).element(patch.pressure.load).length
-        strip_elements = jenkins_elements.strip_elements(patch, f.static, length)
-        return [parallel_element(*strip_element) for strip_element in strip_elements]
-    law = model.rig.friction.interfaces[0]
-    speed = model.rig.speed_scale
-    return [make_element(law, load, speed) for load in strips.compute_strip_loads(patch)]
-
-
-def make_interface_elements(model: Model, meshed: tuple) -> list:
-    """Return the friction elements of each interface under its own load.
-
-    `meshed` are the indices of interfaces whose patches have a coarser mesh.
-    """
-    elements = []
-    for k, interface in enumerate(model.rig.friction.interfaces):
-        if interface.partial_slip:
-            parts = faces.make_patch_elements(interface, model.accuracy.tolerance, k in meshed)
-            elements.append(parallel_element(*parts[:2]))
-        else:
-            elements.append(make_element(interface, interface.load, model.rig.speed_scale))
-    return elements
-
-
-def make_element(interface: InterfaceLaw, load: float, speed: float) -> Element:
-    """Convert the friction law of an interface to an Element under a given load.
-
-    Parameters
-    ----------
-    interface : InterfaceLaw
-    load : float
-        Normal load [N].
-    speed : float
-        Expected slip speed [m/s].
-    """
-    f = interface.numbers
-    if law_has_trait(f.law, "bonds"):
-        return points_element(make_bond_parameters(f, speed, 1e-12), load)
-    return make_law(f, load).element(load)
-
-
-def make_single_law(model: Model, numerics: Numerics, patch) -> SingleLaw:
-    """Return the law of a rig with one interface under a constant load.
+def make_single_law(model: Model, numerics: Numerics, patch) -> Element | None:
+    """Return the law of a rig with one interface under a constant load; None for bonds that are no single element.
 
     Parameters
     ----------
@@ -150,28 +92,17 @@ def make_single_law(model: Model, numerics: Numerics, patch) -> SingleLaw:
     """
     f = model.friction
     if f is None:
-        return SingleLaw(parallel_element([0.0], [1.0]))
-    if model.rig.friction.has_partial_slip:
-        own = model.rig.friction.interfaces[0]
-        parts = faces.make_patch_elements(own, model.accuracy.tolerance, 0 in numerics.meshed)
-        return SingleLaw(parallel_element(*parts[:2]), parts[2])
-    load = patch.pressure.load if patch is not None else model.point.load
-    if law_has_trait(f.law, "bonds"):
+        return parallel_element([0.0], [1.0])
+    joint = list_joints(model, patch, numerics.meshed)[0]
+    if law_has_trait(f.law, "bonds") and not model.rig.friction.has_partial_slip:
         is_single = not (model.partial_slip or numerics.per_point)
         if is_single and choose_bond_summation(model, numerics).engine == "recursion":
-            return SingleLaw(points_element(model.bonds, load))
-        return SingleLaw(None)
+            return points_element(model.bonds, joint.load)
+        return None
     if law_has_trait(f.law, "averaged"):
-        limit = f.static * load * averaged_law.slip_force_ratio(model, patch)
-        return SingleLaw(coulomb.Coulomb(limit, limit).element(1.0))
-    element = make_law(f, load).element(load)
-    if not model.partial_slip:
-        return SingleLaw(element)
-    if patch.strips is not None:  # Strips of a patch that does not yaw have the same displacement.
-        parts = jenkins_elements.strip_elements(patch, f.static, element.length)
-        return SingleLaw(parallel_element(*map(np.concatenate, zip(*parts))))
-    elements = jenkins_elements.elements(patch, f.static, element.length)
-    return SingleLaw(parallel_element(elements.stiffness, elements.yield_displacement), elements)
+        limit = f.static * joint.load * averaged_law.slip_force_ratio(model, patch)
+        return coulomb.Coulomb(limit, limit).element(1.0)
+    return joint.make_element(model.rig.speed_scale)
 
 
 def _make_bond_contact(model: Model, numerics: Numerics, patch, load: float, row):

@@ -13,10 +13,8 @@ import numpy as np
 
 from ...core import IntegratedMeasures, Outcome
 from ...effects import law_has_trait
-from ...friction.record import make_law
 from ...points import time_march as engine
 from ...response.ends import estimate_window_error
-from ...response.inside_steps import add_substep_samples
 from ...response.measures import compute_step_harmonic, peak_sampling_errors
 from ...response.spectrum import friction_harmonic, motion_harmonic
 from ...structure.drive_sizes import (
@@ -36,7 +34,6 @@ from .solution import (
     compute_sampled_loop,
     describe_escape,
     find_travel,
-    first_interface_load,
 )
 
 # Safety factor on the first-order error due to a run that does not end exactly at the requested
@@ -189,30 +186,7 @@ class MarchEvaluator(RunEvaluator):
             "loop": self._compute_loop(run, drive),
             "slide_round_off": self.stick_tolerance if self.contact.set_valued else 0.0,
             "is_single_interface": self.model.rig.friction.strips_slide_apart,
-            "add_substeps": self.add_samples_inside_steps,
         }
-
-    def add_samples_inside_steps(self, window, number: int):
-        """Add samples inside the time steps for laws whose force exceeds its limit within a step.
-
-        Parameters
-        ----------
-        window : Response
-        number : int
-            Index of the interface.
-        """
-        model = self.model
-        interface = model.rig.friction.interfaces[number]
-        if (
-            not law_has_trait(interface.numbers.law, "overshoots")
-            or model.grooves is not None
-            or model.rig.friction.strips_slide_apart
-        ):
-            return window
-        load = interface.load
-        if load is None:
-            load = first_interface_load(model, self.patch)
-        return add_substep_samples(window, make_law(interface.numbers, load), load)
 
     def _compute_loop(self, run, drive) -> CycleLoop | None:
         """Compute the first harmonics of displacement and friction force, and the work per cycle.

@@ -17,6 +17,7 @@ from ..results.notes import (
     note_on_growth,
     note_on_heating,
     warn_of_bonds,
+    warn_of_created_energy,
     warn_of_work_check,
 )
 from ..results.travel import warn_of_large_slide
@@ -56,7 +57,7 @@ def collect_warnings(run) -> list:
     if run.has_friction:
         speed = float(np.abs(solution.window.slide_rate).max())
         warnings += warn_of_bonds(model, speed, measures, run.outcome)
-    warnings += warn_of_created_energy(model, book, model.rig.drive.cycles)
+    warnings += warn_of_created_energy(model, book.get("created", 0.0), book.get("passed", 0.0))
     if (
         patch is not None
         and model.rig.friction.load_varies
@@ -319,32 +320,6 @@ def _note_on_elements_without_slip(run) -> list:
                 'that is reached from rest set accuracy.method = "auto"'
             ]
     return []
-
-
-def warn_of_created_energy(model, energies: dict, cycles: float) -> list:
-    """Return a list with a warning if the law of the 1985 report has created energy.
-
-    It creates energy in steps in which it returns more energy than it has stored.
-
-    Parameters
-    ----------
-    model : Model
-    energies : dict
-        Energies of the run by name [J].
-    cycles : float
-        Number of cycles of the run.
-    """
-    if model.friction is None or model.friction.reading != "report":
-        return []
-    made = energies.get("created", 0.0)
-    work = energies.get("dissipated", 0.0)
-    if made <= 1e-9 * work or made <= 0:
-        return []
-    return [
-        f"the law as printed in the report created {made / cycles:.3g} J per cycle, "
-        f"{100 * made / max(work, 1e-300):.3g} "
-        '% of the energy that it dissipated; with friction.reading = "stretch" no energy is created'
-    ]
 
 
 def note_on_shear_modes(model, n_modes: int, n_nodes: int) -> list:

@@ -11,29 +11,14 @@ import numpy as np
 from ...effects import law_has_trait
 from ...friction.bonds import parameters
 from ...model.model import Model
-from ...points import time_march
 from ...response.rows import add_interface_number, remove_interface_number
 from ...slip import shear_modes
 from ...structure.drive_sizes import find_drive_omega, find_max_acceleration
-from ..sizes import COMPILED_CODE, MemoryPart, RunSizes
 from . import bond_lists
-from .costs import (
-    HYBRID_HISTORY,
-    MARCH_HISTORY,
-    count_history_memory,
-    estimate_element_count_and_stiffness,
-    find_interface_load,
-)
+from .costs import estimate_element_count_and_stiffness, find_interface_load
 from .engines import ENGINES, choose_steady_method, find_obstacle_of_map
 from .numerics import choose_numerics
 
-# Memory [bytes] per pair of modes: matrices, mode shapes and workspace of the eigenvalue solver.
-MODE_PAIR_BYTES = 125.0
-# Memory [bytes] per pair of unknowns of harmonic balance: Jacobian, and factors for the error
-# estimate.
-HARMONIC_PAIR_BYTES = 94.0
-MODE_NODE_BYTES = 24.0  # Memory per shear mode and interface node [bytes].
-DRIVE_ROW_BYTES = 400.0  # Memory per row of a recorded drive [bytes].
 # Largest relative difference between the frequencies of drive and mode at which the mode counts as
 # resonant.
 RESONANCE_TOL = 0.02
@@ -113,70 +98,31 @@ def mode_frequencies(rig, chain: dict) -> list:
     return frequencies
 
 
-def count_rig_sizes(model: Model, n_points: int) -> RunSizes:
-    """Count the unknowns and the memory of a run of a rig, and describe its method.
-
-    Parameters
-    ----------
-    model : Model
-    n_points : int
-        Number of interface nodes; 1 without a patch.
-    """
-    rig = model.rig
+def count_unknowns(model: Model) -> dict:
+    """Count the unknowns of a rig: modes, and for time steps the entries of a list of bonds or the shear modes."""
+    counts = {"modes": len(model.rig.structure.frequencies)}
     numerics = choose_numerics(model)
-    n_modes = len(rig.structure.frequencies)
-    rows = len(getattr(rig.drive.signal, "breaks", ())) if not rig.drive.signal.segments else 0
-    rows_key = "drive.file" if "file" in rig.drive.waveform.required_keys else "drive.duration"
-    parts = [
-        COMPILED_CODE,
-        MemoryPart(MODE_PAIR_BYTES * n_modes**2, f"{n_modes} modes", "structure"),
-        MemoryPart(DRIVE_ROW_BYTES * rows, f"{rows} rows of the drive", rows_key),
-    ]
-    finds_periodic_motion = ENGINES[numerics.engine].finds_periodic_motion
-    if finds_periodic_motion:
-        parts.append(_count_balance_memory(model))
-    else:
-        history = MARCH_HISTORY if numerics.engine == "march" else HYBRID_HISTORY
-        parts += count_history_memory(model, numerics, history)
-
-    sizes = RunSizes({"modes": n_modes}, tuple(parts), engine=numerics.engine)
-    if model.friction is not None:
-        sentences = describe_bond_summation(model, numerics)
-        if finds_periodic_motion:
-            sentences = [f"the steady motion is found by {choose_steady_method(model).words}"]
-        sizes += RunSizes(sentences=tuple(sentences))
-    return sizes + _count_march_sizes(model, numerics, n_points)
-
-
-def _count_balance_memory(model: Model) -> MemoryPart:
-    """Return the memory of the Jacobian of harmonic balance."""
-    harmonics = model.accuracy.harmonics or 0
-    n_unknowns = 2.0 * harmonics * max(1, len(model.rig.friction.interfaces))
-    return MemoryPart(
-        HARMONIC_PAIR_BYTES * n_unknowns**2, f"{harmonics} harmonics", "accuracy.harmonics"
-    )
-
-
-def _count_march_sizes(model: Model, numerics, n_points: int) -> RunSizes:
-    """Return the length of the bond list or the number of shear modes of a time integration."""
     f = model.friction
     if numerics.engine != "march" or f is None:
-        return RunSizes()
+        return counts
     has_bonds = model.grooves is None and law_has_trait(f.law, "bonds")
     if has_bonds and bond_lists.has_bond_list(model, numerics):
         entries = int(bond_lists.estimate_bond_list_cost(model, numerics).strips)
-        part = MemoryPart(
-            time_march.count_list_bytes(entries), "the list of bonds", "accuracy.tail"
-        )
-        return RunSizes({"bond_list_about": entries}, (part,))
-    load_varies = model.rig.friction.load_varies
-    if model.partial_slip and (has_bonds or model.grooves is not None or load_varies):
-        n_modes = numerics.shear_modes or shear_modes.N_SHEAR_MODES
-        part = MemoryPart(
-            MODE_NODE_BYTES * n_modes * n_points, f"{n_modes} shear modes", "accuracy.shear_modes"
-        )
-        return RunSizes({"shear_modes": n_modes}, (part,))
-    return RunSizes()
+        return counts | {"bond_list_about": entries}
+    is_changed = has_bonds or model.grooves is not None or model.rig.friction.load_varies
+    if model.partial_slip and is_changed:
+        counts["shear_modes"] = numerics.shear_modes or shear_modes.N_SHEAR_MODES
+    return counts
+
+
+def describe_method(model: Model) -> list[str]:
+    """Describe in sentences for a plan how the friction force or the steady motion is found."""
+    if model.friction is None:
+        return []
+    numerics = choose_numerics(model)
+    if ENGINES[numerics.engine].finds_periodic_motion:
+        return [f"the steady motion is found by {choose_steady_method(model).words}"]
+    return describe_bond_summation(model, numerics)
 
 
 def compute_dimensionless_groups(model: Model) -> dict:

@@ -8,7 +8,6 @@ from dataclasses import replace
 from time import process_time
 
 from ...response.coarser import StepRun, estimate_errors
-from ...response.rows import ROWS_NEEDING_RUN
 from ..results.result import N_FRAMES, RunInputs
 from .numerics import Numerics
 from .solution import Solution
@@ -122,8 +121,8 @@ class Runner:
         model = self.model
         if numerics.other_rig is not None:
             model = replace(model, rig=model.rig.structure.other_rigs[numerics.other_rig])
-        # The decay curve and some measures need histories from the start of the run.
-        needs_whole = self.model.rig.drive.kind == "free" or bool(ROWS_NEEDING_RUN)
+        # The decay curve needs histories from the start of the run.
+        needs_whole = self.model.rig.drive.kind == "free"
         return self.solve(replace(numerics, whole=needs_whole), model)
 
     def _make_callback(self, steps: float):

@@ -127,7 +127,7 @@ class BalanceFinder:
         rig = model.rig
         parts = []
         if model.friction is not None:
-            parts.append((0, make_single_law(model, numerics, patch).element))
+            parts.append((0, make_single_law(model, numerics, patch)))
         if rig.springs.interlock is not None:
             parts.append((0, Interlock(*rig.springs.interlock)))
         if rig.springs.cubic is not None:
