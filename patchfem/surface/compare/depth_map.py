@@ -83,10 +83,15 @@ class DepthMap:
         gaps = EVEN_DEVIATION * float(np.abs(self.depth[part & self.missing]).sum()) * self.cell
         return value, float(np.sqrt(error**2 + gaps**2 + (self.errors.model * value) ** 2))
 
-    def measure_hidden(self) -> float:
-        """Return the area or volume by which slight wear, within the noise, may lower the datum."""
-        relative = self.depth / self.noise
-        slight = (np.abs(relative) > UNWORN_LIMIT) & (np.abs(relative) < 2 * UNWORN_LIMIT)
-        slight &= ~self.missing & self.inside
+    def measure_hidden(self, covered) -> float:
+        """Return the area or volume that slight wear, within the noise, may have beside what a mask covers.
+
+        It lies there still, or has lowered the datum.
+        """
+        limit = 2 * UNWORN_LIMIT
+        relative = np.clip(self.depth / self.noise, -limit, limit)
+        beside = self.inside & ~covered & ~self.missing
+        left = float((relative * self.noise)[beside].sum()) * self.cell
+        slight = beside & (np.abs(relative) > UNWORN_LIMIT) & (np.abs(relative) < limit)
         excess = max(float(np.sign(relative[slight]).sum()), 0.0) / max(self.unworn.sum(), 1)
-        return excess * UNWORN_LIMIT * self.noise_level * self.size
+        return max(left, excess * UNWORN_LIMIT * self.noise_level * self.size)

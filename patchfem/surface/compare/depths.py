@@ -11,7 +11,7 @@ from .fit import Fit
 from .model import Model
 from .raster import fill_gaps
 from .records import name_quantity
-from .statistics import estimate_correlation, find_box, split_tiles, subtract_plane
+from .statistics import estimate_correlation, find_box, split_tiles, subtract_local_level, subtract_plane
 
 N_TILES = {1: 40, 2: 8}  # number of tiles along each side, whose means show the errors of the datum
 MIN_TILES = 6  # smallest number of tiles that show these errors
@@ -199,5 +199,9 @@ def measure_largest(depths: DepthMap) -> tuple[Quantity, np.ndarray]:
     sigma = float(np.hypot(sigma, depths.level_error))
     scatter = np.hypot(SCATTER_FACTOR * sigma, depths.errors.model * value)
     error = SIDE * float(scatter) + unresolved
+    # A missing height may be as much deeper as worn depths scatter about their neighbours.
+    if (depths.missing & ndimage.binary_dilation(depths.worn)).any():
+        beside = subtract_local_level(depths.depth, depths.worn)
+        crest += SIDE * float(np.nanstd(beside[depths.worn]))
     low = max(value - bias - error, 0.0)
     return name_quantity("worn_depth_max", value, low, max(crest, value) + error), near

@@ -14,7 +14,7 @@ import numpy as np
 from scipy import ndimage
 
 from ..profile import robust_deviation
-from .changes import find_changed
+from .changes import find_changed, find_worn_tops
 from .place import Place, make_matrix
 from .raster import Raster, fill_gaps
 from .statistics import (
@@ -151,6 +151,14 @@ class Model:
     def find_changed(self, depth, noise) -> np.ndarray:
         """Return the points (n,) bool that noise does not explain, of positive depth."""
         return find_changed(self.draw(depth), self.draw(noise))[self.known]
+
+    def find_worn(self, depth, noise) -> np.ndarray:
+        """Return the worn points (n,) bool, with tops that are narrow or hardly worn."""
+        height = fill_gaps(self.draw(self.own.z[self.known] - self.sign * depth / 2))
+        worn = self.find_changed(depth, noise)
+        relative = self.draw(np.where(worn, 0.0, depth / noise), 0.0)
+        tops = find_worn_tops(relative, height, float(np.median(noise)))
+        return worn | tops[self.known]
 
     def refine_place(self) -> np.ndarray:
         """Return the state with the place of the short waves.
