@@ -4,9 +4,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..quantity import SIDE
 from .depth_map import UNWORN_LIMIT
 from .fit import Fit, evaluate, fit_unworn
-from .model import Model
+from .model import MAX_GAIN_CHANGE, Model
 from .place import Place, find_place, order
 from .raster import MIN_HEIGHTS, Raster, fill_gaps
 from .statistics import (
@@ -41,8 +42,7 @@ N_OTHER_PLACES = 15  # number of other places that show how many heights agree b
 MIN_NOISE = 1e-15  # smallest standard deviation of a depth [m]; flat surfaces have none
 EVEN_DEVIATION = 1 / np.sqrt(12)  # standard deviation of a uniform error of one digit
 MAX_GAIN_ERROR = 0.01  # standard deviation of the gain of two calibrated measurements
-MAX_GAIN_CHANGE = 0.3  # largest change of the gain of an instrument
-N_GAIN_STEPS = 3  # number of steps in which the gain is found
+N_GAIN_STEPS = 2  # number of steps in which the gain is found
 N_GAIN_TILES = {1: 40, 2: 8}  # number of tiles along each side that show the error of the gain
 MIN_GAIN_DEVIATIONS = 3.0  # smallest change of the gain that is corrected, in standard deviations
 
@@ -123,6 +123,7 @@ def _use_all_points(aligned: Aligned, first: Raster, second: Raster, digit: floa
         shift=fit.state[: model.n_axes], turn=float(fit.state[model.n_axes])
     )
     model = _make_model(first, second, place, stride=1)
+    model.max_gain_change = aligned.model.max_gain_change
     return replace(
         aligned, model=model, fit=evaluate(model, fit.state, fit.free, digit), place=place
     )
@@ -194,9 +195,12 @@ def _fit_gain(model: Model, fit: Fit, digit: float) -> tuple[Fit, float]:
         state[-1] = np.clip(state[-1] + change, -MAX_GAIN_CHANGE, MAX_GAIN_CHANGE)
         scaled = fit_unworn(model, state, fit.free, digit)
     gain = abs(float(scaled.state[-1]))
-    if MIN_GAIN_DEVIATIONS * error < gain < MAX_GAIN_CHANGE:
-        return scaled, min(error, MAX_GAIN_ERROR)
-    return fit, min(float(np.hypot(error, gain)), MAX_GAIN_ERROR)
+    is_clear = MIN_GAIN_DEVIATIONS * error < gain < MAX_GAIN_CHANGE
+    error = min(error if is_clear else float(np.hypot(error, gain)), MAX_GAIN_ERROR)
+
+    # With a known gain, tops that are a little deeper than the valleys are worn.
+    model.max_gain_change = SIDE * error
+    return fit_unworn(model, scaled.state if is_clear else fit.state, fit.free, digit), error
 
 
 def _estimate_gain(model: Model, fit: Fit) -> tuple[float, float]:

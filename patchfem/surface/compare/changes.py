@@ -31,7 +31,6 @@ N_TOP_CLASSES = 6  # number of the highest classes
 # Smallest rise of the median depth from valleys to tops, in standard deviations of a depth, and of a median.
 MIN_RISE = 0.2
 MIN_RISE_DEVIATIONS = 3.5
-MAX_GAIN_CHANGE = 0.02  # change of the gain that such a rise may be
 N_PARTS = 60  # parts of the trace whose means show a shallow track
 FLANK_PARTS = 5  # smallest number of parts on either side of a shallow track
 MIN_TRACK_PARTS = 3  # smallest number of parts in a shallow track
@@ -87,7 +86,7 @@ def find_changed(depth, noise) -> np.ndarray:
     return ndimage.binary_opening(changed, np.ones((side,) * depth.ndim)) & known
 
 
-def find_worn_tops(relative, height, noise: float) -> np.ndarray:
+def find_worn_tops(relative, height, max_gain_change: float) -> np.ndarray:
     """Find tops that wear touched first, of any width, or on all of the surface.
 
     Filled valleys are the control: an error of interpolation raises valleys and lowers tops of either surface alike, and a
@@ -97,10 +96,10 @@ def find_worn_tops(relative, height, noise: float) -> np.ndarray:
     ----------
     relative : (n,) or (m, n) array
         Depth in standard deviations, 0 where unknown.
-    height : (n,) or (m, n) array [m]
-        Mean height of both surfaces, whose noise does not depend on that of the depth; no gaps.
-    noise : float
-        Standard deviation of an unworn depth [m].
+    height : (n,) or (m, n) array
+        Mean height of both surfaces in standard deviations, whose noise does not depend on that of the depth; no gaps.
+    max_gain_change : float
+        Largest change of the gain of the instrument that both surfaces may still have.
 
     Returns
     -------
@@ -117,8 +116,7 @@ def find_worn_tops(relative, height, noise: float) -> np.ndarray:
     if count < max(MIN_TOPS, CONTROL * ndimage.label(filled)[1]):
         worn[:] = False
 
-    # Where wear lowered most tops, even slightly, these are deeper than the valleys, which another gain of a calibrated
-    # instrument hardly explains.
+    # Where wear lowered most tops, even slightly, these are deeper than the valleys by more than another gain explains.
     order = np.argsort(height, axis=None)
     order = order[relative.ravel()[order] != 0]
     if order.size < N_CLASSES * MIN_RUN:
@@ -126,14 +124,14 @@ def find_worn_tops(relative, height, noise: float) -> np.ndarray:
     classes = np.array_split(order, N_CLASSES)
     medians, places = (
         np.array([np.median(values.ravel()[part]) for part in classes])
-        for values in (relative, height / noise)
+        for values in (relative, height)
     )
     rise, range_of_heights = (
         values - np.median(values[:N_VALLEY_CLASSES]) for values in (medians, places)
     )
     scatter = MIN_RISE_DEVIATIONS / np.sqrt(len(classes[0]))
     tops = slice(-N_TOP_CLASSES, None)
-    limit = MIN_RISE + scatter + MAX_GAIN_CHANGE * float(np.median(range_of_heights[tops]))
+    limit = MIN_RISE + scatter + max_gain_change * float(np.median(range_of_heights[tops]))
     if np.median(rise[tops]) > limit:
         worn.ravel()[np.concatenate([part for part, step in zip(classes, rise) if step > limit])] = True
     return worn

@@ -20,6 +20,7 @@ MAX_GAP_FRACTION = 0.05  # largest unworn gap in a track relative to its width
 MIN_UNWORN_TOPS = 2
 TOP_QUANTILE = 0.25  # quantile of the worn heights above which a height is a top
 TOP_SAMPLES = 3  # number of samples whose mean depth shows whether a top is worn
+MIN_TRACK_DEPTH = 0.5  # mean depth of all tops of a part, in standard deviations, from which on it belongs to a track
 MAX_UNWORN_TOP = 1.5  # largest such mean of an unworn top, in standard deviations of a single depth
 MIN_CHANGED_FRACTION = 0.85  # fraction of changed heights in a wider gap that belongs to the track
 # Standard deviations of a single height on a flank.
@@ -52,10 +53,10 @@ def find_spans(depths: DepthMap) -> list[tuple[int, int]]:
     """Return the first and last worn sample of each track, the widest one first.
 
     Two worn parts belong to one track unless unworn tops between them are as high as the worn ones: valleys below the
-    floor of a track do not wear. New roughness in a track may stand above the first surface.
+    floor of a track do not wear, and the depth of a shallow part shows only in the mean of its tops. New roughness in a track may stand above the first surface.
     """
     changed = depths.worn | (np.abs(depths.depth) > UNWORN_LIMIT * depths.noise)
-    tops = find_unworn_tops(depths)
+    tops = find_tops(depths)
     spans = find_runs(depths.worn)
     k = 0
     while k < len(spans) - 1:
@@ -63,8 +64,9 @@ def find_spans(depths: DepthMap) -> list[tuple[int, int]]:
         gap = start - stop
         width = max(stop - first, last - start)
         is_changed = gap <= width and changed[stop : start + 1].mean() > MIN_CHANGED_FRACTION
-        n_tops = np.searchsorted(tops, start) - np.searchsorted(tops, stop)
-        if n_tops < MIN_UNWORN_TOPS or gap <= MAX_GAP_FRACTION * width or is_changed:
+        between = tops.select(stop, start)
+        has_tops = between.unworn.size >= MIN_UNWORN_TOPS and between.depths.mean() < MIN_TRACK_DEPTH
+        if not has_tops or gap <= MAX_GAP_FRACTION * width or is_changed:
             # A wider track may bridge the gap before it too.
             spans[k : k + 2] = [(first, last)]
             k = max(k - 1, 0)
@@ -73,18 +75,35 @@ def find_spans(depths: DepthMap) -> list[tuple[int, int]]:
     return sorted(spans, key=lambda span: depths.x[span[0]] - depths.x[span[1]])
 
 
-def find_unworn_tops(depths: DepthMap) -> np.ndarray:
-    """Return the samples (k,) of unworn tops that are as high above the long waves as a quarter of the worn heights."""
+class Tops(NamedTuple):
+    """Samples (k,) of tops as high above the long waves as a quarter of the worn heights, and depths in deviations."""
+
+    places: np.ndarray
+    depths: np.ndarray
+
+    def select(self, first: int, last: int) -> "Tops":
+        """Return the tops between two samples."""
+        part = slice(*np.searchsorted(self.places, (first, last)))
+        return Tops(self.places[part], self.depths[part])
+
+    @property
+    def unworn(self) -> np.ndarray:
+        """Samples (j,) of the tops that are not worn."""
+        return self.places[self.depths < MAX_UNWORN_TOP]
+
+
+def find_tops(depths: DepthMap) -> Tops:
+    """Find the tops that would be worn in a track: those as high as a quarter of the worn heights."""
     height = remove_long_waves(depths.before)
     relative = depths.depth / depths.noise
     is_deep = depths.worn & (relative > UNWORN_LIMIT)
     if not is_deep.any():
-        return np.zeros(0, int)
+        return Tops(np.zeros(0, int), np.zeros(0))
     runs = find_runs(height > np.quantile(height[is_deep], TOP_QUANTILE))
     tops = np.array([first + int(np.argmax(height[first : last + 1])) for first, last in runs], int)
+    tops = tops[~depths.missing[tops] & ~depths.worn[tops]]
     # A top is a few samples wide, whose noise is partly independent.
-    near = ndimage.uniform_filter1d(relative, TOP_SAMPLES)[tops]
-    return tops[(near < MAX_UNWORN_TOP) & ~depths.missing[tops] & ~depths.worn[tops]]
+    return Tops(tops, ndimage.uniform_filter1d(relative, TOP_SAMPLES)[tops])
 
 
 def get_margin(span: tuple[int, int]) -> int:
@@ -99,7 +118,7 @@ def find_ends(depths: DepthMap, span: tuple[int, int]) -> tuple[End, End]:
     relative = np.where(depths.grown | (relative < -UNWORN_LIMIT), 0.0, relative)
     middle = (span[0] + span[1]) // 2
     count = relative.size
-    tops = find_unworn_tops(depths)
+    tops = find_tops(depths).unworn
     ends = []
     for x, values, worn, stop, unworn in (
         (depths.x, relative, span[0], middle + 1, tops),
