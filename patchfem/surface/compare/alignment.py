@@ -4,17 +4,19 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..quantity import SIDE
 from .depth_map import UNWORN_LIMIT
 from .fit import Fit, evaluate, fit_unworn
-from .model import Model
+from .model import MAX_GAIN_CHANGE, Model
 from .place import Place, find_place, order
 from .raster import MIN_HEIGHTS, Raster, fill_gaps
 from .statistics import (
     TINY,
-    estimate_correlation,
     find_mirror_finish,
     find_mode,
     remove_long_waves,
+    split_tiles,
+    subtract_local_level,
 )
 
 MAX_FIT_POINTS = (
@@ -40,11 +42,9 @@ N_OTHER_PLACES = 15  # number of other places that show how many heights agree b
 MIN_NOISE = 1e-15  # smallest standard deviation of a depth [m]; flat surfaces have none
 EVEN_DEVIATION = 1 / np.sqrt(12)  # standard deviation of a uniform error of one digit
 MAX_GAIN_ERROR = 0.01  # standard deviation of the gain of two calibrated measurements
-MAX_GAIN_CHANGE = 0.3  # largest change of the gain of an instrument
-MIN_GAIN_CHANGE = 0.003  # smallest change of the gain that is corrected
-MIN_GAIN_DEVIATIONS = 5.0  # the same in standard deviations
-# Changed heights with a gain relative to those without it; less noise shows more.
-MAX_MORE_CHANGED = 1.1
+N_GAIN_STEPS = 2  # number of steps in which the gain is found
+N_GAIN_TILES = {1: 40, 2: 8}  # number of tiles along each side that show the error of the gain
+MIN_GAIN_DEVIATIONS = 3.0  # smallest change of the gain that is corrected, in standard deviations
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,6 +123,7 @@ def _use_all_points(aligned: Aligned, first: Raster, second: Raster, digit: floa
         shift=fit.state[: model.n_axes], turn=float(fit.state[model.n_axes])
     )
     model = _make_model(first, second, place, stride=1)
+    model.max_gain_change = aligned.model.max_gain_change
     return replace(
         aligned, model=model, fit=evaluate(model, fit.state, fit.free, digit), place=place
     )
@@ -186,25 +187,46 @@ def _is_bent(straight: Fit, bent: Fit) -> bool:
 
 
 def _fit_gain(model: Model, fit: Fit, digit: float) -> tuple[Fit, float]:
-    """Fit the gain of the instrument too, and keep it if it is clear; return the error of the gain as well.
+    """Fit the gain of the instrument too, and keep it if it is clear; return the error of the gain as well."""
+    scaled = fit
+    for _ in range(N_GAIN_STEPS):
+        change, error = _estimate_gain(model, scaled)
+        state = scaled.state.copy()
+        state[-1] = np.clip(state[-1] + change, -MAX_GAIN_CHANGE, MAX_GAIN_CHANGE)
+        scaled = fit_unworn(model, state, fit.free, digit)
+    gain = abs(float(scaled.state[-1]))
+    is_clear = MIN_GAIN_DEVIATIONS * error < gain < MAX_GAIN_CHANGE
+    error = min(error if is_clear else float(np.hypot(error, gain)), MAX_GAIN_ERROR)
 
-    Worn tops are lower than before, as with a smaller gain, but then fewer heights agree.
+    # With a known gain, tops that are a little deeper than the valleys are worn.
+    model.max_gain_change = SIDE * error
+    return fit_unworn(model, scaled.state if is_clear else fit.state, fit.free, digit), error
+
+
+def _estimate_gain(model: Model, fit: Fit) -> tuple[float, float]:
+    """Estimate a further change of the gain, and its standard deviation, from the short waves of the valleys.
+
+    A drift has no short waves, and valleys wear last, so that neither passes for another gain.
     """
-    last = fit.state.size - 1
-    scaled = fit_unworn(model, fit.state, [*fit.free, last], digit)
-    change = float(scaled.state[-1])
+    unworn = model.draw(fit.unworn, False)
+    fields = [fill_gaps(model.draw(values)) for values in (fit.depth, model.compute_jacobian(fit.state)[:, -1])]
+    depth, waves = (subtract_local_level(field, unworn) for field in fields)
+    use = unworn & np.isfinite(depth)
+    if use.sum() < MIN_HEIGHTS:
+        return 0.0, MAX_GAIN_ERROR
+    use &= waves <= np.median(waves[use])
+    waves = np.where(use, waves - waves[use].mean(), 0.0)
+    depth = np.where(use, depth - depth[use].mean(), 0.0)
+    power = (waves**2).sum() + TINY
+    slope = float((waves * depth).sum() / power)
 
-    # The noise of the first surface, half of that of the depth, lowers a regression on its waves.
-    dilution = np.median(scaled.noise**2) / 2 / (scaled.jacobian[:, -1].var() + TINY)
-    # Neighbouring heights share errors such as a drift, and waves.
-    influence = (scaled.jacobian[:, -1] * scaled.depth)[scaled.unworn]
-    error = float(np.hypot(dilution, scaled.errors[-1] * np.sqrt(estimate_correlation(influence))))
-
-    is_clear = max(MIN_GAIN_DEVIATIONS * error, MIN_GAIN_CHANGE) < abs(change) < MAX_GAIN_CHANGE
-    is_quieter = np.median(scaled.noise) < np.median(fit.noise)
-    if is_clear and is_quieter and scaled.n_changed <= MAX_MORE_CHANGED * fit.n_changed:
-        return scaled, min(error, MAX_GAIN_ERROR)
-    return fit, min(float(np.hypot(error, change)), MAX_GAIN_ERROR)
+    # The noise of the first surface, half of that of the depth, is part of its waves too.
+    residual = depth - slope * waves
+    dilution = float((residual**2).sum() / 2 / power)
+    # Neighbouring heights share errors, tiles hardly do.
+    influence = waves * residual / power
+    tiles = [influence[tile].sum() for tile in split_tiles(influence.shape, N_GAIN_TILES[depth.ndim])]
+    return dilution - slope, float(np.hypot(np.linalg.norm(tiles), dilution))
 
 
 def _find_digit(z) -> float:

@@ -36,7 +36,7 @@ from .records import (
 )
 from .statistics import find_mirror_finish, remove_long_waves
 from .track import find_spans, get_margin, measure_track
-from .verdict import find_sure_loss, judge_change, limit_wear
+from .verdict import find_sure_loss, judge_change, limit_wear, measure_sharp_loss
 
 END_SAMPLES = 7  # number of lines from an end at which growth includes it
 MIN_GROWN_LINE = 0.5  # fraction of a line near an end that grew, from which on the end grew
@@ -221,15 +221,24 @@ def _measure(
 
     # What the same tests find above the first surface is a control for what they find below it.
     spans = find_spans(depths) if is_trace else []
-    area, error = depths.integrate(_cover_loss(depths, spans))
-    bounds = (area, max(area - SIDE * error, 0.0), area + SIDE * error + depths.measure_hidden())
+    covered = _cover_loss(depths, spans)
+    area, error = depths.integrate(covered)
+    highest = area + SIDE * error + depths.measure_hidden(covered)
+    bounds = (area, max(area - SIDE * error, 0.0), highest)
     is_grown = _enlarge(depths.grown) & depths.inside & ~depths.worn
     grown, grown_error = depths.integrate(is_grown, -1.0)
     sure_area = depths.integrate(depths.worn)[0]
     is_placed = placement.basis == "place"
     # The flanks of a track were compared with random traces, which choose their deepest place too.
     sure_loss = find_sure_loss(depths) if is_placed else SIDE
-    code = judge_change(area, error, sure_loss, sure_area, grown, grown_error)
+    sharp = measure_sharp_loss(depths) if is_placed else 0.0
+    drift = error
+    if sharp > 0:
+        # Drift may be as large as the loss of the tops, but is no cause of it.
+        least = (1 - SIDE * depths.errors.model) * sharp
+        bounds = (max(area, sharp), max(bounds[1], least), max(bounds[2], sharp))
+        drift = 0.0
+    code = judge_change(bounds[0], drift, sure_loss, sure_area, grown, grown_error)
     if not is_placed and code != "worn":
         code = "elsewhere"
     tracks = ()
@@ -367,8 +376,9 @@ def _cover_loss(depths: DepthMap, spans: list[tuple[int, int]]) -> np.ndarray:
     for span in spans:
         margin = get_margin(span)
         covered[max(span[0] - margin, 0) : span[1] + margin + 1] = True
-    # New roughness that stands above the first surface is no loss.
-    return covered & (depths.depth > -UNWORN_LIMIT * depths.noise) & ~depths.grown
+    # New roughness that stands above the first surface is no loss, nor is a spike.
+    is_near = np.abs(depths.depth) < 2 * UNWORN_LIMIT * depths.noise
+    return covered & (depths.worn | depths.missing | is_near) & ~depths.grown
 
 
 def _doubt(

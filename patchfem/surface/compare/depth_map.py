@@ -2,15 +2,15 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 
+from .statistics import remove_long_waves, subtract_local_level
+
 UNWORN_LIMIT = 2.5  # standard deviations within which a depth counts as unworn
 MODEL_ERROR = 0.004  # relative standard deviation of an area or volume due to tip and interpolation
-EVEN_DEVIATION = 1 / np.sqrt(
-    12
-)  # standard deviation of a fraction that may be anything from 0 to 1
 # Errors relative to those that the tiles show, which are few.
 SCATTER_FACTOR = 1.3
 
@@ -23,7 +23,7 @@ class DepthErrors(NamedTuple):
     - freedom: number of independent tiles, beyond those that determine the datum, that show the variance.
     - shared: number of neighbouring tiles that share an error, 1 without drift.
     - correlation: number of neighbouring heights that share an error.
-    - model: relative standard deviation of all depths due to gain, tip and interpolation.
+    - model: relative standard deviation of a single depth due to gain, tip and interpolation.
     """
 
     variance: Callable[[np.ndarray], float]
@@ -75,18 +75,31 @@ class DepthMap:
         """Standard deviation [m] of the mean depth of the common part."""
         return float(np.sqrt(self.errors.variance(self.inside)) / self.inside.sum())
 
+    @cached_property
+    def scatter(self) -> float:
+        """Standard deviation [m] of worn depths about those beside them."""
+        beside = subtract_local_level(self.depth, self.worn)[self.worn]
+        known = beside[np.isfinite(beside)]
+        return float(known.std()) if known.size else 0.0
+
     def integrate(self, part, sign: float = 1.0) -> tuple[float, float]:
         """Integrate the depth over a mask; return the area [m2] or volume [m3] and its standard deviation."""
         value = sign * float(self.depth[part].sum()) * self.cell + 0.0  # no negative zero
         error = SCATTER_FACTOR * np.sqrt(self.errors.variance(part)) * self.cell
-        # A missing height may be as deep as its neighbour, or not worn.
-        gaps = EVEN_DEVIATION * float(np.abs(self.depth[part & self.missing]).sum()) * self.cell
-        return value, float(np.sqrt(error**2 + gaps**2 + (self.errors.model * value) ** 2))
+        # The line over a gap misses the tops in it, which are worn deeper, and its valleys.
+        gaps = self.scatter * float((part & self.missing).sum()) * self.cell
+        return value, float(np.sqrt(error**2 + gaps**2 + (MODEL_ERROR * value) ** 2))
 
-    def measure_hidden(self) -> float:
-        """Return the area or volume by which slight wear, within the noise, may lower the datum."""
-        relative = self.depth / self.noise
-        slight = (np.abs(relative) > UNWORN_LIMIT) & (np.abs(relative) < 2 * UNWORN_LIMIT)
-        slight &= ~self.missing & self.inside
-        excess = max(float(np.sign(relative[slight]).sum()), 0.0) / max(self.unworn.sum(), 1)
-        return excess * UNWORN_LIMIT * self.noise_level * self.size
+    def measure_hidden(self, covered) -> float:
+        """Return the area or volume that slight wear, within the noise, may have beside what a mask covers.
+
+        It lies there still, or has lowered the datum, which then is higher than the valleys.
+        """
+        limit = 2 * UNWORN_LIMIT
+        relative = np.clip(self.depth / self.noise, -limit, limit)
+        beside = self.inside & ~covered & ~self.missing
+        left = max(float((relative * self.noise)[beside].sum()) * self.cell, 0.0)
+        height = remove_long_waves(self.before + self.after)
+        valleys = relative[self.unworn & (height < np.median(height))]
+        lowered = max(-float(np.median(valleys)), 0.0) if valleys.size else 0.0
+        return left + lowered * self.noise_level * self.size

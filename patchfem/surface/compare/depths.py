@@ -53,7 +53,12 @@ def make_depths(model: Model, fit: Fit, gain_error: float = 0.0) -> DepthMap:
         first = first / (1 + fit.state[-1]) + depth
     base = model.datum[(terms, *box)]
     before = subtract_plane(first, base[: 1 + model.n_axes])
-    errors = estimate_errors(depth, noise, masks["unworn"], base)
+    # An error of the gain moves the heights of the second surface that stand out of the datum.
+    unworn = masks["unworn"]
+    columns = base.reshape(len(base), -1).T
+    plane = np.linalg.lstsq(columns[unworn.ravel()], before[unworn], rcond=None)[0]
+    waves = before - (columns @ plane).reshape(before.shape)
+    errors = estimate_errors(depth, noise, unworn, base, gain_error * (waves - depth))
     correlation = 1.0
     if model.n_axes == 1:
         correlation = estimate_correlation((depth / noise)[masks["unworn"]])
@@ -114,7 +119,7 @@ def make_section(x, heights, sigma: float, worn, grown=None) -> DepthMap:
     )
 
 
-def estimate_errors(depth, noise, unworn, base) -> DepthErrors:
+def estimate_errors(depth, noise, unworn, base, shift=0.0) -> DepthErrors:
     """Estimate the errors of sums of depths from the means of unworn heights in tiles about the datum.
 
     With white noise, the mean of c heights has the variance s^2/c; noise that neighbours share and slow errors of the
@@ -127,6 +132,8 @@ def estimate_errors(depth, noise, unworn, base) -> DepthErrors:
         Depths and noise [m], and the mask of heights that are unworn.
     base : (k, n) or (k, m, n) array
         Functions of which the datum is a combination.
+    shift : (n,) or (m, n) array, optional
+        Change of the depths by one standard deviation of the gain [m].
     """
     tiles = []
     for tile in split_tiles(depth.shape, N_TILES[depth.ndim]):
@@ -153,12 +160,27 @@ def estimate_errors(depth, noise, unworn, base) -> DepthErrors:
         drift = float(np.sqrt(scatter / counts.mean()))
         variance = float(scatter * shared * student**2)
     inverse = np.linalg.pinv(centers.T @ centers, rcond=1e-10, hermitian=True)
+    bent = _bend_datum(depth, unworn, base) if counts.size >= MIN_TILES and depth.ndim == 1 else 0.0
 
     def compute_variance(part) -> float:
         moments = base[:, part].sum(axis=1)
-        return variance * float(moments @ inverse @ moments + part.sum())
+        white = variance * float(moments @ inverse @ moments + part.sum())
+        return white + sum((field * part).sum() ** 2 for field in (bent, shift))
 
     return DepthErrors(compute_variance, drift, freedom, shared)
+
+
+def _bend_datum(depth, unworn, base) -> np.ndarray:
+    """Return how far [m] the unworn depths (n,) of a trace bend its datum, if it has two terms more.
+
+    Where a drift is slow, this is the error of a datum in a wide track, which the flanks alone do not show.
+    """
+    x = np.linspace(-1, 1, depth.size)
+    datums = []
+    for columns in (base, [*base, x ** len(base), x ** (len(base) + 1)]):
+        columns = np.transpose(columns)
+        datums.append(columns @ np.linalg.lstsq(columns[unworn], depth[unworn], rcond=1e-10)[0])
+    return datums[1] - datums[0]
 
 
 def measure_largest(depths: DepthMap) -> tuple[Quantity, np.ndarray]:
@@ -199,5 +221,8 @@ def measure_largest(depths: DepthMap) -> tuple[Quantity, np.ndarray]:
     sigma = float(np.hypot(sigma, depths.level_error))
     scatter = np.hypot(SCATTER_FACTOR * sigma, depths.errors.model * value)
     error = SIDE * float(scatter) + unresolved
+    # A missing height may be as much deeper as worn depths scatter about those beside them.
+    if (depths.missing & ndimage.binary_dilation(depths.worn)).any():
+        crest += SIDE * depths.scatter
     low = max(value - bias - error, 0.0)
     return name_quantity("worn_depth_max", value, low, max(crest, value) + error), near

@@ -106,7 +106,7 @@ def evaluate(model: Model, state, free: list[int], digit: float, worn=None) -> F
     sigma = max(estimate_one_sided_scale(depth[~worn]), digit)
     jacobian = model.compute_jacobian(state)
     noise = estimate_noise(depth, model.compute_noise_terms(state, jacobian), sigma, worn)
-    worn = model.find_changed(depth, noise)
+    worn = model.find_worn(depth, noise)
     unworn = (np.abs(depth) < UNWORN_LIMIT * noise) & ~worn
     grown = model.find_changed(-depth, noise) & ~worn
     return Fit(state, free, depth, noise, unworn, worn, grown, jacobian[:, free])

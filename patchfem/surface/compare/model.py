@@ -14,7 +14,7 @@ import numpy as np
 from scipy import ndimage
 
 from ..profile import robust_deviation
-from .changes import find_changed
+from .changes import find_changed, find_worn_tops
 from .place import Place, make_matrix
 from .raster import Raster, fill_gaps
 from .statistics import (
@@ -35,6 +35,7 @@ PLACE_WAVES = {1: 100, 2: 20}
 MIN_WAVE_SAMPLES = 10.0  # smallest such deviation of traces, in samples
 # Deviations of the Gaussians that smooth both surfaces in turn.
 REFINE_WIDTHS = (16, 8, 4, 3, 2, 1, 0, 0, 0)
+MAX_GAIN_CHANGE = 0.3  # largest change of the gain of an instrument
 N_DATUMS = 150  # number of datums that are improved by concentration steps
 MAX_DATUMS = 3000  # number of datums through modes of tiles that are compared
 MAX_DATUM_SAMPLES = 2000  # number of heights from which the datum is found
@@ -49,7 +50,10 @@ MIN_GROWN_DISTANCE = 10.0  # distance, in the same scale, above which they have 
 
 
 class Model:
-    """Depths (n,) at the `known` points of the own surface, which both surfaces show at the first place."""
+    """Depths (n,) at the `known` points of the own surface, which both surfaces show at the first place.
+
+    `max_gain_change` is the largest change of the gain that is left, until it is fitted.
+    """
 
     def __init__(self, own: Raster, other: Raster, place: Place, stride: int = 1):
         """Choose the common points at a place, of each `stride`-th own point."""
@@ -80,6 +84,7 @@ class Model:
             line = np.array([np.ones(filled.size), np.linspace(-1, 1, filled.size)])
             self.waves = ndimage.spline_filter(subtract_plane(filled, line))
         self.start = np.concatenate((place.shift, [place.turn], np.zeros(len(self.datum) + 1)))
+        self.max_gain_change = MAX_GAIN_CHANGE
         self.keep_common(self.start)
 
     def _shape(self, values) -> np.ndarray:
@@ -151,6 +156,14 @@ class Model:
     def find_changed(self, depth, noise) -> np.ndarray:
         """Return the points (n,) bool that noise does not explain, of positive depth."""
         return find_changed(self.draw(depth), self.draw(noise))[self.known]
+
+    def find_worn(self, depth, noise) -> np.ndarray:
+        """Return the worn points (n,) bool, with tops that are narrow or hardly worn."""
+        worn = self.find_changed(depth, noise)
+        height = (self.own.z[self.known] - self.sign * depth / 2) / np.median(noise)
+        relative = self.draw(np.where(worn, 0.0, depth / noise), 0.0)
+        tops = find_worn_tops(relative, fill_gaps(self.draw(height)), self.max_gain_change)
+        return worn | tops[self.known]
 
     def refine_place(self) -> np.ndarray:
         """Return the state with the place of the short waves.

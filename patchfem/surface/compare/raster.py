@@ -4,6 +4,7 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
+from scipy import ndimage
 
 from ...core import PatchfemError
 from ..areal import Areal, fill_nearest, find_scan_spikes
@@ -13,6 +14,10 @@ MIN_HEIGHTS = 40  # smallest number of heights of a trace that is compared
 MIN_SIDE = 16  # smallest number of points along each side of a scan
 MAX_GAP_STEPS = 2.5  # distance of two samples, in median steps, above which heights are missing
 MAX_UNEVEN = 0.1  # largest distance from even places, in steps, of a trace that is not resampled
+FOURTH_DIFFERENCE = (1, -4, 6, -4, 1)  # of a single spike, six times its height
+# Fourth difference of a spike relative to this quantile of all of them.
+LONE_RATIO = 4.0
+LONE_QUANTILE = 0.97
 MAX_SAMPLES = 2_097_152  # largest number of samples in a resampled trace, which limits the memory
 
 
@@ -66,7 +71,7 @@ def clean_surface(surface: Profile | Areal, *, keep_spikes: bool = False) -> Pro
             )
         is_bad = find_scan_spikes(surface)
     else:
-        is_bad = remove_spikes(surface).missing
+        is_bad = remove_spikes(surface).missing | _find_lone_heights(surface.z)
     is_bad = is_bad | _find_saturated(surface.z)
     z = surface.z if keep_spikes else np.where(is_bad, np.nan, surface.z)
     count = np.isfinite(z).sum()
@@ -75,6 +80,18 @@ def clean_surface(surface: Profile | Areal, *, keep_spikes: bool = False) -> Pro
             f"compare: {surface.source}: {count} heights; a comparison needs at least {MIN_HEIGHTS}"
         )
     return replace(surface, z=z)
+
+
+def _find_lone_heights(z) -> np.ndarray:
+    """Return the heights (n,) bool that leave the line of their neighbours, far more than any feature of the trace does."""
+    known = np.isfinite(z)
+    is_lone = np.zeros(z.size, bool)
+    if known.sum() < MIN_HEIGHTS:
+        return is_lone
+    bend = np.abs(ndimage.convolve1d(z[known], FOURTH_DIFFERENCE))
+    is_peak = bend == ndimage.maximum_filter1d(bend, len(FOURTH_DIFFERENCE))
+    is_lone[known] = is_peak & (bend > LONE_RATIO * np.quantile(bend, LONE_QUANTILE))
+    return is_lone
 
 
 def _find_saturated(z) -> np.ndarray:

@@ -16,6 +16,7 @@ FALSE_POSITIVE_RATE = 1e-3
 TRUNCATED_VARIANCE = 0.911
 TINY = 1e-300  # keeps divisions by zero noise finite
 WAVES_PER_SIDE = 40  # side of a surface relative to the deviation of the Gaussian of its long waves
+MIN_NEIGHBOURS = 0.2  # smallest fraction of neighbours that tell the level beside a height
 MAX_FINISH = 1.5  # short waves relative to the noise, below which no place can be found
 
 
@@ -104,6 +105,17 @@ def smooth(z, deviations) -> np.ndarray:
 def remove_long_waves(z, part: float = WAVES_PER_SIDE) -> np.ndarray:
     """Subtract the Gaussian mean line or surface from heights (n,) or (m, n) without gaps."""
     return z - smooth(z, np.array(z.shape) / part)
+
+
+def subtract_local_level(values, mask) -> np.ndarray:
+    """Subtract the Gaussian mean of the values in a mask from values (n,) or (m, n), both without gaps.
+
+    A slow drift has no part in what is left. NaN where less than a fifth of the neighbours are in the mask.
+    """
+    deviations = np.array(values.shape) / WAVES_PER_SIDE
+    weight = smooth(mask.astype(float), deviations)
+    level = smooth(np.where(mask, values, 0.0), deviations) / np.maximum(weight, TINY)
+    return np.where(weight > MIN_NEIGHBOURS, values - level, np.nan)
 
 
 def find_mirror_finish(surfaces) -> dict[str, float]:

@@ -7,20 +7,24 @@ from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
+from scipy import ndimage
 
 from ..profile import find_runs
 from ..quantity import SIDE, Quantity
 from .depth_map import UNWORN_LIMIT, DepthMap
 from .records import Track, name_estimate, name_quantity, name_unknown
+from .statistics import remove_long_waves
 
 MAX_GAP_FRACTION = 0.05  # largest unworn gap in a track relative to its width
-# Number of worn parts from which on they may be tops of one track between valleys.
-MIN_FRAGMENTS = 5
-MAX_TOP_FRACTION = 0.25  # largest gap between such tops relative to the width of those on one side
-MAX_GAP_RATIO = 4.0  # largest gap between such tops relative to the median gap
+# Number of unworn tops that separate two tracks, and to which the interval of an end reaches; the floor may spare one.
+MIN_UNWORN_TOPS = 2
+TOP_QUANTILE = 0.25  # quantile of the worn heights above which a height is a top
+TOP_SAMPLES = 3  # number of samples whose mean depth shows whether a top is worn
+MIN_TRACK_DEPTH = 0.5  # mean depth of all tops of a part, in standard deviations, from which on it belongs to a track
+MAX_UNWORN_TOP = 1.5  # largest such mean of an unworn top, in standard deviations of a single depth
 MIN_CHANGED_FRACTION = 0.85  # fraction of changed heights in a wider gap that belongs to the track
-# Standard deviations of a single height outside of a track that may belong to it.
-MIN_FAR_DEPTH = 4.0
+# Standard deviations of a single height on a flank.
+MIN_FLANK_DEPTH = 4.0
 FLANK_FRACTION = 0.1  # length of the flanks beyond the known ends of a track, relative to its width
 MAX_CUT_SAMPLES = 5  # number of samples between a track and the end of the section that cuts it off
 # Powers of the distance from the end in the forms of a flank: cliff, cliff with a slope, wedge, round.
@@ -48,30 +52,58 @@ class End(NamedTuple):
 def find_spans(depths: DepthMap) -> list[tuple[int, int]]:
     """Return the first and last worn sample of each track, the widest one first.
 
-    Gaps of a twentieth of the width are bridged, and wider ones in which most heights changed: new
-    roughness in a track may stand above the first surface.
+    Two worn parts belong to one track unless unworn tops between them are as high as the worn ones: valleys below the
+    floor of a track do not wear, and the depth of a shallow part shows only in the mean of its tops. New roughness in a track may stand above the first surface.
     """
     changed = depths.worn | (np.abs(depths.depth) > UNWORN_LIMIT * depths.noise)
+    tops = find_tops(depths)
     spans = find_runs(depths.worn)
-    gaps = [later[0] - earlier[1] for earlier, later in pairwise(spans)]
-    max_gap = MAX_CUT_SAMPLES
-    gap_fraction = MAX_GAP_FRACTION
-    if len(spans) >= MIN_FRAGMENTS:
-        max_gap = max(max_gap, MAX_GAP_RATIO * float(np.median(gaps)))
-        gap_fraction = MAX_TOP_FRACTION
     k = 0
     while k < len(spans) - 1:
         (first, stop), (start, last) = spans[k : k + 2]
         gap = start - stop
         width = max(stop - first, last - start)
         is_changed = gap <= width and changed[stop : start + 1].mean() > MIN_CHANGED_FRACTION
-        if gap <= max(gap_fraction * width, max_gap) or is_changed:
+        between = tops.select(stop, start)
+        has_tops = between.unworn.size >= MIN_UNWORN_TOPS and between.depths.mean() < MIN_TRACK_DEPTH
+        if not has_tops or gap <= MAX_GAP_FRACTION * width or is_changed:
             # A wider track may bridge the gap before it too.
             spans[k : k + 2] = [(first, last)]
             k = max(k - 1, 0)
         else:
             k += 1
     return sorted(spans, key=lambda span: depths.x[span[0]] - depths.x[span[1]])
+
+
+class Tops(NamedTuple):
+    """Samples (k,) of tops as high above the long waves as a quarter of the worn heights, and depths in deviations."""
+
+    places: np.ndarray
+    depths: np.ndarray
+
+    def select(self, first: int, last: int) -> "Tops":
+        """Return the tops between two samples."""
+        part = slice(*np.searchsorted(self.places, (first, last)))
+        return Tops(self.places[part], self.depths[part])
+
+    @property
+    def unworn(self) -> np.ndarray:
+        """Samples (j,) of the tops that are not worn."""
+        return self.places[self.depths < MAX_UNWORN_TOP]
+
+
+def find_tops(depths: DepthMap) -> Tops:
+    """Find the tops that would be worn in a track: those as high as a quarter of the worn heights."""
+    height = remove_long_waves(depths.before)
+    relative = depths.depth / depths.noise
+    is_deep = depths.worn & (relative > UNWORN_LIMIT)
+    if not is_deep.any():
+        return Tops(np.zeros(0, int), np.zeros(0))
+    runs = find_runs(height > np.quantile(height[is_deep], TOP_QUANTILE))
+    tops = np.array([first + int(np.argmax(height[first : last + 1])) for first, last in runs], int)
+    tops = tops[~depths.missing[tops] & ~depths.worn[tops]]
+    # A top is a few samples wide, whose noise is partly independent.
+    return Tops(tops, ndimage.uniform_filter1d(relative, TOP_SAMPLES)[tops])
 
 
 def get_margin(span: tuple[int, int]) -> int:
@@ -86,17 +118,18 @@ def find_ends(depths: DepthMap, span: tuple[int, int]) -> tuple[End, End]:
     relative = np.where(depths.grown | (relative < -UNWORN_LIMIT), 0.0, relative)
     middle = (span[0] + span[1]) // 2
     count = relative.size
+    tops = find_tops(depths).unworn
     ends = []
-    for x, values, worn, stop in (
-        (depths.x, relative, span[0], middle + 1),
-        (-depths.x[::-1], relative[::-1], count - 1 - span[1], count - middle),
+    for x, values, worn, stop, unworn in (
+        (depths.x, relative, span[0], middle + 1, tops),
+        (-depths.x[::-1], relative[::-1], count - 1 - span[1], count - middle, count - 1 - tops),
     ):
         end = _find_change_point(x[:stop], values[:stop], worn, depths)
-        # Single deep heights beyond the end may belong to the track.
-        near = np.arange(max(worn - get_margin(span), 0), worn)
-        far = near[values[near] > MIN_FAR_DEPTH]
-        low = min(end.low, float(x[far[0]])) if far.size else end.low
-        ends.append(end._replace(low=low))
+        # Where tops wear first, the end lies between the outermost worn one and those beyond it that are not worn.
+        deep = worn + int(np.argmax(values[worn:stop] > UNWORN_LIMIT))
+        beyond = np.sort(unworn[unworn < deep])[-MIN_UNWORN_TOPS:]
+        low = x[beyond[0]] if beyond.size else x[0]
+        ends.append(End(*(min(place, float(x[deep])) for place in (end.value, min(end.low, low))), max(end.high, x[deep])))
     start, end = ends
     return start, End(-end.value, -end.high, -end.low)
 
@@ -119,7 +152,7 @@ def _find_change_point(x, relative, worn: int, depths: DepthMap) -> End:
     # Above half of its depth, the floor of a shallow track begins.
     inner = relative[worn : worn + MAX_FLANK_SAMPLES]
     height = min(FLANK_HEIGHT, np.quantile(inner, 0.9) / 2)
-    deep = np.flatnonzero(inner > max(height, MIN_FAR_DEPTH))
+    deep = np.flatnonzero(inner > max(height, MIN_FLANK_DEPTH))
     length = int(deep[0]) + 3 if deep.size else SHALLOW_SAMPLES
     stop = min(worn + length, x.size)
     low = max(worn - max(length, MIN_FLANK_SAMPLES), 0)

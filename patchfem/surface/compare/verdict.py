@@ -1,12 +1,13 @@
 """Verdict on lost and grown material, for traces and scans alike."""
 
+import numpy as np
 from scipy import special
 
 from ..quantity import SIDE
+from .changes import CONTROL, find_worn_tops
 from .depth_map import DepthMap
-from .statistics import FALSE_POSITIVE_RATE
+from .statistics import FALSE_POSITIVE_RATE, subtract_local_level
 
-CONTROL = 3.0  # lost over grown material, beyond which it is wear; and the reverse
 MAX_SHARED = 2.5  # largest factor by which a drift that neighbouring tiles share raises the threshold of wear
 MIN_GROWTH = 5.0  # standard deviations of grown material that is reported
 MIN_LOSS = 4.0  # standard deviations of lost material that is reported beside as much growth
@@ -26,8 +27,22 @@ def find_sure_loss(depths: DepthMap) -> float:
     return float(SIDE * student[1] / student[0]) * min(depths.errors.shared, MAX_SHARED)
 
 
+def measure_sharp_loss(depths: DepthMap) -> float:
+    """Return the area [m2] or volume [m3] of tops that lie deeper than the unworn heights beside them, as no drift does."""
+    relative = subtract_local_level(depths.depth, depths.unworn) / depths.noise
+    relative = np.where(np.isnan(relative) | depths.missing, 0.0, relative)
+    height = (depths.before + depths.after) / 2 / depths.noise_level
+    tops = find_worn_tops(relative, height, SIDE * depths.errors.model)
+    return float((relative * depths.noise)[tops].sum()) * depths.cell
+
+
 def judge_change(
-    area: float, error: float, sure_loss: float, lost: float, grown: float, grown_error: float
+    area: float,
+    error: float,
+    sure_loss: float,
+    lost: float,
+    grown: float,
+    grown_error: float,
 ) -> str:
     """Return "worn", "scar_or_drift", "grown", "worn_and_grown" or "no_wear" for areas [m2] or volumes [m3].
 
@@ -37,7 +52,7 @@ def judge_change(
     Parameters
     ----------
     area, error : float
-        Lost material in all tracks, and its standard deviation.
+        Lost material in all tracks, and the standard deviation that a drift gives it.
     sure_loss : float
         Standard deviations from which on the loss is no drift.
     lost : float
