@@ -132,17 +132,18 @@ def read_material(table: dict) -> tuple[float, float]:
 def read_scene(contact: dict, trace_points) -> Scene:
     """Return the scene of a table [contact]."""
     pieces = []
-    coating = contact.get("coating")
     for side in ("lower", "upper"):
         own = contact.get(side, {})
+        coating = own.get("coating", contact.get("coating", "none"))
+        has_coating = coating != "none"
         substrate = read_material(own.get("substrate", contact["substrate"]))
         end = next((key for key in ("chamfer", "end_radius") if key in own), "")
         pieces.append(
             Piece(
                 number(own.get("length", contact["length"])),
                 number(own.get("height", contact["height"])),
-                number(coating["thickness"]) if coating else 0.0,
-                read_material(coating["material"]) if coating else substrate,
+                number(coating["thickness"]) if has_coating else 0.0,
+                read_material(coating["material"]) if has_coating else substrate,
                 substrate,
                 end,
                 number(own[end]) if end else 0.0,
@@ -448,8 +449,11 @@ def press_layer(law: RoughLaw, area, C, gap, rigid, target, spring) -> tuple:
     return f, q, log > log.max() + np.log(MIN_LAYER_PRESSURE), f * rate
 
 
-def press(scene: Scene, parts: list, level: Level) -> Pressed:
-    """Press a scene on columns that are graded towards the edges of given intervals in contact."""
+def condense_pieces(scene: Scene, parts: list, level: Level) -> tuple:
+    """Return nodes and weights (m,) [m] of the face, and the compliances (3, m, m) [m/N] of both pieces.
+
+    The columns are graded towards the edges of given intervals in contact.
+    """
     half = scene.half
     contact = min((high - low for low, high in parts), default=2 * half)
     edges = []
@@ -478,7 +482,12 @@ def press(scene: Scene, parts: list, level: Level) -> Pressed:
     mirror = np.array([1, 1, -1])[:, None, None]
     of_upper = compliances if upper == lower else condense_piece(upper, scene, x, level)
     nodes, weight = order_four.face_nodes(x, ORDER)
-    return press_nodes(scene, nodes, weight, (compliances + mirror * of_upper) / scene.width)
+    return nodes, weight, (compliances + mirror * of_upper) / scene.width
+
+
+def press(scene: Scene, parts: list, level: Level) -> Pressed:
+    """Press a scene on columns that are graded towards the edges of given intervals in contact."""
+    return press_nodes(scene, *condense_pieces(scene, parts, level))
 
 
 def condense_piece(piece: Piece, scene: Scene, x, level: Level) -> np.ndarray:
@@ -682,7 +691,24 @@ def interpolate_peak(scene: Scene, pressed: Pressed) -> float:
     return curve(np.linspace(places[1], places[3], 201)).max()
 
 
-def solve_patch(contact: dict, trace_points=None, levels=LEVELS) -> tuple[dict, dict]:
+def press_levels(scene: Scene, levels=LEVELS) -> list[Pressed]:
+    """Return the patch pressed on each level, whose columns are graded towards the contact edges of the mesh before."""
+    parts = []
+    for k in range(N_SEARCHES):
+        before = parts
+        parts = find_parts(scene, press(scene, parts, SEARCHES[min(k // 2, 1)]))
+        if k > 1 and len(parts) == len(before):
+            change = np.abs(np.subtract(parts, before)).max()
+            if change < min(high - low for low, high in parts) / 100:
+                break
+    found = []
+    for level in levels:
+        found.append(press(scene, parts, level))
+        parts = find_parts(scene, found[-1])
+    return found
+
+
+def solve_patch(contact: dict, trace_points=None) -> tuple[dict, dict]:
     """Return the measures of a table [contact] and their uncertainties by name.
 
     The uncertainty is the larger of the change to the last level and half of the change before it.
@@ -693,24 +719,9 @@ def solve_patch(contact: dict, trace_points=None, levels=LEVELS) -> tuple[dict, 
         Quantities as text in SI units, such as "0.01 m".
     trace_points : (2, k) ndarray, optional
         Positions and heights [m] of a gap.
-    levels : sequence of Level
-        Three levels.
     """
     scene = read_scene(contact, trace_points)
-    parts = []
-    for k in range(N_SEARCHES):
-        before = parts
-        parts = find_parts(scene, press(scene, parts, SEARCHES[min(k // 2, 1)]))
-        if k > 1 and len(parts) == len(before):
-            change = np.abs(np.subtract(parts, before)).max()
-            if change < min(high - low for low, high in parts) / 100:
-                break
-    results = []
-    for level in levels:
-        pressed = press(scene, parts, level)
-        parts = find_parts(scene, pressed)
-        results.append(find_measures(scene, pressed))
-    first, second, last = results
+    first, second, last = (find_measures(scene, pressed) for pressed in press_levels(scene))
     doubt = {
         name: max(abs(value - second[name]), abs(second[name] - first[name]) / 2)
         for name, value in last.items()
