@@ -103,7 +103,7 @@ PAD = (
     '[contact.step]\nheight = "20 um"\nat = "2 mm"\n'
 )
 PAD_PRESSURE = 2000 / (8.35e-3 * 12.7e-3)
-# Elements of order 5, a spectral program, an earlier program of order 4 and closed forms: scene, references, relative doubt, and
+# Elements of order 5, a spectral program, elements of order 4 and closed forms: scene, references, relative doubt, and
 # tolerances from large to small, over which the errors must not grow.
 PATCHES = {
     "tilt": (
