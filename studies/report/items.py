@@ -272,7 +272,7 @@ ITEMS = (
         "two masses with a rigid-body mode and friction on the second mass",
         TWO,
         "studies/integrators/failure.py",
-        "tests/studies/test_integrators.py",
+        "tests/studies/test_report_methods.py",
         "works",
     ),
     Item(
@@ -280,7 +280,7 @@ ITEMS = (
         "if the displacement decides whether a step is accepted, mass 2 moves although friction should hold it",
         BLOCK,
         "studies/integrators/failure.py",
-        "tests/studies/test_integrators.py",
+        "tests/studies/test_report_methods.py",
         "works",
     ),
     Item(
@@ -288,7 +288,7 @@ ITEMS = (
         "if the velocity decides whether a step is accepted, mass 2 does not drift, but the friction force is erratic",
         BLOCK,
         "studies/integrators/failure.py",
-        "tests/studies/test_integrators.py",
+        "tests/studies/test_report_methods.py",
         "works",
     ),
     Item(

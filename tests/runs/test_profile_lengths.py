@@ -50,8 +50,8 @@ def test_exact_rounded_punch_as_profile_agrees_with_closed_form(tmp_path, tolera
         assert measure.error <= tolerance * reference or result.warnings
 
 
-# Contact length [m], approach [m], peak [Pa] and stiffness [N/m] of the independent program
-# studies/contact/order_four.py.
+# Contact length [m], approach [m], peak [Pa] and stiffness [N/m] of elements of order 5
+# (support/patch_of_order_four.py agrees).
 CROWN_REFERENCE = (2 * 3.7177189e-4, 2.8687086e-7, 1.46972585e7, 3.66814797e10 * 12.7e-3)
 
 

@@ -103,7 +103,7 @@ PAD = (
     '[contact.step]\nheight = "20 um"\nat = "2 mm"\n'
 )
 PAD_PRESSURE = 2000 / (8.35e-3 * 12.7e-3)
-# Elements of order 5, a spectral program, `static_reference` and closed forms: scene, references, relative doubt, and
+# Elements of order 5, a spectral program, elements of order 4 and closed forms: scene, references, relative doubt, and
 # tolerances from large to small, over which the errors must not grow.
 PATCHES = {
     "tilt": (
@@ -200,7 +200,7 @@ MAX_MISS = 1.5  # Largest ratio of true to stated error of an exception.
 def test_always_errors_of_random_patch_cover_independent_program(seed):
     """For one random scene of each kind, the errors cover an independent program, apart from MISSES."""
     scene = draw_scene(seed)
-    reference, reference_error = solve_reference(scene, 2e-3)
+    reference, reference_error = solve_reference(scene)
     for tolerance in (1e-2, 1e-3, 1e-4):
         measures = run_scene(format_scene(scene), f"accuracy.tolerance={tolerance}").measures
         rows = reliable_rows(measures, reference, reference_error)

@@ -1,7 +1,7 @@
 """Random rigs for the engine `hybrid`: a recipe, and the case of the engine that a spec describes.
 
-A spec is a dict of plain numbers: modes, faces, drive, start and number of cycles. `hybrid_reference` integrates the
-same spec.
+A spec is a dict of plain numbers: modes, faces, drive, start and number of cycles. `hybrid_campaign` integrates the
+same spec by `motion_reference`.
 
 Recipe. 1 to 5 modes of 60 to 400 Hz with damping ratios of 0.1 to 3 %; 1 to 4 interfaces, each with one of the laws; 8 to 20
 cycles. The drive is a sine (half of the rigs), three tones, a record of rows, or a release from a displacement. A third of

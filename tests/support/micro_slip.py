@@ -4,26 +4,26 @@ Campaign `partial-slip` of `campaigns`. The benches are crowned, tilted or both,
 amplitudes of 0.02 to 2 times the relative displacement at which the whole patch slips, at
 tolerances of 1e-2 to 1e-4.
 
-The solver shares nothing with patchfem: pressure and compliances are those of `static_reference`,
-at the nodes of elements of order 4. With the friction limits g = mu f of the nodes, the missing
+The solver shares nothing with patchfem: pressure and compliances are those of
+`patch_of_order_four`. With the friction limits g = mu f of the nodes, the missing
 shear r = g - t at the displacement q solves r >= 0, C r >= C g - q, r (C r - C g + q) = 0, and
-Masing's rule gives the loop. Each bench is solved on two grids; their difference is the uncertainty
-of the reference.
+Masing's rule gives the loop. The difference between the last two
+grids is the uncertainty of the reference.
 """
 
 from pathlib import Path
 from time import process_time
 
 import numpy as np
-import static_reference as static
 from campaigns import measure_rows
+from patch_of_order_four import Pressed, press_levels, read_scene
 from scipy.interpolate import PchipInterpolator
+from static_scenes import BodySection, PatchScene, read_contact
 
 import patchfem as pf
 
 MATERIALS = (("steel", 210e9, 0.3), ("titanium", 121e9, 0.32), ("aluminium", 70e9, 0.33))
 COATING = 250e9, 0.24  # Young's modulus [Pa] and Poisson's ratio.
-FINE = 5e-4  # Ratio of a cell at a contact edge to the contact width.
 
 
 def solve_missing_shear(compliance, right) -> np.ndarray:
@@ -54,7 +54,7 @@ class RandomBench:
         self.name, self.young, self.poisson = MATERIALS[draw.integers(3)]
         self.static = draw.uniform(0.1, 0.6)
         self.thick = draw.choice([0.0, 1.0], p=[0.6, 0.4])
-        self.thick *= draw.uniform(50e-6, 400e-6)
+        self.thick = float(self.thick * draw.uniform(50e-6, 400e-6))
         plane = self.young / (1 - self.poisson**2)
         reach = draw.uniform(0.15, 1.8) * self.length / 2  # Half-width of Hertzian contact.
         self.radius = reach**2 * np.pi * plane / 2 / (4 * self.load / self.width)
@@ -70,13 +70,13 @@ class RandomBench:
 
     @property
     def scene(self):
-        """Scene for `static_reference`."""
+        """Patch for the reference."""
         base = (self.young, self.poisson)
         layers = (COATING if self.thick else base, base)
-        piece = static.BodySection(self.length, self.height, self.thick, layers)
+        piece = BodySection(self.length, self.height, self.thick, layers)
         curvature = 1 / self.radius if self.crowned else 0.0
         tilt = self.angle if self.tilted else 0.0
-        return static.PatchScene(
+        return PatchScene(
             self.length, self.width, "strain", piece, piece, self.load, tilt, curvature
         )
 
@@ -106,15 +106,13 @@ class RandomBench:
 
 
 class PartialSlipReference:
-    """Solution of a bench on the columns of a refinement step of `static_reference`."""
+    """Solution of a bench whose patch is pressed."""
 
-    def __init__(self, bench, edges, lap):
+    def __init__(self, bench, pressed: Pressed):
         self.bench = bench
-        pressed = static.press_scene(bench.scene, edges, FINE, lap)
-        self.edges = pressed.edges
-        index = np.flatnonzero(pressed.force > 0)
-        self.shear = pressed.tangential[np.ix_(index, index)] / bench.width
-        self.limit = bench.static * bench.width * pressed.force[index]
+        index = np.flatnonzero(pressed.active[0])
+        self.shear = pressed.tt[np.ix_(index, index)]
+        self.limit = bench.static * pressed.force[0, index]
         self.stiffness = float(np.linalg.solve(self.shear, np.ones(index.size)).sum())
 
     def measures(self):
@@ -172,11 +170,8 @@ class PartialSlipReference:
 def solve_bench(seed: int) -> tuple:
     """Return a bench, its measures on the fine grid, and their differences from a coarser grid."""
     bench = RandomBench(seed)
-    edges = static.find_edges(bench.scene)
-    for lap in static.LAPS[:2]:
-        coarse = PartialSlipReference(bench, edges, lap)
-        edges = coarse.edges
-    fine = PartialSlipReference(bench, edges, static.LAPS[2])
+    levels = press_levels(read_scene(read_contact(bench.scene), None))
+    coarse, fine = (PartialSlipReference(bench, pressed) for pressed in levels[1:])
     bench.amplitude = float(bench.share * bench.static * bench.load / fine.stiffness)
     values = fine.measures()
     coarse_values = coarse.measures()

@@ -23,8 +23,11 @@ class Law:
     - apply_event: changes mode and state at an event
     """
 
-    # `splits` states whether the law distinguishes slip from the reversible displacement.
+    # `splits` states whether the law distinguishes slip from the reversible displacement, `relaxes` whether its state
+    # relaxes over the displacement `scale`; `speed_key` names the key of a speed on which its force depends.
     size = 1
+    relaxes = False
+    speed_key = ""
     set_valued = False
     split_by_mode = False
     splits = True
@@ -34,6 +37,7 @@ class Law:
         self.mode = 1
         self.keys = keys
         self.side = 1  # Side of the law's second switching surface, if it has one.
+        self.turns = []  # Reversals, if the law keeps them.
 
     def set_initial_mode(self, v: float, accel: float) -> None:
         """Set the mode for a motion that begins with velocity v and acceleration accel."""
@@ -57,12 +61,16 @@ class Law:
         return s
 
     def scale(self) -> float:
-        """Return the typical size of the state, which is also the displacement that reverses it."""
+        """Return the displacement [m] that reverses the state."""
         return (
             self.keys.get("bond_length", 1.0)
             if "stiffness" not in self.keys
             else self.limit / self.keys["stiffness"]
         )
+
+    def unit(self):
+        """Return the typical size of the state, or of each of its numbers."""
+        return self.scale()
 
     def energy(self, s):
         """Return the stored energy [J]; None if the law has none."""
@@ -77,6 +85,7 @@ class TanhLaw(Law):
     """F = mu N tanh(v/v_0)."""
 
     size = 0
+    speed_key = "reference_speed"
 
     def force(self, s, v, t):
         """Return the friction force [N]."""
@@ -130,40 +139,185 @@ class ElasticPlasticLaw(Law):
         return 0.5 * self.limit * s[0] ** 2 / self.keys["bond_length"]
 
 
-class StretchLaw(Law):
-    """z' = v - |v| z/eps, F = mu N z/eps_0; with growth, eps follows 2.10.
+class ElementsLaw(Law):
+    """Springs in parallel, each with a slider; the state holds their stretches, the mode a tuple of their sides."""
 
-    The speed |v| has a lower bound in a_s/|v|.
+    def __init__(self, limit, elements, **keys):
+        super().__init__(limit, **keys)
+        self.stiffness, self.stretches = map(np.array, elements)
+        self.limits = self.stiffness * self.stretches
+        self.size = self.stretches.size
+        self.mode = (0,) * self.size
+
+    def set_initial_mode(self, v, accel):
+        """Begin with elements that stick."""
+
+    def force(self, s, v, t):
+        """Return the friction force [N]."""
+        return self.stiffness @ s
+
+    def rate(self, s, v, t):
+        """Return the rates of the stretches."""
+        return np.where(self.mode, 0.0, v)
+
+    def reversible(self, s):
+        """Return the mean stretch [m], weighted by the limits of the elements."""
+        return self.limits @ s / self.limits.sum()
+
+    def split(self, s, v, t):
+        """Return the rate of the irreversible displacement [m/s]."""
+        return v - self.reversible(self.rate(s, v, t))
+
+    def guards(self, s, v, t):
+        """Return the margins to yield of elements that stick, and the slip velocity of others."""
+        margins = self.stretches - np.abs(s)
+        return [side * v if side else margin for side, margin in zip(self.mode, margins)]
+
+    def apply_event(self, k, s, v, accel):
+        """Let an element slip or stick."""
+        mode = list(self.mode)
+        s = s.copy()
+        mode[k] = 0 if mode[k] else int(np.sign(s[k]))
+        if mode[k]:
+            s[k] = mode[k] * self.stretches[k]
+        self.mode = tuple(mode)
+        return s
+
+    def scale(self):
+        """Return the smallest stretch [m]."""
+        return self.stretches.min()
+
+
+class PressedSpringsLaw(Law):
+    """Elastic-plastic springs whose density comes and goes with the load N(t), and vanishes while the pieces are apart.
+
+    States: force over mu, density [N] and reversible displacement [m]. The mode is the direction of slip. The side is 1
+    while the density grows with the load, -1 while slip breaks the springs that exceed the load, and 0 while the pieces
+    are apart.
     """
+
+    size = 3
+
+    def __init__(self, load, mu: float, length: float, mean: float):
+        super().__init__(mu * mean)
+        self.load = load  # Function t -> load [N], its rate [N/s].
+        self.mu = mu
+        self.length = length
+        self.mean = mean
+        self.side = 1 if load(0.0)[0] >= 0 else 0
+
+    def start(self):
+        """Return the initial state."""
+        return np.array([0.0, max(self.load(0.0)[0], 0.0), 0.0])
+
+    def set_initial_mode(self, v, accel):
+        """Begin without slip."""
+        self.mode = 0
+
+    def force(self, s, v, t):
+        """Return the friction force [N]."""
+        return self.mu * (self.mode * self.load(t)[0] if self.mode else s[0]) * abs(self.side)
+
+    def split(self, s, v, t):
+        """Return the rate of the irreversible displacement [m/s]."""
+        if self.side == 0:
+            return v
+        gained = max(self.load(t)[1], 0.0)
+        return v - self.mode * gained * self.length / max(s[1], 1e-300) if self.mode else 0.0
+
+    def rate(self, s, v, t):
+        """Return the rates of force, density and reversible displacement."""
+        load, gained = self.load(t)
+        slip = self.split(s, v, t)
+        if self.side == 0:
+            return np.zeros(3)
+        broken = max(s[1] - load, 0.0) * max(self.mode * slip, 0.0) / self.length
+        growth = gained * (self.side > 0) - broken
+        pulled = self.mode * gained if self.mode else s[1] * v / self.length
+        return np.array([pulled, growth, v - slip])
+
+    def reversible(self, s):
+        """Return the reversible part of the relative displacement [m]."""
+        return s[2]
+
+    def guards(self, s, v, t):
+        """Return the margins to lift-off, to a change of growth, and to slip or its end."""
+        load, gained = self.load(t)
+        if self.side == 0:
+            return [-load, 1.0, 1.0]
+        growth = gained if self.side > 0 else s[1] - load
+        end = self.mode * s[1] * v / self.length - gained if self.mode else load - abs(s[0])
+        return [load, growth, end]
+
+    def apply_event(self, k, s, v, accel):
+        """Lift off or touch, let the density grow or break, slip or stick."""
+        s = s.copy()
+        if k == 0:
+            self.side = 0 if self.side else 1
+            self.mode = 0
+            s[:2] = 0.0
+        elif k == 1:
+            self.side = -self.side
+        else:
+            self.mode = 0 if self.mode else int(np.sign(s[0]))
+        return s
+
+    def scale(self):
+        """Return the displacement [m] that reverses the force."""
+        return self.length
+
+    def unit(self):
+        """Return the typical size of each state."""
+        return np.array([self.mean, self.mean, self.length])
+
+
+class StretchLaw(Law):
+    """z' = m v - |v| z/eps, m' = |v| (1 - m)/eps, F = mu N z/eps_0; with growth, eps follows 2.10.
+
+    The state is the sum of the stretches z, the density m, which stays 1 if it starts there, and eps. The speed |v| has a
+    lower bound in a_s/|v|.
+    """
+
+    relaxes = True
 
     def __init__(self, limit, **keys):
         super().__init__(limit, **keys)
         self.grows = "rest_growth" in keys
-        self.size = 2 if self.grows else 1
+        self.size = 3 if self.grows else 2
 
     def start(self):
         """Return the initial state."""
-        return np.array([0.0, self.keys["bond_length"]])[: self.size]
+        density = self.keys.get("initial_bonds", 1.0)
+        return np.array([0.0, density, self.keys["bond_length"]])[: self.size]
+
+    def length(self, s):
+        """Return the bond length [m]."""
+        return s[2] if self.grows else self.keys["bond_length"]
 
     def force(self, s, v, t):
         """Return the friction force [N]."""
         return self.limit * s[0] / self.keys["bond_length"]
 
     def rate(self, s, v, t):
-        """Return the rates of the stretch and of the bond length."""
+        """Return the rates of the stretch, the density and the bond length."""
         new_length = self.keys["bond_length"]
         k = self.keys
         speed = self.mode * v
+        bonds = [s[1] * v - speed * s[0] / self.length(s), speed * (1 - s[1]) / self.length(s)]
         if not self.grows:
-            return np.array([v - speed * s[0] / new_length])
+            return np.array(bonds)
         final_length = new_length * k["kinetic"] / k["static"]
         ages = k["rest_growth"] / (speed if self.side > 0 else k["rest_speed"])
-        return np.array(
-            [
-                v - speed * s[0] / s[1],
-                ages * (new_length - s[1]) + speed * (final_length - s[1]) / k["slip_growth"],
-            ]
-        )
+        growth = ages * (new_length - s[2]) + speed * (final_length - s[2]) / k["slip_growth"]
+        return np.array([*bonds, growth])
+
+    def reversible(self, s):
+        """Return the mean stretch [m]."""
+        return s[0] / max(s[1], 1e-300)
+
+    def unit(self):
+        """Return the typical size of each state."""
+        return np.array([self.scale(), 1.0, self.scale()])[: self.size]
 
     def choose_branch(self, s, v, way):
         """Choose the direction, and the side of the speed limit of ageing."""
@@ -173,7 +327,7 @@ class StretchLaw(Law):
 
     def split(self, s, v, t):
         """Return the rate of the irreversible displacement [m/s]."""
-        return self.mode * v * s[0] / (s[1] if self.grows else self.keys["bond_length"])
+        return self.mode * v * s[0] / (self.length(s) * max(s[1], 1e-300) ** 2)
 
     def set_initial_mode(self, v, accel):
         """Set direction and side for the start of a motion."""
@@ -197,6 +351,12 @@ class StretchLaw(Law):
 
 class BoucWenLaw(Law):
     """z' = v/eps (1 - |z|^n (s sgn(v z) + 1 - s)), F = mu N z."""
+
+    relaxes = True
+
+    def unit(self):
+        """Return the typical size of z."""
+        return 1.0
 
     def force(self, s, v, t):
         """Return the friction force [N]."""
@@ -247,6 +407,9 @@ class BoucWenLaw(Law):
 
 class LuGreLaw(Law):
     """z' = v - k |v| z/g, F = k z + s_1 z' + s_2 v."""
+
+    relaxes = True
+    speed_key = "stribeck_speed"
 
     def rate(self, s, v, t):
         """Return the rate of z."""
@@ -371,6 +534,7 @@ class ReportLaw(Law):
     """
 
     size = 2
+    relaxes = True
     splits = False
 
     def __init__(self, limit, **keys):
@@ -446,10 +610,12 @@ LAWS = {
     "weakening": CoulombLaw,
     "convolution": CoulombLaw,
     "elastic-plastic": ElasticPlasticLaw,
+    "jenkins": ElementsLaw,
     "iwan": IwanLaw,
     "tanh": TanhLaw,
     "bouc-wen": BoucWenLaw,
     "lugre": LuGreLaw,
+    "nonlocal": StretchLaw,
     "stretch": StretchLaw,
     "growing": StretchLaw,
     "report": ReportLaw,

@@ -46,8 +46,7 @@ class Window:
         """Set the laws to the modes and reversals of a smooth piece."""
         for k, law in enumerate(self.motion.laws):
             law.mode, law.side = piece.modes[k]
-            if piece.turns:
-                law.turns = piece.turns[k]
+            law.turns = piece.turns[k]
 
     def _append_values(self, columns, piece, t, w) -> None:
         """Append the values at times t with weights w of a smooth piece."""

@@ -1,4 +1,4 @@
-"""Independent integrator for `motion_scenes`: DOP853 between located events.
+"""Independent integrator for `motion_scenes` and `hybrid_rigs`: DOP853 between located events.
 
 It reads the numbers of a spec, not the scene, and imports nothing from the package. Energies are
 integrated with the motion. `motion_read` evaluates the measures by their definitions: harmonics and
@@ -146,7 +146,8 @@ def integrate_to_event(
     )
     times = [t]
     parts = []
-    previous = np.array([guard[2](t, y) for guard in guards])
+    # Of two events at the same time the second one begins the next piece with a value of 0 or just below.
+    previous = np.maximum([guard[2](t, y) for guard in guards], 0.0)
     while solver.status == "running":
         solver.max_step = motion.max_step(solver.y, solver.f)
         assert solver.step() is None, "the integrator gave up"
@@ -197,12 +198,19 @@ class Motion:
     """
 
     def __init__(self, s: dict, share: float = 0.04):
-        self.s = s
-        self.plant = make_system(s)
-        self.share = share
-        self.drive, self.breaks, self.moving = make_drive(s)
         loads = s["masses"]["loads"] if s["several"] else [s["load"]]
-        self.laws = [LAWS[s["law"]](s["keys"]["static"] * load, **s["keys"]) for load in loads]
+        laws = [LAWS[s["law"]](s["keys"]["static"] * load, **s["keys"]) for load in loads]
+        self.set_equations(s, make_system(s), make_drive(s), laws, share)
+
+    def set_equations(
+        self, s: dict, plant: ModalSystem, drive: tuple, laws: list, share: float
+    ) -> None:
+        """Set the spec, the modal system, the drive as of `make_drive`, and the law of each interface."""
+        self.s = s
+        self.plant = plant
+        self.share = share
+        self.drive, self.breaks, self.moving = drive
+        self.laws = laws
         self.n = self.plant.M.shape[0]
         self.inverse = np.linalg.inv(self.plant.M)
         ends = np.cumsum([2 * self.n, *(law.size for law in self.laws)])
@@ -228,24 +236,32 @@ class Motion:
         out = -p.K @ x - p.C @ v - p.base * self.drive(t)
         return out - p.cubic * (p.output @ x) ** 3 * p.output if p.cubic else out
 
+    def load_ratios(self, t, y) -> np.ndarray:
+        """Return the load of every interface divided by its mean."""
+        return np.ones(len(self.laws))
+
+    def find_resting(self) -> list:
+        """Return the numbers of the set-valued interfaces that stick."""
+        return [k for k, law in enumerate(self.laws) if law.set_valued and not law.mode]
+
     def friction_forces(self, t, y, force_without=None):
         """Return the friction forces of all interfaces [N]."""
         force_without = (
             self.force_without_friction(t, y) if force_without is None else force_without
         )
         rates = self.plant.faces @ y[self.n : 2 * self.n]
-        if not self.laws[0].set_valued:
-            return np.array(
-                [law.force(y[part], v, t) for law, part, v in zip(self.laws, self.parts, rates)]
-            )
-        out = np.array([law.mode * law.kinetic for law in self.laws])
-        stuck = [k for k, law in enumerate(self.laws) if not law.mode]
+        out = self.load_ratios(t, y) * [
+            law.mode * law.kinetic if law.set_valued else law.force(y[part], v, t)
+            for law, part, v in zip(self.laws, self.parts, rates)
+        ]
+        stuck = self.find_resting()
         if stuck:
+            # Rows that depend on each other share the force by least squares.
+            out[stuck] = 0.0
             rows = self.plant.faces[stuck]
             unbalanced = force_without - self.plant.faces.T @ out
-            out[stuck] = np.linalg.solve(
-                rows @ self.inverse @ rows.T, rows @ self.inverse @ unbalanced
-            )
+            matrix = rows @ self.inverse @ rows.T
+            out[stuck] = np.linalg.lstsq(matrix, rows @ self.inverse @ unbalanced, rcond=1e-12)[0]
         return out
 
     def derivative(self, t, y):
@@ -282,7 +298,8 @@ class Motion:
                             k,
                             side,
                             lambda t, y, k=k, side=side, law=law: (
-                                law.limit - side * self.friction_forces(t, y)[k]
+                                law.limit * self.load_ratios(t, y)[k]
+                                - side * self.friction_forces(t, y)[k]
                             ),
                         )
                     )
@@ -321,8 +338,9 @@ class Motion:
             force = self.friction_forces(t, y)
             accel = self.interface_accelerations(t, y)
             scale = max(law.limit for law in self.laws) * 1e-9
+            ratios = self.load_ratios(t, y)
             if all(
-                abs(force[k]) <= self.laws[k].limit + scale
+                abs(force[k]) <= self.laws[k].limit * ratios[k] + scale
                 if not self.laws[k].mode
                 else self.laws[k].mode * accel[k] * self.plant.M[0, 0] > -scale
                 for k in active
@@ -339,25 +357,16 @@ class Motion:
         """
         out = self.share / max(self.plant.fastest, self.s["frequency"])
         n = self.n
-        speed = np.abs(self.plant.faces @ y[n : 2 * n]).max()
-        acceleration = np.abs(self.plant.faces @ slope[n : 2 * n]).max() + 1e-300
-        if self.s["law"] in ("stretch", "growing", "bouc-wen", "lugre", "report"):
-            # Limit of the displacement |v| h + |a| h^2/2 in a step.
-            max_displacement = 30 * self.share * min(law.scale() for law in self.laws)
-            out = min(
-                out,
-                2
-                * max_displacement
-                / (speed + np.sqrt(speed**2 + 2 * acceleration * max_displacement)),
-            )
-        if self.s["law"] in ("tanh", "lugre"):
-            reference_speed = self.s["keys"][
-                "reference_speed" if self.s["law"] == "tanh" else "stribeck_speed"
-            ]
-            out = min(
-                out,
-                max(speed - 5 * reference_speed, 12 * self.share * reference_speed) / acceleration,
-            )
+        speeds = np.abs(self.plant.faces @ y[n : 2 * n])
+        accelerations = np.abs(self.plant.faces @ slope[n : 2 * n]) + 1e-300
+        for law, speed, acceleration in zip(self.laws, speeds, accelerations):
+            if law.relaxes:
+                # Limit of the displacement |v| h + |a| h^2/2 in a step.
+                reach = 30 * self.share * law.scale()
+                out = min(out, 2 * reach / (speed + np.sqrt(speed**2 + 2 * acceleration * reach)))
+            if law.speed_key:
+                slow = law.keys[law.speed_key]
+                out = min(out, max(speed - 5 * slow, 12 * self.share * slow) / acceleration)
         return out
 
     def run(self, end: float, rtol: float, start=None, max_steps: float = np.inf) -> list:
@@ -382,24 +391,23 @@ class Motion:
         atol = np.full(y.size, rtol * 1e-3 * reach)
         atol[n : 2 * n] *= self.s["seeded"]
         for law, part in zip(self.laws, self.parts):
-            atol[part] = rtol * 1e-2 * (1.0 if self.s["law"] == "bouc-wen" else law.scale())
+            atol[part] = rtol * 1e-2 * law.unit()
         atol[-1] = rtol * 1e-2 * reach * self.laws[0].limit
         rates = self.plant.faces @ y[n : 2 * n]
-        for law, v, a in zip(self.laws, rates, np.zeros(len(self.laws))):
-            law.set_initial_mode(v, a)
-        if not self.laws[0].set_valued:
-            for law, v, a in zip(self.laws, rates, self.interface_accelerations(t, y)):
+        for law, v in zip(self.laws, rates):
+            law.set_initial_mode(v, 0.0)
+        self.choose_modes(t, y, self.find_resting())
+        accelerations = self.interface_accelerations(t, y)
+        for law, part, v, a in zip(self.laws, self.parts, rates, accelerations):
+            if not law.set_valued:
                 law.set_initial_mode(v, a)
-            for law, part in zip(self.laws, self.parts):
                 law.set_initial_side(y[part])
-        else:
-            self.choose_modes(t, y, [k for k, law in enumerate(self.laws) if law.mode == 0])
         n_short_pieces = count = 0
         for stop in stops:
             while t < stop:
                 guards = self.guards()
                 modes = tuple((law.mode, law.side) for law in self.laws)
-                state = [list(law.turns) for law in self.laws if hasattr(law, "turns")]
+                state = [list(law.turns) for law in self.laws]
                 solution, hit = integrate_to_event(
                     self, t, y, stop, guards, (rtol, atol), max_steps - count
                 )
@@ -417,8 +425,8 @@ class Motion:
                 y = solution(t)
                 if hit is not None:
                     self.apply_event(t, y, *hit[:2])
-                elif self.laws[0].set_valued and t < end:
-                    self.choose_modes(t, y, [k for k, law in enumerate(self.laws) if law.mode == 0])
+                elif t < end:
+                    self.choose_modes(t, y, self.find_resting())
         return pieces
 
     def apply_event(self, t, y, k: int, g: int) -> None:
@@ -428,19 +436,13 @@ class Motion:
         face = self.plant.faces[k]
         if law.set_valued and law.mode == 0:
             law.mode = g
-            stuck_interfaces = [
-                j for j, other_law in enumerate(self.laws) if other_law.mode == 0 and j != k
-            ]
-            if stuck_interfaces:
-                self.choose_modes(t, y, stuck_interfaces)
+            self.choose_modes(t, y, self.find_resting())
             return
         v = y[n : 2 * n]
         if law.set_valued:
             v -= self.inverse @ face * (face @ v) / (face @ self.inverse @ face)
             law.mode = 0
-            self.choose_modes(
-                t, y, [j for j, other_law in enumerate(self.laws) if other_law.mode == 0]
-            )
+            self.choose_modes(t, y, self.find_resting())
             return
         accel = self.interface_accelerations(t, y)[k]
         y[self.parts[k]] = law.apply_event(g, y[self.parts[k]], face @ v, accel)

@@ -1,6 +1,6 @@
 """Independent program for static patches of every family, which uses nothing of the package.
 
-Elements of order 4 with Gauss-Lobatto nodes (studies/contact/order_four.py), mapped to the shape of the pieces, on columns
+Elements of order 4 with Gauss-Lobatto nodes, mapped to the shape of the pieces, on columns
 that are graded towards the edges of the contact, its ends and steps. SuperLU eliminates the inside with the face last.
 Nodal forces meet the gap at the nodes of the face. Bare contact is solved by a primal-dual interior-point method, a rough
 layer by Newton's method for the separations. The changes between three levels of grading are the uncertainties. Measures
@@ -20,9 +20,7 @@ from scipy.integrate import quad
 from scipy.interpolate import CubicSpline
 from scipy.linalg import cho_factor, cho_solve
 from scipy.sparse.linalg import splu
-from study_module import load_study
 
-order_four = load_study("contact/order_four.py")
 ORDER = 4
 
 
@@ -132,17 +130,18 @@ def read_material(table: dict) -> tuple[float, float]:
 def read_scene(contact: dict, trace_points) -> Scene:
     """Return the scene of a table [contact]."""
     pieces = []
-    coating = contact.get("coating")
     for side in ("lower", "upper"):
         own = contact.get(side, {})
+        coating = own.get("coating", contact.get("coating", "none"))
+        has_coating = coating != "none"
         substrate = read_material(own.get("substrate", contact["substrate"]))
         end = next((key for key in ("chamfer", "end_radius") if key in own), "")
         pieces.append(
             Piece(
                 number(own.get("length", contact["length"])),
                 number(own.get("height", contact["height"])),
-                number(coating["thickness"]) if coating else 0.0,
-                read_material(coating["material"]) if coating else substrate,
+                number(coating["thickness"]) if has_coating else 0.0,
+                read_material(coating["material"]) if has_coating else substrate,
                 substrate,
                 end,
                 number(own[end]) if end else 0.0,
@@ -219,6 +218,84 @@ def grade(low, high, marks, sizes, growth, largest, bands=()) -> np.ndarray:
     return np.concatenate(x)
 
 
+def lobatto() -> tuple[np.ndarray, np.ndarray]:
+    """Return Gauss-Lobatto points and weights on [-1, 1].
+
+    The points are the ends and the zeros of P'_order; w = 2/(p (p + 1) P_p^2).
+    """
+    legendre_p = legendre.Legendre.basis(ORDER)
+    points = np.concatenate([[-1.0], np.sort(legendre_p.deriv().roots().real), [1.0]])
+    return points, 2 / (ORDER * (ORDER + 1) * legendre_p(points) ** 2)
+
+
+def condense_interior(cells: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Condense cells to the nodes on their edges; return the stiffness and the numbers of these nodes (of 25)."""
+    row, column = np.divmod(np.arange((ORDER + 1) ** 2), ORDER + 1)
+    inside = (row % ORDER != 0) & (column % ORDER != 0)
+    keep = np.flatnonzero(~np.tile(inside, 2))
+    drop = np.flatnonzero(np.tile(inside, 2))
+    out = cells[:, keep[:, None], keep]
+    mixed = cells[:, drop[:, None], keep]
+    out = out - mixed.transpose(0, 2, 1) @ np.linalg.solve(cells[:, drop[:, None], drop], mixed)
+    return out, np.flatnonzero(~inside)
+
+
+def _dissection(x0: int, x1: int, y0: int, y1: int, into: list[tuple[int, int, int, int]]) -> None:
+    """Order the nodes strictly inside a box of cells by nested dissection.
+
+    Separators follow the two halves that they separate.
+    """
+    if (x1 - x0 <= 1 and y1 - y0 <= 1) or x1 - x0 < 1 or y1 - y0 < 1:
+        return
+    if x1 - x0 >= y1 - y0:
+        middle = (x0 + x1) // 2
+        _dissection(x0, middle, y0, y1, into)
+        _dissection(middle, x1, y0, y1, into)
+        into.append((middle * ORDER, middle * ORDER + 1, y0 * ORDER + 1, y1 * ORDER))
+    else:
+        middle = (y0 + y1) // 2
+        _dissection(x0, x1, y0, middle, into)
+        _dissection(x0, x1, middle, y1, into)
+        into.append((x0 * ORDER + 1, x1 * ORDER, middle * ORDER, middle * ORDER + 1))
+
+
+def numbering(nx: int, ny: int) -> tuple[np.ndarray, int]:
+    """Return the elimination index of every node, -1 for fixed or condensed nodes, and the number of indices.
+
+    Nested dissection inside, then the free sides, the face y = 0 (row 0) last; the far row is held.
+
+    Parameters
+    ----------
+    nx, ny : int
+        Cells along and across.
+    """
+    place = np.full((ny * ORDER + 1, nx * ORDER + 1), -1)
+    boxes: list[tuple[int, int, int, int]] = []
+    _dissection(0, nx, 0, ny, boxes)
+    boxes += [
+        (0, 1, 1, ny * ORDER),
+        (nx * ORDER, nx * ORDER + 1, 1, ny * ORDER),
+        (0, nx * ORDER + 1, 0, 1),
+    ]
+    count = 0
+    for x0, x1, y0, y1 in boxes:
+        size = (y1 - y0) * (x1 - x0)
+        place[y0:y1, x0:x1] = count + np.arange(size).reshape(y1 - y0, x1 - x0)
+        count += size
+    return place, count
+
+
+def face_nodes(xs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the nodes of the face and their lumped Gauss-Lobatto weights [m]."""
+    points, weights = lobatto()
+    h = np.diff(xs)
+    x = (0.5 * (xs[:-1] + xs[1:])[:, None] + 0.5 * h[:, None] * points)[:, :-1].ravel()
+    weight = np.zeros(len(h) * ORDER + 1)
+    for k in range(ORDER + 1):
+        weight[k : k + len(h) * ORDER : ORDER][: len(h)] += 0.5 * h * weights[k]
+    return np.append(x, xs[-1]), weight
+
+
 def cell_stiffness(corners, lame, shear) -> np.ndarray:
     """Return the stiffness (cells, 50, 50) of cells of order 4; u_x first, then u_y.
 
@@ -229,7 +306,7 @@ def cell_stiffness(corners, lame, shear) -> np.ndarray:
     lame, shear : (cells,) ndarray
         Lame's constants [Pa].
     """
-    points, _ = order_four.lobatto(ORDER)
+    points, _ = lobatto()
     gauss, weight = legendre.leggauss(ORDER + 1)
     coefficients = np.linalg.inv(legendre.legvander(points, ORDER))
     value = legendre.legvander(gauss, ORDER) @ coefficients
@@ -269,8 +346,8 @@ def condense(x, piece: Piece, plane: str, row: float, level: Level, face: slice)
     n_x, n_y = x.size - 1, y.size - 1
 
     # The coating follows the drop of the face; the substrate fades out towards the far face.
-    nodes_x, _ = order_four.face_nodes(x, ORDER)
-    nodes_y, _ = order_four.face_nodes(y, ORDER)
+    nodes_x, _ = face_nodes(x)
+    nodes_y, _ = face_nodes(y)
     fade = np.minimum(1.0, (piece.height - nodes_y) / (piece.height - piece.thickness))
     places = np.stack(np.broadcast_arrays(nodes_x, nodes_y[:, None]))
     places[1] += piece.drop(nodes_x) * fade[:, None]
@@ -286,10 +363,10 @@ def condense(x, piece: Piece, plane: str, row: float, level: Level, face: slice)
     if plane == "stress":
         lame = 2 * lame * shear / (lame + 2 * shear)
     whole = cell_stiffness(of_cells.reshape(2, -1, 5, 5), lame, shear)
-    cells, local = order_four.condense_interior(whole, ORDER)
+    cells, local = condense_interior(whole)
 
     # Nodes of the face are last; all their tangential displacements precede the normal ones.
-    numbers, count = order_four.numbering(n_x, n_y, ORDER)
+    numbers, count = numbering(n_x, n_y)
     numbers = numbers[rows[:, None, :, None], columns[None, :, None, :]].reshape(-1, 25)[:, local]
     m = n_x * ORDER + 1
     last = numbers >= count - m
@@ -448,8 +525,11 @@ def press_layer(law: RoughLaw, area, C, gap, rigid, target, spring) -> tuple:
     return f, q, log > log.max() + np.log(MIN_LAYER_PRESSURE), f * rate
 
 
-def press(scene: Scene, parts: list, level: Level) -> Pressed:
-    """Press a scene on columns that are graded towards the edges of given intervals in contact."""
+def condense_pieces(scene: Scene, parts: list, level: Level) -> tuple:
+    """Return nodes and weights (m,) [m] of the face, and the compliances (3, m, m) [m/N] of both pieces.
+
+    The columns are graded towards the edges of given intervals in contact.
+    """
     half = scene.half
     contact = min((high - low for low, high in parts), default=2 * half)
     edges = []
@@ -477,8 +557,13 @@ def press(scene: Scene, parts: list, level: Level) -> Pressed:
     # The upper piece is the mirror image of a lower one: a shear moves its face the other way.
     mirror = np.array([1, 1, -1])[:, None, None]
     of_upper = compliances if upper == lower else condense_piece(upper, scene, x, level)
-    nodes, weight = order_four.face_nodes(x, ORDER)
-    return press_nodes(scene, nodes, weight, (compliances + mirror * of_upper) / scene.width)
+    nodes, weight = face_nodes(x)
+    return nodes, weight, (compliances + mirror * of_upper) / scene.width
+
+
+def press(scene: Scene, parts: list, level: Level) -> Pressed:
+    """Press a scene on columns that are graded towards the edges of given intervals in contact."""
+    return press_nodes(scene, *condense_pieces(scene, parts, level))
 
 
 def condense_piece(piece: Piece, scene: Scene, x, level: Level) -> np.ndarray:
@@ -682,7 +767,24 @@ def interpolate_peak(scene: Scene, pressed: Pressed) -> float:
     return curve(np.linspace(places[1], places[3], 201)).max()
 
 
-def solve_patch(contact: dict, trace_points=None, levels=LEVELS) -> tuple[dict, dict]:
+def press_levels(scene: Scene, levels=LEVELS) -> list[Pressed]:
+    """Return the patch pressed on each level, whose columns are graded towards the contact edges of the mesh before."""
+    parts = []
+    for k in range(N_SEARCHES):
+        before = parts
+        parts = find_parts(scene, press(scene, parts, SEARCHES[min(k // 2, 1)]))
+        if k > 1 and len(parts) == len(before):
+            change = np.abs(np.subtract(parts, before)).max()
+            if change < min(high - low for low, high in parts) / 100:
+                break
+    found = []
+    for level in levels:
+        found.append(press(scene, parts, level))
+        parts = find_parts(scene, found[-1])
+    return found
+
+
+def solve_patch(contact: dict, trace_points=None) -> tuple[dict, dict]:
     """Return the measures of a table [contact] and their uncertainties by name.
 
     The uncertainty is the larger of the change to the last level and half of the change before it.
@@ -693,24 +795,9 @@ def solve_patch(contact: dict, trace_points=None, levels=LEVELS) -> tuple[dict, 
         Quantities as text in SI units, such as "0.01 m".
     trace_points : (2, k) ndarray, optional
         Positions and heights [m] of a gap.
-    levels : sequence of Level
-        Three levels.
     """
     scene = read_scene(contact, trace_points)
-    parts = []
-    for k in range(N_SEARCHES):
-        before = parts
-        parts = find_parts(scene, press(scene, parts, SEARCHES[min(k // 2, 1)]))
-        if k > 1 and len(parts) == len(before):
-            change = np.abs(np.subtract(parts, before)).max()
-            if change < min(high - low for low, high in parts) / 100:
-                break
-    results = []
-    for level in levels:
-        pressed = press(scene, parts, level)
-        parts = find_parts(scene, pressed)
-        results.append(find_measures(scene, pressed))
-    first, second, last = results
+    first, second, last = (find_measures(scene, pressed) for pressed in press_levels(scene))
     doubt = {
         name: max(abs(value - second[name]), abs(second[name] - first[name]) / 2)
         for name, value in last.items()

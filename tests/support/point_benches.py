@@ -133,8 +133,7 @@ def integrate_bench(bench: dict, rtol: float) -> dict:
     works = {}
     for piece in motion.run(end, rtol, start=None if law.set_valued else motion.start()[:-1]):
         law.mode, law.side = piece.modes[0]
-        if piece.turns:
-            law.turns = piece.turns[0]
+        law.turns = piece.turns[0]
         begin = piece.times[0]
         stop = piece.times[-1]
         count = max(int(N_SAMPLES * (stop - begin) / period), 2)

@@ -24,9 +24,9 @@ from typing import NamedTuple
 import numpy as np
 import wear_scenes
 from campaigns import Row
+from patch_of_order_four import read_scene
 from scipy.ndimage import gaussian_filter1d
-from static_reference import BodySection, PatchScene
-from static_scenes import MATERIALS, format_scene
+from static_scenes import MATERIALS, BodySection, PatchScene, format_scene, read_contact
 from surface_pairs import draw_surface
 from wear_scenes import WearScene
 
@@ -87,11 +87,10 @@ def draw_scene(seed: int) -> WearScene:
 
 def compute_depth(scene: WearScene, x) -> np.ndarray:
     """Return the depth (n,) [m] of both bodies at positions x (n,) [m] along the patch, without the package."""
-    half = scene.patch.length / 2
-    model = wear_scenes.discretize(scene.patch, (-half, half), CELLS)
-    depth = wear_scenes.integrate_depth(model, scene, STEPS).depth
-    positions = np.clip(x, model.place[0], model.place[-1])
-    return np.where(np.abs(x) <= half, np.interp(positions, model.place, depth), 0.0)
+    patch = read_scene(read_contact(scene.patch), None)
+    model = wear_scenes.discretize(patch, (-patch.half, patch.half), CELLS)
+    depth = wear_scenes.integrate_depth(patch, model, scene, STEPS).depth
+    return np.where(np.abs(x) <= patch.half, np.interp(x, model.x, depth), 0.0)
 
 
 def draw_pile_up(random, x, ends: tuple, depth: float) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""Random static patches, as texts of scenes and as input of `static_reference`.
+"""Random static patches as texts of scenes, whose reference is `patch_of_order_four`.
 
 The campaigns "static" and "static-fine" of `campaigns.py` compare runs with a tolerance of 1e-2 and
 of 1e-3.
@@ -6,19 +6,20 @@ of 1e-3.
 
 from __future__ import annotations
 
+import tomllib
 from functools import partial
 from pathlib import Path
 from time import process_time
+from typing import NamedTuple
 
 import numpy as np
 from campaigns import measure_rows
-from static_reference import BodySection, PatchScene, solve_scene
+from patch_of_order_four import solve_patch
 
 import patchfem as pf
 
 KINDS = ("plain", "crown", "h1", "step", "ends", "skin")
 MATERIALS = ((121e9, 0.32), (210e9, 0.3), (70e9, 0.34), (250e9, 0.24))
-FINE = 5e-4  # Size of the cells at contact edges of the reference, relative to the contact.
 # Smallest ratio of the stated error to the uncertainty of the reference at which a row counts.
 KNOWN = 3.0
 JUDGED = (
@@ -32,6 +33,34 @@ JUDGED = (
     "tangential_stiffness",
     "rotational_stiffness",
 )
+
+
+class BodySection(NamedTuple):
+    """Body with lengths [m]; layers: (Young's modulus [Pa], Poisson's ratio) of coating and substrate."""
+
+    length: float
+    height: float
+    thickness: float
+    layers: tuple
+
+
+class PatchScene(NamedTuple):
+    """Patch under a load [N] at a prescribed tilt [rad].
+
+    curvature: of a crown [1/m]; step: (height, position) [m] or None; skin: stiffness of the
+    asperities [Pa/m] or None.
+    """
+
+    length: float
+    width: float
+    plane: str
+    lower: BodySection
+    upper: BodySection
+    load: float
+    tilt: float = 0.0
+    curvature: float = 0.0
+    step: tuple | None = None
+    skin: float | None = None
 
 
 def draw_scene(seed: int) -> PatchScene:
@@ -128,9 +157,14 @@ def format_scene(scene: PatchScene) -> str:
     return "\n".join(rows) + "\n"
 
 
-def solve_reference(scene: PatchScene, tolerance: float = FINE) -> tuple:
+def read_contact(scene: PatchScene) -> dict:
+    """Return the table [contact] of the text of a scene."""
+    return tomllib.loads(format_scene(scene))["contact"]
+
+
+def solve_reference(scene: PatchScene) -> tuple:
     """Return the measures of the reference, and their uncertainties, by name."""
-    true, doubt = solve_scene(scene, tolerance)
+    true, doubt = solve_patch(read_contact(scene))
     doubt = {name: float(doubt[name]) for name in JUDGED}
     # The value is zero by symmetry; its uncertainty is a fraction of the terms of its difference.
     doubt["pressure_centre"] = max(doubt["pressure_centre"], 1e-6 * true["contact_half_width"])

@@ -3,7 +3,7 @@
 This is the campaign "wear" of `campaigns.py`.
 
 Truth: dh/ds = coefficient * pressure for the depth h and the sliding distance s, on the compliance
-of the elements of order 4 of `static_reference`. Nothing of the package is used. Each step is an
+of the elements of order 4 of `patch_of_order_four`. Nothing of the package is used. Each step is an
 implicit Euler step: the contact is solved with C + diag(coefficient * ds / area). Steps halved
 twice give Richardson's extrapolation, and a coarser mesh gives the uncertainty. The volume has the
 closed form coefficient * load * path (`wear_forms.worn_volume`).
@@ -17,8 +17,17 @@ from time import process_time
 from typing import NamedTuple
 
 import numpy as np
-import static_reference as reference
 import static_scenes
+from patch_of_order_four import (
+    Level,
+    Pressed,
+    Scene,
+    condense_pieces,
+    find_intervals,
+    find_measures,
+    number,
+    read_scene,
+)
 from wear_forms import worn_volume
 
 import patchfem as pf
@@ -33,7 +42,7 @@ FIRST_STEP = 1e-4
 class WearScene(NamedTuple):
     """Patch that slides back and forth without partial slip, in SI units."""
 
-    patch: reference.PatchScene
+    patch: static_scenes.PatchScene
     coefficient: float  # [m^2/N]
     amplitude: float  # [m]
     cycles: float
@@ -42,16 +51,6 @@ class WearScene(NamedTuple):
     def path(self) -> float:
         """Sliding distance [m]."""
         return 4 * self.amplitude * self.cycles
-
-
-class WearModel(NamedTuple):
-    """Discrete patch: compliances (m, m) [m/N] per unit width, positions, weights and gap (m,) [m]."""
-
-    normal: np.ndarray
-    tangential: np.ndarray
-    place: np.ndarray
-    weight: np.ndarray
-    gap: np.ndarray
 
 
 def draw_scene(seed: int) -> WearScene:
@@ -78,38 +77,56 @@ def format_scene(scene: WearScene) -> str:
     )
 
 
-def discretize(patch: reference.PatchScene, span: tuple, cells: int) -> WearModel:
-    """Condense both bodies to an interface with uniform cells over `span` and larger ones outside it."""
-    half = patch.length / 2
-    size = (span[1] - span[0]) / cells
-    corner = min(patch.lower.height, patch.length) / 60
-    points = [-half, half]
-    sizes = [min(corner, size)] * 2
-    if patch.lower.length != patch.upper.length:
-        sizes = [size / 8] * 2
-    for place in np.linspace(*span, cells + 1):
-        points = [*points, float(place)]
-        sizes = [*sizes, size]
-    if patch.step:
-        points = [*points, patch.step[1]]
-        sizes = [*sizes, size / 4]
-    x = reference.grade_points(points, sizes, -half, half, 0.5, patch.length / 10)
-    place, weight = reference.order_four.face_nodes(x, reference.ORDER)
-    bodies = [patch.lower] + [patch.upper] * (patch.upper != patch.lower)
-    parts = [reference.condense_face(body, patch.plane, x, 0.5, corner) for body in bodies]
-    low = parts[0]
-    high = parts[-1]
-    normal = low[0] + high[0]
-    if patch.skin:
-        normal = normal + np.diag(1 / (patch.skin * weight))
-    gap = reference.unloaded_gap(patch, place)
-    return WearModel(
-        normal, low[1] + high[1] if patch.upper == patch.lower else np.empty(0), place, weight, gap
-    )
+def discretize(scene: Scene, span: tuple, cells: int) -> Pressed:
+    """Return the unloaded patch on columns of at most 1/cells of `span` there and larger ones outside."""
+    level = Level(1 / (8 * cells), 1 / 60, 0.5, cells, 5)
+    x, weight, compliances = condense_pieces(scene, [span], level)
+    area = weight * scene.width
+    layer = number(scene.layer["normal_stiffness"]) if scene.layer else np.inf
+    empty = np.zeros((1, x.size))
+    return Pressed(x, area, empty, *compliances, layer * area[None], np.zeros(1), empty, [])
+
+
+def solve_contact(compliance, gap, load: float, active=None) -> tuple:
+    """Solve the contact by an active-set method that starts from `active`.
+
+    Parameters
+    ----------
+    compliance : (m, m) array
+        Normal compliance [m/N].
+    gap : (m,) array
+        Of the unloaded faces [m].
+    load : float
+        Sum of the nodal forces [N].
+    active : (m,) array of bool, optional
+        By default the smallest three tenths of the gaps.
+
+    Returns
+    -------
+    tuple
+        Nodal forces (m,) >= 0, the approach, and the nodes in contact. The gaps under load are >= 0, and zero where
+        the force is not.
+    """
+    if active is None:
+        active = gap <= np.quantile(gap, 0.3)
+    for _ in range(400):
+        index = np.flatnonzero(active)
+        columns = np.stack([np.ones(index.size), gap[index]], axis=1)
+        rows = np.linalg.solve(compliance[np.ix_(index, index)], columns)
+        approach = (load + rows[:, 1].sum()) / rows[:, 0].sum()
+        force = np.zeros(gap.size)
+        force[index] = approach * rows[:, 0] - rows[:, 1]
+        displacement = compliance @ force
+        leaves = active & (force < 0)
+        enters = ~active & (displacement + gap - approach < -1e-13 * np.abs(displacement).max())
+        if not leaves.any() and not enters.any():
+            return force, approach, active
+        active = active & ~leaves if leaves.any() else active | enters
+    raise RuntimeError("no contact found")
 
 
 class WornPatch(NamedTuple):
-    """State after wear: depth of both bodies together (m,) [m], nodal forces, approach, nodes in contact."""
+    """State after wear: depth of both bodies together (m,) [m], nodal forces [N], approach, nodes in contact."""
 
     depth: np.ndarray
     force: np.ndarray
@@ -117,90 +134,73 @@ class WornPatch(NamedTuple):
     active: np.ndarray
 
 
-def integrate_depth(model: WearModel, scene: WearScene, steps: int) -> WornPatch:
+def get_compliance(patch: Scene, model: Pressed) -> np.ndarray:
+    """Return the normal compliance (m, m) [m/N] of both pieces and the linear layer."""
+    return model.nn + np.diag(1 / model.slope[0])
+
+
+def integrate_depth(patch: Scene, model: Pressed, scene: WearScene, steps: int) -> WornPatch:
     """Integrate the depth along the sliding distance in `steps` steps that grow geometrically."""
-    load = scene.patch.load / scene.patch.width
     edges = (
         np.expm1(np.linspace(0, 1, steps + 1) * np.log1p(1 / FIRST_STEP)) * FIRST_STEP * scene.path
     )
+    compliance, gap = get_compliance(patch, model), patch.gap(model.x)
     active = None
-    depth = np.zeros(model.gap.size)
+    depth = np.zeros(gap.size)
     for begin, end in pairwise(edges):
         rate = scene.coefficient * (end - begin) / model.weight
-        force, approach, active = reference.solve_contact(
-            model.normal + np.diag(rate), model.gap + depth, load, active
+        force, approach, active = solve_contact(
+            compliance + np.diag(rate), gap + depth, patch.load, active
         )
         depth = depth + rate * force
     return WornPatch(depth, force, approach, active)
 
 
-def compute_measures(model: WearModel, scene: WearScene, steps: int) -> dict:
+def compute_measures(patch: Scene, model: Pressed, scene: WearScene, steps: int) -> dict:
     """Return the measures after wear that is integrated in `steps` steps."""
-    depth, force, approach, active = integrate_depth(model, scene, steps)
-    pressure = force / model.weight
-    index = np.flatnonzero(active)
-    patch = scene.patch
-    place = model.place
-    edges = [
-        reference.locate_edge(place, pressure, int(index[0]), -1, patch),
-        reference.locate_edge(place, pressure, int(index[-1]), 1, patch),
-    ]
-    inverse = np.linalg.inv(model.normal[np.ix_(index, index)])
-    values = {
-        "worn_depth_max": float(depth.max()),
-        "contact_half_width": (edges[1] - edges[0]) / 2,
-        "pressure_peak": reference.interpolate_peak(place, pressure),
-        "approach": approach,
-        "normal_stiffness": inverse.sum() * patch.width,
-        "rotational_stiffness": place[index] @ inverse @ place[index] * patch.width,
-    }
-    if index.size == index[-1] - index[0] + 1:  # The contact has no gap inside.
-        values["contact_fraction"] = (edges[1] - edges[0]) / patch.length
-    if model.tangential.size:
-        compliance = model.tangential[np.ix_(index, index)]
-        values["tangential_stiffness"] = (
-            np.linalg.solve(compliance, np.ones(index.size)).sum() * patch.width
-        )
-    return values
+    depth, force, approach, active = integrate_depth(patch, model, scene, steps)
+    intervals = [find_intervals(patch, model.x, force / model.weight, active)]
+    worn = model._replace(
+        force=force[None], motion=np.array([approach]), active=active[None], intervals=intervals
+    )
+    return find_measures(patch, worn) | {"worn_depth_max": float(depth.max())}
 
 
-def find_contact_span(model: WearModel, scene: WearScene) -> tuple:
+def find_contact_span(patch: Scene, model: Pressed, scene: WearScene) -> tuple:
     """Return the smallest and largest position in contact before and after wear."""
-    load = scene.patch.load / scene.patch.width
+    compliance, gap = get_compliance(patch, model), patch.gap(model.x)
     rate = scene.coefficient * scene.path / model.weight
-    new = reference.solve_contact(model.normal, model.gap, load)[2]
-    worn = reference.solve_contact(model.normal + np.diag(rate), model.gap, load)[2]
-    positions = model.place[new | worn]
+    new = solve_contact(compliance, gap, patch.load)[2]
+    worn = solve_contact(compliance + np.diag(rate), gap, patch.load)[2]
+    positions = model.x[new | worn]
     return float(positions.min()), float(positions.max())
 
 
 def solve_scene(scene: WearScene) -> dict:
     """Return the measures after wear: name -> (value, uncertainty)."""
-    patch = scene.patch
-    half = scene.patch.length / 2
+    patch = read_scene(static_scenes.read_contact(scene.patch), None)
+    half = patch.half
     span = (-half, half)
     for _ in range(3):
-        low, high = find_contact_span(discretize(patch, span, CELLS[0]), scene)
-        margin = 0.05 * (high - low) + 1e-6 * patch.length
+        low, high = find_contact_span(patch, discretize(patch, span, CELLS[0]), scene)
+        margin = 0.05 * (high - low) + 1e-6 * half
         span = (max(low - margin, -half), min(high + margin, half))
     extrapolated = []
     for cells in CELLS:
         model = discretize(patch, span, cells)
-        coarse, middle, fine = (compute_measures(model, scene, steps) for steps in STEPS)
-        shared = coarse.keys() & middle.keys() & fine.keys()
+        coarse, middle, fine = (compute_measures(patch, model, scene, steps) for steps in STEPS)
         extrapolated.append(
             {
                 name: (
                     2 * fine[name] - middle[name],
                     abs(2 * fine[name] - 3 * middle[name] + coarse[name]),
                 )
-                for name in shared
+                for name in fine
             }
         )
     truth = {
         name: (value, error + abs(value - extrapolated[0][name][0]))
         for name, (value, error) in extrapolated[1].items()
-        if name in extrapolated[0]
     }
     truth["worn_volume"] = (worn_volume(scene.coefficient, patch.load, scene.path), 0.0)
     return truth
