@@ -36,14 +36,14 @@ class Front(NamedTuple):
     """Eliminated nodes of one part.
 
     - ``own``: (a,) eliminated nodes
-    - ``ring``: (b,) nodes that remain
+    - ``boundary``: (b,) nodes that remain
     - ``factor``: (2 a, 2 a) lower Cholesky factor L of the stiffness of the own nodes
-    - ``coupling``: (2 a, 2 b) L^-1 K_own,ring
+    - ``coupling``: (2 a, 2 b) L^-1 K_own,boundary
     - ``smallest_pivot``: smallest pivot relative to the diagonal entry before the elimination
     """
 
     own: np.ndarray
-    ring: np.ndarray
+    boundary: np.ndarray
     factor: np.ndarray
     coupling: np.ndarray
     smallest_pivot: float = 1.0
@@ -75,14 +75,14 @@ class Fronts:
         frames = u.shape[-1]
         with use_one_blas_thread():
             # Forward substitution from the leaves to the interface, then back
-            for own, ring, factor, coupling, _ in self.fronts:
+            for own, boundary, factor, coupling, _ in self.fronts:
                 half_solved = dtrsm(1.0, factor, u[own].reshape(-1, frames), lower=1)
                 u[own] = half_solved.reshape(-1, 2, frames)
-                u[ring] -= (coupling.T @ half_solved).reshape(-1, 2, frames)
+                u[boundary] -= (coupling.T @ half_solved).reshape(-1, 2, frames)
             forces = u[self.interface].reshape(-1, frames)
             u[self.interface] = (self.compliance @ forces).reshape(-1, 2, frames)
-            for own, ring, factor, coupling, _ in reversed(self.fronts):
-                right = u[own].reshape(-1, frames) - coupling @ u[ring].reshape(-1, frames)
+            for own, boundary, factor, coupling, _ in reversed(self.fronts):
+                right = u[own].reshape(-1, frames) - coupling @ u[boundary].reshape(-1, frames)
                 u[own] = dtrsm(1.0, factor, right, lower=1, trans_a=1).reshape(-1, 2, frames)
         return u
 
@@ -131,11 +131,15 @@ class Fronts:
 
 
 class _Part(NamedTuple):
-    """Part of a mesh that consists of the leaves from `begin` to `end`, and the numbers of its two halves, () for a leaf."""
+    """Part of a mesh that consists of successive leaves.
+
+    - ``halves``: numbers of its two halves, () for a leaf
+    - ``first_leaf``, ``end_leaf``: first leaf, and last leaf + 1
+    """
 
     halves: tuple[int, ...]
-    begin: int
-    end: int
+    first_leaf: int
+    end_leaf: int
 
 
 class _Stiffness(NamedTuple):
@@ -160,7 +164,7 @@ def _dissect(positions) -> tuple[list[_Part], list[np.ndarray]]:
 
     def divide(cells) -> int:
         """Divide cells, and return the number of their part."""
-        begin = len(leaves)
+        first_leaf = len(leaves)
         halves = ()
         if cells.size > MAX_LEAF_CELLS:
             along = positions[cells]
@@ -170,7 +174,7 @@ def _dissect(positions) -> tuple[list[_Part], list[np.ndarray]]:
             halves = (divide(cells[is_first]), divide(cells[~is_first]))
         else:
             leaves.append(cells)
-        parts.append(_Part(halves, begin, len(leaves)))
+        parts.append(_Part(halves, first_leaf, len(leaves)))
         return len(parts) - 1
 
     divide(np.arange(len(positions)))
@@ -205,7 +209,7 @@ def condense(blocks: list[CellBlock], positions, interface, is_fixed) -> Fronts:
     parts, leaves = _dissect(positions)
     first, last = _find_leaves_of_nodes(blocks, leaves, len(is_fixed))
     last[interface] = len(leaves)  # these nodes belong to no part
-    place = np.empty(len(is_fixed), np.int64)
+    position = np.empty(len(is_fixed), np.int64)
 
     # Halves stand before their part, so their stiffnesses are ready when the part is reached
     stiffnesses = {}
@@ -215,18 +219,18 @@ def condense(blocks: list[CellBlock], positions, interface, is_fixed) -> Fronts:
             if part.halves:
                 terms = [stiffnesses.pop(half) for half in part.halves]
             else:
-                terms = [_assemble_leaf(blocks, leaves[part.begin], place)]
+                terms = [_assemble_leaf(blocks, leaves[part.first_leaf], position)]
             nodes = np.unique(np.concatenate([term.nodes for term in terms]))
-            is_own = (first[nodes] >= part.begin) & (last[nodes] < part.end)
+            is_own = (first[nodes] >= part.first_leaf) & (last[nodes] < part.end_leaf)
             own = nodes[is_own]
-            ring = nodes[~is_own]
-            front, stiffnesses[number] = _eliminate(own, ring, terms, place)
+            boundary = nodes[~is_own]
+            front, stiffnesses[number] = _eliminate(own, boundary, terms, position)
             fronts.append(front)
 
         # The last stiffness is the Schur complement; its rows and columns are put in the order of the interface
         nodes, schur = stiffnesses[len(parts) - 1]
-        place[nodes] = np.arange(nodes.size)
-        unknowns = _number_unknowns(place[interface])
+        position[nodes] = np.arange(nodes.size)
+        unknowns = _number_unknowns(position[interface])
         factor, pivot = _factorise(schur.take(unknowns, 0).take(unknowns, 1))
         compliance = cho_inverse(factor)
     smallest_pivot = min([pivot, *(front.smallest_pivot for front in fronts)])
@@ -261,8 +265,8 @@ def _find_leaves_of_nodes(blocks, leaves, n_nodes: int) -> tuple[np.ndarray, np.
     return first, last
 
 
-def _assemble_leaf(blocks, cells, place) -> _Stiffness:
-    """Assemble the stiffness of given cells; `place` is a workspace (n_nodes,)."""
+def _assemble_leaf(blocks, cells, position) -> _Stiffness:
+    """Assemble the stiffness of given cells; `position` is a workspace (n_nodes,)."""
     selected = []
     n_cells = 0
     for nodes, matrices in blocks:
@@ -270,11 +274,11 @@ def _assemble_leaf(blocks, cells, place) -> _Stiffness:
         n_cells += len(nodes)
         selected.append((nodes[here], matrices[here]))
     nodes = np.unique(np.concatenate([cells.ravel() for cells, _ in selected]))
-    place[nodes] = np.arange(nodes.size)
+    position[nodes] = np.arange(nodes.size)
     size = 2 * nodes.size + 2
     total = 0.0
     for cell_nodes, matrices in selected:
-        unknowns = _number_unknowns(place[cell_nodes])
+        unknowns = _number_unknowns(position[cell_nodes])
         entries = unknowns[:, :, None] * size + unknowns[:, None]
         total = total + np.bincount(entries.ravel(), matrices.ravel(), size**2)
     return _Stiffness(nodes, total.reshape(size, size))
@@ -285,37 +289,37 @@ def _number_unknowns(nodes) -> np.ndarray:
     return (2 * nodes[..., None] + np.array([0, 1])).reshape(*nodes.shape[:-1], 2 * nodes.shape[-1])
 
 
-def _eliminate(own, ring, terms, place) -> tuple[Front, _Stiffness]:
-    """Add up the stiffnesses of a part and eliminate its own nodes: K_oo = L L^T, S = K_rr - W^T W with W = L^-1 K_or."""
+def _eliminate(own, boundary, terms, position) -> tuple[Front, _Stiffness]:
+    """Add up the stiffnesses of a part and eliminate its own nodes: K_oo = L L^T, S = K_bb - W^T W with W = L^-1 K_ob."""
     sums = None
     for nodes, matrix in terms:
         # Nodes that the term does not contain take the zeros in its last rows and columns, as does the node that is
-        # added to the ring for the zeros of the result.
-        place[own] = place[ring] = nodes.size
-        place[nodes] = np.arange(nodes.size)
-        of_own = _number_unknowns(place[own])
-        of_ring = _number_unknowns(np.append(place[ring], nodes.size))
+        # added to the boundary for the zeros of the result.
+        position[own] = position[boundary] = nodes.size
+        position[nodes] = np.arange(nodes.size)
+        of_own = _number_unknowns(position[own])
+        of_boundary = _number_unknowns(np.append(position[boundary], nodes.size))
         rows = matrix.take(of_own, 0)
         term = (
             rows.take(of_own, 1),
-            rows.take(of_ring, 1),
-            matrix.take(of_ring, 0).take(of_ring, 1),
+            rows.take(of_boundary, 1),
+            matrix.take(of_boundary, 0).take(of_boundary, 1),
         )
         sums = term if sums is None else tuple(map(np.add, sums, term, sums))
 
     # The coupling W and the remaining stiffness S overwrite their terms
-    own_own, own_ring, remaining = sums
+    own_own, own_boundary, remaining = sums
     factor = own_own
     smallest_pivot = 1.0
     if own.size:
         factor, smallest_pivot = _factorise(own_own)
         # The arrays are passed transposed, because LAPACK stores columns.
-        coupling = own_ring.T
+        coupling = own_boundary.T
         dtrsm(1.0, factor, coupling, side=1, lower=1, trans_a=1, overwrite_b=1)
         dgemm(-1.0, coupling, coupling, beta=1.0, c=remaining.T, trans_b=1, overwrite_c=1)
 
-    front = Front(own, ring, factor, own_ring[:, : 2 * ring.size], smallest_pivot)
-    return front, _Stiffness(ring, remaining)
+    front = Front(own, boundary, factor, own_boundary[:, : 2 * boundary.size], smallest_pivot)
+    return front, _Stiffness(boundary, remaining)
 
 
 def _factorise(matrix) -> tuple[np.ndarray, float]:

@@ -105,7 +105,7 @@ def measure_wear(first: PatchState, second: PatchState) -> Wear:
     # a node is worn if its depth is larger than the error
     is_worn = depth > max(error, MIN_WORN_FRACTION * float(depth.max()), 0.0)
     hidden = find_plane_below(x, second.y, depth)
-    share = float(second.area[is_worn].sum()) / area
+    worn_fraction = float(second.area[is_worn].sum()) / area
     mean_error = None if volume_error is None else volume_error / area
     values = {
         "worn_volume": _enclose(volume, volume_error, "m3"),
@@ -113,7 +113,7 @@ def measure_wear(first: PatchState, second: PatchState) -> Wear:
         "worn_depth_mean": _enclose(volume / area, mean_error, "m"),
         "worn_area": _enclose(volume / area * length, mean_error and mean_error * length, "m2"),
         "hidden_wear": _enclose(float(np.mean(hidden)), depth_error, "m"),
-        "worn_share": Quantity(share, share, share, "1", ""),
+        "worn_share": Quantity(worn_fraction, worn_fraction, worn_fraction, "1", ""),
     }
     track = {}
     if second.y is None and is_worn.any():

@@ -15,8 +15,10 @@ from pressed import press, press_to_approach
 from patchfem.contact import StripCompliance, patch_problem, solve_by_gradients
 from patchfem.contact.active_set import solve_primal_dual
 from patchfem.contact.gaps import crown, tilt
-from patchfem.contact.unilateral import RESIDUAL_TOL, explain_singular_set
+from patchfem.contact.unilateral import explain_singular_set
 from patchfem.core import Compliance, Interface, NotConverged, Outcome, PatchfemError
+
+RESIDUAL_TOL = 1e-12  # largest relative residual of a pressed patch, as `press_strips` states it
 
 
 def make_pair(x, c) -> Compliance:

@@ -153,7 +153,7 @@ def sum_list(fraction, increment, bonds, v0, dt):
     """
     strips = bonds.bondlist
     status = bonds.status
-    first = int(status[STATUS.room_start])
+    first = int(status[STATUS.first_column])
     end = int(status[STATUS.end])
 
     # The strips that exist, then the two columns that are no strips: initial bonds and new bonds
@@ -190,7 +190,7 @@ def total(row, point, bonds):
     """
     strips = bonds.bondlist
     pressure = STRIP.pressure + point
-    first = int(bonds.status[STATUS.room_start])
+    first = int(bonds.status[STATUS.first_column])
     result = strips[pressure, first] * strips[row, first]
     for k in range(int(bonds.status[STATUS.head]), int(bonds.status[STATUS.end]) + 1):
         result += strips[pressure, k] * strips[row, k]
@@ -358,7 +358,7 @@ def list_mean(increment, bonds, v0, dt):
     if abs(increment) < MIN_POSITIVE:
         return bonds.status[STATUS.force]
     strips = bonds.bondlist
-    first = int(bonds.status[STATUS.room_start])
+    first = int(bonds.status[STATUS.first_column])
 
     # Energy balance divided by the increment: damage dissipates the fraction dR/eps of the mean energy, and the stored
     # energy rises from its present value to that at the end
@@ -378,17 +378,17 @@ def list_mean(increment, bonds, v0, dt):
     strips[STRIP.mean, first] = 0.0
     for k in range(int(bonds.status[STATUS.head]), int(bonds.status[STATUS.end]) + 1):
         strips[STRIP.mean, k] = 0.0
-    share = _find_simpson_share(increment, bonds)
-    if share > 0:
-        _add_to_mean(share * loss / 6, present_row, bonds)
+    simpson_fraction = _find_simpson_fraction(increment, bonds)
+    if simpson_fraction > 0:
+        _add_to_mean(simpson_fraction * loss / 6, present_row, bonds)
         sum_list(0.5, increment, bonds, v0, dt)
-        _add_to_mean(4 * share * loss / 6, row, bonds)
-    if share < 1:
-        _integrate_panels((1 - share) * loss, row, increment, bonds, v0, dt)
+        _add_to_mean(4 * simpson_fraction * loss / 6, row, bonds)
+    if simpson_fraction < 1:
+        _integrate_panels((1 - simpson_fraction) * loss, row, increment, bonds, v0, dt)
     if gain != 0:
         _add_to_mean(-gain, present_row, bonds)
     sum_list(1.0, increment, bonds, v0, dt)
-    end_weight = gain + share * loss / 6
+    end_weight = gain + simpson_fraction * loss / 6
     if end_weight != 0:
         _add_to_mean(end_weight, row, bonds)
     _write_exact_means(increment, after.middle_length, bonds)
@@ -407,14 +407,14 @@ def _write_exact_means(increment, eps, bonds):
         new = int(bonds.status[STATUS.end])
         strips[STRIP.mean, new] = average_formed(increment, eps, bonds)
     else:
-        first = int(bonds.status[STATUS.room_start])
+        first = int(bonds.status[STATUS.first_column])
         strips[STRIP.mean, first] = average_initial(increment, bonds)
 
 
 @njit(**NJIT_KERNEL)
 def _add_to_mean(weight, row, bonds):
     """Add a row of all bonds, times a weight, to the row of the mean force."""
-    first = uint64(bonds.status[STATUS.room_start])
+    first = uint64(bonds.status[STATUS.first_column])
     mean = bonds.bondlist[STRIP.mean]
     values = bonds.bondlist[row]
     mean[first] += weight * values[first]
@@ -475,8 +475,8 @@ def _needs_energy_balance(increment, bonds):
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def _find_simpson_share(increment, bonds):
-    """Return the share of Simpson's rule in the mean of an increment; the remainder is that of panels of Gauss points.
+def _find_simpson_fraction(increment, bonds):
+    """Return the fraction of Simpson's rule in the mean of an increment; the remainder is that of panels of Gauss points.
 
     It is 1 for increments of up to half a limit with a smooth force and falls to 0 at the limit, so that the mean depends
     continuously on the increment. For distributed initial bonds it must not depend on their position.

@@ -90,9 +90,9 @@ def make_status(capacity: int, count: int | None = None) -> np.ndarray:
     """
     status = np.zeros((count or 1, len(ListStatus._fields)))
     start = capacity * np.arange(count or 1)
-    status[:, STATUS.room_start] = start
+    status[:, STATUS.first_column] = start
     status[:, STATUS.head] = status[:, STATUS.end] = start + 1
-    status[:, STATUS.room_end] = start + capacity
+    status[:, STATUS.end_column] = start + capacity
     status[:, STATUS.pressure] = 1.0
     status[:, STATUS.initial_pressure] = 1.0
     return status if count else status[0]
@@ -158,12 +158,12 @@ def enlarge_lists(bondlist, statuses, capacity: int) -> np.ndarray:
     """
     enlarged = np.zeros((len(bondlist), capacity * len(statuses)))
     for j, status in enumerate(statuses):
-        first, head, end = status[[STATUS.room_start, STATUS.head, STATUS.end]].astype(int)
+        first, head, end = status[[STATUS.first_column, STATUS.head, STATUS.end]].astype(int)
         start = j * capacity
         enlarged[:, start] = bondlist[:, first]
         enlarged[:, start + 1 : start + 1 + end - head] = bondlist[:, head:end]
-        status[STATUS.room_start] = start
+        status[STATUS.first_column] = start
         status[STATUS.head] = start + 1
         status[STATUS.end] = start + 1 + end - head
-        status[STATUS.room_end] = start + capacity
+        status[STATUS.end_column] = start + capacity
     return enlarged

@@ -149,7 +149,7 @@ class ListStatus(NamedTuple):
     - n_extra: number of strips in excess of one per step
     - max_strips: largest number of strips
     - owed: energy [m] that the next dissipation repays, see `points.lists_kernels`
-    - room_start, room_end: columns of the array that belong to this list; the first one has the initial bonds
+    - first_column, end_column: columns of the array that belong to this list; the first one has the initial bonds
     - pressure: relative pressure under which bonds form; of several points the largest
     - initial_pressure: relative pressure under which the initial bonds of one point formed
     """
@@ -164,8 +164,8 @@ class ListStatus(NamedTuple):
     n_extra: int = 7
     max_strips: int = 8
     owed: int = 9
-    room_start: int = 10
-    room_end: int = 11
+    first_column: int = 10
+    end_column: int = 11
     pressure: int = 12
     initial_pressure: int = 13
 

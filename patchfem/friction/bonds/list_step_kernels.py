@@ -83,10 +83,10 @@ def list_step(increment, bonds, v0, v1, dt):
     _move_reference(bonds)
 
     # Without pressure no bonds form, but those that exist still grow old
-    has_room = True
+    has_space = True
     if increment != 0:
         if status[STATUS.pressure] > 0:
-            has_room = _append_strips(increment, before, after, bonds)
+            has_space = _append_strips(increment, before, after, bonds)
         _drop_old_strips(bonds)
         # A merge visits the whole list, so it waits until the list has grown by a fifth
         n_strips = status[STATUS.end] - status[STATUS.head]
@@ -94,7 +94,7 @@ def list_step(increment, bonds, v0, v1, dt):
         if bonds.law[LAW.merge_width] > 0 and has_grown:
             _merge_strips(bonds)
     update_sums(bonds)
-    return has_room
+    return has_space
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
@@ -102,7 +102,7 @@ def update_sums(bonds):
     """Write force and energy of the present state into the strips and, of the first point, into the status."""
     strips = bonds.bondlist
     status = bonds.status
-    first = int(status[STATUS.room_start])
+    first = int(status[STATUS.first_column])
     sum_list(0.0, 0.0, bonds, 0.0, 0.0)
     strips[STRIP.present_force, first] = strips[STRIP.force, first]
     strips[STRIP.present_energy, first] = strips[STRIP.energy, first]
@@ -142,7 +142,7 @@ def _append_strips(increment, before, after, bonds):
     # Bonds of reading="report" fill one strip; other forms need several strips if the increment is long
     division = divide(path, after.middle_length, after.growth - before.growth, law)
     status[STATUS.n_extra] += division.count - 1
-    if not _make_room(int(division.count), bonds):
+    if not _make_space(int(division.count), bonds):
         return False
     # The pressures of the new bonds stand in the column after the last strip
     new = int(status[STATUS.end])
@@ -177,17 +177,17 @@ def _append_strips(increment, before, after, bonds):
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def _make_room(count, bonds):
+def _make_space(count, bonds):
     """Move a list to its first column if further strips do not fit at its end; return whether they fit."""
     strips = bonds.bondlist
     status = bonds.status
     # The column after the last strip is that of new bonds
-    capacity = min(int(status[STATUS.room_end]), strips.shape[1]) - 1
+    capacity = min(int(status[STATUS.end_column]), strips.shape[1]) - 1
     head = int(status[STATUS.head])
     end = int(status[STATUS.end])
     if end + count <= capacity:
         return True
-    first = int(status[STATUS.room_start]) + 1
+    first = int(status[STATUS.first_column]) + 1
     for i in range(strips.shape[0]):
         for k in range(head, end + 1):
             strips[i, k - head + first] = strips[i, k]
@@ -398,7 +398,7 @@ def break_bonds(point, bonds):
     status = bonds.status
     _scale_pressure(0.0, point, bonds)
     if bonds.bondlist.shape[0] == N_ROWS:
-        status[STATUS.head] = status[STATUS.end] = status[STATUS.room_start] + 1
+        status[STATUS.head] = status[STATUS.end] = status[STATUS.first_column] + 1
         status[STATUS.n_after_merge] = status[STATUS.energy] = status[STATUS.force] = 0.0
 
 
@@ -407,7 +407,7 @@ def _scale_pressure(factor, point, bonds):
     """Multiply the pressures of all bonds of a point by a factor."""
     strips = bonds.bondlist
     status = bonds.status
-    strips[STRIP.pressure + point, int(status[STATUS.room_start])] *= factor
+    strips[STRIP.pressure + point, int(status[STATUS.first_column])] *= factor
     for k in range(int(status[STATUS.head]), int(status[STATUS.end])):
         strips[STRIP.pressure + point, k] *= factor
     status[STATUS.initial_pressure] *= factor
@@ -418,7 +418,7 @@ def _density(column, point, bonds):
     """Return the density of the surviving bonds of a strip at a point, for reading="stretch"."""
     strips = bonds.bondlist
     pressure = strips[STRIP.pressure + point, column]
-    if column == int(bonds.status[STATUS.room_start]):
+    if column == int(bonds.status[STATUS.first_column]):
         return pressure * bonds.law[LAW.initial] * exp(-bonds.now[PATH.damage])
     scale = exp(bonds.now[PATH.reference] - bonds.now[PATH.damage])
     weight = strips[STRIP.value_1, column] + strips[STRIP.value_2, column]
@@ -428,7 +428,7 @@ def _density(column, point, bonds):
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def _total_density(point, bonds):
     """Return the density of all surviving bonds of a point, for reading="stretch"."""
-    result = _density(int(bonds.status[STATUS.room_start]), point, bonds)
+    result = _density(int(bonds.status[STATUS.first_column]), point, bonds)
     for k in range(int(bonds.status[STATUS.head]), int(bonds.status[STATUS.end])):
         result += _density(k, point, bonds)
     return result
@@ -439,7 +439,7 @@ def _release_last_formed(excess, point, bonds):
     """Release the bonds of a point that formed last, up to a density; the bonds of a strip in equal parts."""
     strips = bonds.bondlist
     status = bonds.status
-    first = int(status[STATUS.room_start])
+    first = int(status[STATUS.first_column])
     head = int(status[STATUS.head])
     for k in range(int(status[STATUS.end]) - 1, head - 2, -1):
         column = first if k < head else k
@@ -461,7 +461,7 @@ def append_unstretched(bonds):
     bool
         False if the array of strips is full.
     """
-    if not _make_room(1, bonds):
+    if not _make_space(1, bonds):
         return False
     strips = bonds.bondlist
     now = bonds.now

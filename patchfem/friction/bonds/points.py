@@ -210,7 +210,7 @@ class ListedBonds:
     def _sum(self, state: BondList, row: int) -> np.ndarray:
         """Return mu_s times the sum of a row of the strips and of the initial bonds, weighted by their pressures."""
         columns = np.arange(int(state.status[STATUS.head]) - 1, int(state.status[STATUS.end]))
-        columns[0] = state.status[STATUS.room_start]
+        columns[0] = state.status[STATUS.first_column]
         strips = state.bondlist
         return self.law.static * (strips[STRIP.pressure :, columns] @ strips[row, columns])
 
