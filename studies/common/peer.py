@@ -1,4 +1,4 @@
-"""Another program as a child process, CPU seconds, and the time at equal error: shared by the comparisons.
+"""Another program as a child process, and the time at equal error.
 
 A peer is another program. It runs under its own interpreter, which an environment variable names, and answers JSON
 lines. The study and the peer take turns, so that a busy machine slows both alike. CPU seconds are those of one thread,
@@ -8,13 +8,11 @@ without imports.
 import json
 import os
 import subprocess
-import sys
 from pathlib import Path
-from time import process_time
 
 import numpy as np
 
-from patchfem.core import Missing, NotConverged, PatchfemError
+from patchfem.core import Missing, NotConverged
 
 ONE_THREAD = {name: "1" for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")}
 
@@ -73,16 +71,6 @@ class Peer:
         self.child.wait()
 
 
-def measure_seconds(work, repeats: int = 1) -> tuple:
-    """Return the answer of work() and the median of its CPU seconds."""
-    seconds = []
-    for _ in range(repeats):
-        start = process_time()
-        answer = work()
-        seconds.append(process_time() - start)
-    return answer, float(np.median(seconds))
-
-
 def interpolate_seconds(error: float, errors, seconds) -> tuple:
     """Interpolate the seconds at which a curve of falling errors reaches `error`, log-log.
 
@@ -116,13 +104,3 @@ def ratio_text(theirs: float, ours: float, sign: str) -> str:
         From `interpolate_seconds`.
     """
     return {"<": "> ", ">": "< ", "": ""}[sign] + f"{theirs / ours:.2g}"
-
-
-def run(main) -> int:
-    """Return the exit code of a study; a named failure is printed as one line on stderr, without a traceback."""
-    try:
-        main()
-    except PatchfemError as error:
-        print(error, file=sys.stderr)
-        return error.code
-    return 0

@@ -42,8 +42,10 @@ TWO_DRIVE = SineDrive(1.0, 1.14, False)
 TWO_LIMIT = 3.0  # friction limit [N]
 
 
-def run_motion(modes, drive, laws, cycles: float, times=(), start=None, window: int = 1):
-    """Integrate modes from event to event with the smallest step tolerance.
+def run_motion(
+    modes, drive, laws, cycles: float, times=(), start=None, window: int = 1, rtol=cases.EXACT_RTOL
+):
+    """Integrate modes from event to event, by default with the smallest step tolerance.
 
     Parameters
     ----------
@@ -57,6 +59,8 @@ def run_motion(modes, drive, laws, cycles: float, times=(), start=None, window: 
     start : InitialState, optional
     window : int
         Cycles at the end whose measures are recorded.
+    rtol : float
+        Tolerance of a step.
 
     Returns
     -------
@@ -67,7 +71,7 @@ def run_motion(modes, drive, laws, cycles: float, times=(), start=None, window: 
         cases.Interface(law, cases.Load(1.0), row) for law, row in zip(laws, modes.interfaces)
     ]
     sizes = cases.find_sizes(modes, signal, drive, start)
-    options = cases.Options(drive.moving, rtol=cases.EXACT_RTOL)
+    options = cases.Options(drive.moving, rtol=rtol)
     rig = cases.make_rig(modes, signal, interfaces, sizes, options)
     case = cases.Case(
         rig,
@@ -84,21 +88,23 @@ def make_coulomb(static: float, kinetic: float | None = None) -> LawNumbers:
     return LawNumbers("coulomb", (float(static), float(static if kinetic is None else kinetic)))
 
 
-def sample_motion(modes, drive, limit, cycles: float, times, start=None):
-    """Integrate modes with Coulomb friction and return the response at given times.
+def sample_motion(modes, drive, law, cycles: float, times, start=None, **options):
+    """Integrate modes with one interface and return the response at given times.
 
     Parameters
     ----------
     modes : ModalBasis
     drive : drive
-    limit : float
-        Friction limit [N].
+    law : LawNumbers
+        Law of the interface under a load of 1 N.
     cycles : float
     times : (k,) array
         [s]
     start : InitialState, optional
+    **options
+        Those of `run_motion`.
     """
-    motion = run_motion(modes, drive, [make_coulomb(limit)], cycles, np.unique(times), start)
+    motion = run_motion(modes, drive, [law], cycles, np.unique(times), start, **options)
     response = motion.make_response(modes, drive)
     return response.select(np.searchsorted(response.time, np.asarray(times, float)))
 
@@ -109,4 +115,6 @@ def exact(name: str, times):
         "sdof": (SDOF, SDOF_DRIVE, SDOF_LIMIT),
         "two": (TWO, TWO_DRIVE, TWO_LIMIT),
     }[name]
-    return sample_motion(modes, drive, limit, float(np.ceil(times[-1])) / drive.period, times)
+    return sample_motion(
+        modes, drive, make_coulomb(limit), float(np.ceil(times[-1])) / drive.period, times
+    )

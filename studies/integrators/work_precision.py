@@ -40,7 +40,7 @@ from drawing import BLUE, GREY, ORANGE, drawing
 from engine_peers import PEERS
 from engine_problems import ALL
 from engines import OURS
-from peer import run
+from measuring import run
 from precision_rows import EQUAL, FLOOR, curve, measure, ratios
 
 FOLDER = Path(__file__).parent
@@ -53,8 +53,7 @@ TITLES = {
 }
 SHOWN_PROBLEMS = ("block", "two", "patch")
 STYLES = {
-    "exact": ("*", BLUE),
-    "exact, one mode": ("*", "#8b1a1a"),
+    "hybrid": ("*", "#8b1a1a"),
     "march": ("o", BLUE),
     "duhamel, report": ("v", "#b9c7d6"),
     "duhamel, static branch": ("^", "#7fa6cc"),
@@ -114,7 +113,7 @@ def report(table: dict) -> None:
     for text in table["absent"].values():
         print(text)
     for where in dict.fromkeys(r["problem"] for r in table["rows"]):
-        reference = {"patch": "march", "decay": "newmark, and force"}.get(where, "exact")
+        reference = {"decay": "newmark, and force"}.get(where, "hybrid")
         print(f"{TITLES[where]}: CPU time over that of '{reference}' at an error of {EQUAL}")
         for name, found in ratios(table["rows"], where, reference).items():
             print(f"  {name:24} " + "  ".join(f"{found[error]:>9}" for error in EQUAL))

@@ -27,7 +27,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
 from drawing import BLUE, GREY, ORANGE, drawing
-from problems import SDOF, SDOF_DRIVE, sample_motion
+from problems import SDOF, SDOF_DRIVE, make_coulomb, sample_motion
 from report_methods import coulomb, solve_newmark
 from study_text import read_answer
 
@@ -94,7 +94,7 @@ def steady(onset: float, level: float) -> Row:
 def exact_cycle(onset: float, level: float = 5.0, after: int = 40) -> Cycle:
     """Return a cycle of the exact motion, `after` cycles from rest."""
     times = 2 * np.pi * (after + 0.5 + np.linspace(0, 1, CURVE))
-    r = sample_motion(SDOF, SDOF_DRIVE, onset / level, after + 2.0, times)
+    r = sample_motion(SDOF, SDOF_DRIVE, make_coulomb(onset / level), after + 2.0, times)
     return Cycle(
         r.output, r.output_rate, r.force, r.acceleration - r.base_acceleration, r.acceleration
     )
@@ -127,7 +127,7 @@ def growth(onset: float, level: float, cycles: int = 200) -> np.ndarray:
     q = sample_motion(
         SDOF,
         SDOF_DRIVE,
-        onset / level,
+        make_coulomb(onset / level),
         cycles,
         np.linspace(0, 2 * np.pi * cycles, 60 * cycles + 1)[1:],
     ).output

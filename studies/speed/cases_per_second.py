@@ -3,19 +3,19 @@
 Together 970 cases, with errors; their amplitudes are wrong by 3e-6 in the middle and 2.4e-5 rms, and 2 of 2000 lie
 outside their errors. One by one from event to event, with a step tolerance of 1e-8, 12 cases; a loop of thirty lines
 14 300, 5930, 2890 and 1530 at 100 to 800 steps a cycle, wrong by 4.6e-5 to 6.3e-8 in the middle and 4.5e-3 to 7.8e-5 rms;
-DOP853 1.6 (CVODE was not installed). Two cores did much else; with less beside it, an earlier run gave 1219, 14.6 with a
-step tolerance of 1e-12, 22 430 to 2806, and 2.5 to 2.7.
+DOP853 1.6. Two cores did much else; with less beside it, an earlier run gave 1219, 14.6 with a step tolerance of 1e-12,
+22 430 to 2806, and 2.5 to 2.7.
 
 Random blocks on a spring (m = k = 1, damping ratio .003 to .1, friction .1 to .9 of the push) under 200 cycles of a
 base acceleration at their own frequency, from rest; the amplitude in the last cycle beside that of method "exact".
 The marched cases and method "exact" are timed from the values of the keys to columns of some 20 measures with
-error bars; the loop of thirty lines gives an amplitude alone, and no error; SciPy's DOP853 and SUNDIALS' CVODE go from
-event to event, in Python, no step longer than an eighth of a cycle, on the first few of the same cases. CPU seconds of
-one thread, all in one run, compiled code made before.
+error bars; the loop of thirty lines gives an amplitude alone, and no error; SciPy's DOP853 went from event to event, in
+Python, no step longer than an eighth of a cycle, on the first three of the same cases (this file at be63a014). CPU
+seconds of one thread, all in one run, compiled code made before.
 
-Run: python studies/speed/cases_per_second.py            (2000 cases, 3 by DOP853 and CVODE)
+Run: python studies/speed/cases_per_second.py            (2000 cases)
      python studies/speed/cases_per_second.py --laws     (whole sweeps of all laws and of patches)
-     python studies/speed/cases_per_second.py --full     (10 000 cases, 10 by DOP853 and CVODE)
+     python studies/speed/cases_per_second.py --full     (10 000 cases)
 """
 
 import sys
@@ -25,23 +25,17 @@ from pathlib import Path
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
-sys.path.insert(0, str(Path(__file__).parents[1] / "integrators"))
-from engine_peers import PEERS
-from engines import advancer
+from measuring import measure_seconds, run
 from numba import njit
-from peer import Peer, measure_seconds, run
 from rig_texts import TEXTS
-from switched import PROBLEMS, follow
 
 from patchfem.campaigns import Cases, SweepScene
 from patchfem.campaigns.sweeps.executors import LocalExecutor
 from patchfem.campaigns.sweeps.sweep import WorkerData, iterate_chunks
 from patchfem.campaigns.sweeps.sweep_table import SweepTable
-from patchfem.core import Missing
 from patchfem.scene import loads, make_axis
 
 CYCLES = 200  # cycles of a run
-POINTS = 200  # samples of a cycle of the loop in NumPy
 LANES = 64  # cases that the loop integrates together
 AMPLITUDE = "relative_displacement_amplitude"
 SCENE = f"""[normal]
@@ -185,51 +179,6 @@ def by_patchfem(cases: np.ndarray, text: str = SCENE):
 def by_exact(cases: np.ndarray):
     """Compute the results from event to event with a step tolerance of 1e-12, case by case."""
     return by_patchfem(cases, SCENE + 'method = "exact"\n')
-
-
-def top(slide: np.ndarray) -> float:
-    """Return half the range of samples, each end by a parabola through three samples."""
-    ends = []
-    for one in (slide, -slide):
-        k = 1 + int(np.argmax(one[1:-1]))
-        a, b, c = one[k - 1 : k + 2]
-        ends.append(b + (a - c) ** 2 / (8 * (2 * b - a - c)) if 2 * b > a + c else b)
-    return sum(ends) / 2
-
-
-TIMES = 2 * np.pi * (CYCLES - 1 + np.arange(POINTS + 2) / POINTS)
-
-
-def by_dop853(case, tolerance: float) -> float:
-    """Return the amplitude of one case by SciPy's DOP853 from event to event."""
-    block = PROBLEMS["block"](limit=float(case[0]), xi=float(case[1]))
-    return top(follow(block, advancer(tolerance, 1.0), TIMES, 1 / 8)[0])
-
-
-def by_cvode(child: Peer, cases: np.ndarray, tolerance: float) -> tuple:
-    """Integrate cases by CVODE of SUNDIALS with its root finder; return amplitudes (n,) and CPU seconds.
-
-    Parameters
-    ----------
-    child : Peer
-    cases : (n, 2) array
-    tolerance : float
-    """
-    found = [
-        child.ask(
-            problem="block",
-            numbers={"limit": limit, "xi": xi},
-            tolerance=tolerance,
-            scale=1.0,
-            method="Adams",
-            longest=1 / 8,
-            times=TIMES.tolist(),
-        )
-        for limit, xi in cases.tolist()
-    ]
-    return np.array([top(np.array(one["slide"])) for one in found]), sum(
-        one["seconds"] for one in found
-    )
 
 
 def row(name: str, knob: str, seconds: float, amplitudes, exact) -> dict:
@@ -387,9 +336,7 @@ def families(seed: int = 1, names=tuple(FAMILIES), goes: int = 3, share: float =
     return rows
 
 
-def main(
-    count: int = 2000, few: int = 3, steps=(100, 200, 400, 800), tolerances=(1e-3, 1e-5, 1e-8)
-) -> list[dict]:
+def main(count: int = 2000, steps=(100, 200, 400, 800)) -> list[dict]:
     """Measure all methods, print them and return the rows."""
     cases = draw_blocks(count)
     warm = cases[:LANES]
@@ -411,26 +358,10 @@ def main(
     for one in steps:
         amplitudes, seconds = measure_seconds(lambda one=one: by_loop(cases, one))
         rows.append(row("loop of thirty lines", str(one), seconds, amplitudes, exact))
-    some = cases[:few]
-    for tolerance in tolerances:
-        amplitudes, seconds = measure_seconds(
-            lambda tolerance=tolerance: [by_dop853(case, tolerance) for case in some]
-        )
-        rows.append(row("DOP853 with events", f"{tolerance:g}", seconds, amplitudes, exact[:few]))
-    _, _, _, script, variable, remedy = PEERS["SUNDIALS CVODE"]
-    try:
-        with Peer("SUNDIALS CVODE", script, variable, sys.executable, remedy) as child:
-            for tolerance in tolerances:
-                amplitudes, seconds = by_cvode(child, some, tolerance)
-                rows.append(
-                    row("SUNDIALS CVODE", f"{tolerance:g}", seconds, amplitudes, exact[:few])
-                )
-    except Missing as missing:
-        print(missing, file=sys.stderr)
     return rows
 
 
 if __name__ == "__main__":
     if "--laws" in sys.argv[1:]:
         raise SystemExit(run(lambda: families(*(int(one) for one in sys.argv[2:]))))
-    raise SystemExit(run(lambda: main(10_000, 10) if "--full" in sys.argv[1:] else main()))
+    raise SystemExit(run(lambda: main(10_000) if "--full" in sys.argv[1:] else main()))
