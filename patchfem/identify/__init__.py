@@ -22,7 +22,6 @@ PUBLIC = {
         "identify_driven_modes",
         "list_shape_modes",
     ),
-    "space": ("make_space_filling_points",),
     "fit_sentences": ("describe_fit",),
     "advice": ("advise_test",),
 }
