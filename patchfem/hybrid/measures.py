@@ -44,7 +44,8 @@ def compute_measures(
     first : (c, n) array
         States at the start.
     **model
-        `n_friction`: number of friction interfaces; `stiffness`: of the first mode at the contact [N/m].
+        `n_friction`: number of friction interfaces; `stiffness` (c,): of the first mode at the contact [N/m], 0 if
+        unknown.
     """
     settings = rigs.settings
     period = settings[:, Setting.PERIOD]
@@ -89,7 +90,7 @@ def compute_measures(
         values["normal_load_least"] = row[:, Window.MIN_LOAD]
         values["normal_load_peak"] = row[:, Window.MAX_LOAD]
         values["open_fraction"] = row[:, Window.OPEN] / span
-    loop = _compute_loop(rigs, records, window, span, values, model.get("stiffness", 0.0))
+    loop = _compute_loop(rigs, records, window, span, values, model["stiffness"])
     return values | {name: np.where(has_cycle, value, np.nan) for name, value in loop.items()}
 
 
@@ -131,7 +132,7 @@ def _compute_energies(rigs, states, first, n_friction: int) -> dict:
     return values | {"energy_balance": np.divide(gap, size, out=np.zeros_like(gap), where=size > 0)}
 
 
-def _compute_loop(rigs, records, window: int, span, values: dict, stiffness: float) -> dict:
+def _compute_loop(rigs, records, window: int, span, values: dict, stiffness) -> dict:
     """Return stiffness, damping and drift of the first interface, from its cycles in a window."""
     row = records.faces[:, window, 0]
     slide = row[:, Window.SLIDE_COS] - 1j * row[:, Window.SLIDE_SIN]
@@ -152,7 +153,7 @@ def _compute_loop(rigs, records, window: int, span, values: dict, stiffness: flo
             "equivalent_stiffness": (force / slide).real,
             "harmonic_force_ratio": np.abs(force / slide),
             "secant_stiffness": secant,
-            "equivalent_damping": damping if stiffness else np.full_like(damping, np.nan),
+            "equivalent_damping": np.where(stiffness > 0, damping, np.nan),
         }
     if numbers.size > 1:
         means = cycles[..., Cycle.SLIDE] / rigs.settings[:, Setting.PERIOD, None]

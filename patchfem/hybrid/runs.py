@@ -80,7 +80,7 @@ class Motion:
 
     - case: the case
     - status, message: how the run ended, and in words if it ended early
-    - values, errors: measures of the last window by name, and their errors
+    - values: measures of the last window by name
     - extremes (c, 2), phasors (c,): smallest and largest output [m] and phasor of the output [m] of each cycle
     - rows (k, m): stored samples and events in the order of time, see `records.Record`; an event follows a sample at
       its time
@@ -95,7 +95,6 @@ class Motion:
     status: Status
     message: str
     values: dict
-    errors: dict
     extremes: np.ndarray
     phasors: np.ndarray
     rows: np.ndarray
@@ -253,7 +252,8 @@ def run_batch(
     compiled.load("hybrid.engine_kernels").run_cases(rigs, states, records)
     if not has_windows:
         return Batch(rigs, states, records, start, [])
-    model = {"n_friction": cases[0].n_friction, "stiffness": cases[0].first_stiffness}
+    stiffness = np.array([case.first_stiffness for case in cases])
+    model = {"n_friction": cases[0].n_friction, "stiffness": stiffness}
     with np.errstate(invalid="ignore", divide="ignore"):
         windows = [
             compute_measures(rigs, states, records, w, start, **model)
@@ -283,29 +283,23 @@ def estimate_errors(values: dict, coarse: dict, rtol: float) -> dict:
     return errors
 
 
-def _compare(cases, fine: Batch) -> list[dict]:
-    """Return the errors of each window from a run with larger steps."""
-    rtol = float(cases[0].rig.settings[Setting.RTOL])
-    coarse = run_batch([case.with_tolerance(COARSE * rtol, COARSE_STEP) for case in cases])
-    return [
-        estimate_errors(values, rough, rtol) for values, rough in zip(fine.windows, coarse.windows)
-    ]
+def with_larger_steps(case: Case) -> Case:
+    """Return the case of the comparison run, with larger steps."""
+    rtol = float(case.rig.settings[Setting.RTOL])
+    return case.with_tolerance(COARSE * rtol, COARSE_STEP)
 
 
 def run_case(
     case: Case,
     *,
-    has_errors: bool = True,
     start: State | None = None,
     fills_histories: bool = True,
 ) -> Motion:
-    """Run a single case as a batch of one; a run that ends early has no errors.
+    """Run a single case as a batch of one.
 
     Parameters
     ----------
     case : Case
-    has_errors : bool
-        Whether errors are estimated by a run with larger steps.
     start : State, optional
         End of another motion of the same rig, from which the case goes on at t = 0; default: the start of the case.
     fills_histories : bool
@@ -318,9 +312,6 @@ def run_case(
     clock = states.clock[0]
     status = Status(int(clock[Clock.STATUS]))
     n_cycles = int(clock[Clock.N_CYCLES])
-    errors = {}
-    if has_errors and status == Status.DONE:
-        errors = {name: float(error[0]) for name, error in _compare([case], batch)[0].items()}
 
     cycles = records.cycles[0, :n_cycles]
     samples = records.samples[0][: int(clock[Clock.SAMPLE])]
@@ -343,7 +334,6 @@ def run_case(
         status=status,
         message=MESSAGES.get(status, "").format(steps=case.rig.settings[Setting.MAX_STEPS]),
         values={name: float(value[0]) for name, value in batch.windows[0].items()},
-        errors=errors,
         extremes=cycles[:, [Cycle.MIN, Cycle.MAX]],
         phasors=2 / duration * (cycles[:, Cycle.COS] - 1j * cycles[:, Cycle.SIN]),
         rows=rows[np.argsort(rows[:, 0], kind="stable")],

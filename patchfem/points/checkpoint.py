@@ -23,8 +23,10 @@ MAX_WRITE_FRACTION = 0.02  # largest fraction of the elapsed time that is spent 
 # Largest number of samples from before the last cycles, which limits memory and file size
 MAX_EARLY_SAMPLES = 400_000
 RETRY_ADVICE = "run without --resume"
-BLOCKS = ("numbers", "rows", "sums")  # lists of arrays of a record
-CYCLES = ("extremes", "phasors")  # lists of numbers of its cycles
+# What a march and its record change besides the arrays of the engine
+MARCH_STATE = ("done", "first_energy", "first_sums", "work_sums")
+RECORD_STATE = ("numbers", "rows", "sums", "totals", "recent", "before")
+CYCLES = ("extremes", "phasors")  # lists of numbers of the cycles of a record
 _FILES = ContextVar("checkpoint_files", default=None)
 
 
@@ -106,8 +108,10 @@ def open_checkpoint(run, record, request: tuple) -> MarchCheckpoint:
     files.n_begun += 1
     path = files.path_of_march(files.n_begun)
     digest = hashlib.sha256(f"{files.key} {request}".encode())
-    for name, array in flatten(run.system).items():
-        digest.update(f"{name} {array.shape} ".encode() + array.tobytes())
+    arrays = []
+    pack(run.system, arrays)
+    for array in arrays:
+        digest.update(f"{array.shape} ".encode() + array.tobytes())
     time = np.linspace(0, request[0] * run.step, 1000)
     digest.update(np.asarray(run.drive.values(time)).tobytes())
     key = digest.hexdigest()
@@ -116,35 +120,29 @@ def open_checkpoint(run, record, request: tuple) -> MarchCheckpoint:
     return MarchCheckpoint(path, key)
 
 
-def flatten(value, name: str = "") -> dict[str, np.ndarray]:
-    """Return the arrays of nested tuples by name; numbers are left out."""
+def pack(value, arrays: list):
+    """Return nested tuples and lists as lists for JSON; an array is appended to `arrays`, and becomes its number there."""
     if isinstance(value, np.ndarray):
-        return {name: value}
-    arrays = {}
-    if isinstance(value, tuple):
-        for number, part in enumerate(value):
-            arrays |= flatten(part, f"{name}.{number}")
-    return arrays
+        arrays.append(value)
+        return {"array": len(arrays) - 1}
+    if isinstance(value, tuple | list):
+        return [pack(part, arrays) for part in value]
+    return value
 
 
-def rebuild(value, arrays: dict, name: str = ""):
-    """Return a copy of nested tuples in which each array is replaced by the stored one of the same name.
+def unpack(value, arrays):
+    """Return the lists that `pack` made, with the arrays of a mapping by the names "0", "1", ..."""
+    if isinstance(value, dict):
+        return arrays[str(value["array"])]
+    if isinstance(value, list):
+        return [unpack(part, arrays) for part in value]
+    return value
 
-    Parameters
-    ----------
-    value : tuple
-        Nested tuples of the same form.
-    arrays : mapping
-        Stored arrays by name, as `flatten` names them.
-    name : str
-        Name of the value in the file.
-    """
-    if isinstance(value, np.ndarray):
-        return arrays[name]
-    if isinstance(value, tuple):
-        return type(value)(
-            *(rebuild(part, arrays, f"{name}.{number}") for number, part in enumerate(value))
-        )
+
+def convert_to_tuples(value, model):
+    """Return nested lists as the nested tuples of a model."""
+    if isinstance(model, tuple):
+        return type(model)(*map(convert_to_tuples, value, model))
     return value
 
 
@@ -164,22 +162,18 @@ def save_checkpoint(path: Path, key: str, run, record) -> None:
     Missing
         If the file cannot be written.
     """
-    arrays = {f"system{name}": array for name, array in flatten(run.system).items()}
-    for name in BLOCKS:
-        for number, block in enumerate(getattr(record, name)):
-            arrays[f"{name}.{number}"] = block
-    for name in CYCLES:
-        arrays[name] = np.array(getattr(record, name))
-    for number, (_, samples, sums) in enumerate(record.recent):
-        arrays |= {f"samples.{number}": samples, f"energies.{number}": sums}
-    arrays |= {"totals": record.totals, "works": run.work_sums, "lists": run.first_sums}
-    if record.before is not None:
-        arrays["before"] = record.before
-    firsts = [first for first, _, _ in record.recent]
-    numbers = {"done": run.done, "firsts": firsts, "energy": run.first_energy}
-    n_bytes = sum(array.nbytes for array in arrays.values())
+    arrays = []
+    state = (
+        run.system,
+        [getattr(run, name) for name in MARCH_STATE],
+        [getattr(record, name) for name in RECORD_STATE],
+        [np.array(getattr(record, name)) for name in CYCLES],
+    )
+    form = np.array(json.dumps(pack(state, arrays)))
+    named = {str(number): array for number, array in enumerate(arrays)}
+    n_bytes = sum(array.nbytes for array in arrays)
     with write_atomically(path, n_bytes) as partial, open(partial, "wb") as file:
-        np.savez(file, key=np.array(key), march=np.array(json.dumps(numbers)), **arrays)
+        np.savez(file, key=np.array(key), form=form, **named)
         file.flush()
         os.fsync(file.fileno())
 
@@ -206,26 +200,16 @@ def load_checkpoint(path: Path, key: str, run, record) -> None:
                 f"{folder}: the state saved there belongs to another scene or to another version of patchfem; "
                 f"{RETRY_ADVICE}"
             )
-        numbers = json.loads(str(arrays["march"]))
-        run.system = rebuild(run.system, arrays, "system")
-        run.done = numbers["done"]
-        run.first_energy = numbers["energy"]
-        run.work_sums = arrays["works"]
-        for name in CYCLES:
-            setattr(record, name, list(arrays[name]))
-        for name in BLOCKS:
-            blocks = []
-            while f"{name}.{len(blocks)}" in arrays:
-                blocks.append(arrays[f"{name}.{len(blocks)}"])
-            setattr(record, name, blocks)
-        record.totals = arrays["totals"]
-        record.recent = [
-            (first, arrays[f"samples.{number}"], arrays[f"energies.{number}"])
-            for number, first in enumerate(numbers["firsts"])
-        ]
+        form = json.loads(str(arrays["form"]))
+        system, march_state, record_state, cycles = unpack(form, arrays)
+        run.system = convert_to_tuples(system, run.system)
+        for name, value in zip(MARCH_STATE, march_state, strict=True):
+            setattr(run, name, value)
+        for name, value in zip(RECORD_STATE, record_state, strict=True):
+            setattr(record, name, value)
+        for name, value in zip(CYCLES, cycles, strict=True):
+            setattr(record, name, list(value))
         record.last = record.recent[-1]
-        record.before = arrays.get("before")
-        run.first_sums = arrays["lists"]
     except PatchfemError:
         raise
     except Exception as error:  # a damaged archive can raise exceptions of many classes

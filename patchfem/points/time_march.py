@@ -567,41 +567,6 @@ class March:
         interface += sample[n + Sample.SPRINGS]
         return 0.5 * self.modes.mass * squares + float(interface)
 
-    def move_to(self, position, velocity) -> None:
-        """Set the modal coordinates and velocities (n,); the points slide to the new position slowly."""
-        system = self.system
-        row = system.ports.rows[0]
-        begin = float(row @ self.state[0])
-        end = float(row @ position)
-        self.state[:] = position, velocity
-        if end != begin:
-            path = np.array([begin, end])
-            no_modes = system.structure._replace(
-                path=path,
-                drive=np.zeros((2, 3)),
-                responses=np.zeros((len(system.structure.responses), 0, 3)),
-                loss=np.zeros((len(system.structure.responses), 3, 3)),
-                work=np.zeros((len(system.structure.responses), 3, 3)),
-                inputs=np.zeros(3),
-                modes=np.zeros((3, 0)),
-                damping=np.zeros((0, 0)),
-            )
-            ports = system.ports._replace(
-                rows=np.zeros((len(system.ports.rows), 0)),
-                compliance=np.zeros_like(system.ports.compliance),
-            )
-            still = system._replace(
-                structure=no_modes,
-                ports=ports,
-                state=np.zeros((3, 0)),
-                options=system.options._replace(step=1.0),
-            )
-            self.kernels.march(still, 1, np.zeros((2, self.width - system.state.shape[1])))
-            system.points.shear[[Shear.LAST, Shear.EARLIER, Shear.FIRST]] = 0.0
-        if system.flank.size:
-            slope = float(self.contact.grooves.slope(end))
-            system.flank[Flank.RISE_SPEED] = slope * float(row @ velocity)
-
     def _set_drive(self, count: int) -> None:
         """Write the drive, and a prescribed load, of the next steps."""
         structure = self.system.structure._replace(

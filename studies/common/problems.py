@@ -80,7 +80,7 @@ def run_motion(
         np.asarray(times, float),
         len(interfaces),
     )
-    return runs.run_case(case, has_errors=False)
+    return runs.run_case(case)
 
 
 def make_coulomb(static: float, kinetic: float | None = None) -> LawNumbers:

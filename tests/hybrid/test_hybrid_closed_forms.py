@@ -29,7 +29,7 @@ def test_block_in_two_stops_has_the_amplitude_of_forty_digits():
 
 def test_block_without_stops_after_200_cycles():
     """Friction of half the drive; peak at the end of 200 cycles from exact propagation between reversals."""
-    motion = runs.run_case(make_oscillator(coulomb(), load=0.5, rtol=1e-12), has_errors=False)
+    motion = runs.run_case(make_oscillator(coulomb(), load=0.5, rtol=1e-12))
     assert motion.extremes[-1, 1] == pytest.approx(59.1676969670915519, rel=1e-9)
     # Slip does not start where the block turns without rest.
     assert np.isnan(motion.values["slip_start_phase"])
@@ -188,9 +188,7 @@ def test_pressed_springs_equal_the_elastic_plastic_law_under_a_constant_load():
         masing.from_elements([8.0], [0.1]),
         LawNumbers("pressed_springs", (1.0, 0.1), (0.0, 0.8), (0.8, 0.8)),
     ):
-        motion = runs.run_case(
-            make_oscillator(law, load=0.8, cycles=40, rtol=1e-11), has_errors=False
-        )
+        motion = runs.run_case(make_oscillator(law, load=0.8, cycles=40, rtol=1e-11))
         values.append(
             [
                 motion.values[name]

@@ -42,7 +42,7 @@ def run_on_grooves(case, tones, period, cycles, *, speed=None, position=0.0, for
     start = cases.make_start(rig, [interface], SimpleNamespace(z=[position], v=[0.0]))
     schedule = cases.make_schedule(cycles, period, 1)
     made = cases.Case(rig, start, *schedule, np.asarray(times, float), 1)
-    return runs.run_case(made, has_errors=False)
+    return runs.run_case(made)
 
 
 def run_drawn_case(case, cycles, **options):

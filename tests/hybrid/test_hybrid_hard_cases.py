@@ -69,7 +69,7 @@ def test_chatter_of_many_interfaces_on_many_modes():
     case = make_rig_case(
         [coulomb(1.0, 0.5)] * 8, [0.05] * 8, rng.normal(size=(8, 10)), np.linspace(1, 20, 10)
     )
-    motion = runs.run_case(case, has_errors=False)
+    motion = runs.run_case(case)
     assert motion.status is Status.DONE
     assert motion.values["energy_balance"] < 1e-6
     forces = motion.event_rows[:, 1 + case.y.size :][:, :8]
@@ -87,7 +87,7 @@ def test_forty_modes():
     case = make_rig_case(
         laws, [0.1] * 4, rng.normal(size=(4, 40)), np.geomspace(1, 140, 40), cycles=10
     )
-    motion = runs.run_case(case, has_errors=False)
+    motion = runs.run_case(case)
     assert motion.status is Status.DONE
     assert motion.values["energy_balance"] < 1e-7
 
@@ -96,7 +96,7 @@ def test_forty_modes():
 def test_stiff_contacts_tend_to_coulomb_friction_or_are_refused(length):
     """Elastic-plastic contact of the stretch `length`: near Coulomb's motion by a few lengths, or a sentence."""
     law = masing.from_elements([0.8 / length], [length])
-    motion = runs.run_case(make_oscillator(law, cycles=60, rtol=1e-7), has_errors=False)
+    motion = runs.run_case(make_oscillator(law, cycles=60, rtol=1e-7))
     if length < 1e-8:
         assert motion.status is Status.TOO_STIFF
         assert "coulomb" in motion.message
@@ -107,7 +107,7 @@ def test_stiff_contacts_tend_to_coulomb_friction_or_are_refused(length):
 def test_regularised_friction_tends_to_coulomb_friction():
     """The rate law with a speed of 1e-4 of the drive's."""
     law = LawNumbers("tanh", (1.0, 1e-4))
-    motion = runs.run_case(make_oscillator(law, cycles=60, rtol=1e-6), has_errors=False)
+    motion = runs.run_case(make_oscillator(law, cycles=60, rtol=1e-6))
     assert motion.values[AMPLITUDE] == pytest.approx(COULOMB_AMPLITUDE, rel=5e-3)
 
 

@@ -36,7 +36,7 @@ def test_shooting_equals_a_long_run(name):
     assert steady.change < steady.tolerance
     assert steady.is_stable
     assert steady.n_periods <= 60
-    run = runs.run_case(case, has_errors=False)
+    run = runs.run_case(case)
     assert steady.batch.windows[0][AMPLITUDE][0] == pytest.approx(run.values[AMPLITUDE], rel=1e-6)
     assert steady.batch.windows[0]["loop_area"][0] == pytest.approx(
         run.values["loop_area"], rel=1e-5

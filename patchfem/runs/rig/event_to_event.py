@@ -229,7 +229,7 @@ class LumpedEvaluator(RunEvaluator):
             rtol=numerics.local,
             n_steps=numerics.steps,
         )
-        return engine.run_case(case, has_errors=False, start=state, fills_histories=numerics.whole)
+        return engine.run_case(case, start=state, fills_histories=numerics.whole)
 
     def find_steady_amplitude(self, run: LumpedRun) -> tuple | None:
         """Return amplitude [m] and error of the steady motion of elements that a run under a sine approaches.
