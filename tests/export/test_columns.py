@@ -8,8 +8,7 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from patchfem.export import answer, columns
-from patchfem.export.charts import table
+from patchfem.export import answer, columns, page
 
 G_N = 9.80665
 
@@ -31,7 +30,7 @@ class Record:
 
 def test_exact_heading_line():
     """A column has a heading, the name of its variable and a style; the heading is the name if it has no other."""
-    heads = table.parse_columns("x, height = before, at = value:quantity, error:rounded")
+    heads = columns.parse_columns("x, height = before, at = value:quantity, error:rounded")
     assert [tuple(column) for column in heads] == [
         ("x", "x", ""),
         ("height", "before", ""),
@@ -42,10 +41,10 @@ def test_exact_heading_line():
 
 def test_always_heading_lines_have_names_and_known_styles():
     """Each column of the tables has a name, and a style that the page knows."""
-    tables = [one.columns for tables in table.TABLES.values() for one in tables]
-    files = [file.columns for files in table.CSV_FILES.values() for file in files.values()]
+    tables = [one.columns for tables in page.TABLES.values() for one in tables]
+    files = [file.columns for files in columns.CSV_FILES.values() for file in files.values()]
     for line in tables + [line for line in files if line]:
-        for column in table.parse_columns(line):
+        for column in columns.parse_columns(line):
             assert column.name and " " not in column.name, line
             assert column.style in ("", "name", "quantity", "rounded", "percent"), line
 

@@ -16,12 +16,13 @@ DASHES = ("solid", "dash", "dot", "dashdot")
 SYMBOLS = ("circle", "diamond", "square", "x")
 BAND_OPACITY = 0.18
 FRAME_MILLISECONDS = 120  # duration of a frame of a film
+# Position of a menu, above its chart.
 MENU_PLACE = {
     "x": 0,
     "xanchor": "left",
     "y": 1.02,
     "yanchor": "bottom",
-}  # a menu stands above its chart
+}
 
 
 def draw(panel: Panel) -> dict:
