@@ -8,20 +8,16 @@ from ..export.surfaces import pairs as compared_pairs
 from ..export.surfaces import worn
 from ..surface.compare.compare import Options
 from .shared import (
+    DEFAULT_OUTPUT,
     NOT_CONVERGED,
     CommandExit,
-    Json,
-    NoPage,
-    Out,
     Output,
-    Plot,
+    OutputGroup,
     Progress,
-    Quiet,
     Sets,
     Units,
     UsageError,
     Verbose,
-    choose_folder,
     flag_option,
     load_model,
     load_scene,
@@ -71,11 +67,7 @@ def compare(
         "piece of which the traces are, such as upper (or lower), for --predicted; it may be left out if "
         "both pieces wear alike (wear.upper_share = 0.5)"
     ) = "",
-    out: Out = None,
-    no_page: NoPage = False,
-    plot: Plot = None,
-    json_: Json = False,
-    quiet: Quiet = False,
+    written: OutputGroup = DEFAULT_OUTPUT,
     verbose: Verbose = False,
 ):
     """Compare the surfaces measured in the files BEFORE and AFTER: worn depth, volume or area with intervals, a verdict
@@ -91,8 +83,7 @@ def compare(
     files = [path for path in (before, after, *other) if path is not None]
     if pairs is not None:
         _refuse_others({"another file": files, **given}, "a table of pairs")
-        output = Output(choose_folder(out, pairs.stem), json_, quiet, not no_page, plot, verbose)
-        _compare_pairs(pairs, options, output)
+        _compare_pairs(pairs, options, written.make_output(pairs.stem, is_verbose=verbose))
         return
     if len(files) != 2:
         removed = ""
@@ -101,8 +92,9 @@ def compare(
         raise UsageError(
             f"compare: give two files BEFORE and AFTER, or a table of pairs with --pairs{removed}"
         )
-    name = f"{before.resolve().stem}-{after.resolve().stem}"
-    output = Output(choose_folder(out, name), json_, quiet, not no_page, plot, verbose)
+    output = written.make_output(
+        f"{before.resolve().stem}-{after.resolve().stem}", is_verbose=verbose
+    )
     if before.is_dir() or after.is_dir():
         set_options = {"--set": set_, "--units": units, "--shift": shift, "--datum": datum}
         set_options |= {"--direction": direction, "--keep-spikes": keep_spikes}

@@ -7,19 +7,15 @@ from ..disk import atomic_write
 from ..export import run_folder, store
 from ..runs import plan
 from .shared import (
+    DEFAULT_OUTPUT,
     NOT_CONVERGED,
     CommandExit,
-    Json,
-    NoPage,
-    Out,
     Output,
-    Plot,
+    OutputGroup,
     Progress,
-    Quiet,
     Sets,
     UsageError,
     Verbose,
-    choose_folder,
     flag_option,
     load_scene,
     present,
@@ -31,18 +27,14 @@ def run(
     scene: Path,
     /,
     *,
-    out: Out = None,
     set_: Sets = (),
-    json_: Json = False,
     resume: flag_option(
         "continue an interrupted run; possible with [wear] and for a run that is integrated in time"
     ) = False,
     fresh: flag_option(
         "compute the stiffness of the pieces again instead of taking it from the cache"
     ) = False,
-    no_page: NoPage = False,
-    plot: Plot = None,
-    quiet: Quiet = False,
+    files: OutputGroup = DEFAULT_OUTPUT,
     verbose: Verbose = False,
 ):
     """Run SCENE and write its results folder, by default out/<scene name>.
@@ -55,20 +47,20 @@ def run(
             "run --resume: only a run with [wear] on a patch or a run that is integrated in time saves its "
             "state; run the scene again without --resume"
         )
-    target = choose_folder(out, run_plan.model.source.path.stem)
-    output = Output(target, json_, quiet, not no_page, plot, verbose)
+    output = files.make_output(run_plan.model.source.path.stem, is_verbose=verbose)
+    target = output.target
     if resume and run_folder.is_complete(run_plan, target):
         _report_complete_run(target, output)
         return
 
-    report = None if quiet else print_message
-    with Progress(quiet or json_) as progress:
+    report = None if files.quiet else print_message
+    with Progress(files.quiet or files.json_) as progress:
         written = run_folder.run_into(
             run_plan, target, report, progress, fresh=fresh, resume=resume
         )
     try:
         # the page comes after the results, so that an error in the page does not lose them
-        present(written.answer, output, lambda: no_page or _draw_page(written, target))
+        present(written.answer, output, lambda: files.no_page or _draw_page(written, target))
     except KeyboardInterrupt:
         print_message(
             f"interrupted while the page was drawn; the results in {target} are complete except for report.html"
@@ -79,7 +71,7 @@ def run(
         print_message(
             "wall-clock seconds: " + ", ".join(f"{k} {v:.3f}" for k, v in seconds.items())
         )
-    _end_run(written.answer, quiet)
+    _end_run(written.answer, files.quiet)
 
 
 def _report_complete_run(target: Path, output: Output) -> None:

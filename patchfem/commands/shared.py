@@ -4,7 +4,7 @@ import json
 import shlex
 import sys
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from threading import Event, Thread
 from time import monotonic
@@ -94,6 +94,26 @@ class Output(NamedTuple):
         return None if self.is_quiet or self.as_json else print_message
 
 
+@dataclass(frozen=True)
+class OutputOptions:
+    """Options of all commands that write a results folder."""
+
+    out: Out = None
+    no_page: NoPage = False
+    plot: Plot = None
+    json_: Json = False
+    quiet: Quiet = False
+
+    def make_output(self, name: str, *, is_verbose: bool = False) -> Output:
+        """Return the output into the folder that -o gives, or into out/NAME."""
+        target = self.out if self.out is not None else Path("out") / name
+        return Output(target, self.json_, self.quiet, not self.no_page, self.plot, is_verbose)
+
+
+OutputGroup = Annotated[OutputOptions, Parameter(name="*")]
+DEFAULT_OUTPUT = OutputOptions()
+
+
 def save(make_answer: Callable, output: Output):
     """Make an answer, write it with its page into its folder, print it and return it.
 
@@ -165,11 +185,6 @@ def print_remarks(answer) -> None:
             print_message(make_printable(line))
     for text in answer.remarks.notes:
         note(text)
-
-
-def choose_folder(out: Path | None, name: str) -> Path:
-    """Return the folder for the results: the one that is given, or out/<name> if none is given."""
-    return out if out is not None else Path("out") / name
 
 
 def refuse_existing(out: Path | None) -> None:

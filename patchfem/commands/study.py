@@ -14,19 +14,14 @@ from ..export import backbones, costs, fits
 from ..model import model
 from ..scene.scene import remember_written
 from .shared import (
+    DEFAULT_OUTPUT,
     NOT_CONVERGED,
     CommandExit,
-    Json,
-    NoPage,
-    Out,
-    Output,
-    Plot,
+    OutputGroup,
     Progress,
-    Quiet,
     Sets,
     UsageError,
     Verbose,
-    choose_folder,
     describe_command,
     flag_option,
     load_model,
@@ -49,12 +44,8 @@ def cost(
     verbose: flag_option(
         "vary also each setting alone, and print all numbers", "-v", "--verbose"
     ) = False,
-    out: Out = None,
     set_: Sets = (),
-    no_page: NoPage = False,
-    plot: Plot = None,
-    json_: Json = False,
-    quiet: Quiet = False,
+    files: OutputGroup = DEFAULT_OUTPUT,
 ):
     """Measure how the error of SCENE depends on computing time (CPU seconds): one run for each of several tolerances,
     or for each value of one accuracy setting.
@@ -68,12 +59,11 @@ def cost(
     names = [over or cost_curves.TOLERANCE]
     if verbose and not over:
         names += numerical_settings.find_applicable_settings(scene_model)
-    target = choose_folder(out, f"{scene_model.source.path.stem}-cost")
-    output = Output(target, json_, quiet, not no_page, plot, verbose)
+    output = files.make_output(f"{scene_model.source.path.stem}-cost", is_verbose=verbose)
 
     def measure_costs(_):
         """Run the scene with all settings."""
-        report = None if quiet else print_message
+        report = None if files.quiet else print_message
         curves = {
             name: cost_curves.compute_setting_costs(scene_model, name, report) for name in names
         }
@@ -108,12 +98,8 @@ def backbone(
         'frequency, damping ratio and optionally slide of modes that replace those of the scene, such as "120 Hz:0.01, '
         '170 Hz:0.02"; the frequencies are those of the bolted joint'
     ) = "",
-    out: Out = None,
     set_: Sets = (),
-    no_page: NoPage = False,
-    plot: Plot = None,
-    json_: Json = False,
-    quiet: Quiet = False,
+    files: OutputGroup = DEFAULT_OUTPUT,
     verbose: Verbose = False,
 ):
     """Compute frequency and damping ratio of a mode of SCENE against its amplitude, and the force at the output that holds
@@ -130,8 +116,7 @@ def backbone(
 
     if over and any(text.partition("=")[0] == over.partition("=")[0] for text in set_):
         raise UsageError(f"--over {over}: --set gives this key, too; remove one of them")
-    target = choose_folder(out, f"{scene.stem}-backbone")
-    output = Output(target, json_, quiet, not no_page, plot, verbose)
+    output = files.make_output(f"{scene.stem}-backbone", is_verbose=verbose)
     report = output.report and (lambda name: print_message(f"{name} ..."))
     request = backbone_requests.BackboneRequest(mode, amplitudes, forces, method, modes, over)
 
@@ -201,12 +186,8 @@ def fit(
         "cycles"
     ) = False,
     rows: Annotated[RowFitOptions, Parameter(name="*")] = RowFitOptions(),
-    out: Out = None,
     set_: Sets = (),
-    no_page: NoPage = False,
-    plot: Plot = None,
-    json_: Json = False,
-    quiet: Quiet = False,
+    files: OutputGroup = DEFAULT_OUTPUT,
     verbose: Verbose = False,
 ):
     """Fit values of keys of SCENE to measurements. A bench is fitted to a friction loop. A rig is fitted to rows of
@@ -216,13 +197,12 @@ def fit(
     Example: patchfem fit bench.toml --to loop.csv --free "friction.static=0.1..0.6"
     """
     loaded_scene = remember_written(load_scene(scene, set_))
-    target = choose_folder(out, f"{scene.stem}-fit")
-    output = Output(target, json_, quiet, not no_page, plot, verbose)
+    output = files.make_output(f"{scene.stem}-fit", is_verbose=verbose)
     options = fit_requests.FitOptions(hold, offset, warm_up, **vars(rows))
     # the fits to a loop and to a curve are too short for a progress line
     is_short = fit_requests.choose_kind(loaded_scene, to) in ("loop", "curve")
-    with Progress(quiet or json_ or is_short) as progress:
-        report = None if quiet else print_message
+    with Progress(files.quiet or files.json_ or is_short) as progress:
+        report = None if files.quiet else print_message
         listener = fit_requests.Listener(
             report, progress, lambda name: f"--{name.replace('_', '-')}"
         )
@@ -231,9 +211,9 @@ def fit(
             to,
             free,
             options,
-            target,
+            output.target,
             listener,
-            with_page=not no_page,
+            with_page=output.has_page,
             command=describe_command(),
         )
     present(answer, output)

@@ -15,19 +15,15 @@ from ..campaigns.sweeps import executors, parse_request
 from ..export.sweeps import run
 from ..scene import assignments
 from .shared import (
+    DEFAULT_OUTPUT,
     NOT_CONVERGED,
     CommandExit,
-    Json,
-    NoPage,
-    Out,
     Output,
-    Plot,
+    OutputGroup,
     Progress,
-    Quiet,
     Sets,
     UsageError,
     Verbose,
-    choose_folder,
     flag_option,
     note,
     present,
@@ -136,7 +132,6 @@ def sweep(
     *,
     what: CaseOptions | None = None,
     by: WorkerOptions | None = None,
-    out: Out = None,
     set_: Sets = (),
     resume: flag_option("continue an interrupted sweep in this folder") = False,
     keep: Annotated[
@@ -147,10 +142,7 @@ def sweep(
             "cases, none for more cases"
         ),
     ] = None,
-    no_page: NoPage = False,
-    plot: Plot = None,
-    json_: Json = False,
-    quiet: Quiet = False,
+    files: OutputGroup = DEFAULT_OUTPUT,
     verbose: Verbose = False,
 ):
     """Run SCENE for all combinations of the values in --over, or of the values in its table [sweep]. Write sweep.csv,
@@ -158,23 +150,23 @@ def sweep(
 
     Example: patchfem sweep rig.toml --over "contact.tilt.angle=1e-6 rad..1e-2 rad:9" -j 2
     """
-    if no_page and keep == "pages":
+    if files.no_page and keep == "pages":
         raise UsageError(
             "sweep: --no-page and --keep pages contradict each other; use only one of them"
         )
     start_time = perf_counter()
     by = by or WorkerOptions()
     part = by.part()
-    target = choose_folder(out, f"{scene.stem}-sweep")
-    output = Output(target, json_, quiet, not no_page, plot, verbose)
+    output = files.make_output(f"{scene.stem}-sweep", is_verbose=verbose)
+    target = output.target
     sweep_scene, cases = parse_request.read_sweep(scene, set_, (what or CaseOptions()).request())
     if by.collect:
-        answer = run.collect_shards(sweep_scene, cases, target, not no_page)
+        answer = run.collect_shards(sweep_scene, cases, target, output.has_page)
     else:
-        if not quiet:
+        if not files.quiet:
             _print_notes(sweep_scene, cases, what)
-        place = run.SweepTarget(target, resume, keep or "", part, not no_page)
-        answer = _run_cases(sweep_scene, cases, place, by, is_quiet=quiet)
+        place = run.SweepTarget(target, resume, keep or "", part, output.has_page)
+        answer = _run_cases(sweep_scene, cases, place, by, is_quiet=files.quiet)
     if answer is None:
         _print_shard(by.shard, len(cases), output)
     else:

@@ -87,7 +87,7 @@ def _write_variable(file: h5netcdf.File, name: str, variable: Variable) -> None:
     has_strings = values.dtype.kind in "UO"
     options = {"fillvalue": np.nan} if values.dtype.kind == "f" else {}
     if values.size >= MIN_COMPRESSED_VALUES:
-        options |= {"compression": "gzip", "compression_opts": 1}
+        options |= {"compression": "gzip", "compression_opts": 1, "shuffle": True}
     kind = h5py.string_dtype() if has_strings else values.dtype
     stored = file.create_variable(name, variable.dims, kind, **options)
     stored[...] = values.astype(object) if has_strings else values

@@ -273,9 +273,9 @@ def _list_cases(answer: Answer) -> list[dict]:
     """Return a table of the main measures of each case, for a sweep of few cases over one key; else no table."""
     dims = {variable.dims for variable in answer.data.values() if variable.dims}
     key = next(iter(dims))[0] if len(dims) == 1 else ""
-    rows = list_rows(answer, key) if key in answer.data else []
-    if len(rows) > MAX_LISTED_CASES:
+    if key not in answer.data or answer.data[key].values.size > MAX_LISTED_CASES:
         return []
+    rows = list_rows(answer, key)
     known = [
         name
         for name in quantities.KEY

@@ -290,11 +290,12 @@ def _motion(result: Result) -> Data:
         data = make_columns("time mode", columns)
         if result.plan.kind != "rig":
             return data
+        count = response.time.size
         if rig.friction.names:
-            loads = np.array([[interface.load] for interface in rig.friction.interfaces])
+            loads = np.repeat([[one.load] for one in rig.friction.interfaces], count, axis=1)
         else:
-            loads = response.extra.get("normal_load", result.measures["normal_load"].value)
-    loads = np.broadcast_to(loads, (*np.shape(loads)[:-1], response.time.size))
+            constant = np.full(count, result.measures["normal_load"].value)
+            loads = response.extra.get("normal_load", constant)
     columns = {"normal_load": (loads, "N", "normal load on the interface")}
     return data | make_columns("interface time", columns)
 

@@ -8,9 +8,7 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from patchfem.export.answer import Answer, Quantity, encode, make_columns, to_plain
-from patchfem.export.charts.table import CSV_FILES, TABLES, parse_columns
-from patchfem.export.columns import format_curves, list_rows
+from patchfem.export import answer, columns, page
 
 G_N = 9.80665
 
@@ -32,8 +30,8 @@ class Record:
 
 def test_exact_heading_line():
     """A column has a heading, the name of its variable and a style; the heading is the name if it has no other."""
-    columns = parse_columns("x, height = before, at = value:quantity, error:rounded")
-    assert [tuple(column) for column in columns] == [
+    heads = columns.parse_columns("x, height = before, at = value:quantity, error:rounded")
+    assert [tuple(column) for column in heads] == [
         ("x", "x", ""),
         ("height", "before", ""),
         ("at", "value", "quantity"),
@@ -43,23 +41,23 @@ def test_exact_heading_line():
 
 def test_always_heading_lines_have_names_and_known_styles():
     """Each column of the tables has a name, and a style that the page knows."""
-    tables = [table.columns for tables in TABLES.values() for table in tables]
-    files = [file.columns for files in CSV_FILES.values() for file in files.values()]
+    tables = [one.columns for tables in page.TABLES.values() for one in tables]
+    files = [file.columns for files in columns.CSV_FILES.values() for file in files.values()]
     for line in tables + [line for line in files if line]:
-        for column in parse_columns(line):
+        for column in columns.parse_columns(line):
             assert column.name and " " not in column.name, line
             assert column.style in ("", "name", "quantity", "rounded", "percent"), line
 
 
 def test_exact_csv_of_fit_has_units_of_its_headings():
     """A column whose heading names a unit has its values in this unit, others in SI; missing numbers are empty."""
-    columns = {
+    arrays = {
         "frequency": ([140.0, 150.0], "Hz"),
         "input": ([2 * G_N, G_N], "m s-2"),
         "computed_displacement": ([25.4e-6, None], "m"),
     }
-    data = make_columns("row", columns) | {"flag": encode("row", ["U", ""])}
-    text = format_curves(Answer("fit", "", (), data=data))["fit.csv"]
+    data = answer.make_columns("row", arrays) | {"flag": answer.encode("row", ["U", ""])}
+    text = columns.format_curves(answer.Answer("fit", "", (), data=data))["fit.csv"]
     lines = list(csv.reader(text.splitlines()))
     assert lines[0] == ["frequency [Hz]", "input [g]", "flag", "computed displacement [mil]"]
     assert [line[2:] for line in lines[1:]] == [["U", "1.0"], ["", ""]]
@@ -68,10 +66,10 @@ def test_exact_csv_of_fit_has_units_of_its_headings():
 
 def test_exact_csv_of_methods_stands_below_each_other():
     """A CSV of a backbone has the rows of all methods; a variable that one method lacks is empty there."""
-    data = make_columns("balance_amplitude", {"balance_amplitude": ([1e-6, 2e-6], "m")})
-    data |= make_columns("balance_amplitude", {"balance_force": ([3.0, 4.0], "N")})
-    data |= make_columns("quasi_static_amplitude", {"quasi_static_amplitude": ([5e-6], "m")})
-    text = format_curves(Answer("backbone", "", (), data=data))["backbone.csv"]
+    data = answer.make_columns("balance_amplitude", {"balance_amplitude": ([1e-6, 2e-6], "m")})
+    data |= answer.make_columns("balance_amplitude", {"balance_force": ([3.0, 4.0], "N")})
+    data |= answer.make_columns("quasi_static_amplitude", {"quasi_static_amplitude": ([5e-6], "m")})
+    text = columns.format_curves(answer.Answer("backbone", "", (), data=data))["backbone.csv"]
     assert text.splitlines() == [
         "method,amplitude [m],force [N]",
         "balance,1e-06,3.0",
@@ -82,14 +80,16 @@ def test_exact_csv_of_methods_stands_below_each_other():
 
 def test_exact_rows_of_dimension_are_quantities():
     """The rows of a dimension have numbers with their errors as quantities, codes and words as text."""
-    columns = {
+    arrays = {
         "force": ([1.0, np.nan], "N"),
         "force_error": ([0.1, np.nan], "N"),
         "setting": (["a", "b"], ""),
     }
-    data = make_columns("run", columns) | {"result": encode("run", ["meets", "misses"])}
-    first, second = list_rows(Answer("cost", "", (), data=data), "run")
-    assert first["force"] == Quantity(1.0, "N", 0.1) and second["force"].value is None
+    data = answer.make_columns("run", arrays) | {
+        "result": answer.encode("run", ["meets", "misses"])
+    }
+    first, second = columns.list_rows(answer.Answer("cost", "", (), data=data), "run")
+    assert first["force"] == answer.Quantity(1.0, "N", 0.1) and second["force"].value is None
     assert (first["setting"], second["result"]) == ("a", "misses")
 
 
@@ -100,9 +100,11 @@ def test_exact_rows_of_details_are_objects_by_name():
             "measures": {"peak_depth": {"before": {"value": 2.0, "unit": "m", "floor": 0.0}}}
         }
     }
-    (row,) = list_rows(Answer("compare", "", (), details=details), "pressed/measures")
-    assert row == {"name": "peak depth", "before": Quantity(2.0, "m")}
-    assert list_rows(Answer("compare", "", ()), "pressed/measures") == []
+    (row,) = columns.list_rows(
+        answer.Answer("compare", "", (), details=details), "pressed/measures"
+    )
+    assert row == {"name": "peak depth", "before": answer.Quantity(2.0, "m")}
+    assert columns.list_rows(answer.Answer("compare", "", ()), "pressed/measures") == []
 
 
 def test_exact_details_are_plain_json():
@@ -121,5 +123,5 @@ def test_exact_details_are_plain_json():
         "flag": [True, False],
         "objects": [None, True],
     }
-    assert to_plain(content) == plain
-    assert json.loads(json.dumps(Answer("fit", "", (), details=content).details)) == plain
+    assert answer.to_plain(content) == plain
+    assert json.loads(json.dumps(answer.Answer("fit", "", (), details=content).details)) == plain

@@ -16,7 +16,13 @@ DASHES = ("solid", "dash", "dot", "dashdot")
 SYMBOLS = ("circle", "diamond", "square", "x")
 BAND_OPACITY = 0.18
 FRAME_MILLISECONDS = 120  # duration of a frame of a film
-MENU_PLACE = {"x": 0, "xanchor": "left", "y": 1.02, "yanchor": "bottom"}  # above the chart
+# Position of a menu, above its chart.
+MENU_PLACE = {
+    "x": 0,
+    "xanchor": "left",
+    "y": 1.02,
+    "yanchor": "bottom",
+}
 
 
 def draw(panel: Panel) -> dict:
