@@ -133,7 +133,9 @@ def find_worn_tops(relative, height, max_gain_change: float) -> np.ndarray:
     tops = slice(-N_TOP_CLASSES, None)
     limit = MIN_RISE + scatter + max_gain_change * float(np.median(range_of_heights[tops]))
     if np.median(rise[tops]) > limit:
-        worn.ravel()[np.concatenate([part for part, step in zip(classes, rise) if step > limit])] = True
+        worn.ravel()[
+            np.concatenate([part for part, step in zip(classes, rise) if step > limit])
+        ] = True
     return worn
 
 

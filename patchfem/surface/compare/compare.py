@@ -267,7 +267,7 @@ def _measure(
             values["worn_share"] = _measure_share(depths)
         if is_trace and is_placed:
             regions, cutoff = waves.measure_roughness(depths, spans)
-    limit = find_detection_limit(depths.depth, depths.noise) if is_placed else None
+    limit = _find_detection_limit(depths) if is_placed else None
     numbers = {"lost": area, "grown": grown, "basis": placement.basis}
     numbers |= limit_wear(bounds[2] / depths.size, limit) | possible
     if not is_trace:
@@ -276,6 +276,18 @@ def _measure(
     evidence = Evidence(placement, depths, regions, cutoff)
     findings = _collect_findings(verdict, evidence, bend, tracks, rasters)
     return Comparison(*surfaces, verdict, values, tracks, findings, evidence)
+
+
+def _find_detection_limit(depths: DepthMap) -> float:
+    """Return the mean depth [m] from which on wear is found; over the middle third of a trace a drift may hide more."""
+    limit = find_detection_limit(depths.depth, depths.noise)
+    if depths.depth.ndim > 1:
+        return limit
+    count = depths.depth.size
+    middle = np.zeros(count, bool)
+    middle[count // 3 : 2 * count // 3] = True
+    # The loss is found although its own error may lower it.
+    return max(limit, 2 * SIDE * depths.integrate(middle)[1] / (middle.sum() * depths.cell))
 
 
 def _get_bend(aligned: Aligned) -> float:

@@ -53,7 +53,8 @@ def find_spans(depths: DepthMap) -> list[tuple[int, int]]:
     """Return the first and last worn sample of each track, the widest one first.
 
     Two worn parts belong to one track unless unworn tops between them are as high as the worn ones: valleys below the
-    floor of a track do not wear, and the depth of a shallow part shows only in the mean of its tops. New roughness in a track may stand above the first surface.
+    floor of a track do not wear, and the depth of a shallow part shows only in the mean of its tops. New roughness in a
+    track may stand above the first surface.
     """
     changed = depths.worn | (np.abs(depths.depth) > UNWORN_LIMIT * depths.noise)
     tops = find_tops(depths)
@@ -65,7 +66,9 @@ def find_spans(depths: DepthMap) -> list[tuple[int, int]]:
         width = max(stop - first, last - start)
         is_changed = gap <= width and changed[stop : start + 1].mean() > MIN_CHANGED_FRACTION
         between = tops.select(stop, start)
-        has_tops = between.unworn.size >= MIN_UNWORN_TOPS and between.depths.mean() < MIN_TRACK_DEPTH
+        has_tops = (
+            between.unworn.size >= MIN_UNWORN_TOPS and between.depths.mean() < MIN_TRACK_DEPTH
+        )
         if not has_tops or gap <= MAX_GAP_FRACTION * width or is_changed:
             # A wider track may bridge the gap before it too.
             spans[k : k + 2] = [(first, last)]
@@ -129,7 +132,12 @@ def find_ends(depths: DepthMap, span: tuple[int, int]) -> tuple[End, End]:
         deep = worn + int(np.argmax(values[worn:stop] > UNWORN_LIMIT))
         beyond = np.sort(unworn[unworn < deep])[-MIN_UNWORN_TOPS:]
         low = x[beyond[0]] if beyond.size else x[0]
-        ends.append(End(*(min(place, float(x[deep])) for place in (end.value, min(end.low, low))), max(end.high, x[deep])))
+        ends.append(
+            End(
+                *(min(place, float(x[deep])) for place in (end.value, min(end.low, low))),
+                max(end.high, x[deep]),
+            )
+        )
     start, end = ends
     return start, End(-end.value, -end.high, -end.low)
 
