@@ -151,7 +151,6 @@ def estimate_errors(depth, noise, unworn, base, shifts=()) -> DepthErrors:
     variance = float(np.median(noise) ** 2 * depth.size / N_TILES[depth.ndim] ** depth.ndim)
     freedom = MIN_FREEDOM
     drift = 0.0
-    shared = 1.0
     if counts.size >= MIN_TILES:
         fitted = np.linalg.lstsq(centers, means * root, rcond=None)[0]
         residual = means * root - centers @ fitted
@@ -169,7 +168,7 @@ def estimate_errors(depth, noise, unworn, base, shifts=()) -> DepthErrors:
         white = variance * float(moments @ inverse @ moments + part.sum())
         return white + sum(float(shift[part].sum()) ** 2 for shift in shifts)
 
-    return DepthErrors(compute_variance, drift, freedom, shared)
+    return DepthErrors(compute_variance, drift, freedom)
 
 
 def _bend_datum(depth, unworn, base) -> np.ndarray:

@@ -65,10 +65,9 @@ def find_spans(depths: DepthMap) -> list[tuple[int, int]]:
         gap = start - stop
         width = max(stop - first, last - start)
         is_changed = gap <= width and changed[stop : start + 1].mean() > MIN_CHANGED_FRACTION
-        between = tops.select(stop, start)
-        has_tops = (
-            between.unworn.size >= MIN_UNWORN_TOPS and between.depths.mean() < MIN_TRACK_DEPTH
-        )
+        between = tops.depths[slice(*np.searchsorted(tops.places, (stop, start)))]
+        n_unworn = (between < MAX_UNWORN_TOP).sum()
+        has_tops = n_unworn >= MIN_UNWORN_TOPS and between.mean() < MIN_TRACK_DEPTH
         if not has_tops or gap <= MAX_GAP_FRACTION * width or is_changed:
             # A wider track may bridge the gap before it too.
             spans[k : k + 2] = [(first, last)]
@@ -79,24 +78,14 @@ def find_spans(depths: DepthMap) -> list[tuple[int, int]]:
 
 
 class Tops(NamedTuple):
-    """Samples (k,) of tops as high above the long waves as a quarter of the worn heights, and depths in deviations."""
+    """Samples (k,) of the highest points of tops, and the depths there (k,) in standard deviations."""
 
     places: np.ndarray
     depths: np.ndarray
 
-    def select(self, first: int, last: int) -> "Tops":
-        """Return the tops between two samples."""
-        part = slice(*np.searchsorted(self.places, (first, last)))
-        return Tops(self.places[part], self.depths[part])
-
-    @property
-    def unworn(self) -> np.ndarray:
-        """Samples (j,) of the tops that are not worn."""
-        return self.places[self.depths < MAX_UNWORN_TOP]
-
 
 def find_tops(depths: DepthMap) -> Tops:
-    """Find the tops that would be worn in a track: those as high as a quarter of the worn heights."""
+    """Find the tops that would be worn in a track: as high as the lowest quarter of the worn heights; not the worn ones."""
     height = remove_long_waves(depths.before)
     relative = depths.depth / depths.noise
     is_deep = depths.worn & (relative > UNWORN_LIMIT)
@@ -121,7 +110,8 @@ def find_ends(depths: DepthMap, span: tuple[int, int]) -> tuple[End, End]:
     relative = np.where(depths.grown | (relative < -UNWORN_LIMIT), 0.0, relative)
     middle = (span[0] + span[1]) // 2
     count = relative.size
-    tops = find_tops(depths).unworn
+    tops = find_tops(depths)
+    tops = tops.places[tops.depths < MAX_UNWORN_TOP]
     ends = []
     for x, values, worn, stop, unworn in (
         (depths.x, relative, span[0], middle + 1, tops),
@@ -131,13 +121,10 @@ def find_ends(depths: DepthMap, span: tuple[int, int]) -> tuple[End, End]:
         # Where tops wear first, the end lies between the outermost worn one and those beyond it that are not worn.
         deep = worn + int(np.argmax(values[worn:stop] > UNWORN_LIMIT))
         beyond = np.sort(unworn[unworn < deep])[-MIN_UNWORN_TOPS:]
-        low = x[beyond[0]] if beyond.size else x[0]
-        ends.append(
-            End(
-                *(min(place, float(x[deep])) for place in (end.value, min(end.low, low))),
-                max(end.high, x[deep]),
-            )
-        )
+        farthest = beyond[0] if beyond.size else 0
+        value = min(end.value, float(x[deep]))
+        low = min(end.low, float(x[min(farthest, deep)]))
+        ends.append(End(value, low, max(end.high, float(x[deep]))))
     start, end = ends
     return start, End(-end.value, -end.high, -end.low)
 
