@@ -221,23 +221,17 @@ def _measure(
 
     # What the same tests find above the first surface is a control for what they find below it.
     spans = find_spans(depths) if is_trace else []
-    covered = _cover_loss(depths, spans)
-    area, error = depths.integrate(covered)
-    highest = area + SIDE * error + depths.measure_hidden(covered)
-    bounds = (area, max(area - SIDE * error, 0.0), highest)
+    area, error = depths.integrate(_cover_loss(depths, spans))
     is_grown = _enlarge(depths.grown) & depths.inside & ~depths.worn
     grown, grown_error = depths.integrate(is_grown, -1.0)
     sure_area = depths.integrate(depths.worn)[0]
     is_placed = placement.basis == "place"
     # The flanks of a track were compared with random traces, which choose their deepest place too.
     sure_loss = find_sure_loss(depths) if is_placed else SIDE
+    # Drift may be as large as the loss of sharp tops, but is no cause of it.
     sharp = measure_sharp_loss(depths) if is_placed else 0.0
-    drift = error
-    if sharp > 0:
-        # Drift may be as large as the loss of the tops, but is no cause of it.
-        least = (1 - SIDE * depths.errors.model) * sharp
-        bounds = (max(area, sharp), max(bounds[1], least), max(bounds[2], sharp))
-        drift = 0.0
+    drift = 0.0 if sharp > 0 else error
+    bounds = _bound_loss(depths, spans, sharp)
     code = judge_change(bounds[0], drift, sure_loss, sure_area, grown, grown_error)
     if not is_placed and code != "worn":
         code = "elsewhere"
@@ -276,6 +270,17 @@ def _measure(
     evidence = Evidence(placement, depths, regions, cutoff)
     findings = _collect_findings(verdict, evidence, bend, tracks, rasters)
     return Comparison(*surfaces, verdict, values, tracks, findings, evidence)
+
+
+def _bound_loss(
+    depths: DepthMap, spans: list[tuple[int, int]], sharp: float
+) -> tuple[float, float, float]:
+    """Return the lost area [m2] or volume [m3] with its interval; sharp: what sure tops of it have lost."""
+    covered = _cover_loss(depths, spans)
+    area, error = depths.integrate(covered)
+    low = max(area - SIDE * error, (1 - SIDE * depths.errors.model) * sharp, 0.0)
+    high = area + SIDE * error + depths.measure_hidden(covered)
+    return max(area, sharp), low, max(high, sharp)
 
 
 def _find_detection_limit(depths: DepthMap) -> float:

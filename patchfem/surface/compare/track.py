@@ -7,19 +7,16 @@ from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
-from scipy import ndimage
 
 from ..profile import find_runs
 from ..quantity import SIDE, Quantity
 from .depth_map import UNWORN_LIMIT, DepthMap
 from .records import Track, name_estimate, name_quantity, name_unknown
-from .statistics import remove_long_waves
+from .tops import find_tops
 
 MAX_GAP_FRACTION = 0.05  # largest unworn gap in a track relative to its width
 # Number of unworn tops that separate two tracks, and to which the interval of an end reaches; the floor may spare one.
 MIN_UNWORN_TOPS = 2
-TOP_QUANTILE = 0.25  # quantile of the worn heights above which a height is a top
-TOP_SAMPLES = 3  # number of samples whose mean depth shows whether a top is worn
 MIN_TRACK_DEPTH = 0.5  # mean depth of all tops of a part, in standard deviations, from which on it belongs to a track
 MAX_UNWORN_TOP = 1.5  # largest such mean of an unworn top, in standard deviations of a single depth
 MIN_CHANGED_FRACTION = 0.85  # fraction of changed heights in a wider gap that belongs to the track
@@ -75,27 +72,6 @@ def find_spans(depths: DepthMap) -> list[tuple[int, int]]:
         else:
             k += 1
     return sorted(spans, key=lambda span: depths.x[span[0]] - depths.x[span[1]])
-
-
-class Tops(NamedTuple):
-    """Samples (k,) of the highest points of tops, and the depths there (k,) in standard deviations."""
-
-    places: np.ndarray
-    depths: np.ndarray
-
-
-def find_tops(depths: DepthMap) -> Tops:
-    """Find the tops that would be worn in a track: as high as the lowest quarter of the worn heights; not the worn ones."""
-    height = remove_long_waves(depths.before)
-    relative = depths.depth / depths.noise
-    is_deep = depths.worn & (relative > UNWORN_LIMIT)
-    if not is_deep.any():
-        return Tops(np.zeros(0, int), np.zeros(0))
-    runs = find_runs(height > np.quantile(height[is_deep], TOP_QUANTILE))
-    tops = np.array([first + int(np.argmax(height[first : last + 1])) for first, last in runs], int)
-    tops = tops[~depths.missing[tops] & ~depths.worn[tops]]
-    # A top is a few samples wide, whose noise is partly independent.
-    return Tops(tops, ndimage.uniform_filter1d(relative, TOP_SAMPLES)[tops])
 
 
 def get_margin(span: tuple[int, int]) -> int:

@@ -4,9 +4,9 @@ import numpy as np
 from scipy import special
 
 from ..quantity import SIDE
-from .changes import CONTROL, find_worn_tops
 from .depth_map import DepthMap
 from .statistics import FALSE_POSITIVE_RATE, subtract_local_level
+from .tops import CONTROL, find_worn_tops
 
 MIN_GROWTH = 5.0  # standard deviations of grown material that is reported
 MIN_LOSS = 4.0  # standard deviations of lost material that is reported beside as much growth
@@ -30,7 +30,7 @@ def measure_sharp_loss(depths: DepthMap) -> float:
     relative = np.where(np.isnan(relative) | depths.missing, 0.0, relative)
     height = (depths.before + depths.after) / 2 / depths.noise_level
     tops = find_worn_tops(relative, height, SIDE * depths.errors.model)
-    return float((relative * depths.noise)[tops].sum()) * depths.cell
+    return float((relative * depths.noise)[tops & depths.worn].sum()) * depths.cell
 
 
 def judge_change(
