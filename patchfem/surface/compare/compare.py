@@ -231,14 +231,14 @@ def _measure(
     # Drift may be as large as the loss of sharp tops, but is no cause of it.
     sharp = measure_sharp_loss(depths) if is_placed else 0.0
     drift = 0.0 if sharp > 0 else error
-    bounds = _bound_loss(depths, spans, sharp)
-    code = judge_change(bounds[0], drift, sure_loss, sure_area, grown, grown_error)
+    loss = _bound_loss(depths, spans, sharp)
+    code = judge_change(loss.value, drift, sure_loss, sure_area, grown, grown_error)
     if not is_placed and code != "worn":
         code = "elsewhere"
     tracks = ()
     if code.startswith("worn"):
         # The area of a single track is that of the common part.
-        whole = bounds if len(spans) == 1 else None
+        whole = loss[:3] if len(spans) == 1 else None
         tracks = tuple(measure_track(depths, span, whole) for span in spans)
     bend = _get_bend(aligned)
     code, possible = _doubt(code, depths, spans, tracks, (area, grown, bend))
@@ -251,8 +251,8 @@ def _measure(
     regions = {}
     cutoff = None
     if code.startswith("worn"):
-        means = [bound / depths.size for bound in bounds]
-        values[names.lost] = name_quantity(names.lost, *bounds)
+        means = [bound / depths.size for bound in loss[:3]]
+        values[names.lost] = loss
         values["worn_depth_mean"] = name_quantity("worn_depth_mean", *means)
         values |= _locate_largest(depths)
         if is_trace:
@@ -263,7 +263,7 @@ def _measure(
             regions, cutoff = waves.measure_roughness(depths, spans)
     limit = _find_detection_limit(depths) if is_placed else None
     numbers = {"lost": area, "grown": grown, "basis": placement.basis}
-    numbers |= limit_wear(bounds[2] / depths.size, limit) | possible
+    numbers |= limit_wear(loss.high / depths.size, limit) | possible
     if not is_trace:
         numbers["side"] = find_largest_window(depths.depth.shape)
     verdict = Finding(code, numbers)
@@ -272,15 +272,14 @@ def _measure(
     return Comparison(*surfaces, verdict, values, tracks, findings, evidence)
 
 
-def _bound_loss(
-    depths: DepthMap, spans: list[tuple[int, int]], sharp: float
-) -> tuple[float, float, float]:
+def _bound_loss(depths: DepthMap, spans: list[tuple[int, int]], sharp: float) -> Quantity:
     """Return the lost area [m2] or volume [m3] with its interval; sharp: what sure tops of it have lost."""
     covered = _cover_loss(depths, spans)
     area, error = depths.integrate(covered)
     low = max(area - SIDE * error, (1 - SIDE * depths.errors.model) * sharp, 0.0)
     high = area + SIDE * error + depths.measure_hidden(covered)
-    return max(area, sharp), low, max(high, sharp)
+    name = NAMES[depths.depth.ndim].lost
+    return name_quantity(name, max(area, sharp), low, max(high, sharp))
 
 
 def _find_detection_limit(depths: DepthMap) -> float:

@@ -26,11 +26,13 @@ def find_sure_loss(depths: DepthMap) -> float:
 
 def measure_sharp_loss(depths: DepthMap) -> float:
     """Return the area [m2] or volume [m3] of tops that lie deeper than the unworn heights beside them, as no drift does."""
+    if not depths.worn.any():
+        return 0.0
     relative = subtract_local_level(depths.depth, depths.unworn) / depths.noise
     relative = np.where(np.isnan(relative) | depths.missing, 0.0, relative)
     height = (depths.before + depths.after) / 2 / depths.noise_level
     tops = find_worn_tops(relative, height, SIDE * depths.errors.model)
-    return float((relative * depths.noise)[tops & depths.worn].sum()) * depths.cell
+    return float((relative * depths.noise)[tops].sum()) * depths.cell
 
 
 def judge_change(
