@@ -3,9 +3,7 @@
 import numpy as np
 import pytest
 from scipy.ndimage import gaussian_filter1d
-from test_traces import NM, UM, draw_surface, has_finding, make_pair
-
-from patchfem.surface.compare.compare import compare_surfaces
+from test_traces import NM, UM, compare_surfaces, draw_surface, has_finding, make_pair
 
 START = 40  # sample of the surface at which the second trace starts
 
