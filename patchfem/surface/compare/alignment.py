@@ -209,7 +209,8 @@ def _estimate_gain(model: Model, fit: Fit) -> tuple[float, float]:
     A drift has no short waves, and valleys wear last, so that neither passes for another gain.
     """
     unworn = model.draw(fit.unworn, False)
-    fields = [fill_gaps(model.draw(values)) for values in (fit.depth, model.compute_jacobian(fit.state)[:, -1])]
+    columns = (fit.depth, model.compute_jacobian(fit.state)[:, -1])
+    fields = [fill_gaps(model.draw(column)) for column in columns]
     depth, waves = (subtract_local_level(field, unworn) for field in fields)
     use = unworn & np.isfinite(depth)
     if use.sum() < MIN_HEIGHTS:
@@ -225,8 +226,9 @@ def _estimate_gain(model: Model, fit: Fit) -> tuple[float, float]:
     dilution = float((residual**2).sum() / 2 / power)
     # Neighbouring heights share errors, tiles hardly do.
     influence = waves * residual / power
-    tiles = [influence[tile].sum() for tile in split_tiles(influence.shape, N_GAIN_TILES[depth.ndim])]
-    return dilution - slope, float(np.hypot(np.linalg.norm(tiles), dilution))
+    tiles = split_tiles(influence.shape, N_GAIN_TILES[depth.ndim])
+    sums = [influence[tile].sum() for tile in tiles]
+    return dilution - slope, float(np.hypot(np.linalg.norm(sums), dilution))
 
 
 def _find_digit(z) -> float:

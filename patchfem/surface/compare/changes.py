@@ -10,7 +10,6 @@ from .statistics import (
     compute_threshold,
     estimate_correlation,
     estimate_one_sided_scale,
-    remove_long_waves,
 )
 
 WINDOWS = {1: (1, 4, 16, 64), 2: (1, 3, 9, 25)}  # sides of the windows whose mean depth is tested
@@ -22,15 +21,6 @@ MIN_SPOT_SIDE = {1: 1, 2: 3}  # the same of points that are changed alone
 MAX_PULL = {1: 4.0, 2: 8.0}  # standard deviations to which a single depth counts in a mean
 # Fraction of the means above or below zero that are unchanged at least.
 UNCHANGED_FRACTION = {1: 0.5, 2: 0.25}
-CONTROL = 3.0  # lost over grown material, beyond which it is wear; and the reverse
-MIN_TOPS = 3  # smallest number of worn tops that are no specks of dust on the first surface
-TOP_SIDE = 2  # smallest side of a worn top, in samples; a spike is narrower
-N_CLASSES = 10  # number of classes of heights whose depths are compared
-N_VALLEY_CLASSES = 3  # number of the lowest classes, which wear last
-N_TOP_CLASSES = 6  # number of the highest classes
-# Smallest rise of the median depth from valleys to tops, in standard deviations of a depth, and of a median.
-MIN_RISE = 0.2
-MIN_RISE_DEVIATIONS = 3.5
 N_PARTS = 60  # parts of the trace whose means show a shallow track
 FLANK_PARTS = 5  # smallest number of parts on either side of a shallow track
 MIN_TRACK_PARTS = 3  # smallest number of parts in a shallow track
@@ -84,57 +74,6 @@ def find_changed(depth, noise) -> np.ndarray:
         changed = ndimage.binary_dilation(changed)
         side = MIN_RUN
     return ndimage.binary_opening(changed, np.ones((side,) * depth.ndim)) & known
-
-
-def find_worn_tops(relative, height, max_gain_change: float) -> np.ndarray:
-    """Find tops that wear touched first, of any width, or on all of the surface.
-
-    Filled valleys are the control: an error of interpolation raises valleys and lowers tops of either surface alike, and a
-    drift is too slow for both.
-
-    Parameters
-    ----------
-    relative : (n,) or (m, n) array
-        Depth in standard deviations, 0 where unknown.
-    height : (n,) or (m, n) array
-        Mean height of both surfaces in standard deviations, whose noise does not depend on that of the depth; no gaps.
-    max_gain_change : float
-        Largest change of the gain of the instrument that both surfaces may still have.
-
-    Returns
-    -------
-    array
-        Mask of the same shape.
-    """
-    height = remove_long_waves(height)
-    is_high = height > np.median(height)
-    limit = compute_threshold(len(WINDOWS[height.ndim]) * height.size)
-    square = np.ones((TOP_SIDE,) * height.ndim)
-    worn = ndimage.binary_opening((relative > limit) & is_high, square)
-    filled = ndimage.binary_opening((relative < -limit) & ~is_high, square)
-    count = ndimage.label(worn)[1]
-    if count < max(MIN_TOPS, CONTROL * ndimage.label(filled)[1]):
-        worn[:] = False
-
-    # Where wear lowered most tops, even slightly, these are deeper than the valleys by more than another gain explains.
-    order = np.argsort(height, axis=None)
-    order = order[relative.ravel()[order] != 0]
-    if order.size < N_CLASSES * MIN_RUN:
-        return worn
-    classes = np.array_split(order, N_CLASSES)
-    medians, places = (
-        np.array([np.median(values.ravel()[part]) for part in classes])
-        for values in (relative, height)
-    )
-    rise, range_of_heights = (
-        values - np.median(values[:N_VALLEY_CLASSES]) for values in (medians, places)
-    )
-    scatter = MIN_RISE_DEVIATIONS / np.sqrt(len(classes[0]))
-    tops = slice(-N_TOP_CLASSES, None)
-    limit = MIN_RISE + scatter + max_gain_change * float(np.median(range_of_heights[tops]))
-    if np.median(rise[tops]) > limit:
-        worn.ravel()[np.concatenate([part for part, step in zip(classes, rise) if step > limit])] = True
-    return worn
 
 
 class Boxes(NamedTuple):

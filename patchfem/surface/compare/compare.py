@@ -221,30 +221,24 @@ def _measure(
 
     # What the same tests find above the first surface is a control for what they find below it.
     spans = find_spans(depths) if is_trace else []
-    covered = _cover_loss(depths, spans)
-    area, error = depths.integrate(covered)
-    highest = area + SIDE * error + depths.measure_hidden(covered)
-    bounds = (area, max(area - SIDE * error, 0.0), highest)
+    area, error = depths.integrate(_cover_loss(depths, spans))
     is_grown = _enlarge(depths.grown) & depths.inside & ~depths.worn
     grown, grown_error = depths.integrate(is_grown, -1.0)
     sure_area = depths.integrate(depths.worn)[0]
     is_placed = placement.basis == "place"
     # The flanks of a track were compared with random traces, which choose their deepest place too.
     sure_loss = find_sure_loss(depths) if is_placed else SIDE
+    # Drift may be as large as the loss of sharp tops, but is no cause of it.
     sharp = measure_sharp_loss(depths) if is_placed else 0.0
-    drift = error
-    if sharp > 0:
-        # Drift may be as large as the loss of the tops, but is no cause of it.
-        least = (1 - SIDE * depths.errors.model) * sharp
-        bounds = (max(area, sharp), max(bounds[1], least), max(bounds[2], sharp))
-        drift = 0.0
-    code = judge_change(bounds[0], drift, sure_loss, sure_area, grown, grown_error)
+    drift = 0.0 if sharp > 0 else error
+    loss = _bound_loss(depths, spans, sharp)
+    code = judge_change(loss.value, drift, sure_loss, sure_area, grown, grown_error)
     if not is_placed and code != "worn":
         code = "elsewhere"
     tracks = ()
     if code.startswith("worn"):
         # The area of a single track is that of the common part.
-        whole = bounds if len(spans) == 1 else None
+        whole = loss[:3] if len(spans) == 1 else None
         tracks = tuple(measure_track(depths, span, whole) for span in spans)
     bend = _get_bend(aligned)
     code, possible = _doubt(code, depths, spans, tracks, (area, grown, bend))
@@ -257,8 +251,8 @@ def _measure(
     regions = {}
     cutoff = None
     if code.startswith("worn"):
-        means = [bound / depths.size for bound in bounds]
-        values[names.lost] = name_quantity(names.lost, *bounds)
+        means = [bound / depths.size for bound in loss[:3]]
+        values[names.lost] = loss
         values["worn_depth_mean"] = name_quantity("worn_depth_mean", *means)
         values |= _locate_largest(depths)
         if is_trace:
@@ -267,15 +261,37 @@ def _measure(
             values["worn_share"] = _measure_share(depths)
         if is_trace and is_placed:
             regions, cutoff = waves.measure_roughness(depths, spans)
-    limit = find_detection_limit(depths.depth, depths.noise) if is_placed else None
+    limit = _find_detection_limit(depths) if is_placed else None
     numbers = {"lost": area, "grown": grown, "basis": placement.basis}
-    numbers |= limit_wear(bounds[2] / depths.size, limit) | possible
+    numbers |= limit_wear(loss.high / depths.size, limit) | possible
     if not is_trace:
         numbers["side"] = find_largest_window(depths.depth.shape)
     verdict = Finding(code, numbers)
     evidence = Evidence(placement, depths, regions, cutoff)
     findings = _collect_findings(verdict, evidence, bend, tracks, rasters)
     return Comparison(*surfaces, verdict, values, tracks, findings, evidence)
+
+
+def _bound_loss(depths: DepthMap, spans: list[tuple[int, int]], sharp: float) -> Quantity:
+    """Return the lost area [m2] or volume [m3] with its interval; sharp: what sure tops of it have lost."""
+    covered = _cover_loss(depths, spans)
+    area, error = depths.integrate(covered)
+    low = max(area - SIDE * error, (1 - SIDE * depths.errors.model) * sharp, 0.0)
+    high = area + SIDE * error + depths.measure_hidden(covered)
+    name = NAMES[depths.depth.ndim].lost
+    return name_quantity(name, max(area, sharp), low, max(high, sharp))
+
+
+def _find_detection_limit(depths: DepthMap) -> float:
+    """Return the mean depth [m] from which on wear is found; over the middle third of a trace a drift may hide more."""
+    limit = find_detection_limit(depths.depth, depths.noise)
+    if depths.depth.ndim > 1:
+        return limit
+    count = depths.depth.size
+    middle = np.zeros(count, bool)
+    middle[count // 3 : 2 * count // 3] = True
+    # The loss is found although its own error may lower it.
+    return max(limit, 2 * SIDE * depths.integrate(middle)[1] / (middle.sum() * depths.cell))
 
 
 def _get_bend(aligned: Aligned) -> float:

@@ -21,7 +21,6 @@ class DepthErrors(NamedTuple):
     - variance: function of a mask, variance [m2] of the sum of its depths.
     - drift: root mean square [m] of the mean depths of unworn tiles about the datum, 0 if these are too few.
     - freedom: number of independent tiles, beyond those that determine the datum, that show the variance.
-    - shared: number of neighbouring tiles that share an error, 1 without drift.
     - correlation: number of neighbouring heights that share an error.
     - model: relative standard deviation of a single depth due to gain, tip and interpolation.
     """
@@ -29,7 +28,6 @@ class DepthErrors(NamedTuple):
     variance: Callable[[np.ndarray], float]
     drift: float = 0.0
     freedom: float = np.inf
-    shared: float = 1.0
     correlation: float = 1.0
     model: float = MODEL_ERROR
 

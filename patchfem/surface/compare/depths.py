@@ -58,7 +58,10 @@ def make_depths(model: Model, fit: Fit, gain_error: float = 0.0) -> DepthMap:
     columns = base.reshape(len(base), -1).T
     plane = np.linalg.lstsq(columns[unworn.ravel()], before[unworn], rcond=None)[0]
     waves = before - (columns @ plane).reshape(before.shape)
-    errors = estimate_errors(depth, noise, unworn, base, gain_error * (waves - depth))
+    shifts = [gain_error * (waves - depth)]
+    if model.n_axes == 1:
+        shifts.append(_bend_datum(depth, unworn, base))
+    errors = estimate_errors(depth, noise, unworn, base, shifts)
     correlation = 1.0
     if model.n_axes == 1:
         correlation = estimate_correlation((depth / noise)[masks["unworn"]])
@@ -119,7 +122,7 @@ def make_section(x, heights, sigma: float, worn, grown=None) -> DepthMap:
     )
 
 
-def estimate_errors(depth, noise, unworn, base, shift=0.0) -> DepthErrors:
+def estimate_errors(depth, noise, unworn, base, shifts=()) -> DepthErrors:
     """Estimate the errors of sums of depths from the means of unworn heights in tiles about the datum.
 
     With white noise, the mean of c heights has the variance s^2/c; noise that neighbours share and slow errors of the
@@ -132,8 +135,8 @@ def estimate_errors(depth, noise, unworn, base, shift=0.0) -> DepthErrors:
         Depths and noise [m], and the mask of heights that are unworn.
     base : (k, n) or (k, m, n) array
         Functions of which the datum is a combination.
-    shift : (n,) or (m, n) array, optional
-        Change of the depths by one standard deviation of the gain [m].
+    shifts : sequence of (n,) or (m, n) array, optional
+        Changes of the depths by one standard deviation of other errors [m].
     """
     tiles = []
     for tile in split_tiles(depth.shape, N_TILES[depth.ndim]):
@@ -148,7 +151,6 @@ def estimate_errors(depth, noise, unworn, base, shift=0.0) -> DepthErrors:
     variance = float(np.median(noise) ** 2 * depth.size / N_TILES[depth.ndim] ** depth.ndim)
     freedom = MIN_FREEDOM
     drift = 0.0
-    shared = 1.0
     if counts.size >= MIN_TILES:
         fitted = np.linalg.lstsq(centers, means * root, rcond=None)[0]
         residual = means * root - centers @ fitted
@@ -160,14 +162,13 @@ def estimate_errors(depth, noise, unworn, base, shift=0.0) -> DepthErrors:
         drift = float(np.sqrt(scatter / counts.mean()))
         variance = float(scatter * shared * student**2)
     inverse = np.linalg.pinv(centers.T @ centers, rcond=1e-10, hermitian=True)
-    bent = _bend_datum(depth, unworn, base) if counts.size >= MIN_TILES and depth.ndim == 1 else 0.0
 
     def compute_variance(part) -> float:
         moments = base[:, part].sum(axis=1)
         white = variance * float(moments @ inverse @ moments + part.sum())
-        return white + sum((field * part).sum() ** 2 for field in (bent, shift))
+        return white + sum(float(shift[part].sum()) ** 2 for shift in shifts)
 
-    return DepthErrors(compute_variance, drift, freedom, shared)
+    return DepthErrors(compute_variance, drift, freedom)
 
 
 def _bend_datum(depth, unworn, base) -> np.ndarray:

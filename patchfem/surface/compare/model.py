@@ -14,7 +14,7 @@ import numpy as np
 from scipy import ndimage
 
 from ..profile import robust_deviation
-from .changes import find_changed, find_worn_tops
+from .changes import find_changed
 from .place import Place, make_matrix
 from .raster import Raster, fill_gaps
 from .statistics import (
@@ -25,6 +25,7 @@ from .statistics import (
     split_tiles,
     subtract_plane,
 )
+from .tops import find_worn_tops
 
 BORDER_SAMPLES = 3  # distance from the border of a surface from which on its spline is accurate
 MIN_KNOWN_WEIGHT = 0.99  # weight of measured neighbours of a point whose height is known

@@ -14,7 +14,7 @@ MIN_HEIGHTS = 40  # smallest number of heights of a trace that is compared
 MIN_SIDE = 16  # smallest number of points along each side of a scan
 MAX_GAP_STEPS = 2.5  # distance of two samples, in median steps, above which heights are missing
 MAX_UNEVEN = 0.1  # largest distance from even places, in steps, of a trace that is not resampled
-FOURTH_DIFFERENCE = (1, -4, 6, -4, 1)  # of a single spike, six times its height
+FOURTH_DIFFERENCE = (1, -4, 6, -4, 1)  # six times the height of a single spike
 # Fourth difference of a spike relative to this quantile of all of them.
 LONE_RATIO = 4.0
 LONE_QUANTILE = 0.97

@@ -7,19 +7,16 @@ from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
-from scipy import ndimage
 
 from ..profile import find_runs
 from ..quantity import SIDE, Quantity
 from .depth_map import UNWORN_LIMIT, DepthMap
 from .records import Track, name_estimate, name_quantity, name_unknown
-from .statistics import remove_long_waves
+from .tops import find_tops
 
 MAX_GAP_FRACTION = 0.05  # largest unworn gap in a track relative to its width
 # Number of unworn tops that separate two tracks, and to which the interval of an end reaches; the floor may spare one.
 MIN_UNWORN_TOPS = 2
-TOP_QUANTILE = 0.25  # quantile of the worn heights above which a height is a top
-TOP_SAMPLES = 3  # number of samples whose mean depth shows whether a top is worn
 MIN_TRACK_DEPTH = 0.5  # mean depth of all tops of a part, in standard deviations, from which on it belongs to a track
 MAX_UNWORN_TOP = 1.5  # largest such mean of an unworn top, in standard deviations of a single depth
 MIN_CHANGED_FRACTION = 0.85  # fraction of changed heights in a wider gap that belongs to the track
@@ -53,7 +50,8 @@ def find_spans(depths: DepthMap) -> list[tuple[int, int]]:
     """Return the first and last worn sample of each track, the widest one first.
 
     Two worn parts belong to one track unless unworn tops between them are as high as the worn ones: valleys below the
-    floor of a track do not wear, and the depth of a shallow part shows only in the mean of its tops. New roughness in a track may stand above the first surface.
+    floor of a track do not wear, and the depth of a shallow part shows only in the mean of its tops. New roughness in a
+    track may stand above the first surface.
     """
     changed = depths.worn | (np.abs(depths.depth) > UNWORN_LIMIT * depths.noise)
     tops = find_tops(depths)
@@ -64,8 +62,9 @@ def find_spans(depths: DepthMap) -> list[tuple[int, int]]:
         gap = start - stop
         width = max(stop - first, last - start)
         is_changed = gap <= width and changed[stop : start + 1].mean() > MIN_CHANGED_FRACTION
-        between = tops.select(stop, start)
-        has_tops = between.unworn.size >= MIN_UNWORN_TOPS and between.depths.mean() < MIN_TRACK_DEPTH
+        between = tops.depths[slice(*np.searchsorted(tops.places, (stop, start)))]
+        n_unworn = (between < MAX_UNWORN_TOP).sum()
+        has_tops = n_unworn >= MIN_UNWORN_TOPS and between.mean() < MIN_TRACK_DEPTH
         if not has_tops or gap <= MAX_GAP_FRACTION * width or is_changed:
             # A wider track may bridge the gap before it too.
             spans[k : k + 2] = [(first, last)]
@@ -73,37 +72,6 @@ def find_spans(depths: DepthMap) -> list[tuple[int, int]]:
         else:
             k += 1
     return sorted(spans, key=lambda span: depths.x[span[0]] - depths.x[span[1]])
-
-
-class Tops(NamedTuple):
-    """Samples (k,) of tops as high above the long waves as a quarter of the worn heights, and depths in deviations."""
-
-    places: np.ndarray
-    depths: np.ndarray
-
-    def select(self, first: int, last: int) -> "Tops":
-        """Return the tops between two samples."""
-        part = slice(*np.searchsorted(self.places, (first, last)))
-        return Tops(self.places[part], self.depths[part])
-
-    @property
-    def unworn(self) -> np.ndarray:
-        """Samples (j,) of the tops that are not worn."""
-        return self.places[self.depths < MAX_UNWORN_TOP]
-
-
-def find_tops(depths: DepthMap) -> Tops:
-    """Find the tops that would be worn in a track: those as high as a quarter of the worn heights."""
-    height = remove_long_waves(depths.before)
-    relative = depths.depth / depths.noise
-    is_deep = depths.worn & (relative > UNWORN_LIMIT)
-    if not is_deep.any():
-        return Tops(np.zeros(0, int), np.zeros(0))
-    runs = find_runs(height > np.quantile(height[is_deep], TOP_QUANTILE))
-    tops = np.array([first + int(np.argmax(height[first : last + 1])) for first, last in runs], int)
-    tops = tops[~depths.missing[tops] & ~depths.worn[tops]]
-    # A top is a few samples wide, whose noise is partly independent.
-    return Tops(tops, ndimage.uniform_filter1d(relative, TOP_SAMPLES)[tops])
 
 
 def get_margin(span: tuple[int, int]) -> int:
@@ -118,7 +86,8 @@ def find_ends(depths: DepthMap, span: tuple[int, int]) -> tuple[End, End]:
     relative = np.where(depths.grown | (relative < -UNWORN_LIMIT), 0.0, relative)
     middle = (span[0] + span[1]) // 2
     count = relative.size
-    tops = find_tops(depths).unworn
+    tops = find_tops(depths)
+    tops = tops.places[tops.depths < MAX_UNWORN_TOP]
     ends = []
     for x, values, worn, stop, unworn in (
         (depths.x, relative, span[0], middle + 1, tops),
@@ -128,8 +97,10 @@ def find_ends(depths: DepthMap, span: tuple[int, int]) -> tuple[End, End]:
         # Where tops wear first, the end lies between the outermost worn one and those beyond it that are not worn.
         deep = worn + int(np.argmax(values[worn:stop] > UNWORN_LIMIT))
         beyond = np.sort(unworn[unworn < deep])[-MIN_UNWORN_TOPS:]
-        low = x[beyond[0]] if beyond.size else x[0]
-        ends.append(End(*(min(place, float(x[deep])) for place in (end.value, min(end.low, low))), max(end.high, x[deep])))
+        farthest = beyond[0] if beyond.size else 0
+        value = min(end.value, float(x[deep]))
+        low = min(end.low, float(x[min(farthest, deep)]))
+        ends.append(End(value, low, max(end.high, float(x[deep]))))
     start, end = ends
     return start, End(-end.value, -end.high, -end.low)
 

@@ -4,11 +4,10 @@ import numpy as np
 from scipy import special
 
 from ..quantity import SIDE
-from .changes import CONTROL, find_worn_tops
 from .depth_map import DepthMap
 from .statistics import FALSE_POSITIVE_RATE, subtract_local_level
+from .tops import CONTROL, find_worn_tops
 
-MAX_SHARED = 2.5  # largest factor by which a drift that neighbouring tiles share raises the threshold of wear
 MIN_GROWTH = 5.0  # standard deviations of grown material that is reported
 MIN_LOSS = 4.0  # standard deviations of lost material that is reported beside as much growth
 
@@ -17,18 +16,18 @@ def find_sure_loss(depths: DepthMap) -> float:
     """Return the number of standard deviations of lost material that drift and noise do not explain.
 
     The worn places were chosen as the deepest ones out of as many as the common part contains. Drift is known
-    from few independent tiles, so the quantile is that of Student's t; stated errors contain its ratio at 95 %. The datum
-    was laid where the drift is smallest, and its dips count as worn, so the unworn tiles show too little of a drift that
-    neighbouring ones share.
+    from few independent tiles, so the quantile is that of Student's t; stated errors contain its ratio at 95 %.
     """
     n_places = depths.inside.sum() / max(depths.worn.sum(), 1)
     freedom = depths.errors.freedom
     student = special.stdtrit(freedom, (0.975, 1 - FALSE_POSITIVE_RATE / n_places))
-    return float(SIDE * student[1] / student[0]) * min(depths.errors.shared, MAX_SHARED)
+    return float(SIDE * student[1] / student[0])
 
 
 def measure_sharp_loss(depths: DepthMap) -> float:
     """Return the area [m2] or volume [m3] of tops that lie deeper than the unworn heights beside them, as no drift does."""
+    if not depths.worn.any():
+        return 0.0
     relative = subtract_local_level(depths.depth, depths.unworn) / depths.noise
     relative = np.where(np.isnan(relative) | depths.missing, 0.0, relative)
     height = (depths.before + depths.after) / 2 / depths.noise_level

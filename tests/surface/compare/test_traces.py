@@ -127,7 +127,9 @@ def test_always_drift_alone_is_hardly_ever_called_wear():
     codes = [each.verdict.code for each in found]
     assert set(codes) <= {"no_wear", "scar_or_drift", "worn"} and codes.count("worn") <= 1
     assert sum(has_finding(each, "drift") for each in found) >= 6
-    unsure = next(each for each in found if each.verdict.code == "scar_or_drift")
+    # A scar of twice the range of the drift may be either.
+    unsure = compare_surfaces(*make_pair(make_parabola(0.15 * UM, 500, 900, 1500) + drifts[0], 0))
+    assert unsure.verdict.code == "scar_or_drift"
     assert unsure.verdict.numbers["scar_depth"] > 0
     assert unsure.values["worn_depth_mean"].reason == "scar_or_drift"
     worn = make_parabola(UM, 500, 900, 1500)

@@ -1,0 +1,104 @@
+"""Tops of a surface, which wear touches first: worn ones of any width, and those that would be worn in a track."""
+
+from typing import NamedTuple
+
+import numpy as np
+from scipy import ndimage
+
+from ..profile import find_runs
+from .changes import MIN_RUN, WINDOWS
+from .depth_map import UNWORN_LIMIT, DepthMap
+from .statistics import compute_threshold, remove_long_waves
+
+CONTROL = 3.0  # lost over grown material, beyond which it is wear; and the reverse
+MIN_TOPS = 3  # smallest number of worn tops that are no specks of dust on the first surface
+TOP_SIDE = 2  # smallest side of a worn top, in samples; a spike is narrower
+N_CLASSES = 10  # number of classes of heights whose depths are compared
+N_VALLEY_CLASSES = 3  # number of the lowest classes, which wear last
+N_TOP_CLASSES = 6  # number of the highest classes
+# Smallest rise of the median depth from valleys to tops, in standard deviations of a depth, and of a median.
+MIN_RISE = 0.2
+MIN_RISE_DEVIATIONS = 3.5
+TOP_QUANTILE = 0.25  # quantile of the worn heights above which a height is a top
+TOP_SAMPLES = 3  # number of samples whose mean depth shows whether a top is worn
+
+
+def find_worn_tops(relative, height, max_gain_change: float) -> np.ndarray:
+    """Find tops that wear touched first, of any width, or on all of the surface.
+
+    Filled valleys are the control: an error of interpolation raises valleys and lowers tops of either surface alike, and a
+    drift is too slow for both.
+
+    Parameters
+    ----------
+    relative : (n,) or (m, n) array
+        Depth in standard deviations, 0 where unknown.
+    height : (n,) or (m, n) array
+        Mean height of both surfaces in standard deviations, whose noise does not depend on that of the depth; no gaps.
+    max_gain_change : float
+        Largest change of the gain of the instrument that both surfaces may still have.
+
+    Returns
+    -------
+    array
+        Mask of the same shape.
+    """
+    height = remove_long_waves(height)
+    is_high = height > np.median(height)
+    limit = compute_threshold(len(WINDOWS[height.ndim]) * height.size)
+    square = np.ones((TOP_SIDE,) * height.ndim)
+    worn = ndimage.binary_opening((relative > limit) & is_high, square)
+    filled = ndimage.binary_opening((relative < -limit) & ~is_high, square)
+    if ndimage.label(worn)[1] < max(MIN_TOPS, CONTROL * ndimage.label(filled)[1]):
+        worn[:] = False
+
+    known = np.flatnonzero(relative)
+    is_lowered = _find_lowered_tops(relative.flat[known], height.flat[known], max_gain_change)
+    worn.flat[known[is_lowered]] = True
+    return worn
+
+
+def _find_lowered_tops(relative, height, max_gain_change: float) -> np.ndarray:
+    """Return the heights (n,) bool of classes that wear lowered, even slightly, if it lowered most tops of a surface.
+
+    They are deeper than the valleys by more than another gain explains.
+    """
+    is_worn = np.zeros(height.size, bool)
+    if height.size < N_CLASSES * MIN_RUN:
+        return is_worn
+    classes = np.array_split(np.argsort(height), N_CLASSES)
+    rise, above = (_subtract_valleys(values, classes) for values in (relative, height))
+    scatter = MIN_RISE_DEVIATIONS / np.sqrt(len(classes[0]))
+    gained = max_gain_change * np.median(above[-N_TOP_CLASSES:])
+    limit = MIN_RISE + scatter + gained
+    if np.median(rise[-N_TOP_CLASSES:]) > limit:
+        for part, step in zip(classes, rise):
+            is_worn[part] = step > limit
+    return is_worn
+
+
+def _subtract_valleys(values, classes: list[np.ndarray]) -> np.ndarray:
+    """Return the medians (k,) of classes of values (n,) less that of the lowest classes."""
+    medians = np.array([np.median(values[part]) for part in classes])
+    return medians - np.median(medians[:N_VALLEY_CLASSES])
+
+
+class Tops(NamedTuple):
+    """Samples (k,) of the highest points of tops, and the depths there (k,) in standard deviations."""
+
+    places: np.ndarray
+    depths: np.ndarray
+
+
+def find_tops(depths: DepthMap) -> Tops:
+    """Find the tops that would be worn in a track: as high as the lowest quarter of the worn heights; not the worn ones."""
+    height = remove_long_waves(depths.before)
+    relative = depths.depth / depths.noise
+    is_deep = depths.worn & (relative > UNWORN_LIMIT)
+    if not is_deep.any():
+        return Tops(np.zeros(0, int), np.zeros(0))
+    runs = find_runs(height > np.quantile(height[is_deep], TOP_QUANTILE))
+    tops = np.array([first + int(np.argmax(height[first : last + 1])) for first, last in runs], int)
+    tops = tops[~depths.missing[tops] & ~depths.worn[tops]]
+    # A top is a few samples wide, whose noise is partly independent.
+    return Tops(tops, ndimage.uniform_filter1d(relative, TOP_SAMPLES)[tops])
