@@ -110,7 +110,16 @@ def _make_load(model: Model, patch) -> Load:
 
 
 def list_elements(model: Model, numerics: Numerics, patch) -> list[tuple[np.ndarray, np.ndarray]]:
-    """Return stiffness [N/m] and yield displacement [m] (e,) of the elements of each interface (`joints.Joint`)."""
+    """Return stiffness [N/m] and yield displacement [m] (e,) of the elements of each interface.
+
+    Parameters
+    ----------
+    model : Model
+    numerics : Numerics
+        Names the interfaces with a coarser mesh.
+    patch : Patch or None
+        None without [contact].
+    """
     joints = list_joints(model, patch, numerics.meshed)
     return [joint.list_elements(model.rig.speed_scale) for joint in joints]
 
