@@ -232,7 +232,7 @@ def _advise_mesh(
     # The main measures have decided on the mesh; another measure needs a smaller tolerance.
     tolerance = PROPOSED_TOLERANCE_RATIO * missed.model.accuracy.tolerance
     is_at_limit = is_at_limit or refine.is_main(missed.worst)
-    if is_at_limit or not any(mesh_levels.refines_at(*place, tolerance) for place in solved):
+    if is_at_limit or not any(mesh_levels.needs_finer_mesh(*place, tolerance) for place in solved):
         return Advice(
             f"{cause}a finer mesh does not reduce it or is too expensive; {USE_ERROR_ADVICE}"
         )

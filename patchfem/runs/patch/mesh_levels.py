@@ -263,7 +263,7 @@ def resolves_slip_work(patch_model, patches, tolerance: float) -> bool:
     return slip_zones.max_slip_error_ratio(solved, slip, tolerance) <= 1
 
 
-def refines_at(patch_model, patches, tolerance: float) -> bool:
+def needs_finer_mesh(patch_model, patches, tolerance: float) -> bool:
     """Return whether a patch would get a finer mesh at a smaller tolerance.
 
     Parameters
