@@ -17,6 +17,7 @@ from ..model.gap import longest_loaded_cell
 from ..model.model import Model
 from ..response import rows
 from . import refine
+from .patch import mesh_levels
 from .results import notes, patch_rows
 from .results.interfaces import Face, merge_findings
 from .results.result import Advice, Finding
@@ -229,11 +230,12 @@ def _advise_mesh(
     if any(patch_model.mesh.shared is not None for patch_model, _ in solved):
         return Advice(f"{cause}run this case by itself, so that its mesh is refined")
     # The main measures have decided on the mesh; another measure needs a smaller tolerance.
-    if is_at_limit or refine.is_main(missed.worst):
+    tolerance = PROPOSED_TOLERANCE_RATIO * missed.model.accuracy.tolerance
+    is_at_limit = is_at_limit or refine.is_main(missed.worst)
+    if is_at_limit or not any(mesh_levels.needs_finer_mesh(*place, tolerance) for place in solved):
         return Advice(
             f"{cause}a finer mesh does not reduce it or is too expensive; {USE_ERROR_ADVICE}"
         )
-    tolerance = PROPOSED_TOLERANCE_RATIO * missed.model.accuracy.tolerance
     text = f"{cause}set accuracy.tolerance = {tolerance:.3g} for a finer mesh"
     return Advice(text, "accuracy.tolerance", tolerance)
 

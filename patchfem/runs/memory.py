@@ -16,8 +16,8 @@ from .rig import engines, numerics
 # Address space [bytes] that packages and the compiler map in addition to the memory in use.
 MAPPED_BYTES = 210e6
 FIXED_BYTES = 160e6  # packages and compiled code [bytes]
-NODE_BYTES = 4.6e3  # per node of the pieces, to condense them [bytes]
-FRAME_NODE_BYTES = 3.5e3  # per node of the pieces, for the frames of a motion [bytes]
+# Per node of the pieces [bytes]: to condense them in a static run, and with the frames of a motion.
+NODE_BYTES = {True: 4.6e3, False: 8.1e3}
 STRIP_NODE_BYTES = 3e3  # per strip and interface node [bytes]
 SHEAR_NODE_BYTES = 24.0  # per shear mode and interface node [bytes]
 SLIDE_SAMPLE_BYTES = 250.0  # per sample of a prescribed slide [bytes]
@@ -56,8 +56,10 @@ class HistoryBytes(NamedTuple):
     turn: float
 
 
-HYBRID_HISTORY = HistoryBytes(80.0, 140.0, 16.0)
-MARCH_HISTORY = HistoryBytes(45.0, 50.0, 18.0)
+HISTORY_BYTES = {
+    "hybrid": HistoryBytes(80.0, 140.0, 16.0),
+    "march": HistoryBytes(45.0, 50.0, 18.0),
+}
 
 
 def list_parts(plan: Plan) -> list[MemoryPart]:
@@ -74,14 +76,13 @@ def list_parts(plan: Plan) -> list[MemoryPart]:
     finer = "make contact.element_size larger"
     if any(patch.mesh.file for patch in patches):
         finer = "give contact.mesh fewer nodes on the interface"
-    node_bytes = NODE_BYTES + (FRAME_NODE_BYTES if model.kind != "patch" else 0.0)
     n_bonds = counts.get("bond_list_about")
     list_bytes = time_march.count_list_bytes(n_bonds) if n_bonds else 0.0
     n_shear = counts.get("shear_modes", 0)
     parts = [
         MemoryPart(FIXED_BYTES, "packages and compiled code"),
         MemoryPart(
-            node_bytes * counts.get("elastic_unknowns_about", 0) / 2,
+            NODE_BYTES[model.kind == "patch"] * counts.get("elastic_unknowns_about", 0) / 2,
             f"{points} nodes of the interface",
             finer,
         ),
@@ -136,7 +137,7 @@ def _list_parts_of_motion(plan: Plan) -> list[MemoryPart]:
     # Histories: all samples of the last cycles, and reversals and extremes of the cycles before.
     settings = numerics.choose_numerics(model)
     is_march = plan.engine == "march"
-    history = MARCH_HISTORY if is_march else HYBRID_HISTORY
+    history = HISTORY_BYTES[plan.engine]
     samples = max(2, settings.window) * (settings.steps if is_march else SAMPLES_PER_CYCLE)
     width = 2.0 * n_modes + 12 + 6 * n_interfaces
     turns = min(REVERSALS_PER_CYCLE * drive.cycles, checkpoint.MAX_EARLY_SAMPLES)

@@ -63,9 +63,7 @@ GROUPS = {  # Definition and SI unit of each group.
 class Plan:
     """Model with the engine that will run it and the numbers of its unknowns.
 
-    - model, kind: model, and the kind of its run.
-    - effects: names of the effects in the scene.
-    - not_in_scene: effects that the scene does not contain.
+    - model: model of the run.
     - engine: name of the engine; "static" for a patch without motion.
     - unknowns: numbers of unknowns of mesh and motion by name.
     - samples: number of samples that a bench keeps; 0 for other runs.
@@ -75,15 +73,27 @@ class Plan:
     """
 
     model: Model
-    kind: str
-    effects: tuple
-    not_in_scene: tuple
     engine: str
     unknowns: dict
     samples: int
     chain: dict
     groups: dict
     verdict: tuple
+
+    @property
+    def kind(self) -> str:
+        """Kind of the run."""
+        return self.model.kind
+
+    @property
+    def effects(self) -> tuple:
+        """Names of the effects in the scene."""
+        return self.model.source.effects
+
+    @property
+    def not_in_scene(self) -> tuple:
+        """Names of the effects that the scene does not contain."""
+        return self.model.absent
 
     def __repr__(self) -> str:
         sizes = []
@@ -221,9 +231,6 @@ def _make_plan(model: Model) -> Plan:
         )
     return Plan(
         model,
-        model.kind,
-        model.source.effects,
-        model.absent,
         engine,
         unknowns,
         samples,

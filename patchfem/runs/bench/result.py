@@ -3,9 +3,12 @@
 In: a plan of kind bench and its Patch. Out: a Result.
 """
 
+from dataclasses import replace
+
 import numpy as np
 
 from ...core import Outcome
+from ...formatting import format_quantity
 from ...response.errors import add_errors
 from ...response.outcome import OPEN_LOOP, remove_errors
 from ...response.rows import set_final_floors
@@ -35,6 +38,9 @@ from .errors import BenchErrors, estimate_bench_errors
 from .law import nodal_element_limit
 from .ledger import BenchOptions
 
+MAX_EXTRA_CYCLES = 4  # Largest number of added cycles in the search for a steady loop.
+MAX_EVALUATIONS = 2e6  # Largest number of evaluations (points x samples) in this search.
+
 
 def run_prescribed(inputs: RunInputs) -> Result:
     """Run a bench plan with prescribed displacement and return its Result."""
@@ -63,7 +69,7 @@ def run_prescribed(inputs: RunInputs) -> Result:
         ),
         *note_on_heating(model, patch, fine),
         *warn_of_work_check(measures, steps),
-        *_warn_of_open_loop(model, fine),
+        *_warn_of_open_loop(model, patch, fine, steps),
     ]
     fields = {}
     if patch is not None:
@@ -132,21 +138,40 @@ def _compute_loop_closing_error(fine) -> float:
     return gap
 
 
-def _warn_of_open_loop(model, fine) -> list:
-    """Return a list with a warning if the last friction loop is neither closed nor equal to the one before."""
+def _warn_of_open_loop(model, patch, fine, steps: int) -> list:
+    """Return a list with a warning if the last friction loop is neither closed nor steady.
+
+    The warning names the number of cycles after which the loop is steady, if at most
+    MAX_EXTRA_CYCLES more cycles and MAX_EVALUATIONS evaluations are sufficient to find it.
+    """
+    period = model.slide.period
     tolerance = model.accuracy.tolerance
     cycles = model.slide.cycles
-    if model.slide.period is None or cycles < 1 or not fine.values.get("loop_area"):
+    if period is None or cycles < 1 or not fine.values.get("loop_area"):
         return []
     if (gap := _compute_loop_closing_error(fine)) <= tolerance:
         return []
-    ends = fine.time[-1] - model.slide.period * np.arange(2, -1, -1)
-    before, last = np.diff(np.interp(ends, fine.time, fine.ledger[0]))
-    if cycles >= 2 and abs(before - last) <= tolerance * abs(last):
-        return []
-    return [
+    text = (
         f"{OPEN_LOOP}: it misses by {100 * gap:.2g} % (limit {100 * tolerance:g} %), so loop_area, the friction "
-        f"work of the last cycle, is not the energy dissipated in a steady loop; set slide.cycles = {cycles + 1:g}"
+        "work of the last cycle, is not the energy dissipated in a steady loop"
+    )
+    points = 1 if patch is None else patch.x.size
+    evaluations = fine.time.size * points * (cycles + MAX_EXTRA_CYCLES) / cycles
+    if evaluations > MAX_EVALUATIONS:
+        return [f"{text}; raise slide.cycles"]
+    longer = bench.run_bench(
+        replace(model, slide=replace(model.slide, cycles=cycles + MAX_EXTRA_CYCLES)), patch, steps
+    )
+    ends = longer.time[-1] - period * np.arange(MAX_EXTRA_CYCLES + 1, -1, -1)
+    loops = np.diff(np.interp(ends, longer.time, longer.ledger[0]))
+    is_near_last = np.abs(loops - loops[-1]) <= tolerance * np.abs(loops[-1])
+    if is_near_last[0]:
+        return []
+    if not is_near_last[-2]:
+        return [f"{text}; no steady loop is reached within {cycles + MAX_EXTRA_CYCLES:g} cycles"]
+    count = int(np.flatnonzero(~is_near_last)[-1]) + 1
+    return [
+        f"{text}, which is {format_quantity(float(loops[-1]), 'J', 4)}; set slide.cycles = {cycles + count:g}"
     ]
 
 

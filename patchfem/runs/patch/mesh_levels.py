@@ -13,7 +13,7 @@ from ...model.pieces import make_piece_meshes
 from . import profile_points, slip_zones, store
 from .condensed import condense, condense_on_shared_meshes
 from .grids import MAX_CONDENSING_SECONDS, MIN_LEVELS, make_base_grids, predict_condensing_seconds
-from .measures import max_mesh_error_ratio, with_static_measures
+from .measures import estimate_static_measures, max_mesh_error_ratio, with_static_measures
 from .press import solve_patch_contact
 
 # Tolerance at which a patch with prescribed partial slip may take as much CPU time as a patch in a
@@ -261,3 +261,22 @@ def resolves_slip_work(patch_model, patches, tolerance: float) -> bool:
         return True
     solved = [patch for patch in patches if patch is not None]
     return slip_zones.max_slip_error_ratio(solved, slip, tolerance) <= 1
+
+
+def needs_finer_mesh(patch_model, patches, tolerance: float) -> bool:
+    """Return whether a patch would get a finer mesh at a smaller tolerance.
+
+    Parameters
+    ----------
+    patch_model : PatchModel
+    patches : sequence of Patch or None
+        Patches from fine to coarse.
+    tolerance : float
+    """
+    finer = [mesh.refine() for mesh in patches[0].pair.meshes if mesh is not None]
+    if predict_condensing_seconds(finer) > max_condensing_seconds(patch_model, tolerance):
+        return False
+    # Values are extrapolated where they miss the tolerance.
+    measures = estimate_static_measures(*patches, tolerance=tolerance)
+    is_within = max_mesh_error_ratio(measures, tolerance) <= 1
+    return not (is_within and resolves_slip_work(patch_model, patches, tolerance))

@@ -24,8 +24,7 @@ from ...response.decay_curve import (
 from ...response.errors import MAX_ORDER, convergence_error
 from ...slip.mesh_correction import SPREAD_FACTOR, spread_elements
 from ..patch import faces
-from . import numerics
-from .joints import list_joints
+from . import joints, numerics
 from .solution import Solution
 from .steady import balance
 
@@ -119,7 +118,7 @@ def make_laws_on_mesh(model, patch, meshed: tuple = ()):
         rig.modes,
         [
             (k, joint.make_element(rig.speed_scale))
-            for k, joint in enumerate(list_joints(model, None, meshed))
+            for k, joint in enumerate(joints.list_joints(model, None, meshed))
         ],
     )
 

@@ -16,7 +16,7 @@ from ...hybrid.laws.masing import from_elements, has_many_elements, with_all_rev
 from ...hybrid.records import LawNumbers
 from ...model.model import Model
 from ..bench import averaged_law
-from .joints import list_joints
+from . import joints
 from .numerics import Numerics
 
 STUCK_SLIP = 1e-3  # largest slip per cycle of an interface that counts as stuck, relative to its elastic length
@@ -63,13 +63,13 @@ def make_joints(model: Model, numerics: Numerics, patch) -> Joints:
     if model.friction is None:
         return Joints()
     speed = rig.speed_scale
-    joints = list_joints(model, patch, numerics.meshed)
+    listed = joints.list_joints(model, patch, numerics.meshed)
     is_soft = bool(model.partial_slip or rig.friction.has_partial_slip)
     if not (is_soft or rig.friction.names or rig.friction.strips_slide_apart):
         laws = [_make_whole_law(model, patch)]
     else:
         laws = []
-        for joint in joints:
+        for joint in listed:
             law = make_law(joint.interface.numbers, joint.load, speed)
             if joint.stiffness is not None:
                 law = from_elements(joint.stiffness, joint.yields)
@@ -79,8 +79,8 @@ def make_joints(model: Model, numerics: Numerics, patch) -> Joints:
     return Joints(
         tuple(laws),
         tuple(list_elements(model, numerics, patch)) if is_soft else _list_single_elements(laws),
-        joints[0] if is_soft and len(joints) == 1 else None,
-        _find_stick_tolerance(joints, [law for law, _ in laws]),
+        listed[0] if is_soft and len(listed) == 1 else None,
+        _find_stick_tolerance(listed, [law for law, _ in laws]),
     )
 
 
@@ -110,9 +110,18 @@ def _make_load(model: Model, patch) -> Load:
 
 
 def list_elements(model: Model, numerics: Numerics, patch) -> list[tuple[np.ndarray, np.ndarray]]:
-    """Return stiffness [N/m] and yield displacement [m] (e,) of the elements of each interface (`joints.Joint`)."""
-    joints = list_joints(model, patch, numerics.meshed)
-    return [joint.list_elements(model.rig.speed_scale) for joint in joints]
+    """Return stiffness [N/m] and yield displacement [m] (e,) of the elements of each interface.
+
+    Parameters
+    ----------
+    model : Model
+    numerics : Numerics
+        Names the interfaces with a coarser mesh.
+    patch : Patch or None
+        None without [contact].
+    """
+    listed = joints.list_joints(model, patch, numerics.meshed)
+    return [joint.list_elements(model.rig.speed_scale) for joint in listed]
 
 
 def _list_single_elements(laws) -> tuple:
@@ -126,10 +135,10 @@ def _list_single_elements(laws) -> tuple:
     return tuple(elements)
 
 
-def _find_stick_tolerance(joints, laws) -> float:
+def _find_stick_tolerance(listed, laws) -> float:
     """Return the largest slip per cycle [m] of interfaces that count as stuck; 0 for rigid laws."""
     lengths = []
-    for joint, law in zip(joints, laws):
+    for joint, law in zip(listed, laws):
         keys = joint.interface.numbers
         if np.isfinite(law.length):
             lengths.append(law.length)

@@ -93,12 +93,12 @@ def make_single_law(model: Model, numerics: Numerics, patch) -> Element | None:
     f = model.friction
     if f is None:
         return parallel_element([0.0], [1.0])
-    joint = list_joints(model, patch, numerics.meshed)[0]
+    is_single = not (model.partial_slip or numerics.per_point)
     if law_has_trait(f.law, "bonds") and not model.rig.friction.has_partial_slip:
-        is_single = not (model.partial_slip or numerics.per_point)
-        if is_single and choose_bond_summation(model, numerics).engine == "recursion":
-            return points_element(model.bonds, joint.load)
-        return None
+        if not is_single or choose_bond_summation(model, numerics).engine != "recursion":
+            return None
+        return points_element(model.bonds, list_joints(model, patch)[0].load)
+    joint = list_joints(model, patch, numerics.meshed)[0]
     if law_has_trait(f.law, "averaged"):
         limit = f.static * joint.load * averaged_law.slip_force_ratio(model, patch)
         return coulomb.Coulomb(limit, limit).element(1.0)

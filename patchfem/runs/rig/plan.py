@@ -1,6 +1,6 @@
 """Sizes, stiffnesses, frequencies and dimensionless groups of a rig for a plan.
 
-In: a Model. Out: `RunSizes`, the stiffness chain, natural frequencies with free and stuck
+In: a Model. Out: numbers of unknowns, the stiffness chain, natural frequencies with free and stuck
 interfaces, dimensionless groups, and sentences for the plan.
 """
 
