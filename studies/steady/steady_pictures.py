@@ -9,63 +9,6 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
 from drawing import BLUE, GREY, ORANGE, drawing
 
 
-def against_march(table: dict, measure: str, path: Path) -> Path:
-    """Plot amplitude against frequency by the direct method and by time stepping, and their difference."""
-    names = list(table)
-    wide = min(len(names) + 1, 3)  # the last panel holds the legend
-    tall = -(-(len(names) + 1) // wide)
-    with drawing(path, (9.6, 4.2 * tall), 2 * tall, wide, sharex=True, squeeze=False) as (_, axes):
-        pairs = [
-            (axes[2 * row, column], axes[2 * row + 1, column])
-            for row in range(tall)
-            for column in range(wide)
-        ]
-        for (top, low), name in zip(pairs, names):
-            rows = table[name]
-            f = [r.frequency for r in rows]
-            top.semilogy(
-                f, [1e6 * r.steady[measure] for r in rows], "-", color=BLUE, label="steady"
-            )
-            top.semilogy(
-                f, [1e6 * r.march[measure] for r in rows], "o", color=ORANGE, ms=3, label="march"
-            )
-            low.semilogy(
-                f,
-                [max(r.miss(measure), 1e-16) for r in rows],
-                "o-",
-                color=ORANGE,
-                ms=3,
-                lw=0.7,
-                label="march",
-            )
-            if rows[0].run is not None:
-                low.semilogy(
-                    f,
-                    [max(r.miss(measure, "run"), 1e-16) for r in rows],
-                    "s-",
-                    color=GREY,
-                    ms=3,
-                    lw=0.7,
-                    label="long exact run",
-                )
-            top.set(title=name, ylim=(4, 200))
-            low.set(xlabel="frequency [Hz]", ylim=(1e-16, 1e-2))
-            low.xaxis.set_tick_params(labelbottom=True)
-        for top, low in pairs[: len(names) : wide]:
-            top.set_ylabel("amplitude [um]")
-            low.set_ylabel("difference / amplitude")
-        for axis in (one for pair in pairs[len(names) :] for one in pair):
-            axis.axis("off")
-        named = {
-            text: line
-            for pair in pairs
-            for one in pair
-            for line, text in zip(*one.get_legend_handles_labels())
-        }
-        pairs[-1][0].legend(named.values(), named.keys(), loc="center", fontsize=10)
-    return path
-
-
 def backbone(rows: list, path: Path) -> Path:
     """Plot frequency and damping against amplitude; lines are nine harmonics, markers are the bench."""
     with drawing(path, (8.5, 3.4), 1, 2) as (_, axes):

@@ -75,6 +75,8 @@ def test_exact_wear_measures_agree_with_archard(result_folders, before):
         track["area_gross"]["value"] / width, rel=1e-12
     )
     assert track["depth_mean"]["value"] < track["depth_floor"]["value"] < deepest
+    # the share of the nodes that are worn, known to an element at each end
+    assert found["worn_share"]["value"] == pytest.approx(width / 12.7e-3, abs=0.4e-3 / 12.7e-3)
     for end in (
         track["from"],
         track["to"],

@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from pieces import CARBIDE, COATED, COATING, TITANIUM
 
 from patchfem.closed_forms.contact import layered_compliance
+from patchfem.core import NotConverged
 from patchfem.elasticity import (
     Layers,
     Piece,
@@ -88,3 +89,10 @@ def test_order_of_harmonic_layer_compliance_is_two(wavelength):
     assert np.all(errors < 0)
     assert -np.polyfit(np.log(counts), np.log(-errors), 1)[0] == pytest.approx(2.0, abs=0.1)
     assert abs(errors[-1]) <= 4e-3
+
+
+def test_refuses_moduli_of_coating_and_substrate_too_far_apart():
+    """A stiffness that is singular to working precision is refused with the ratio of the moduli and the remedies."""
+    layers = Layers((1e30, 0.24), (1e12, 0.32), "strain")
+    with pytest.raises(NotConverged, match=r"differ by a factor of 1e\+18: bring the moduli"):
+        _ = make_grid_piece(graded_grid(2e-3, 1e-3, 2e-4, COATING), layers).factor

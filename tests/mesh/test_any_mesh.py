@@ -270,14 +270,15 @@ def test_refuses_curved_elements_nonplanar_meshes_and_unknown_tags(tmp_path):
     """Elements of other orders, meshes that are not plane and unknown tags are refused."""
     pair = make_pair("quads")
     path = tmp_path / "pair.vtu"
-    mesh = meshio.Mesh(
-        np.column_stack([pair.points, pair.points[:, 0]]),
-        [(k, c) for k, c, _ in find_cell_blocks(pair)],
-        cell_data={"tag": [t for _, _, t in find_cell_blocks(pair)]},
-    )
-    meshio.write(path, mesh)
-    with pytest.raises(PatchfemError, match=r"not plane: its z values span 0\.002 m"):
-        read_pieces(path)
+    for slope, span in ((1e-4, "2e-07"), (1.0, r"0\.002")):
+        mesh = meshio.Mesh(
+            np.column_stack([pair.points, slope * pair.points[:, 0]]),
+            [(k, c) for k, c, _ in find_cell_blocks(pair)],
+            cell_data={"tag": [t for _, _, t in find_cell_blocks(pair)]},
+        )
+        meshio.write(path, mesh)
+        with pytest.raises(PatchfemError, match=f"not plane: its z values span {span} m"):
+            read_pieces(path)
     mesh.cell_data = {"tag": [t + 100 for _, _, t in find_cell_blocks(pair)]}
     meshio.write(path, mesh)
     with pytest.raises(

@@ -29,7 +29,6 @@ KINDS = {  # Name on the command line -> module and function.
     "rigs": ("random_rigs", "compare_rig"),
     "harmonic": ("random_rigs", "compare_harmonic_rig"),
     "marched-rigs": ("random_rigs", "compare_marched_rig"),
-    "point-benches": ("point_benches", "compare_bench"),
     "partial-slip": ("micro_slip", "compare_bench"),
     "shear-joints": ("shear_scenes", "compare_joint"),
     "shear-rigs": ("shear_scenes", "compare_rig"),

@@ -46,10 +46,6 @@ class Law:
     def set_initial_side(self, s) -> None:
         """Set `side` for a motion that begins in a state s other than 0."""
 
-    def choose_branch(self, s, v: float, way: float) -> None:
-        """Choose the branch of the rate equation at a state s and a velocity v; `way` is the direction, +-1."""
-        self.mode = way
-
     def guards(self, s, v, t) -> list:
         """Return the event functions: values whose decrease through zero is an event."""
         return [self.mode * v]
@@ -319,12 +315,6 @@ class StretchLaw(Law):
         """Return the typical size of each state."""
         return np.array([self.scale(), 1.0, self.scale()])[: self.size]
 
-    def choose_branch(self, s, v, way):
-        """Choose the direction, and the side of the speed limit of ageing."""
-        super().choose_branch(s, v, way)
-        if self.grows:
-            self.side = 1 if self.mode * v > self.keys["rest_speed"] else -1
-
     def split(self, s, v, t):
         """Return the rate of the irreversible displacement [m/s]."""
         return self.mode * v * s[0] / (self.length(s) * max(s[1], 1e-300) ** 2)
@@ -391,11 +381,6 @@ class BoucWenLaw(Law):
         """Set the sign of z for a start in a state other than 0."""
         if s[0]:
             self.side = 1 if s[0] > 0 else -1
-
-    def choose_branch(self, s, v, way):
-        """Choose the direction and the sign of z."""
-        super().choose_branch(s, v, way)
-        self.side = 1 if s[0] > 0 else -1
 
     def apply_event(self, k, s, v, accel):
         """Reverse the direction, or change the sign of z."""

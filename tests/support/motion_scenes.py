@@ -1,11 +1,8 @@
 """Random scenes of rigs, with every law, drive and structure, for program and reference.
 
 `draw_spec(seed)` draws the numbers, `format_scene(spec)` writes the scene, and `format_record(spec)` is the table of a
-drive from a file. `draw_unseen_specs(count)` gives rigs for each of the methods, with seeds to which no
-number of the program was fitted.
+drive from a file.
 """
-
-from itertools import count as from_
 
 import numpy as np
 
@@ -91,50 +88,6 @@ def draw_spec(seed: int) -> dict:
     ):
         out["method"] = "harmonic"
     return out
-
-
-HELD_OUT = 29_000_000  # First seed of the rigs that were not used in developing the program.
-# Laws that each method can compute: events, yields, smooth laws, and laws that can only be marched.
-METHODS = {
-    "events": ("coulomb", "weakening"),
-    "yields": ("elastic-plastic", "iwan"),
-    "smooth": ("tanh", "bouc-wen", "lugre", "stretch", "growing"),
-    "march": LAWS,
-    "harmonic": LAWS,
-}
-
-
-def draw_unseen_specs(count: int) -> list:
-    """Return specs of `count` rigs with 1 to 4 modes, for each method in turn.
-
-    The march and harmonic balance are named in the scene; otherwise the program chooses the method.
-    """
-    seeds = from_(HELD_OUT)
-    out = []
-    for k in range(count):
-        method = tuple(METHODS)[k % len(METHODS)]
-        out.append(next(s for s in map(draw_spec, seeds) if suits_method(s, method)))
-        out[-1].pop("method", None)
-        out[-1] |= {"method": method} if method in ("march", "harmonic") else {}
-    return out
-
-
-def suits_method(s: dict, method: str) -> bool:
-    """Return whether a method can compute a spec, and is chosen or can be named for it."""
-    if s["law"] not in METHODS[method]:
-        return False
-    if method == "harmonic":
-        return (
-            s["drive"] in ("sine", "force")
-            and s["law"] not in ("order", "report", "growing", "weakening")
-            and not (s["several"] or s["patch"] or s.get("cubic") or s.get("load_amplitude"))
-        )
-    sheared = bool(s["patch"]) and s["patch"]["shear"]
-    return (
-        method == "march"
-        or not (sheared or "cubic" in s or "load_amplitude" in s)
-        or method == "yields"
-    )
 
 
 def _draw_modes(r, frequency: float) -> list:
