@@ -366,17 +366,21 @@ def format_scores(name: str, rows: list[dict]) -> str:
     return f"{name} {len(rows)}: {', '.join(counts)}, {np.mean([row['seconds'] for row in rows]):.2f} s"
 
 
-def print_generator(draw, seed: int, count: int) -> None:
-    """Print the scores of a generator's pairs, and each pair with a fault."""
-    rows = [score_pair(pair) for pair in draw(seed, count)]
+def print_generator(draw, score, seed: int, count: int) -> list[dict]:
+    """Print the scores of a generator's pairs, and each pair with a fault; return the scores.
+
+    `score` is a function like `score_pair`.
+    """
+    rows = [score(pair) for pair in draw(seed, count)]
     print(format_scores(draw.__name__, rows), flush=True)
     for index, row in enumerate(rows):
         faults = [name for name in INTERVALS if row.get(name) is False]
         faults += [word for word in HEADLINES if row.get(word)]
         if faults:
             print("  ", index, row["name"], "|", row["code"], "|", " ".join(faults), flush=True)
+    return rows
 
 
 if __name__ == "__main__":
-    print_generator(draw_bench, int(sys.argv[1]), int(sys.argv[2]))
-    print_generator(draw_field, int(sys.argv[1]), int(sys.argv[3]))
+    print_generator(draw_bench, score_pair, int(sys.argv[1]), int(sys.argv[2]))
+    print_generator(draw_field, score_pair, int(sys.argv[1]), int(sys.argv[3]))

@@ -19,7 +19,14 @@ from typing import NamedTuple
 
 import numpy as np
 from scipy.ndimage import gaussian_filter1d
-from surface_scores import MAX_HIDDEN, WornPair, make_profile, print_generator, see_ends
+from surface_scores import (
+    MAX_HIDDEN,
+    WornPair,
+    make_profile,
+    print_generator,
+    score_pair,
+    see_ends,
+)
 
 TRACK_SHAPES = ("box", "parabola", "w")
 PLATEAU_KINDS = ("none", "cut part", "cut all", "rubbed part", "rubbed all")
@@ -199,4 +206,4 @@ def draw_plateau(seed: int, count: int) -> Iterator[WornPair]:
 
 if __name__ == "__main__":
     for draw in (draw_turned, draw_plateau):
-        print_generator(draw, *map(int, sys.argv[1:]))
+        print_generator(draw, score_pair, *map(int, sys.argv[1:]))

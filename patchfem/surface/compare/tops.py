@@ -84,10 +84,16 @@ def _subtract_valleys(values, classes: list[np.ndarray]) -> np.ndarray:
 
 
 class Tops(NamedTuple):
-    """Samples (k,) of the highest points of tops, and the depths there (k,) in standard deviations."""
+    """Tops of a surface (n,).
+
+    - places (k,): samples of their highest points.
+    - depths (k,): depths there in standard deviations.
+    - is_high (n,): which heights belong to tops.
+    """
 
     places: np.ndarray
     depths: np.ndarray
+    is_high: np.ndarray
 
 
 def find_tops(depths: DepthMap) -> Tops:
@@ -96,9 +102,10 @@ def find_tops(depths: DepthMap) -> Tops:
     relative = depths.depth / depths.noise
     is_deep = depths.worn & (relative > UNWORN_LIMIT)
     if not is_deep.any():
-        return Tops(np.zeros(0, int), np.zeros(0))
-    runs = find_runs(height > np.quantile(height[is_deep], TOP_QUANTILE))
+        return Tops(np.zeros(0, int), np.zeros(0), is_deep)
+    is_high = height > np.quantile(height[is_deep], TOP_QUANTILE)
+    runs = find_runs(is_high)
     tops = np.array([first + int(np.argmax(height[first : last + 1])) for first, last in runs], int)
     tops = tops[~depths.missing[tops] & ~depths.worn[tops]]
     # A top is a few samples wide, whose noise is partly independent.
-    return Tops(tops, ndimage.uniform_filter1d(relative, TOP_SAMPLES)[tops])
+    return Tops(tops, ndimage.uniform_filter1d(relative, TOP_SAMPLES)[tops], is_high)

@@ -19,6 +19,9 @@ MAX_GAP_FRACTION = 0.05  # largest unworn gap in a track relative to its width
 MIN_UNWORN_TOPS = 2
 MIN_TRACK_DEPTH = 0.5  # mean depth of all tops of a part, in standard deviations, from which on it belongs to a track
 MAX_UNWORN_TOP = 1.5  # largest such mean of an unworn top, in standard deviations of a single depth
+MAX_VALLEY_DEPTH = (
+    0.5  # largest mean depth of valleys relative to that of tops at which only tops are worn
+)
 MIN_CHANGED_FRACTION = 0.85  # fraction of changed heights in a wider gap that belongs to the track
 # Standard deviations of a single height on a flank.
 MIN_FLANK_DEPTH = 4.0
@@ -86,23 +89,43 @@ def find_ends(depths: DepthMap, span: tuple[int, int]) -> tuple[End, End]:
     relative = np.where(depths.grown | (relative < -UNWORN_LIMIT), 0.0, relative)
     middle = (span[0] + span[1]) // 2
     count = relative.size
+
+    # Each end is sought in the direction from outside to the middle.
     tops = find_tops(depths)
-    tops = tops.places[tops.depths < MAX_UNWORN_TOP]
+    unworn = tops.places[tops.depths < MAX_UNWORN_TOP]
+    sides = (
+        (depths.x, relative, tops.is_high, span[0], middle + 1, unworn),
+        (
+            -depths.x[::-1],
+            relative[::-1],
+            tops.is_high[::-1],
+            count - 1 - span[1],
+            count - middle,
+            count - 1 - unworn,
+        ),
+    )
     ends = []
-    for x, values, worn, stop, unworn in (
-        (depths.x, relative, span[0], middle + 1, tops),
-        (-depths.x[::-1], relative[::-1], count - 1 - span[1], count - middle, count - 1 - tops),
-    ):
+    for x, values, is_high, worn, stop, places in sides:
         end = _find_change_point(x[:stop], values[:stop], worn, depths)
-        # Where tops wear first, the end lies between the outermost worn one and those beyond it that are not worn.
         deep = worn + int(np.argmax(values[worn:stop] > UNWORN_LIMIT))
-        beyond = np.sort(unworn[unworn < deep])[-MIN_UNWORN_TOPS:]
-        farthest = beyond[0] if beyond.size else 0
+        beyond = np.sort(places[places < deep])[-MIN_UNWORN_TOPS:]
+        farthest = int(beyond[0]) if beyond.size else 0
+        # Where only tops are worn, the end lies between the outermost worn one and those beyond it that are not worn.
+        inside = slice(deep, 2 * deep - farthest)
+        if not _has_unworn_valleys(values[inside], is_high[inside]):
+            farthest = deep
         value = min(end.value, float(x[deep]))
-        low = min(end.low, float(x[min(farthest, deep)]))
+        low = min(end.low, float(x[farthest]))
         ends.append(End(value, low, max(end.high, float(x[deep]))))
     start, end = ends
     return start, End(-end.value, -end.high, -end.low)
+
+
+def _has_unworn_valleys(relative, is_high) -> bool:
+    """Return whether depths (n,) inside of an end are those of tops alone, from which heights are high (n,) bool."""
+    if is_high.all() or not is_high.any():
+        return False
+    return bool(relative[~is_high].mean() < MAX_VALLEY_DEPTH * relative[is_high].mean())
 
 
 def _find_change_point(x, relative, worn: int, depths: DepthMap) -> End:
