@@ -18,6 +18,8 @@ FOURTH_DIFFERENCE = (1, -4, 6, -4, 1)  # six times the height of a single spike
 # Fourth difference of a spike relative to this quantile of all of them.
 LONE_RATIO = 4.0
 LONE_QUANTILE = 0.97
+# Opposite fourth difference of both neighbours relative to it: 4/6 beside a spike, 1/3 on one side of a step.
+NEIGHBOUR_RATIO = 0.5
 MAX_SAMPLES = 2_097_152  # largest number of samples in a resampled trace, which limits the memory
 
 
@@ -88,9 +90,15 @@ def _find_lone_heights(z) -> np.ndarray:
     is_lone = np.zeros(z.size, bool)
     if known.sum() < MIN_HEIGHTS:
         return is_lone
-    bend = np.abs(ndimage.convolve1d(z[known], FOURTH_DIFFERENCE))
-    is_peak = bend == ndimage.maximum_filter1d(bend, len(FOURTH_DIFFERENCE))
-    is_lone[known] = is_peak & (bend > LONE_RATIO * np.quantile(bend, LONE_QUANTILE))
+    bend = ndimage.convolve1d(z[known], FOURTH_DIFFERENCE)
+    size = np.abs(bend)
+    is_peak = size == ndimage.maximum_filter1d(size, len(FOURTH_DIFFERENCE))
+    is_peak &= size > LONE_RATIO * np.quantile(size, LONE_QUANTILE)
+
+    # The edge of a track is a step, beside which the fourth difference of one neighbour is small.
+    beside = np.maximum(bend[:-2] * np.sign(bend[1:-1]), bend[2:] * np.sign(bend[1:-1]))
+    is_spike = np.pad(-beside > NEIGHBOUR_RATIO * size[1:-1], 1, constant_values=True)
+    is_lone[known] = is_peak & is_spike
     return is_lone
 
 
