@@ -441,8 +441,8 @@ def cost(
     --------
     >>> import patchfem as pf
     >>> curve = pf.cost(pf.new("bench"), over="steps_per_cycle", say=lambda line: None)
-    >>> [run["meets_tolerance"] for run in curve["steps_per_cycle"]["runs"]][-1]
-    True
+    >>> curve["steps_per_cycle"]["cheapest"]["loop_area"]
+    '200'
     """
     model = build(scene, **sets)
     setting = _require_string(over, "cost: over") or cost_curves.TOLERANCE

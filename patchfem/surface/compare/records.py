@@ -5,14 +5,16 @@ and numbers stand here; sentences are made where results are shown.
 """
 
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from ..areal import Areal
 from ..profile import Profile
 from ..quantity import SIDE, Quantity
-from .depth_map import DepthMap
+
+if TYPE_CHECKING:
+    from .depth_map import DepthMap
 
 # Unit and definition of each quantity of a comparison.
 DEFINITIONS = {
@@ -117,7 +119,7 @@ class Evidence:
     """
 
     placement: Placement | None = None
-    curves: DepthMap | None = None
+    curves: "DepthMap | None" = None
     roughness: dict[str, dict[str, dict[str, Quantity]]] = field(default_factory=dict)
     cutoff: float | None = None
     removed: tuple[int, int] = (0, 0)
