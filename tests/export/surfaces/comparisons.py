@@ -3,9 +3,9 @@
 import numpy as np
 
 from patchfem.surface.areal import Areal
+from patchfem.surface.compare.depth_map import DepthMap
 from patchfem.surface.compare.records import (
     Comparison,
-    DepthMap,
     Evidence,
     Finding,
     Placement,
