@@ -19,7 +19,7 @@ generators alone: missed 3 | 17, mean 86 of 91 | 70 of 77, from 63 of 67 | 48 of
 That version reached to the next unworn tops at every end, also where the valleys of a track were worn: ends of ordinary
 tracks were ten times wider than before. Recipe of the score of the rule that asks for unworn valleys, fixed before it was
 computed: seed 98793001, the same numbers of pairs of the same generators, with the median width of the interval of `width`
-relative to its value.
+relative to its value. The scores stand in tests/README.md.
 
     python tests/support/coated_pairs.py SEED COUNT_OLD COUNT_NEW FOLDER
 """
