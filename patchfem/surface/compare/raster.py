@@ -14,7 +14,7 @@ MIN_HEIGHTS = 40  # smallest number of heights of a trace that is compared
 MIN_SIDE = 16  # smallest number of points along each side of a scan
 MAX_GAP_STEPS = 2.5  # distance of two samples, in median steps, above which heights are missing
 MAX_UNEVEN = 0.1  # largest distance from even places, in steps, of a trace that is not resampled
-FOURTH_DIFFERENCE = (1, -4, 6, -4, 1)  # six times the height of a single spike
+N_NEIGHBOURS = 5  # number of heights that a fourth difference contains
 # Fourth difference of a spike relative to this quantile of all of them.
 LONE_RATIO = 4.0
 LONE_QUANTILE = 0.97
@@ -90,15 +90,15 @@ def _find_lone_heights(z) -> np.ndarray:
     is_lone = np.zeros(z.size, bool)
     if known.sum() < MIN_HEIGHTS:
         return is_lone
-    bend = ndimage.convolve1d(z[known], FOURTH_DIFFERENCE)
+    # Fourth difference; that of a single spike is six times its height. Both ends lack neighbours.
+    bend = np.pad(np.diff(z[known], 4), 2)
     size = np.abs(bend)
-    is_peak = size == ndimage.maximum_filter1d(size, len(FOURTH_DIFFERENCE))
+    is_peak = size == ndimage.maximum_filter1d(size, N_NEIGHBOURS)
     is_peak &= size > LONE_RATIO * np.quantile(size, LONE_QUANTILE)
 
     # The edge of a track is a step, beside which the fourth difference of one neighbour is small.
-    beside = np.maximum(bend[:-2] * np.sign(bend[1:-1]), bend[2:] * np.sign(bend[1:-1]))
-    is_spike = np.pad(-beside > NEIGHBOUR_RATIO * size[1:-1], 1, constant_values=True)
-    is_lone[known] = is_peak & is_spike
+    opposite = -np.sign(bend) * (np.roll(bend, 1), np.roll(bend, -1))
+    is_lone[known] = is_peak & (opposite.min(axis=0) > NEIGHBOUR_RATIO * size)
     return is_lone
 
 
