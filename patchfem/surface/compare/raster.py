@@ -4,7 +4,6 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-from scipy import ndimage
 
 from ...core import PatchfemError
 from ..areal import Areal, fill_nearest, find_scan_spikes
@@ -14,12 +13,6 @@ MIN_HEIGHTS = 40  # smallest number of heights of a trace that is compared
 MIN_SIDE = 16  # smallest number of points along each side of a scan
 MAX_GAP_STEPS = 2.5  # distance of two samples, in median steps, above which heights are missing
 MAX_UNEVEN = 0.1  # largest distance from even places, in steps, of a trace that is not resampled
-N_NEIGHBOURS = 5  # number of heights that a fourth difference contains
-# Fourth difference of a spike relative to this quantile of all of them.
-LONE_RATIO = 4.0
-LONE_QUANTILE = 0.97
-# Opposite fourth difference of both neighbours relative to it: 4/6 beside a spike, 1/3 on one side of a step.
-NEIGHBOUR_RATIO = 0.5
 MAX_SAMPLES = 2_097_152  # largest number of samples in a resampled trace, which limits the memory
 
 
@@ -73,7 +66,7 @@ def clean_surface(surface: Profile | Areal, *, keep_spikes: bool = False) -> Pro
             )
         is_bad = find_scan_spikes(surface)
     else:
-        is_bad = remove_spikes(surface).missing | _find_lone_heights(surface.z)
+        is_bad = remove_spikes(surface).missing
     is_bad = is_bad | _find_saturated(surface.z)
     z = surface.z if keep_spikes else np.where(is_bad, np.nan, surface.z)
     count = np.isfinite(z).sum()
@@ -82,24 +75,6 @@ def clean_surface(surface: Profile | Areal, *, keep_spikes: bool = False) -> Pro
             f"compare: {surface.source}: {count} heights; a comparison needs at least {MIN_HEIGHTS}"
         )
     return replace(surface, z=z)
-
-
-def _find_lone_heights(z) -> np.ndarray:
-    """Return the heights (n,) bool that leave the line of their neighbours, far more than any feature of the trace does."""
-    known = np.isfinite(z)
-    is_lone = np.zeros(z.size, bool)
-    if known.sum() < MIN_HEIGHTS:
-        return is_lone
-    # Fourth difference; that of a single spike is six times its height. Both ends lack neighbours.
-    bend = np.pad(np.diff(z[known], 4), 2)
-    size = np.abs(bend)
-    is_peak = size == ndimage.maximum_filter1d(size, N_NEIGHBOURS)
-    is_peak &= size > LONE_RATIO * np.quantile(size, LONE_QUANTILE)
-
-    # The edge of a track is a step, beside which the fourth difference of one neighbour is small.
-    opposite = -np.sign(bend) * (np.roll(bend, 1), np.roll(bend, -1))
-    is_lone[known] = is_peak & (opposite.min(axis=0) > NEIGHBOUR_RATIO * size)
-    return is_lone
 
 
 def _find_saturated(z) -> np.ndarray:
