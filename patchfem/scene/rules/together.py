@@ -9,7 +9,8 @@ selectors stands in `keys.choices`, and what no run can compute together in `sup
 
 from __future__ import annotations
 
-import re
+from functools import lru_cache
+from typing import Any, NamedTuple
 
 from ...effects import LAWS, law_takes_stiffness_or_length
 from .contact import iterate_patches
@@ -140,7 +141,7 @@ def check_together(draft: SceneDraft, kind: str) -> None:
             for patch in patches if "patch." in condition else [""]:
                 condition_here = condition.replace("patch.", f"{patch}.")
                 if holds(draft, kind, condition_here):
-                    report(re.match("!?([\\w.]+)", condition_here)[1], sentence)
+                    report(_split_condition(condition_here)[0].keys[0], sentence)
 
 
 def holds(draft: SceneDraft, kind: str, condition: str) -> bool:
@@ -154,15 +155,31 @@ def holds(draft: SceneDraft, kind: str, condition: str) -> bool:
     condition : str
         Clauses as in the rows of this module.
     """
-    return all(_clause_holds(draft, kind, clause) for clause in condition.split(" & "))
+    for clause in _split_condition(condition):
+        written = (kind if key == "kind" else draft.written_value(key) for key in clause.keys)
+        if clause.is_negated == any(clause.is_met_by(value) for value in written):
+            return False
+    return True
 
 
-def _clause_holds(draft: SceneDraft, kind: str, clause: str) -> bool:
-    """Return whether one clause of a condition holds."""
-    keys, _, words = clause.lstrip("!").partition("=")
-    values = words.split("|") if words else []
-    for key in keys.split("|"):
-        value = kind if key == "kind" else draft.written_value(key)
-        if value is not None and (not values or str(value) in values):
-            return not clause.startswith("!")
-    return clause.startswith("!")
+class _Clause(NamedTuple):
+    """Clause of a condition: its keys, and the values that one of them has, () for any."""
+
+    is_negated: bool
+    keys: tuple[str, ...]
+    values: tuple[str, ...]
+
+    def is_met_by(self, written: Any) -> bool:
+        """Return whether the written value of one key meets the clause without its `!`."""
+        return written is not None and (not self.values or str(written) in self.values)
+
+
+@lru_cache(4096)
+def _split_condition(condition: str) -> list[_Clause]:
+    """Return the clauses of a condition."""
+    clauses = []
+    for text in condition.split(" & "):
+        keys, _, values = text.removeprefix("!").partition("=")
+        names = tuple(filter(None, values.split("|")))
+        clauses.append(_Clause(text.startswith("!"), tuple(keys.split("|")), names))
+    return clauses
