@@ -157,7 +157,7 @@ def holds(draft: SceneDraft, kind: str, condition: str) -> bool:
     """
     for clause in _split_condition(condition):
         written = (kind if key == "kind" else draft.written_value(key) for key in clause.keys)
-        if clause.is_negated == any(clause.is_met_by(value) for value in written):
+        if clause.is_negated == any(clause.accepts(value) for value in written):
             return False
     return True
 
@@ -169,8 +169,8 @@ class _Clause(NamedTuple):
     keys: tuple[str, ...]
     values: tuple[str, ...]
 
-    def is_met_by(self, written: Any) -> bool:
-        """Return whether the written value of one key meets the clause without its `!`."""
+    def accepts(self, written: Any) -> bool:
+        """Return whether the clause, without its `!`, holds for the written value of a key."""
         return written is not None and (not self.values or str(written) in self.values)
 
 
