@@ -84,22 +84,8 @@ class TextTable(NamedTuple):
             yield number, cells
 
 
-def read_lines(path: Path, contents: str, remedy: str = "") -> list[str]:
-    """Read the lines of a text file; the last one is empty if the file ends with a line break.
-
-    Parameters
-    ----------
-    path : Path
-    contents, remedy : str
-        Words of the error messages, as in `TableFormat`.
-
-    Raises
-    ------
-    Missing
-        If there is no file.
-    PatchfemError
-        If the file cannot be read or is too large.
-    """
+def _read_lines(path: Path, contents: str, remedy: str) -> list[str]:
+    """Read the lines of a text file; the last one is empty if the file ends with a line break."""
     try:
         if path.stat().st_size > MAX_BYTES:
             raise PatchfemError(
@@ -154,7 +140,7 @@ def read_text(path: Path, contents: str, remedy: str = "") -> TextTable:
     PatchfemError
         If the file cannot be read or is too large.
     """
-    header, *lines = read_lines(path, contents, remedy)
+    header, *lines = _read_lines(path, contents, remedy)
     while lines and not lines[-1].strip():
         lines.pop()
     separator = max(",;\t", key=header.count)

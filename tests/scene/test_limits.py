@@ -201,6 +201,18 @@ def test_exact_remarks_on_keys_without_effect(text, sets, remark):
     assert loads(scene.resolved()).tables() == scene.tables()
 
 
+def test_exact_quadrature_of_interface_is_used_without_remark():
+    """The quadrature of a law of bonds between masses is used: it stands in the resolved scene, and gives no remark."""
+    law = ["law=nonlocal", "bond_length=5 um", "reading=report"]
+    sets = [f"structure.interface[1].{change}" for change in law]
+    text = PAIR[: PAIR.rindex("[[structure.interface]]")] + FORCED
+    scene = loads(text, sets=[*sets, "accuracy.quadrature=merged"])
+    assert scene.remarks == []
+    assert loads(scene.resolved()).accuracy.quadrature == "merged"
+    (remark,) = loads(text, sets=["accuracy.quadrature=merged"]).remarks
+    assert "has no meaning without law 'nonlocal'" in remark
+
+
 STUDIES = sorted((Path(__file__).parents[2] / "studies").rglob("*.toml"))
 
 

@@ -11,6 +11,7 @@ from scene_texts import (
     PATCH,
     PIECE,
     RIG,
+    SLIDE,
     STRUCTURE,
     find_line,
     get_only_mistake,
@@ -501,3 +502,17 @@ def test_refuses_invalid_outlines(tables, sets, key, words):
     assert any(f"{key}: " in line and words in line for line in list_mistakes(text, *sets)), (
         list_mistakes(text, *sets)
     )
+
+
+def test_refuses_factor_on_missing_bond_length_with_one_sentence():
+    """A law that has a stiffness but no bond length is not told to give a bond length in its place."""
+    text = PATCH + SLIDE + '[friction]\nlaw = "iwan"\nstatic = 0.3\nchi = -0.5\nbeta = 0.5\n'
+    text += 'stiffness = "1e7 N/m"\n[wear]\ncoefficient = "1e-14 m^2/N"\ncycles = 100\n'
+    text += '[wear.friction]\ndepth = ["0 um", "1 um"]\nbond_length_factor = [1, 2]\n'
+    assert "law 'iwan' has no bond_length" in get_only_mistake(text)
+
+
+def test_refuses_missing_law_of_measured_joint_with_one_sentence():
+    """A scene with [friction] but without its law has a joint, with which its modes may have been measured."""
+    text = "[friction]\nstatic = 0.3\n[normal]\nload = '1 N'\n" + STRUCTURE
+    assert "friction.law: missing" in get_only_mistake(text, "structure.measured=stuck")

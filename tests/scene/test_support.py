@@ -7,7 +7,6 @@ import re
 import pytest
 from scene_texts import BENCH, FORCED, LINEAR, PAIR, PATCH, RIG
 
-from patchfem.effects import describe_unsupported
 from patchfem.scene import loads
 from patchfem.scene.rules import support
 from patchfem.scene.scene import SceneError
@@ -162,11 +161,7 @@ def list_refusals(names: str) -> list[str]:
 
 def make_pattern(names: str, instead: str) -> str:
     """Return a pattern that only the message of a row matches; properties of the scene are free in it."""
-    first, *others = names.split(", ")
-    feature = support.find_feature(first)
-    beside = " and ".join(filter(None, map(support.name_feature, others)))
-    message = describe_unsupported(f"{feature.words} with {beside}".strip(), instead)
-    return PROPERTY.sub("((?! and ).)+", re.escape(message))
+    return PROPERTY.sub("((?! and ).)+", re.escape(support.describe_row(names, instead)))
 
 
 @pytest.mark.parametrize("names, instead", support.SUPPORT, ids=[row[0] for row in support.SUPPORT])
@@ -174,6 +169,7 @@ def test_refuses_each_row_of_support(names, instead):
     """A scene with the features of a row is refused for this row alone, with its advice."""
     (found,) = list_refusals(names)
     assert re.fullmatch(make_pattern(names, instead), found.split(": ", 2)[2]), found
+    assert " with is " not in found and not found.endswith("; ")
 
 
 # Two rows that apply to a scene at the same key: (features of both, the key, end of the only message at it).

@@ -7,27 +7,25 @@ from patchfem.scene.keys.lookup import find_key
 from patchfem.scene.keys.tables import Tables
 from patchfem.scene.keys.types import build_table
 from patchfem.scene.rules import together
+from patchfem.scene.rules.check import find_kind
 from patchfem.scene.rules.scene_draft import SceneDraft
 
 ROWS = together.MISTAKES | together.REMARKS | together.MISSING | together.MISSING_TABLES
 
 
-def write_plain_values(condition: str) -> tuple[dict, str]:
-    """Return the plain values of a scene that fulfils a condition, and its kind."""
+def write_plain_values(condition: str) -> dict:
+    """Return the plain values of a scene that has the keys of a condition."""
     raw = {}
-    kind = ""
     for clause in condition.split(" & "):
         keys, _, words = clause.partition("=")
         key = keys.split("|")[0]
-        if key == "kind":
-            kind = words.split("|")[0]
-        elif not key.startswith("!"):
+        if key != "kind" and not key.startswith("!"):
             *tables, name = key.split(".")
             table = raw
             for piece in tables:
                 table = table.setdefault(piece, {})
             table.setdefault(name, words.split("|")[0] if words else {})
-    return raw, kind
+    return raw
 
 
 @pytest.mark.parametrize("condition", ROWS)
@@ -41,10 +39,9 @@ def test_reports_each_row_at_its_first_key(condition):
             assert key == "kind" or known is not None, key
             assert known is None or not words or set(words.split("|")) <= {*known.allowed}, clause
 
-    raw, kind = write_plain_values(condition_of_contact)
-    draft = SceneDraft("a.toml", {}, raw)
+    draft = SceneDraft("a.toml", {}, write_plain_values(condition_of_contact))
     draft.tables = build_table(Tables, {"contact": build_table(Contact, {})})
-    together.check_together(draft, kind)
+    together.check_together(draft, find_kind(draft))
     first = condition_of_contact.split(" & ")[0].lstrip("!").partition("=")[0]
     reports = [*draft.mistake_lines(), *draft.remarks]
     assert any(first in line and ROWS[condition] in line for line in reports), reports

@@ -91,7 +91,8 @@ def compute_cases(
         except SceneError as error:
             if axis is None:
                 raise
-            # A value of --over is applied as one of --set, whose messages name items by their names.
+            # The program sets a value of --over as --set does, so its mistakes are reported as mistakes of --set. They
+            # may name a mode by its name where --over has its number, so only the last piece of the key is compared.
             key_end = f".{axis.key.rpartition('.')[2]}: "
             mistakes = []
             for text in error.mistakes:

@@ -58,8 +58,10 @@ def list_fixed_settings(accuracy: Accuracy) -> list[str]:
 
 def check_quadrature(draft: SceneDraft, kind: str) -> None:
     """Add a remark on a quadrature if there is no sum over bonds."""
-    quadrature = draft.values.accuracy.quadrature
-    is_summed = law_has_trait(draft.values.friction.law, "bonds") and kind in ("bench", "rig")
+    scene = draft.values
+    quadrature = scene.accuracy.quadrature
+    laws = [table.law for table in (scene.friction, *scene.structure.interface)]
+    is_summed = kind in ("bench", "rig") and any(law_has_trait(law, "bonds") for law in laws)
     if quadrature and quadrature != "auto" and not is_summed:
         draft.add_remark(
             "accuracy.quadrature",

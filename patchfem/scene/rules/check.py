@@ -31,7 +31,7 @@ def check_scene(draft: SceneDraft) -> str:
     _check_small_tables(draft)
     check_wear(draft)
     check_grooves(draft)
-    kind = _find_kind(draft)
+    kind = find_kind(draft)
     for check_table in (
         check_together,
         check_quadrature,
@@ -70,7 +70,7 @@ def _check_small_tables(draft: SceneDraft) -> None:
         )
 
 
-def _find_kind(draft: SceneDraft) -> str:
+def find_kind(draft: SceneDraft) -> str:
     """Return the kind of run that the tables define, "" if they define none."""
     tables = {name for name in RUN_TABLES if draft.has(name)}
     if draft.has("structure.interface"):

@@ -449,14 +449,21 @@ def check_combinations(draft: SceneDraft, kind: str) -> None:
             if not is_tried or feature.key in reported:
                 continue
             if all(map(is_there, (first, *others))):
-                beside = " and ".join(filter(None, map(name_feature, others)))
-                words = f"{feature.words} with {beside}".strip()
-                message = describe_unsupported(words, instead).format_map(joint)
+                message = describe_row(names, instead).format_map(joint)
                 draft.add_mistake(feature.key.format_map(joint), message)
                 reported.add(feature.key)
 
 
-def name_feature(name: str) -> str:
+def describe_row(names: str, instead: str) -> str:
+    """Return the message of a row of SUPPORT, with names of properties in braces."""
+    first, *others = names.split(", ")
+    words = find_feature(first).words
+    if beside := " and ".join(filter(None, map(_name_feature, others))):
+        words = f"{words} with {beside}".strip()
+    return describe_unsupported(words, instead)
+
+
+def _name_feature(name: str) -> str:
     """Return a feature as text, with names of properties in braces; "" for a mere condition."""
     feature = find_feature(name)
     if "=" in name:

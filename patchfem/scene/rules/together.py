@@ -9,8 +9,10 @@ selectors stands in `keys.choices`, and what no run can compute together in `sup
 
 from __future__ import annotations
 
-import re
+from functools import lru_cache
+from typing import Any, NamedTuple
 
+from ...effects import LAWS, law_takes_stiffness_or_length
 from .contact import iterate_patches
 from .outlines import END_KEYS, PIECE_NAMES
 from .scene_draft import SceneDraft
@@ -20,6 +22,8 @@ PIECE_KEYS = [f"patch.{name}.{key}" for name in PIECE_NAMES for key in ("length"
 INTERFACE_EXCLUDES = (
     "and [[structure.interface]] exclude each other: each interface has its own law and load"
 )
+# The law takes a stiffness or the bond length that determines it.
+TAKES_EITHER = f"friction.law={'|'.join(filter(law_takes_stiffness_or_length, LAWS))}"
 JOINS_MASSES = f"joins masses, which cannot be used with [contact]; {MODES_ADVICE}"
 MISTAKES = {
     # tables
@@ -34,12 +38,8 @@ MISTAKES = {
         "[slide] prescribes the motion, but [structure] with [drive] computes the motion: keep only [slide], or only "
         "[structure] with [drive]",
     ),
-    "wear & kind=patch": "wear needs a slide: add [friction] with [slide], or with [structure] and [drive]",
-    **{
-        f"{table}.grooves & kind=patch|linear": f"[{table}.grooves] needs a sliding motion: add [friction] and [slide], "
-        "or [structure] and [drive]"
-        for table in ("contact", "normal")
-    },
+    "contact.grooves & kind=patch": "[contact.grooves] needs a sliding motion: add [friction] with [slide], or with "
+    "[structure] and [drive]",
     # patches
     **dict.fromkeys(
         (f"{key} & patch.mesh" for key in PIECE_KEYS),
@@ -72,16 +72,16 @@ MISTAKES = {
     ),
     "structure.measured_joint & !structure.measured=stuck": "names the joint that is subtracted from the modes, but nothing "
     'is subtracted; add measured = "stuck" or leave `measured_joint` out',
-    "structure.measured=stuck & !friction.law & !structure.interface": "'stuck' subtracts the stiffness of the joint from "
-    "the modes, but this scene has no joint; add [friction] and its load, or leave `measured` out",
+    "structure.measured=stuck & !friction.law|friction.static & !structure.interface": "'stuck' subtracts the stiffness of "
+    "the joint from the modes, but this scene has no joint; add [friction] and its load, or leave `measured` out",
     "structure.reduced.slide & structure.interface": "applies only to [friction]; a [[structure.interface]] names its two "
     "sides with the key `between`: leave structure.reduced.slide out",
     # wear
     "wear.friction & normal": "a [normal] contact has no area, so its wear has no depth: use [contact]",
     "wear.start & normal": "[normal] is a point and has no worn depth to start from: use [contact], or leave wear.start out "
     "and add the worn volumes of both runs",
-    "wear.friction.bond_length_factor & friction.stiffness": "has no meaning with friction.stiffness; give "
-    "friction.bond_length in place of friction.stiffness",
+    f"wear.friction.bond_length_factor & friction.stiffness & {TAKES_EITHER}": "has no meaning with friction.stiffness; "
+    "give friction.bond_length in place of friction.stiffness",
 }
 WITHOUT_PATCH = "has no meaning without [contact] and is not used"
 REMARKS = {
@@ -107,11 +107,11 @@ REMARKS = {
 MISSING_TABLES = {
     "!drive & structure & kind=rig|linear": "[structure] needs this table",
     "!structure & drive & kind=rig|linear": "[drive] needs this table",
-    "!friction & contact|normal|slide|wear & kind=bench|rig & !structure.interface": "a run with a load, a slide or wear "
+    "!friction & normal|contact|slide|wear & kind=bench|rig & !structure.interface": "a run with a load, a slide or wear "
     "also needs this table",
     "!contact & friction|slide|wear & kind=bench|rig & !normal & !structure.interface": "friction needs a normal load, "
     "[contact] or [normal]",
-    "!slide & contact|friction|normal|wear & kind=bench|rig & !structure & !drive": "friction needs a motion, [slide] or "
+    "!slide & friction|contact|normal|wear & kind=bench|rig & !structure & !drive": "friction needs a motion, [slide] or "
     "[structure] with [drive]; only `patchfem backbone` needs neither",
     "!contact & !normal & !friction & !slide & !structure & !drive & !wear": "a scene needs [contact] (pressed pieces), or "
     "[structure] with [drive] (a vibrating structure); with [friction] a scene needs a load and a motion",
@@ -141,7 +141,7 @@ def check_together(draft: SceneDraft, kind: str) -> None:
             for patch in patches if "patch." in condition else [""]:
                 condition_here = condition.replace("patch.", f"{patch}.")
                 if holds(draft, kind, condition_here):
-                    report(re.match("!?([\\w.]+)", condition_here)[1], sentence)
+                    report(_split_condition(condition_here)[0].keys[0], sentence)
 
 
 def holds(draft: SceneDraft, kind: str, condition: str) -> bool:
@@ -155,15 +155,31 @@ def holds(draft: SceneDraft, kind: str, condition: str) -> bool:
     condition : str
         Clauses as in the rows of this module.
     """
-    return all(_clause_holds(draft, kind, clause) for clause in condition.split(" & "))
+    for clause in _split_condition(condition):
+        written = (kind if key == "kind" else draft.written_value(key) for key in clause.keys)
+        if clause.is_negated == any(clause.accepts(value) for value in written):
+            return False
+    return True
 
 
-def _clause_holds(draft: SceneDraft, kind: str, clause: str) -> bool:
-    """Return whether one clause of a condition holds."""
-    keys, _, words = clause.lstrip("!").partition("=")
-    values = words.split("|") if words else []
-    for key in keys.split("|"):
-        value = kind if key == "kind" else draft.written_value(key)
-        if value is not None and (not values or str(value) in values):
-            return not clause.startswith("!")
-    return clause.startswith("!")
+class _Clause(NamedTuple):
+    """Clause of a condition: its keys, and the values that one of them has, () for any."""
+
+    is_negated: bool
+    keys: tuple[str, ...]
+    values: tuple[str, ...]
+
+    def accepts(self, written: Any) -> bool:
+        """Return whether the clause, without its `!`, holds for the written value of a key."""
+        return written is not None and (not self.values or str(written) in self.values)
+
+
+@lru_cache(4096)
+def _split_condition(condition: str) -> list[_Clause]:
+    """Return the clauses of a condition."""
+    clauses = []
+    for text in condition.split(" & "):
+        keys, _, values = text.removeprefix("!").partition("=")
+        names = tuple(filter(None, values.split("|")))
+        clauses.append(_Clause(text.startswith("!"), tuple(keys.split("|")), names))
+    return clauses

@@ -10,7 +10,7 @@ from .view import UNKNOWN_VALUE
 
 
 def check_wear(draft: SceneDraft) -> None:
-    """Report mistakes in [wear]."""
+    """Report mistakes in [wear.friction]."""
     wear = TableFacts(draft, "wear", draft.tables.wear)
     if wear.friction:
         _check_friction(wear)
