@@ -123,7 +123,7 @@ def _multiply(line, vector):
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def refine_column(sets, column):
+def _refine_column(sets, column):
     """Improve the column of 1, d or t of the tableau (0, 1 or 2) by a step of iterative refinement.
 
     Returns the residual before the step, relative to the largest term.
@@ -162,12 +162,12 @@ def refine_column(sets, column):
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def _lost_digits(sets):
-    """Refine the columns of the tableau; return whether it had lost more digits than a step restores."""
+def refine_columns(sets):
+    """Improve the columns of 1, d and t of the tableau; return the largest relative residual before the step."""
     residual = 0.0
     for column in range(3):
-        residual = max(residual, refine_column(sets, column))
-    return residual > MAX_TABLEAU_RESIDUAL
+        residual = max(residual, _refine_column(sets, column))
+    return residual
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
@@ -251,9 +251,9 @@ def build_set(sets, name):
     If the tableau has lost its digits, it is computed anew and pivoted once more. The slot is -1 if the compliance is not
     positive definite on the set. Cost: m^2 multiplications for each node that is exchanged. name: name of the set.
     """
-    if not pivot_to_target(sets) or _lost_digits(sets):
+    if not pivot_to_target(sets) or refine_columns(sets) > MAX_TABLEAU_RESIDUAL:
         reset_tableau(sets)
-        if not pivot_to_target(sets) or _lost_digits(sets):
+        if not pivot_to_target(sets) or refine_columns(sets) > MAX_TABLEAU_RESIDUAL:
             return -1
     return store_set(sets, name)
 
