@@ -17,7 +17,6 @@ from typing import NamedTuple
 from ..compiled.flags_kernels import FASTMATH_FLAGS, NJIT_NO_REFCOUNT
 from ..compiled.jit import njit
 from .set_arrays import (
-    N_BUILT,
     N_STORED,
     NEXT_SLOT,
     REFERENCE_ENERGY,
@@ -176,7 +175,6 @@ def take_slot(sets):
     stored = sets.stored
     slot = sets.counters[NEXT_SLOT]
     sets.counters[NEXT_SLOT] = (slot + 1) % stored.names.size
-    sets.counters[N_BUILT] += 1
     if sets.counters[N_STORED] < stored.names.size:
         sets.counters[N_STORED] += 1
         return slot
@@ -363,7 +361,7 @@ def exchange_violating_nodes(sets, slot, d, t, bounds, is_single):
 def find_set(sets, slot, d, t):
     """Find the contact set at a rigid displacement, starting from a neighbouring set.
 
-    For 400 nodes this takes 0.5 us on a known set, and 0.3 ms for a new set that differs by one node.
+    For 400 nodes this takes 1 us on a known set, and 0.3 ms for a new set that differs by one node.
 
     Parameters
     ----------
