@@ -856,13 +856,14 @@ def wedge_loop_area(amplitude, friction, tangential_stiffness, area, min_pressur
     high = friction * max_pressure / tangential_stiffness
     slip = np.clip(amplitude, low, high)
 
-    # Fraction of the strips that slip, and the mean of u (U - u) over them
+    # A strip that slips at the displacement u dissipates 4 k u (U - u) in a cycle of the amplitude U. The sum over all
+    # strips is the fraction of them that slip, times the mean over these, for which u is spread evenly.
     if high > low:
         fraction = (slip - low) / (high - low)
     else:
         fraction = (amplitude >= low).astype(float)
-    integral = amplitude * (slip + low) / 2 - (slip**2 + slip * low + low**2) / 3
-    return 4 * tangential_stiffness * area * fraction * integral
+    mean = amplitude * (slip + low) / 2 - (slip**2 + slip * low + low**2) / 3
+    return 4 * tangential_stiffness * area * fraction * mean
 
 
 def core_contact_fraction(offset, length):

@@ -23,10 +23,6 @@ from patchfem.compiled import hash_sources, prebuilt
 if not prebuilt.is_cpu_sufficient():
     raise SystemExit('this CPU lacks instruction sets of the machine code')
 print(prebuilt.COMMON_CPUS[platform.machine()].name, prebuilt.compute_key(hash_sources))"""
-# Program that compiles every kernel that it calls.
-COMPILE_PROGRAM = """import sys
-from patchfem.__main__ import main
-main(sys.argv[1:])"""
 RIG_TEXT = """
 [normal]
 load = "26 lbf"
@@ -90,7 +86,7 @@ def build_machine_code(target: Path, commands=list_usual_commands) -> None:
     CalledProcessError
         If a command fails.
     """
-    python = [sys.executable, "-P", "-c"]
+    python = [sys.executable, "-P"]
     with TemporaryDirectory() as work:
         cache = Path(work) / "cache"
         environment = os.environ | {
@@ -99,7 +95,7 @@ def build_machine_code(target: Path, commands=list_usual_commands) -> None:
             "PYTHONPATH": str(ROOT),
         }
         cpu, key = subprocess.run(
-            [*python, CPU_AND_KEY_PROGRAM],
+            [*python, "-c", CPU_AND_KEY_PROGRAM],
             env=environment,
             cwd=work,
             check=True,
@@ -108,7 +104,15 @@ def build_machine_code(target: Path, commands=list_usual_commands) -> None:
         ).stdout.split()
         for number, arguments in enumerate(commands(Path(work))):
             subprocess.run(
-                [*python, COMPILE_PROGRAM, *map(str, arguments), "-q", "-o", f"{work}/{number}"],
+                [
+                    *python,
+                    "-m",
+                    "patchfem",
+                    *map(str, arguments),
+                    "-q",
+                    "-o",
+                    f"{work}/{number}",
+                ],
                 env=environment | {"NUMBA_CPU_NAME": cpu},
                 cwd=work,
                 check=True,

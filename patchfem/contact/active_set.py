@@ -139,7 +139,8 @@ def solve_on_set(
     solution[:, nodes] = solve_block(right_sides[:, nodes].T).T
     solution[:, index.size :] *= problem.springs
 
-    # Modified Gram-Schmidt: each motion is freed of the part that the motions before it cause, in the norm of C^-1
+    # Modified Gram-Schmidt: the motions are made orthogonal, in the scalar product of C^-1. Forces of one motion then do
+    # no work in another.
     forces = solution[1:]
     stiffness = np.empty(n_motions)
     for k in range(n_motions):

@@ -189,12 +189,12 @@ def _solve_newton(problem: AsperityProblem, separation, motion) -> AsperitySolut
                 return None
         motion = motion + motion_change
 
-        # Largest relative change of a pressure; of nodes that carry nothing only the part that matters counts
+        # Relative changes of the pressures. That of a nearly unloaded node counts in proportion to its force.
         log_change = -change * decay
         new_log_force = np.maximum(log_force, log_force + log_change)
         fraction = np.exp(np.minimum(0.0, new_log_force - log_force.max()))
 
-        # Convergence, or round-off of the separations over the depth of the gap
+        # The iteration has converged if the changes are below the tolerance or below rounding errors
         depth = np.ptp(contact.gap) + np.abs(problem.compliance.product(force)).max()
         depth += 2 * np.abs(motion[1:]).sum()
         # Round-off of a separation changes the pressure of the loaded nodes by this fraction.
@@ -209,7 +209,8 @@ def _solve_newton(problem: AsperityProblem, separation, motion) -> AsperitySolut
             new_force = np.where(fraction < 1e-15, law_force, new_force)
             return AsperitySolution(new_force, separation + change, motion, iteration)
 
-        # Rising nodes move along log P, falling ones along s; an unloaded node may rise to a small pressure at once
+        # Where the pressure rises, the law is steep, and the step is limited to one that is linear in the pressure; an
+        # unloaded node may rise to a small pressure at once
         along_log = -np.log1p(np.maximum(log_change, 0.0)) / decay
         limited_change = np.where(log_change > 0, along_log, change)
         load = contact.target[0] if imbalance.size else force.sum()

@@ -297,7 +297,8 @@ def set_stiffness(contact: SetFactor, motions, edges: list[ContactEdge]) -> np.n
     (r,) ndarray
         [N/m], or [N m/rad] for a rotation.
     """
-    # Forces under the motions, under the compliances of the nodes beyond the edges, and under a unit at the last nodes
+    # Forces that cause the motions, the displacements by a unit force beyond each edge, and a unit displacement of the last
+    # node before each edge
     compliance = contact.compliance
     outside = [edge.node + edge.side for edge in edges]
     nodes = [edge.node for edge in edges]
@@ -310,8 +311,7 @@ def set_stiffness(contact: SetFactor, motions, edges: list[ContactEdge]) -> np.n
     if contact.index.size < 3:
         return stiffness
 
-    # A node more or less is a bordered matrix: the stiffness changes by the square of the mismatch over its Schur
-    # complement
+    # Change of the stiffness by the node beyond the edge, and by loss of the last node before it (Schur complements)
     for k, edge in enumerate(edges):
         row = compliance[outside[k]]
         gain = (motions[outside[k]] - row @ force) ** 2 / (row[outside[k]] - row @ outer[:, k])

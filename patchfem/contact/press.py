@@ -268,7 +268,7 @@ def press_strips(strips: StripModel, gap, holder: Holder) -> StripsState:
             residuals = compute_residuals(compliance, problem, solution)
             opening = np.where(solution.force > 0, 0.0, np.maximum(opening, 0.0))
 
-    # The check of the solution, and of what the nodes in contact leave undetermined
+    # A solution with large residuals is refused, and one whose nodes in contact leave a rotation undetermined
     is_strict = offsets.size == 1 and not strips.is_smooth
     place, remedy = RESIDUAL_REMEDIES[strips.is_smooth]
     tolerance = RESIDUAL_TOL if is_strict else STRIP_RESIDUAL_TOL

@@ -17,7 +17,6 @@ REFERENCE_ENERGY = 2
 REFERENCE_OPENING = 3
 N_STORED = 0  # index into `SetArrays.counters` of the number of stored sets
 NEXT_SLOT = 1  # index into `SetArrays.counters` of the slot of the next set
-N_BUILT = 2  # index into `SetArrays.counters` of the number of sets computed so far
 
 
 class EnergyTerm(IntEnum):
@@ -95,7 +94,7 @@ class SetArrays(NamedTuple):
     - opening (m,): openings of the reference state without forces [m].
     - reference (4,): properties of the reference state, from `REFERENCE_LOAD` to `REFERENCE_OPENING`.
     - tableau, stored: see there.
-    - counters (3,): from `N_STORED` to `N_BUILT`.
+    - counters (2,): `N_STORED` and `NEXT_SLOT`.
     """
 
     compliance: np.ndarray
@@ -159,7 +158,7 @@ def make_set_arrays(compliance, x, opening, reference, in_contact, n_slots: int)
         np.array(reference, float),
         tableau,
         stored,
-        np.zeros(3, np.int64),
+        np.zeros(2, np.int64),
     )
 
 

@@ -67,9 +67,11 @@ def is_running(pid: int, start: str = "") -> bool:
 
 
 class Owner(NamedTuple):
-    """Entry of a lock file: number and start time of a process, "-" if unknown, and hash of its machine.
+    """Process that holds a lock: the words in the lock file. Fields that the file does not contain are "".
 
-    An incomplete entry has empty fields.
+    - pid: number of the process
+    - start: start time of the process [clock ticks since boot], or "-" if the system does not know it
+    - host: hash of the machine on which the process runs (`HOST_HASH`)
     """
 
     pid: str = ""

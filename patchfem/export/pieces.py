@@ -22,7 +22,7 @@ PICTURES = (".png", ".svg", ".pdf")
 FILMS = (".gif", ".mp4", ".html")
 FIGURE_SIZE = (12.0, 5.2)  # [inch]; with DPI an even number of pixels, which video formats need
 DPI = 100
-CYCLE_SECONDS = 2.4  # duration of a film [s] within the limits of the frame rate
+FILM_SECONDS = 2.4  # duration of a film [s] within the limits of the frame rate
 FRAME_RATE_LIMITS = (3.0, 25.0)  # [1/s]
 DRAWN_MOTION_FRACTION = 0.05  # largest motion as drawn, over the height of the contact window
 DRAWN_SLIDE_FRACTION = 0.03  # largest slide of the upper piece as drawn, over its length
@@ -276,7 +276,7 @@ def write_film(frames: Frames, title: str, magnify: float | None, out: Path) -> 
     figure.draw_without_rendering()
     figure.set_layout_engine("none")  # so that the panels stay at their places
     film = animation.FuncAnimation(figure, show, len(numbers))
-    rate = float(np.clip(len(numbers) / CYCLE_SECONDS, *FRAME_RATE_LIMITS))
+    rate = float(np.clip(len(numbers) / FILM_SECONDS, *FRAME_RATE_LIMITS))
     with write_atomically(out) as partial:
         if out.suffix == ".html":
             partial.write_text(_make_page(film.to_jshtml(rate), title), "utf-8")

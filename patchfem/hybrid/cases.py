@@ -35,7 +35,7 @@ MAX_CYCLE_STEPS = 100  # further steps per cycle that a run may take
 DEFAULT_RTOL = 1e-7  # tolerance of a step
 EXACT_RTOL = 1e-12  # the same for accuracy.method = "exact"
 MIN_COMPUTED = 3  # cycles at the end of which each is computed
-N_ROWS = 30  # rows of `State.rows`
+N_STATE_ROWS = 30  # rows of `State.rows`
 
 
 class Load(NamedTuple):
@@ -365,7 +365,7 @@ def make_batch(cases, n_events: int = 0) -> tuple[Rig, State, Record]:
         np.array([case.y for case in cases]),
         memory,
         clock,
-        np.zeros((N_ROWS, n)),
+        np.zeros((N_STATE_ROWS, n)),
         np.full((5, n_faces, 4), np.inf),
         np.zeros((6, Probe.FACES + Probe.COUNT * n_faces)),
         np.zeros((n_faces, n_faces)),

@@ -606,7 +606,7 @@ def modes_at_gauss_points(modes: ShearModes, x: np.ndarray, count: int) -> Gauss
     """
     spectrum = modes.spectrum
     n_modes = modes.stiffness.size
-    positions, limit = gauss_rule(x, spectrum.limit, count)
+    positions, limit = reduce_to_gauss_points(x, spectrum.limit, count)
     shape = np.stack([np.interp(positions, x, mode) for mode in modes.shape.T], axis=1)
     error = spectrum.relative_difference(
         spectrum.backbone(n_modes), spectrum.backbone(n_modes, shape, limit)
@@ -615,22 +615,24 @@ def modes_at_gauss_points(modes: ShearModes, x: np.ndarray, count: int) -> Gauss
     return GaussModes(replace(modes, points=points, shape=frozen_array(shape)), limit, error)
 
 
-def gauss_rule(x: np.ndarray, weight: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return positions and weights (count,) of the Gauss rule for a weighted sum over given points.
+def reduce_to_gauss_points(
+    x: np.ndarray, weight: np.ndarray, count: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return a few points and weights whose weighted sum of a function equals that over many given points.
 
-    The rule is exact for polynomials up to the degree 2 count - 1. It follows from Lanczos' method, in which each vector
-    is made orthogonal to all previous ones.
+    It is exact for polynomials up to the degree 2 count - 1, as Gauss's rule is for an integral. The points follow from
+    Lanczos' method, in which each vector is made orthogonal to all previous ones.
 
     Parameters
     ----------
     x, weight : (a,) ndarray
-        Positions and weights > 0 of the points.
+        Positions and weights > 0 of the given points.
     count : int
-        Number of Gauss points.
+        Number k of points of the rule.
 
     Returns
     -------
-    positions, weights : (count,) ndarray
+    positions, weights : (k,) ndarray
         In the units of `x` and `weight`.
     """
     scaled = 2 * (x - x.mean()) / np.ptp(x)

@@ -139,7 +139,7 @@ def take_jump(
     -------
     WearState
     """
-    # The last jump takes what round-off would leave over
+    # A remainder that is only a rounding error is added to the last jump
     end = min(problem.cycles, until)
     remaining = end - state.cycle
     length = min(problem.cycles / count if count else state.length, remaining)
@@ -202,7 +202,7 @@ def _take_halves(
     half, _ = solve_jump(problem.press, state.depth, rate, length / 2)
     depth, force = solve_jump(problem.press, half, rate, length / 2)
 
-    # The sum of all whole jumps, whose difference from the halves is the error of the run
+    # The depth of a run in whole jumps, whose difference from that of the halves gives the error of the run
     coarse_depth = coarse
     if state.coarse_depth is not state.depth:
         coarse_depth, _ = solve_jump(problem.press, state.coarse_depth, rate, length)

@@ -11,7 +11,7 @@ from pressed import press, solve_forces
 
 from patchfem.compiled import load
 from patchfem.contact import ContactSets, hash_set
-from patchfem.contact.set_arrays import N_BUILT, N_STORED
+from patchfem.contact.set_arrays import N_STORED
 
 PRESS = load("contact.press_kernels")
 
@@ -75,8 +75,10 @@ def test_exact_set_search_forces_equal_unilateral_solve(memory_limit):
         slot = PRESS.find_set(arrays, slot, d, t)
         check_state(sets, PRESS.press_state(arrays, slot, d, t, force), force, d, t, 1e-12)
         n_separated += not force.any()
-    assert n_separated >= 5 and arrays.counters[N_BUILT] > 16
-    assert memory_limit or arrays.stored.names.size == arrays.counters[N_STORED] == 16
+    # The motions need more than 16 sets, so that with memory for 16 of them sets are replaced
+    n_stored = arrays.counters[N_STORED]
+    assert n_separated >= 5
+    assert n_stored > 16 if memory_limit else n_stored == arrays.stored.names.size == 16
 
 
 @settings(settings.get_profile("costly"))

@@ -189,7 +189,8 @@ def set_stiffness(compliance: PointCompliance, active, motion, edges: list[Conta
     if not edges or active.sum() < 3:
         return stiffness
 
-    # Schur complements of the points inside and outside the edge of the longest contact
+    # Compliance of the point beyond the edge of the longest contact, and stiffness of the last point before it, while the
+    # other points in contact are held (Schur complements)
     mismatch = motion - compliance.product(force)
     longest_edge = max(edges, key=lambda edge: _contact_length(active, edge))
     indices = np.arange(motion.size)

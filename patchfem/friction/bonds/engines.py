@@ -135,8 +135,8 @@ def choose_engine(
     if engine == "recursion" or (engine == "auto" and not unsupported_reason("recursion", law)):
         return RECURSION
 
-    # A tenth of the tolerance is shared out: the merge width, whose error grows with its square, may use 0.09 of the
-    # tolerance and the cut-off 0.001.
+    # A list may use a tenth of the tolerance: merging, whose error grows with the square of the width, 0.09 of the
+    # tolerance, and the cut-off 0.001.
     if tail is None:
         tail = min(1e-3 * tolerance, MAX_TAIL)
     width = merge
@@ -147,8 +147,8 @@ def choose_engine(
         tail_used = tail * drops_strips
         choices[name] = _estimate(law, name, tail_used, width * merges_strips, stroke, steps)
 
-    # What the scene prescribes wins. Otherwise the error of bonds that form at a reversal (order below 0) may forbid
-    # merging at every width.
+    # An engine or a merge width that the scene prescribes is used. Otherwise the faster list is, but growing bonds of an
+    # order below 0 have an error that no merge width reduces (NEGATIVE_ORDER_ERROR); if it is too large, none is merged.
     if engine != "auto":
         return choices[engine]
     if merge is not None:

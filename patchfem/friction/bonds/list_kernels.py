@@ -272,7 +272,8 @@ def divide(path, eps, growth, law):
     if form == FORM_REPORT:
         return Division(1.0, 1.0, 1.0, True)
 
-    # Ages R = -AGE_PER_WIDTH eps ln(1 - j step) of the ends j of the strips: equal steps of exp(-R/(AGE_PER_WIDTH eps))
+    # Strip j ends at bonds of the age R_j, which is their path since they formed. Strips are longer at higher ages, where
+    # bonds carry less: exp(-R_j/(AGE_PER_WIDTH eps)) falls by the same step from each strip to the next.
     x = path / eps
     cutoff = law[LAW.cutoff] if form == FORM_STRETCH else law[LAW.cutoff] / eps
     cutoff = min(cutoff, MAX_NEW_AGE)
@@ -373,8 +374,8 @@ def list_mean(increment, bonds, v0, dt):
         loss = np.copysign(1 / after.middle_length, increment)
         gain = 1 / increment
 
-    # The mean is a weighted sum of the values at the start, inside and at the end of the increment. Simpson's rule has
-    # the weights 1/6, 4/6 and 1/6; near its limit it shares the sum with panels of Gauss points.
+    # Numerical integration over the increment. Short increments use Simpson's rule, with the weights 1/6, 4/6 and 1/6 at
+    # start, middle and end. Long ones use Gauss's rule on several panels. In between, the mean is a mixture of both.
     strips[STRIP.mean, first] = 0.0
     for k in range(int(bonds.status[STATUS.head]), int(bonds.status[STATUS.end]) + 1):
         strips[STRIP.mean, k] = 0.0
@@ -476,7 +477,7 @@ def _needs_energy_balance(increment, bonds):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def _find_simpson_fraction(increment, bonds):
-    """Return the fraction of Simpson's rule in the mean of an increment; the remainder is that of panels of Gauss points.
+    """Return the weight of Simpson's rule in the mean of an increment; Gauss's rule on panels has the remaining weight.
 
     It is 1 for increments of up to half a limit with a smooth force and falls to 0 at the limit, so that the mean depends
     continuously on the increment. For distributed initial bonds it must not depend on their position.

@@ -74,7 +74,7 @@ def list_step(increment, bonds, v0, v1, dt):
     )
     after = find_path(1.0, increment, bonds, v0, v1, dt)
 
-    # The path state moves first, because the values of the new strips refer to its damage or growth
+    # The path state is updated first, because the values of the new strips refer to its damage or growth
     now[PATH.displacement] = after.displacement
     now[PATH.path] = after.path
     now[PATH.damage] = after.damage

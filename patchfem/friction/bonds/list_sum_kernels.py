@@ -96,7 +96,8 @@ def sum_strips(after, bonds):
         force_factor *= scale
         energy_factor = force_factor / (p + 1)
 
-    # All strips by two Gauss points in a loop without branches, then those again for which this is not exact enough
+    # Two Gauss points sum all strips in a loop without branches. Strips for which this is not exact enough are then
+    # integrated again.
     if form == FORM_STRETCH:
         _sum_gauss_stretch(after, force_factor, energy_factor, bonds)
     else:
@@ -176,13 +177,14 @@ def _sum_gauss_growing(after, scale, factor, bonds):
         covered = strips[STRIP.covered, k]
         path = after.path - strips[STRIP.path, k]
 
-        # Their length: that of mature bonds, less what the time since they formed leaves of the difference (eq. 2.10)
+        # Their length is that of mature bonds, less the part of their initial difference from it that growth has not
+        # removed yet (eq. 2.10)
         length_1 = max(after.length - scale * strips[STRIP.value_1, k], min_length)
         length_2 = max(after.length - scale * strips[STRIP.value_2, k], min_length)
         x_1 = max(path + GAUSS_POINT_1 * covered, MIN_POSITIVE) / length_1
         x_2 = max(path + GAUSS_POINT_2 * covered, MIN_POSITIVE) / length_2
 
-        # Eq. 2.17 as printed: (R/eps)^p exp(-R/eps) along u/|u|
+        # A bond acts with (R/eps)^p exp(-R/eps) in the direction of its stretch, as eq. 2.17 is printed
         if is_whole:
             force_1 = whole_power(x_1, p) * fast_exp(-x_1)
             force_2 = whole_power(x_2, p) * fast_exp(-x_2)
@@ -291,7 +293,8 @@ def _integrate_growing_piece(after, scale, bonds, column, low, high):
     path = max(after.path - strips[STRIP.path, column], 0.0)
     step = strips[STRIP.end, column] - strips[STRIP.start, column]
 
-    # Bonds that grew along the strip have a last length near 0
+    # Where bonds grew while the strip formed, the last ones to form have a length near 0. Otherwise (R/eps)^p is not
+    # smooth at R = 0, and R^p is integrated exactly.
     last = _bond_length(0.0, after, scale, value_1, value_2)
     first = _bond_length(1.0, after, scale, value_1, value_2)
     is_steep = p < 2 and p != np.floor(p) and last > MIN_RESTING_RATIO * first
@@ -314,7 +317,7 @@ def _integrate_growing_piece(after, scale, bonds, column, low, high):
             density *= power(distance / length, p)
         density *= 0.5 * width * covered
 
-        # u keeps its sign on the piece, so the sign of either point serves
+        # The stretch u has the same sign at both points, because the piece lies on one side of u = 0
         sign = np.copysign(1.0, u)
         if point == 0:
             force_1 = density
@@ -479,8 +482,9 @@ def sum_initial(after, bonds):
 def average_initial(increment, bonds):
     """Return the mean force of the initial bonds over an increment for unit pressure and reading="report".
 
-    The force jumps at displacement 0, for which the mean is exact, or rises from -phi to phi over the width over which
-    the bonds are distributed; there phi is replaced by its mean over the width.
+    The force is phi(x) = x^p exp(-x)/Gamma(p + 1) of the path x in bond lengths, in the direction of the displacement. It
+    jumps at displacement 0, for which the mean is exact, or rises from -phi to phi over the width over which the bonds
+    are distributed; there phi is replaced by its mean over the width.
 
     Parameters
     ----------

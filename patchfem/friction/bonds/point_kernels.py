@@ -71,7 +71,7 @@ class MeanStretch(NamedTuple):
 
 
 class BondMoments(NamedTuple):
-    """Sums over the bonds of a point: m [Pa], z [Pa m] and s2 [Pa m2]; of a point with a load in N instead of Pa."""
+    """Sums over the bonds of a point: m [Pa], z [Pa m] and s2 [Pa m2]; N replaces Pa where a load replaces the pressure."""
 
     m: float
     z: float
