@@ -58,7 +58,7 @@ def find_applicable_settings(model: Model) -> list[str]:
 
 
 def list_tolerances(model: Model) -> list[Setting]:
-    """Return settings for several values of accuracy.tolerance with that of the scene, from large to small."""
+    """Return the model with several values of accuracy.tolerance, among them that of the scene, from large to small."""
     settings = []
     for value in sorted({*TOLERANCES, model.accuracy.tolerance}, reverse=True):
         changed = _change_setting(model, "tolerance", value)

@@ -19,7 +19,6 @@ from ..core import NotConverged, Outcome, frozen_array
 from .intervals import FitIntervals, compute_intervals, make_unknown_intervals
 from .space import (
     SearchCounts,
-    SearchSpace,
     UnitCubeResidual,
     make_search_space,
     make_space_filling_points,
@@ -112,7 +111,7 @@ class Fit:
 
     @property
     def n_agreed(self) -> int:
-        """Number of descents with the same final sum of squares."""
+        """Number of descents that ended at the smallest residual, apart from round-off."""
         return self.descents.count_within(SAME_RESULT_RATIO)
 
     def count_earlier_search(self, earlier: "Fit") -> "Fit":
@@ -156,11 +155,6 @@ class Problem:
     high: Sequence
     start: Sequence | None = None
 
-    @property
-    def search_space(self) -> SearchSpace:
-        """Mapping of the bounded parameters to the unit cube."""
-        return make_search_space(self.low, self.high)
-
     def solve(self, max_descents: int = 3, interval_kind: str = IntervalKind.ROWS) -> Fit:
         """Minimize the sum of squares from the start of the problem and the best of some trial points.
 
@@ -190,7 +184,8 @@ class Problem:
         """
         n = len(self.low)
         is_random = search.seed is not None
-        model = UnitCubeResidual(self.residual, self.search_space, is_expensive=is_random)
+        space = make_search_space(self.low, self.high)
+        model = UnitCubeResidual(self.residual, space, is_expensive=is_random)
         if is_random:
             starts = list(np.random.default_rng(search.seed).random((search.starts, n)))
         else:
@@ -269,7 +264,8 @@ def _assemble_fit(model: UnitCubeResidual, best: Descent, descents: Descents, ki
         u, cost = _move_onto_bounds(model, u, cost)
         is_series = kind == IntervalKind.SERIES
         intervals = compute_intervals(model, u, cost, descend, is_series=is_series)
-    is_converged = best.is_converged or descents.n_best > 1
+    n_near = np.count_nonzero(descents.rms <= SAME_MINIMUM_RATIO * np.sqrt(cost / model.rows))
+    is_converged = best.is_converged or n_near > 1
     return Fit(
         values=frozen_array(model.space.to_values(u)),
         at_bound=tuple(np.where(u <= 0, "low", np.where(u >= 1, "high", "")).tolist()),

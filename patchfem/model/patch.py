@@ -221,7 +221,6 @@ class PatchMesh:
     - file: mesh file of the two pieces.
     - is_static: whether no part of the patch moves, so that all the time goes into the mesh.
     - edge_motion: cause of a motion of the edges of the contact: ``"load"``, ``"wear"`` or ``""``.
-    - tolerance: relative error that the mesh has to meet, None for the tolerance of the run.
     - shared: meshes that serve all cases of a sweep.
     - can_gather_points: whether no fields of the motion are needed, so that few points may
       represent the patch.
@@ -233,7 +232,6 @@ class PatchMesh:
     file: MeshFile | None
     is_static: bool = False
     edge_motion: str = ""
-    tolerance: float | None = None
     shared: SharedMeshes | None = None
     can_gather_points: bool = False
     slip: PrescribedSlip | None = None
@@ -295,7 +293,8 @@ class PatchModel:
         """Return a copy of the patch with an element size [m]; None: the mesh is refined to the tolerance."""
         gap = self.gap
         if not gap.is_rough and self.mesh.file is None:
-            gap = replace(gap, average=size, limit=size)
+            lengths = _average_over_cells(size, self.interface.strips, self.pieces)
+            gap = replace(gap, average=lengths.average, limit=lengths.limit)
         return replace(self, mesh=replace(self.mesh, element_size=size), gap=gap)
 
     def with_loading(self, **changes) -> "PatchModel":
@@ -419,20 +418,25 @@ def _build_loading(contact: Contact) -> PatchLoading:
 
 
 def find_profile_lengths(contact: Contact, pieces: PatchPieces) -> ProfileLengths:
-    """Return the lengths over which a profile is averaged.
-
-    An automatic mesh resolves the whole file. Where the finest waves cannot be solved apart
-    (strips, pieces that reach beyond the interface), its cells are those of an even mesh at most.
-    """
+    """Return the lengths over which a profile is averaged."""
     if contact.asperities is not None:
         cutoff = find_shortest_wavelength(contact, pieces.length)
         average = cutoff and cutoff / profile.ELEMENTS_PER_WAVE
         return ProfileLengths(average, None)
     if contact.mesh is not None:
         return ProfileLengths(None, 0.0)
-    if contact.element_size:
-        return ProfileLengths(contact.element_size, contact.element_size)
-    if contact.strips is None and not pieces.has_overhang:
+    return _average_over_cells(contact.element_size, contact.strips, pieces)
+
+
+def _average_over_cells(size: float | None, strips, pieces: PatchPieces) -> ProfileLengths:
+    """Return the lengths over which a profile is averaged on a mesh with an element size [m], or on an automatic one.
+
+    An automatic mesh resolves the whole file. Where the finest waves cannot be solved apart (strips, pieces that reach
+    beyond the interface), its cells are those of an even mesh at most.
+    """
+    if size:
+        return ProfileLengths(size, size)
+    if strips is None and not pieces.has_overhang:
         return ProfileLengths(None, None)
     return ProfileLengths(None, pieces.length / DEFAULT_CELLS)
 

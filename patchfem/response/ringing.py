@@ -335,7 +335,7 @@ def _project(time, value, forced, poles) -> _Projection:
     sine = decay * np.sin(np.outer(time, omegas))
     columns = np.hstack([forced, cosine, sine])
 
-    # Least squares by an orthonormal basis of the columns.
+    # Least squares from the singular values, without columns that nearly depend on others.
     basis, sizes, rows = np.linalg.svd(columns, full_matrices=False)
     is_known = sizes > MIN_INDEPENDENT * sizes[0]
     basis = basis[:, is_known]

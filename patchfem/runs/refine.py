@@ -117,7 +117,7 @@ def _is_on_points(result, name: str) -> bool:
 
 
 def is_main(name: str) -> bool:
-    """Return whether the tolerance of a run applies to a measure."""
+    """Return whether a run is refined until this measure meets the tolerance; warnings are about all measures."""
     row = PATCH_TABLE.get(name) or rows.TABLE.get(name)
     return row is not None and row.has("main")
 

@@ -65,6 +65,24 @@ def test_force_holds_the_amplitude_in_a_run(scene):
     assert (shift < 1e-3).all() if scene is JOINT else (shift > 1e-3).all()
 
 
+def test_note_on_other_modes_states_the_shift_of_the_phase_resonance():
+    """The note names the amplitude of the largest shift in half-widths; far modes are weak, and one mode has no note."""
+    amplitudes = [2e-4, 5e-4]
+    curve = pf.backbone(TWO_MODES, amplitudes=amplitudes, method="balance")
+    forced = curve.balance_force_frequency.values
+    shift = np.abs(forced / curve.balance_frequency.values - 1)
+    k = int(np.argmax(shift / curve.balance_damping.values))
+    assert (
+        f"at {1e6 * amplitudes[k]:.0f} um its phase resonance has {forced[k]:.5g} Hz, {100 * shift[k]:.2g} % beside"
+        in str(curve.attrs["advice"])
+    )
+    weak = "The coupling with the other modes is weak."
+    far = TWO_MODES.replace("170 Hz", "20 kHz")
+    for scene, is_noted in ((far, True), (JOINT, False)):
+        curve = pf.backbone(scene, amplitudes=amplitudes, method="balance")
+        assert (weak in str(curve.attrs["advice"])) == is_noted
+
+
 def test_rigid_friction_of_several_modes_has_no_force():
     """With rigid friction and two modes there is no force, and a note says which law has one; with one mode it is known."""
     for scene, is_known in ((JOINT, True), (TWO_MODES, False)):

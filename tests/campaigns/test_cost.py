@@ -93,6 +93,23 @@ def test_exact_error_at_setting_of_scene_agrees_with_run(keys, own, monkeypatch)
     assert row.values == pytest.approx({name: m.value for name, m in measures.items()}, rel=1e-9)
 
 
+def test_exact_automatic_mesh_averages_profile_as_run(tmp_path):
+    """Under a trace on pieces of unequal length, the row of the automatic mesh averages it as the run does.
+
+    Once it resolved the finest waves, which cannot be solved apart there.
+    """
+    heights = "".join(f"{1e-5 * k},{1e-7 * (k % 3)}\n" for k in range(1271))
+    (tmp_path / "trace.csv").write_text(f"x [m],height [m]\n{heights}", "utf-8")
+    scene = tmp_path / "scene.toml"
+    tables = '[contact.profile]\nfile = "trace.csv"\n[contact.lower]\nlength = "20 mm"\n'
+    scene.write_text(PIECE + 'load = "26 lbf"\nsubstrate = "steel"\n' + tables, "utf-8")
+    model = build(scene)
+    *_, uniform, automatic = numerical_settings.make_setting_values(model, "element_size")
+    assert automatic.value is None and automatic.model.patch.gap.average is None
+    assert automatic.model.patch.gap.limit == model.patch.gap.limit == LENGTH / 200
+    assert uniform.model.patch.gap.limit == uniform.model.patch.gap.average == uniform.value
+
+
 def test_exact_table_contains_values_and_errors(tmp_path):
     """The table contains the errors of each run."""
     scene = tmp_path / "a.toml"

@@ -334,10 +334,10 @@ def fit_curve(
 
     Raises
     ------
-    SceneError, PatchfemError
+    SceneError
         If the input is invalid.
-    NotConverged
-        If no search converges.
+    PatchfemError
+        If the input is invalid, or if neither method has a curve at a starting point.
     """
     begin = perf_counter()
     ranges = parse_ranges(free_parameters)

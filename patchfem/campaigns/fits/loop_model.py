@@ -40,7 +40,7 @@ class BenchModel:
         Bounds of the free parameters.
     offsets : sequence of Offset
         Offsets, whose values follow those of the free parameters.
-    warm : bool
+    warm_up : bool
         Whether the complete cycles of the record are repeated before it as a warm-up.
     say : Callable, optional
         Called with a line of text that reports the progress.

@@ -94,7 +94,7 @@ class FreeKeys:
         return [*self.ranges, *self.offsets]
 
     def require_enough_rows(self, path: Path, count: int, name: str) -> None:
-        """Raise PatchfemError unless more values are fitted than unknowns.
+        """Raise PatchfemError if a measurement has too few values to determine the unknowns and their intervals.
 
         Parameters
         ----------
@@ -103,7 +103,7 @@ class FreeKeys:
         count : int
             Number of fitted values, without those that are held out.
         name : str
-            Word for them.
+            Word for these values, such as "rows".
         """
         if count <= len(self.bounds):
             raise PatchfemError(

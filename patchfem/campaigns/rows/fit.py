@@ -240,6 +240,7 @@ def _advise_condition(
     information = np.zeros((len(readings.conditions), len(ranges), len(ranges)))
     for is_of_kind in (readings.is_acceleration[is_used], ~readings.is_acceleration[is_used]):
         for k in set(condition[is_of_kind].tolist()):
+            # a repetition gives one reading of each kind
             gradient = fit.intervals.effects[is_of_kind & (condition == k)].mean(axis=0)
             information[k] += np.outer(gradient, gradient)
     places = [f"at {f:.6g} Hz and {level / G_N:.4g} g" for f, level in readings.conditions]
