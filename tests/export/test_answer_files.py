@@ -108,6 +108,12 @@ def change_summary(**entries):
     return change
 
 
+def break_text(folder) -> None:
+    """Put a byte that no UTF-8 text has into the title of summary.json."""
+    path = folder / "summary.json"
+    path.write_bytes(path.read_bytes().replace(b'"title": "', b'"title": "\xff', 1))
+
+
 def cut_netcdf(folder) -> None:
     """Cut result.nc in the middle."""
     content = (folder / "result.nc").read_bytes()
@@ -127,6 +133,8 @@ DAMAGES = {
     "huge number": change_summary(measures={"loop_area": {"value": [], "unit": "J"}}),
     "unknown kind": change_summary(kind="b"),
     "no verdict": change_summary(verdict=None),
+    "number in verdict": change_summary(verdict=[1]),
+    "byte in summary": break_text,
     "cut netCDF": cut_netcdf,
     "text as netCDF": lambda folder: (folder / "result.nc").write_text("a", "utf-8"),
     "ring in netCDF": remove_dataset,
@@ -159,3 +167,20 @@ def test_refuses_damaged_folder(bench_results, tmp_path, damage):
         assert answer.code == 2, (command, answer)
         assert "out" in answer.err and "internal fault" not in answer.err
         assert len(answer.err.strip().splitlines()) == 1
+
+
+@pytest.mark.parametrize(
+    "damage, reason",
+    [
+        ("byte in summary", "invalid start byte"),
+        ("number in verdict", "verdict has an entry that is not a text"),
+        ("huge number", "measures.loop_area.value is missing or of a wrong type"),
+        ("summary of 1.1", "patchfem before 2.0 wrote it"),
+    ],
+)
+def test_refusal_of_summary_says_what_is_wrong(bench_results, tmp_path, damage, reason):
+    """The message on a damaged summary names the entry or the byte; only one without a verdict is called an old one."""
+    folder = shutil.copytree(bench_results, tmp_path / "out")
+    DAMAGES[damage](folder)
+    with pytest.raises(PatchfemError, match=reason):
+        store.read_summary(folder)
