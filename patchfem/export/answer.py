@@ -97,12 +97,12 @@ class Variable:
     meanings: tuple[str, ...] = ()
 
 
-# arrays by name, and measures by name
-Data = dict[str, Variable]
+# arrays of an answer by name, and its measures by name
+Variables = dict[str, Variable]
 Quantities = dict[str, Quantity]
 
 
-def make_columns(dims: str, columns: dict[str, tuple]) -> Data:
+def make_columns(dims: str, columns: dict[str, tuple]) -> Variables:
     """Return variables over the same dimensions.
 
     Parameters
@@ -190,7 +190,7 @@ class Answer:
     title: str
     verdict: tuple[str, ...]
     quantities: Quantities = field(default_factory=dict)
-    data: Data = field(default_factory=dict)
+    data: Variables = field(default_factory=dict)
     remarks: Remarks = Remarks()
     details: dict = field(default_factory=dict)
     origin: dict = field(default_factory=dict)

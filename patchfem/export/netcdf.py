@@ -12,7 +12,7 @@ import h5py
 import numpy as np
 
 from ..disk.atomic_write import open_lossy, write_atomically
-from .answer import Answer, Data, Variable
+from .answer import Answer, Variable, Variables
 
 MIN_COMPRESSED_VALUES = 100  # arrays with fewer values are stored without compression
 
@@ -54,7 +54,7 @@ def write_netcdf(answer: Answer, path: Path) -> None:
     write_arrays(answer.data, make_attributes(answer), path)
 
 
-def write_arrays(data: Data, attributes: dict, path: Path) -> None:
+def write_arrays(data: Variables, attributes: dict, path: Path) -> None:
     """Write variables and attributes as a netCDF4 file, which replaces an older one when it is complete.
 
     HDF5 writes through `open_lossy`, because it would crash on a full disk; the error is raised when the file is closed.
@@ -94,7 +94,7 @@ def _write_variable(file: h5netcdf.File, name: str, variable: Variable) -> None:
     stored.attrs.update(variable_attributes(variable))
 
 
-def read_netcdf(path: Path) -> tuple[Data, dict]:
+def read_netcdf(path: Path) -> tuple[Variables, dict]:
     """Read variables, in the order in which they were written, and attributes of a file of `write_arrays`.
 
     Parameters
