@@ -39,7 +39,7 @@ def make_attributes(answer: Answer) -> dict[str, str | float | list[str]]:
     return attributes
 
 
-def variable_attributes(variable: Variable) -> dict:
+def make_variable_attributes(variable: Variable) -> dict:
     """Return the attributes of a variable: unit, description, and the names of codes."""
     attributes = {"long_name": variable.text} if variable.text else {}
     if variable.meanings:
@@ -91,7 +91,7 @@ def _write_variable(file: h5netcdf.File, name: str, variable: Variable) -> None:
     kind = h5py.string_dtype() if has_strings else values.dtype
     stored = file.create_variable(name, variable.dims, kind, **options)
     stored[...] = values.astype(object) if has_strings else values
-    stored.attrs.update(variable_attributes(variable))
+    stored.attrs.update(make_variable_attributes(variable))
 
 
 def read_netcdf(path: Path) -> tuple[Variables, dict]:
@@ -126,14 +126,16 @@ def read_netcdf(path: Path) -> tuple[Variables, dict]:
 
 
 def make_variable(dims: tuple[str, ...], values: np.ndarray, attributes: Mapping) -> Variable:
-    """Return the variable that is stored with the attributes of `variable_attributes`.
+    """Return a variable of a netCDF file from its array and its attributes; the inverse of `make_variable_attributes`.
 
     Parameters
     ----------
     dims : tuple of str
+        Names of the dimensions of the array.
     values : ndarray
+        Array as stored, in SI units.
     attributes : mapping
-        `units`, `long_name` and `flag_meanings`, as far as they exist.
+        Attributes of the array as stored; `units`, `long_name` and `flag_meanings` are read, as far as they exist.
     """
     unit, text, meanings = (
         str(attributes.get(key, "")) for key in ("units", "long_name", "flag_meanings")
@@ -148,7 +150,7 @@ def to_dataset(answer: Answer):
 
     variables = {}
     for name, variable in answer.data.items():
-        variables[name] = (variable.dims, variable.values, variable_attributes(variable))
+        variables[name] = (variable.dims, variable.values, make_variable_attributes(variable))
     return xr.Dataset(variables, attrs=make_attributes(answer))
 
 
