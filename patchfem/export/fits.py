@@ -190,15 +190,15 @@ def _describe_values(fit: AnyFit) -> dict[str, dict]:
 
 def _describe_value(bound: Range, fit: Fit, k: int) -> dict:
     """Return fitted value k with its confidence interval and range, as written in fit.json."""
-    ends = fit.intervals.ends[k]
+    ends = fit.intervals.ends[k].tolist()
     interval = ends if np.isfinite(ends).all() else None
-    low, high = (None, None) if interval is None else interval.tolist()
+    low, high = interval or (None, None)
     return {
         "value": float(fit.values[k]),
         "unit": bound.unit,
         "low": low,
         "high": high,
-        "interval": None if interval is None else [low, high],
+        "interval": interval,
         "method": fit.intervals.methods[k],
         "bounds": [bound.low, bound.high],
         "at_bound": fit.at_bound[k] or None,
