@@ -150,28 +150,28 @@ VARIABLES = {
         "m",
         "half the peak-to-peak motion at the output",
         "extra.curve.amplitude",
-        True,
+        has_error=True,
     ),
     "curve_acceleration_peak": Row(
         "curve_point",
         "m s-2",
         "largest absolute acceleration",
         "extra.curve.acceleration_peak",
-        True,
+        has_error=True,
     ),
     "curve_acceleration_fundamental": Row(
         "curve_point",
         "m s-2",
         "first harmonic of the absolute acceleration",
         "extra.curve.acceleration_fundamental",
-        True,
+        has_error=True,
     ),
     "curve_acceleration_distortion": Row(
         "curve_point",
         "1",
         "third over first harmonic of the absolute acceleration",
         "extra.curve.acceleration_distortion",
-        True,
+        has_error=True,
     ),
     "curve_multiplier": Row(
         "curve_point", "1", "largest Floquet multiplier", "extra.curve.multiplier"
