@@ -132,10 +132,12 @@ def encode(dimension: str, texts: list[str], description: str = "") -> Variable:
     ----------
     dimension : str
     texts : list of str
+        Text of each element; a code stands for each different one.
     description : str, optional
     """
     meanings, codes = np.unique(np.asarray(texts, str), return_inverse=True)
-    codes = codes.astype(np.int8)
+    # the smallest signed type that has all codes
+    codes = codes.astype(np.min_scalar_type(-max(meanings.size, 1)))
     return Variable((dimension,), codes, "", description, tuple(meanings.tolist()))
 
 

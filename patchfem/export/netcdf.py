@@ -43,7 +43,7 @@ def make_variable_attributes(variable: Variable) -> dict:
     """Return the attributes of a variable: unit, description, and the names of codes."""
     attributes = {"long_name": variable.text} if variable.text else {}
     if variable.meanings:
-        codes = np.arange(len(variable.meanings), dtype=np.int8)
+        codes = np.arange(len(variable.meanings), dtype=variable.values.dtype)
         meanings = " ".join(name.replace(" ", "_") for name in variable.meanings)
         return attributes | {"flag_values": codes, "flag_meanings": meanings}
     return attributes | ({"units": variable.unit} if variable.unit else {})

@@ -2,6 +2,7 @@
 
 import json
 import shutil
+from dataclasses import replace
 
 import h5py
 import numpy as np
@@ -12,7 +13,8 @@ from scene_texts import BENCH
 
 from patchfem import PatchfemError
 from patchfem.export import netcdf, store
-from patchfem.export.answer import Answer, Quantity, Remarks, Variable
+from patchfem.export.answer import Answer, Quantity, Remarks, Variable, encode
+from patchfem.export.columns import list_cells
 
 
 def make_answer() -> Answer:
@@ -167,6 +169,21 @@ def test_refuses_damaged_folder(bench_results, tmp_path, damage):
         assert answer.code == 2, (command, answer)
         assert "out" in answer.err and "internal fault" not in answer.err
         assert len(answer.err.strip().splitlines()) == 1
+
+
+@pytest.mark.parametrize("count, kind", [(0, "int8"), (128, "int8"), (129, "int16")])
+def test_exact_codes_of_many_texts_are_read_back(tmp_path, count, kind):
+    """Texts that are stored as codes are read back, also more of them than a byte can number."""
+    texts = [f"{number} Hz" for number in range(count)]
+    drive = encode("row", texts)
+    assert drive.values.dtype == kind
+    answer = replace(make_answer(), data={"drive": drive})
+    store.write(answer, tmp_path)
+    read = store.read(tmp_path).data["drive"]
+    assert list_cells(read) == texts
+    with xr.open_dataset(tmp_path / "result.nc", engine="h5netcdf") as dataset:
+        if count:  # CF conventions: the flags have the type of their variable
+            assert dataset["drive"].attrs["flag_values"].dtype == dataset["drive"].dtype == kind
 
 
 @pytest.mark.parametrize(
