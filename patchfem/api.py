@@ -441,8 +441,9 @@ def cost(
     --------
     >>> import patchfem as pf
     >>> curve = pf.cost(pf.new("bench"), over="steps_per_cycle", say=lambda line: None)
-    >>> curve["steps_per_cycle"]["cheapest"]["loop_area"]
-    '200'
+    >>> coarsest = curve["steps_per_cycle"]["runs"][0]
+    >>> coarsest["label"], coarsest["meets_tolerance"]
+    ('200', True)
     """
     model = build(scene, **sets)
     setting = _require_string(over, "cost: over") or cost_curves.TOLERANCE
