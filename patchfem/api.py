@@ -688,7 +688,7 @@ class SweepPlots:
 
     @staticmethod
     def backbone(dataset: Dataset, ax: Axes | None = None) -> Axes:
-        """Plot frequency and damping ratio of a mode against its amplitude, for each method.
+        """Plot frequency, damping ratio and force of a mode against its amplitude, for each method.
 
         The recommended curve is the first one, with its band.
 
@@ -697,7 +697,7 @@ class SweepPlots:
         dataset : xarray.Dataset
             Result of `pf.backbone`.
         ax : matplotlib.axes.Axes, optional
-            Axes for the frequency; the damping ratio is then omitted. Default: a new figure with both.
+            Axes for the frequency; damping ratio and force are then omitted. Default: a new figure with all three.
 
         Returns
         -------

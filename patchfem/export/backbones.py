@@ -83,7 +83,7 @@ def backbone_axes(dataset, ax=None):
     dataset : xarray.Dataset
         Result of `Answer.to_xarray`.
     ax : matplotlib.axes.Axes, optional
-        Axes for the frequency alone; by default a new figure with frequency and damping ratio.
+        Axes for the frequency alone; by default those of a new figure, which also has damping ratio and force.
 
     Returns
     -------
