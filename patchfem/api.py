@@ -684,7 +684,7 @@ class SweepPlots:
         >>> axes = pf.plot.sweep(dataset, "loop_area")
         >>> axes.figure.savefig("loop_area.png")
         """
-        return sweep_datasets.sweep_axes(dataset, measure, ax)
+        return sweep_datasets.draw_sweep(dataset, measure, ax)
 
     @staticmethod
     def backbone(dataset: Dataset, ax: Axes | None = None) -> Axes:
@@ -715,7 +715,7 @@ class SweepPlots:
         >>> curves = pf.backbone(pf.new("rig"), amplitudes="0.1 um..10 um:5", method="quasi-static", **law)
         >>> pf.plot.backbone(curves).figure.savefig("backbone.png")
         """
-        return backbones.backbone_axes(dataset, ax)
+        return backbones.draw_backbone(dataset, ax)
 
 
 plot = SweepPlots()

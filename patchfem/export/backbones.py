@@ -75,13 +75,13 @@ def _make_sentence(text: str) -> str:
     return f"{text[0].upper()}{text[1:].rstrip('.')}."
 
 
-def backbone_axes(dataset, ax=None):
+def draw_backbone(dataset, ax=None):
     """Draw the Dataset of a backbone on matplotlib Axes.
 
     Parameters
     ----------
     dataset : xarray.Dataset
-        Result of `Answer.to_xarray`.
+        Result of `pf.backbone`.
     ax : matplotlib.axes.Axes, optional
         Axes for the frequency alone; by default those of a new figure, which also has damping ratio and force.
 
