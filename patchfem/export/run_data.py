@@ -379,9 +379,10 @@ def _collect_frames(fields: dict, surface, frame: str = "frame") -> Variables:
     }
     data = make_columns("x", nodes)
     data |= make_columns(frame, {f"{frame}_time": (fields["time"], "s", "time of the frame")})
-    return data | {
-        name: _make_field(name, fields[name], frame) for name in FIELDS if name in fields
-    }
+    for name in FIELDS:
+        if name in fields:
+            data[name] = _make_field(name, fields[name], frame)
+    return data
 
 
 def _make_field(name: str, values, frame: str) -> Variable:
