@@ -12,9 +12,9 @@ from command_line import run_cli
 from scene_texts import BENCH
 
 from patchfem import PatchfemError
-from patchfem.export import netcdf, store
-from patchfem.export.answer import Answer, Quantity, Remarks, Variable, encode
-from patchfem.export.columns import list_cells
+from patchfem.export import answer as answers
+from patchfem.export import columns, netcdf, store
+from patchfem.export.answer import Answer, Quantity, Remarks, Variable
 
 
 def make_answer() -> Answer:
@@ -175,12 +175,12 @@ def test_refuses_damaged_folder(bench_results, tmp_path, damage):
 def test_exact_codes_of_many_texts_are_read_back(tmp_path, count, kind):
     """Texts that are stored as codes are read back, also more of them than a byte can number."""
     texts = [f"{number} Hz" for number in range(count)]
-    drive = encode("row", texts)
+    drive = answers.encode("row", texts)
     assert drive.values.dtype == kind
     answer = replace(make_answer(), data={"drive": drive})
     store.write(answer, tmp_path)
     read = store.read(tmp_path).data["drive"]
-    assert list_cells(read) == texts
+    assert columns.list_cells(read) == texts
     with xr.open_dataset(tmp_path / "result.nc", engine="h5netcdf") as dataset:
         if count:  # CF conventions: the flags have the type of their variable
             assert dataset["drive"].attrs["flag_values"].dtype == dataset["drive"].dtype == kind

@@ -261,15 +261,14 @@ def test_exact_signed_maps_have_same_colours_in_page_and_picture():
     from gzip import decompress
 
     from patchfem.export import page
-    from patchfem.export.charts import axes, plotly
-    from patchfem.export.charts.panel import Axis, Curve, Panel
+    from patchfem.export.charts import axes, panel, plotly
 
-    curve = Curve("", np.arange(2.0), np.array([[-1.0, 0.5]]), rows=np.zeros(1))
-    panel = Panel("map", "map", Axis("x"), Axis("y"), [curve], colour_label="depth")
-    (mesh,) = axes.make_figure([panel]).axes[0].collections
+    curve = panel.Curve("", np.arange(2.0), np.array([[-1.0, 0.5]]), rows=np.zeros(1))
+    chart = panel.Panel("map", "map", panel.Axis("x"), panel.Axis("y"), [curve])
+    (mesh,) = axes.make_figure([chart]).axes[0].collections
     drawn = [mesh.cmap(mesh.norm(value))[:3] for value in (-1.0, 1.0)]
 
-    (trace,) = plotly.draw(panel)["data"]
+    (trace,) = plotly.draw(chart)["data"]
     library = decompress(b64decode(page.read_library())).decode()
     scale = re.search(rf"{trace['colorscale']}:(\[\[.*?\]\])", library)[1]
     colours = re.findall(r"rgb\((\d+),(\d+),(\d+)\)", scale)
