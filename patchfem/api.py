@@ -441,8 +441,9 @@ def cost(
     --------
     >>> import patchfem as pf
     >>> curve = pf.cost(pf.new("bench"), over="steps_per_cycle", say=lambda line: None)
-    >>> curve["steps_per_cycle"]["cheapest"]["loop_area"]
-    '200'
+    >>> coarsest = curve["steps_per_cycle"]["runs"][0]
+    >>> coarsest["label"], coarsest["meets_tolerance"]
+    ('200', True)
     """
     model = build(scene, **sets)
     setting = _require_string(over, "cost: over") or cost_curves.TOLERANCE
@@ -683,11 +684,11 @@ class SweepPlots:
         >>> axes = pf.plot.sweep(dataset, "loop_area")
         >>> axes.figure.savefig("loop_area.png")
         """
-        return sweep_datasets.sweep_axes(dataset, measure, ax)
+        return sweep_datasets.draw_sweep(dataset, measure, ax)
 
     @staticmethod
     def backbone(dataset: Dataset, ax: Axes | None = None) -> Axes:
-        """Plot frequency and damping ratio of a mode against its amplitude, for each method.
+        """Plot frequency, damping ratio and force of a mode against its amplitude, for each method.
 
         The recommended curve is the first one, with its band.
 
@@ -696,7 +697,7 @@ class SweepPlots:
         dataset : xarray.Dataset
             Result of `pf.backbone`.
         ax : matplotlib.axes.Axes, optional
-            Axes for the frequency; the damping ratio is then omitted. Default: a new figure with both.
+            Axes for the frequency; damping ratio and force are then omitted. Default: a new figure with all three.
 
         Returns
         -------
@@ -714,7 +715,7 @@ class SweepPlots:
         >>> curves = pf.backbone(pf.new("rig"), amplitudes="0.1 um..10 um:5", method="quasi-static", **law)
         >>> pf.plot.backbone(curves).figure.savefig("backbone.png")
         """
-        return backbones.backbone_axes(dataset, ax)
+        return backbones.draw_backbone(dataset, ax)
 
 
 plot = SweepPlots()

@@ -67,7 +67,7 @@ def compare(
         "piece of which the traces are, such as upper (or lower), for --predicted; it may be left out if "
         "both pieces wear alike (wear.upper_share = 0.5)"
     ) = "",
-    written: OutputGroup = DEFAULT_OUTPUT,
+    output_options: OutputGroup = DEFAULT_OUTPUT,
     verbose: Verbose = False,
 ):
     """Compare the surfaces measured in the files BEFORE and AFTER: worn depth, volume or area with intervals, a verdict
@@ -83,7 +83,7 @@ def compare(
     files = [path for path in (before, after, *other) if path is not None]
     if pairs is not None:
         _refuse_others({"another file": files, **given}, "a table of pairs")
-        _compare_pairs(pairs, options, written.make_output(pairs.stem, is_verbose=verbose))
+        _compare_pairs(pairs, options, output_options.make_output(pairs.stem, is_verbose=verbose))
         return
     if len(files) != 2:
         removed = ""
@@ -92,7 +92,7 @@ def compare(
         raise UsageError(
             f"compare: give two files BEFORE and AFTER, or a table of pairs with --pairs{removed}"
         )
-    output = written.make_output(
+    output = output_options.make_output(
         f"{before.resolve().stem}-{after.resolve().stem}", is_verbose=verbose
     )
     if before.is_dir() or after.is_dir():

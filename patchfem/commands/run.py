@@ -34,7 +34,7 @@ def run(
     fresh: flag_option(
         "compute the stiffness of the pieces again instead of taking it from the cache"
     ) = False,
-    files: OutputGroup = DEFAULT_OUTPUT,
+    output_options: OutputGroup = DEFAULT_OUTPUT,
     verbose: Verbose = False,
 ):
     """Run SCENE and write its results folder, by default out/<scene name>.
@@ -47,20 +47,20 @@ def run(
             "run --resume: only a run with [wear] on a patch or a run that is integrated in time saves its "
             "state; run the scene again without --resume"
         )
-    output = files.make_output(run_plan.model.source.path.stem, is_verbose=verbose)
+    output = output_options.make_output(run_plan.model.source.path.stem, is_verbose=verbose)
     target = output.target
     if resume and run_folder.is_complete(run_plan, target):
         _report_complete_run(target, output)
         return
 
-    report = None if files.quiet else print_message
-    with Progress(files.quiet or files.json_) as progress:
+    report = None if output.is_quiet else print_message
+    with Progress(output.is_quiet or output.as_json) as progress:
         written = run_folder.run_into(
             run_plan, target, report, progress, fresh=fresh, resume=resume
         )
     try:
         # the page comes after the results, so that an error in the page does not lose them
-        present(written.answer, output, lambda: files.no_page or _draw_page(written, target))
+        present(written.answer, output, lambda: output.has_page and _draw_page(written, target))
     except KeyboardInterrupt:
         print_message(
             f"interrupted while the page was drawn; the results in {target} are complete except for report.html"
@@ -71,7 +71,7 @@ def run(
         print_message(
             "wall-clock seconds: " + ", ".join(f"{k} {v:.3f}" for k, v in seconds.items())
         )
-    _end_run(written.answer, files.quiet)
+    _end_run(written.answer, output.is_quiet)
 
 
 def _report_complete_run(target: Path, output: Output) -> None:

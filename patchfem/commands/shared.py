@@ -68,9 +68,7 @@ Units = text_option(
     'size and unit of z, such as "0.8 um,nm"'
 )
 NoPage = flag_option("leave out report.html", "--no-page")
-Plot = path_option(
-    "write also the first picture, such as -o loop.png (.png, .svg or .pdf)", "--plot"
-)
+Plot = path_option("write also the first picture, such as loop.png (.png, .svg or .pdf)", "--plot")
 Verbose = flag_option("print all numbers", "-v", "--verbose")
 
 

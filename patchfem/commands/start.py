@@ -111,7 +111,7 @@ def demo(*, out: Out = None, no_page: NoPage = False):
     """
     scene = starting.find_shipped_scene()
     print_message(f"scene: {scene}; for another template run: patchfem new")
-    run(scene, files=OutputOptions(out or Path("out") / "demo", no_page))
+    run(scene, output_options=OutputOptions(out or Path("out") / "demo", no_page))
 
 
 def schema(*, out: out_option("file to write, such as scene.json; default: the screen") = None):

@@ -45,7 +45,7 @@ def cost(
         "vary also each setting alone, and print all numbers", "-v", "--verbose"
     ) = False,
     set_: Sets = (),
-    files: OutputGroup = DEFAULT_OUTPUT,
+    output_options: OutputGroup = DEFAULT_OUTPUT,
 ):
     """Measure how the error of SCENE depends on computing time (CPU seconds): one run for each of several tolerances,
     or for each value of one accuracy setting.
@@ -59,11 +59,11 @@ def cost(
     names = [over or cost_curves.TOLERANCE]
     if verbose and not over:
         names += numerical_settings.find_applicable_settings(scene_model)
-    output = files.make_output(f"{scene_model.source.path.stem}-cost", is_verbose=verbose)
+    output = output_options.make_output(f"{scene_model.source.path.stem}-cost", is_verbose=verbose)
 
     def measure_costs(_):
         """Run the scene with all settings."""
-        report = None if files.quiet else print_message
+        report = None if output.is_quiet else print_message
         curves = {
             name: cost_curves.compute_setting_costs(scene_model, name, report) for name in names
         }
@@ -99,7 +99,7 @@ def backbone(
         '170 Hz:0.02"; the frequencies are those of the bolted joint'
     ) = "",
     set_: Sets = (),
-    files: OutputGroup = DEFAULT_OUTPUT,
+    output_options: OutputGroup = DEFAULT_OUTPUT,
     verbose: Verbose = False,
 ):
     """Compute frequency and damping ratio of a mode of SCENE against its amplitude, and the force at the output that holds
@@ -116,7 +116,7 @@ def backbone(
 
     if over and any(text.partition("=")[0] == over.partition("=")[0] for text in set_):
         raise UsageError(f"--over {over}: --set gives this key, too; remove one of them")
-    output = files.make_output(f"{scene.stem}-backbone", is_verbose=verbose)
+    output = output_options.make_output(f"{scene.stem}-backbone", is_verbose=verbose)
     report = output.report and (lambda name: print_message(f"{name} ..."))
     request = backbone_requests.BackboneRequest(mode, amplitudes, forces, method, modes, over)
 
@@ -187,7 +187,7 @@ def fit(
     ) = False,
     rows: Annotated[RowFitOptions, Parameter(name="*")] = RowFitOptions(),
     set_: Sets = (),
-    files: OutputGroup = DEFAULT_OUTPUT,
+    output_options: OutputGroup = DEFAULT_OUTPUT,
     verbose: Verbose = False,
 ):
     """Fit values of keys of SCENE to measurements. A bench is fitted to a friction loop. A rig is fitted to rows of
@@ -197,12 +197,12 @@ def fit(
     Example: patchfem fit bench.toml --to loop.csv --free "friction.static=0.1..0.6"
     """
     loaded_scene = remember_written(load_scene(scene, set_))
-    output = files.make_output(f"{scene.stem}-fit", is_verbose=verbose)
+    output = output_options.make_output(f"{scene.stem}-fit", is_verbose=verbose)
     options = fit_requests.FitOptions(hold, offset, warm_up, **vars(rows))
     # the fits to a loop and to a curve are too short for a progress line
     is_short = fit_requests.choose_kind(loaded_scene, to) in ("loop", "curve")
-    with Progress(files.quiet or files.json_ or is_short) as progress:
-        report = None if files.quiet else print_message
+    with Progress(output.is_quiet or output.as_json or is_short) as progress:
+        report = None if output.is_quiet else print_message
         listener = fit_requests.Listener(
             report, progress, lambda name: f"--{name.replace('_', '-')}"
         )

@@ -142,7 +142,7 @@ def sweep(
             "cases, none for more cases"
         ),
     ] = None,
-    files: OutputGroup = DEFAULT_OUTPUT,
+    output_options: OutputGroup = DEFAULT_OUTPUT,
     verbose: Verbose = False,
 ):
     """Run SCENE for all combinations of the values in --over, or of the values in its table [sweep]. Write sweep.csv,
@@ -150,23 +150,23 @@ def sweep(
 
     Example: patchfem sweep rig.toml --over "contact.tilt.angle=1e-6 rad..1e-2 rad:9" -j 2
     """
-    if files.no_page and keep == "pages":
+    if output_options.no_page and keep == "pages":
         raise UsageError(
             "sweep: --no-page and --keep pages contradict each other; use only one of them"
         )
     start_time = perf_counter()
     by = by or WorkerOptions()
     part = by.part()
-    output = files.make_output(f"{scene.stem}-sweep", is_verbose=verbose)
+    output = output_options.make_output(f"{scene.stem}-sweep", is_verbose=verbose)
     target = output.target
     sweep_scene, cases = parse_request.read_sweep(scene, set_, (what or CaseOptions()).request())
     if by.collect:
         answer = run.collect_shards(sweep_scene, cases, target, output.has_page)
     else:
-        if not files.quiet:
+        if not output.is_quiet:
             _print_notes(sweep_scene, cases, what)
         place = run.SweepTarget(target, resume, keep or "", part, output.has_page)
-        answer = _run_cases(sweep_scene, cases, place, by, is_quiet=files.quiet)
+        answer = _run_cases(sweep_scene, cases, place, by, is_quiet=output.is_quiet)
     if answer is None:
         _print_shard(by.shard, len(cases), output)
     else:

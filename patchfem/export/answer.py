@@ -97,12 +97,12 @@ class Variable:
     meanings: tuple[str, ...] = ()
 
 
-# arrays by name, and measures by name
-Data = dict[str, Variable]
+# arrays of an answer by name, and its measures by name
+Variables = dict[str, Variable]
 Quantities = dict[str, Quantity]
 
 
-def make_columns(dims: str, columns: dict[str, tuple]) -> Data:
+def make_columns(dims: str, columns: dict[str, tuple]) -> Variables:
     """Return variables over the same dimensions.
 
     Parameters
@@ -132,10 +132,12 @@ def encode(dimension: str, texts: list[str], description: str = "") -> Variable:
     ----------
     dimension : str
     texts : list of str
+        Text of each element; a code stands for each different one.
     description : str, optional
     """
     meanings, codes = np.unique(np.asarray(texts, str), return_inverse=True)
-    codes = codes.astype(np.int8)
+    # the smallest signed type that has all codes
+    codes = codes.astype(np.min_scalar_type(-max(meanings.size, 1)))
     return Variable((dimension,), codes, "", description, tuple(meanings.tolist()))
 
 
@@ -190,7 +192,7 @@ class Answer:
     title: str
     verdict: tuple[str, ...]
     quantities: Quantities = field(default_factory=dict)
-    data: Data = field(default_factory=dict)
+    data: Variables = field(default_factory=dict)
     remarks: Remarks = Remarks()
     details: dict = field(default_factory=dict)
     origin: dict = field(default_factory=dict)

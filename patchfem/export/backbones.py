@@ -10,7 +10,7 @@ from ..campaigns.backbone.request import BackboneCases, BackboneRequest, compute
 from ..core import PatchfemError
 from ..formatting import format_number, format_quantity
 from . import quantities
-from .answer import Answer, Data, Quantities, Quantity, Remarks, Variable, make_columns
+from .answer import Answer, Quantities, Quantity, Remarks, Variable, Variables, make_columns
 from .charts import axes
 from .netcdf import from_dataset
 from .runs import make_origin
@@ -75,15 +75,15 @@ def _make_sentence(text: str) -> str:
     return f"{text[0].upper()}{text[1:].rstrip('.')}."
 
 
-def backbone_axes(dataset, ax=None):
+def draw_backbone(dataset, ax=None):
     """Draw the Dataset of a backbone on matplotlib Axes.
 
     Parameters
     ----------
     dataset : xarray.Dataset
-        Result of `Answer.to_xarray`.
+        Result of `pf.backbone`.
     ax : matplotlib.axes.Axes, optional
-        Axes for the frequency alone; by default a new figure with frequency and damping ratio.
+        Axes for the frequency alone; by default those of a new figure, which also has damping ratio and force.
 
     Returns
     -------
@@ -176,7 +176,7 @@ def _make_verdict(backbone: Backbone, measures: Quantities) -> tuple[str, ...]:
     return (headline, natural, extreme, *backbone.advice[:1])
 
 
-def _make_data(backbone: Backbone) -> Data:
+def _make_data(backbone: Backbone) -> Variables:
     """Return the curves of all methods, the recommended one first, and the band of tests around it.
 
     The band has variables of its own and, for the charts, is the interval of the recommended curve.
@@ -264,7 +264,7 @@ def _make_cases_answer(cases: BackboneCases) -> Answer:
     )
 
 
-def _make_cases_data(cases: BackboneCases) -> Data:
+def _make_cases_data(cases: BackboneCases) -> Variables:
     """Return the recommended curves of all values of the key at common amplitudes; NaN where one has no motion."""
     data = {"case": Variable(("case",), np.array(cases.axis.texts), "", cases.axis.key)}
     for method in METHODS:

@@ -5,7 +5,7 @@ import io
 
 import numpy as np
 
-from .answer import Answer, Data, Quantity, Variable
+from .answer import Answer, Quantity, Variable, Variables
 from .charts.table import BACKBONE_METHODS, CSV_FILES, CSV_UNITS, Column, parse_columns
 
 
@@ -54,7 +54,7 @@ def add_unit(name: str, unit: str) -> str:
     return f"{name} [{unit}]" if unit not in ("", "1") else name
 
 
-def _list_variables(data: Data, columns: list[Column]) -> dict[str, list]:
+def _list_variables(data: Variables, columns: list[Column]) -> dict[str, list]:
     """Return columns of variables; {} if there are less than two."""
     lists = {}
     for column in columns:
@@ -94,7 +94,7 @@ def _is_number(cell) -> bool:
     return isinstance(cell, dict) and "value" in cell
 
 
-def _stack_methods(data: Data, columns: list[Column]) -> dict[str, list]:
+def _stack_methods(data: Variables, columns: list[Column]) -> dict[str, list]:
     """Return columns with the variables of all methods, and of all cases, below each other."""
     names = [column.name for column in columns]
     methods = [method for method in BACKBONE_METHODS if f"{method}_{names[0]}" in data]

@@ -17,7 +17,7 @@ from ..campaigns.cost import (
 from ..formatting import format_number
 from ..model.model import Model
 from . import quantities
-from .answer import Answer, Data, Quantities, Quantity, Remarks, encode, make_columns, to_plain
+from .answer import Answer, Quantities, Quantity, Remarks, Variables, encode, make_columns, to_plain
 from .runs import make_origin
 
 # columns of cost.csv that every run has: attribute -> heading and unit
@@ -182,7 +182,7 @@ def _make_quantities(row: Row, main: str, tolerance: float) -> Quantities:
     return out
 
 
-def _make_data(rows: list[Row], main: str, tolerance: float) -> Data:
+def _make_data(rows: list[Row], main: str, tolerance: float) -> Variables:
     """Return a row for each run: the columns of cost.csv, which the charts and the table of the page show too."""
     runs = [row.run for row in rows]
     columns = {"knob": ([row.knob for row in rows], "")}

@@ -1,4 +1,4 @@
-"""Description of the drive signal of a run, and of the keys that the command line has changed."""
+"""The drive signal of a run as a phrase, and the scene keys that its options --set have changed as a list."""
 
 from pathlib import Path
 from textwrap import shorten
@@ -47,14 +47,14 @@ def _describe_waveform(keys: dict) -> str:
         )
         return f"free motion{start}"
     waveform = WAVEFORMS[keys.get("waveform", SINE_WAVEFORM.name)]
-    values = _drive_values(keys)
+    values = _format_drive_values(keys)
     try:
         return waveform.phrase.format_map(values) or _describe_by_level(waveform.name, values)
     except KeyError:  # the scene does not set a key that the phrase contains
         return _describe_by_level(waveform.name, values)
 
 
-def _drive_values(keys: dict) -> dict:
+def _format_drive_values(keys: dict) -> dict:
     """Return the values that are inserted into the phrase for a waveform, as text."""
     values = {key: _format_drive_value(key, value) for key, value in keys.items()}
     values["seed"] = keys.get("seed", 0)
@@ -117,8 +117,11 @@ def _describe_slide(keys: dict) -> str:
     return f"a slide of {format_resolved(keys['distance'])} at {format_resolved(keys['speed'])}{hold_text}"
 
 
-def list_changed_keys(sets: tuple) -> str:
-    """Return a list of the scene keys that the command-line options --set have changed."""
+def format_changed_keys(sets: tuple) -> str:
+    """Return the scene keys that the options --set have changed, with their values, such as "load = 4 kN".
+
+    sets: ``table.key=value`` strings; a list of more than 160 characters is cut.
+    """
     return shorten(
         ", ".join(
             f"{key} = {value}"

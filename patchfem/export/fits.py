@@ -23,7 +23,7 @@ from ..model.model import build, write_resolved
 from ..scene.assignments import Range
 from ..scene.scene import Scene, add_sets, move_scene
 from . import page, store
-from .answer import Answer, Data, Quantities, Quantity, Remarks, encode, make_columns
+from .answer import Answer, Quantities, Quantity, Remarks, Variables, encode, make_columns
 from .folder import STARTS, Folder
 from .quantities import format_quantity
 from .runs import make_origin
@@ -100,7 +100,7 @@ class Parts(NamedTuple):
     residual: str
     details: dict
     scores: Quantities
-    data: Data
+    data: Variables
 
 
 def make_answer(fit: AnyFit, scene: Scene) -> Answer:
@@ -165,7 +165,7 @@ def _make_headline(details: dict, measures: Quantities) -> str:
     return f"Fitted to {source}: {text}."
 
 
-def _collect_pairs(correlation: np.ndarray, names: list[str]) -> Data:
+def _collect_pairs(correlation: np.ndarray, names: list[str]) -> Variables:
     """Return the correlation of each pair of fitted values, the strongest first; {} for a single value."""
     if len(names) < 2:
         return {}
@@ -190,15 +190,15 @@ def _describe_values(fit: AnyFit) -> dict[str, dict]:
 
 def _describe_value(bound: Range, fit: Fit, k: int) -> dict:
     """Return fitted value k with its confidence interval and range, as written in fit.json."""
-    ends = fit.intervals.ends[k]
+    ends = fit.intervals.ends[k].tolist()
     interval = ends if np.isfinite(ends).all() else None
-    low, high = (None, None) if interval is None else interval.tolist()
+    low, high = interval or (None, None)
     return {
         "value": float(fit.values[k]),
         "unit": bound.unit,
         "low": low,
         "high": high,
-        "interval": None if interval is None else [low, high],
+        "interval": interval,
         "method": fit.intervals.methods[k],
         "bounds": [bound.low, bound.high],
         "at_bound": fit.at_bound[k] or None,
@@ -367,7 +367,7 @@ def describe_rows_fit(fit: FittedRows) -> Parts:
     return Parts(residual, details, scores, data)
 
 
-def _collect_rows(fit: FittedRows) -> tuple[list[dict], Data]:
+def _collect_rows(fit: FittedRows) -> tuple[list[dict], Variables]:
     """Return measured and computed readings of each row: as written in fit.json, and as arrays with their ratios."""
     cells = fit.cells
     entries = [asdict(row) for row in cells.rows]

@@ -12,7 +12,7 @@ import h5py
 import numpy as np
 
 from ..disk.atomic_write import open_lossy, write_atomically
-from .answer import Answer, Data, Variable
+from .answer import Answer, Variable, Variables
 
 MIN_COMPRESSED_VALUES = 100  # arrays with fewer values are stored without compression
 
@@ -39,11 +39,11 @@ def make_attributes(answer: Answer) -> dict[str, str | float | list[str]]:
     return attributes
 
 
-def variable_attributes(variable: Variable) -> dict:
+def make_variable_attributes(variable: Variable) -> dict:
     """Return the attributes of a variable: unit, description, and the names of codes."""
     attributes = {"long_name": variable.text} if variable.text else {}
     if variable.meanings:
-        codes = np.arange(len(variable.meanings), dtype=np.int8)
+        codes = np.arange(len(variable.meanings), dtype=variable.values.dtype)
         meanings = " ".join(name.replace(" ", "_") for name in variable.meanings)
         return attributes | {"flag_values": codes, "flag_meanings": meanings}
     return attributes | ({"units": variable.unit} if variable.unit else {})
@@ -54,7 +54,7 @@ def write_netcdf(answer: Answer, path: Path) -> None:
     write_arrays(answer.data, make_attributes(answer), path)
 
 
-def write_arrays(data: Data, attributes: dict, path: Path) -> None:
+def write_arrays(data: Variables, attributes: dict, path: Path) -> None:
     """Write variables and attributes as a netCDF4 file, which replaces an older one when it is complete.
 
     HDF5 writes through `open_lossy`, because it would crash on a full disk; the error is raised when the file is closed.
@@ -91,10 +91,10 @@ def _write_variable(file: h5netcdf.File, name: str, variable: Variable) -> None:
     kind = h5py.string_dtype() if has_strings else values.dtype
     stored = file.create_variable(name, variable.dims, kind, **options)
     stored[...] = values.astype(object) if has_strings else values
-    stored.attrs.update(variable_attributes(variable))
+    stored.attrs.update(make_variable_attributes(variable))
 
 
-def read_netcdf(path: Path) -> tuple[Data, dict]:
+def read_netcdf(path: Path) -> tuple[Variables, dict]:
     """Read variables, in the order in which they were written, and attributes of a file of `write_arrays`.
 
     Parameters
@@ -126,14 +126,16 @@ def read_netcdf(path: Path) -> tuple[Data, dict]:
 
 
 def make_variable(dims: tuple[str, ...], values: np.ndarray, attributes: Mapping) -> Variable:
-    """Return the variable that is stored with the attributes of `variable_attributes`.
+    """Return a variable of a netCDF file from its array and its attributes; the inverse of `make_variable_attributes`.
 
     Parameters
     ----------
     dims : tuple of str
+        Names of the dimensions of the array.
     values : ndarray
+        Array as stored, in SI units.
     attributes : mapping
-        `units`, `long_name` and `flag_meanings`, as far as they exist.
+        Attributes of the array as stored; `units`, `long_name` and `flag_meanings` are read, as far as they exist.
     """
     unit, text, meanings = (
         str(attributes.get(key, "")) for key in ("units", "long_name", "flag_meanings")
@@ -148,7 +150,7 @@ def to_dataset(answer: Answer):
 
     variables = {}
     for name, variable in answer.data.items():
-        variables[name] = (variable.dims, variable.values, variable_attributes(variable))
+        variables[name] = (variable.dims, variable.values, make_variable_attributes(variable))
     return xr.Dataset(variables, attrs=make_attributes(answer))
 
 

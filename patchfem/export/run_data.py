@@ -20,7 +20,7 @@ from ..response.rows import TABLE
 from ..runs.accuracy_curve import compute_accuracy_curve
 from ..runs.results.result import Result, patch_surface
 from ..structure import drive_sizes
-from .answer import Data, Variable, encode, make_columns
+from .answer import Variable, Variables, encode, make_columns
 
 # a measured row belongs to a run if its frequency differs by no more than this [Hz]
 SAME_FREQUENCY = 0.5
@@ -150,28 +150,28 @@ VARIABLES = {
         "m",
         "half the peak-to-peak motion at the output",
         "extra.curve.amplitude",
-        True,
+        has_error=True,
     ),
     "curve_acceleration_peak": Row(
         "curve_point",
         "m s-2",
         "largest absolute acceleration",
         "extra.curve.acceleration_peak",
-        True,
+        has_error=True,
     ),
     "curve_acceleration_fundamental": Row(
         "curve_point",
         "m s-2",
         "first harmonic of the absolute acceleration",
         "extra.curve.acceleration_fundamental",
-        True,
+        has_error=True,
     ),
     "curve_acceleration_distortion": Row(
         "curve_point",
         "1",
         "third over first harmonic of the absolute acceleration",
         "extra.curve.acceleration_distortion",
-        True,
+        has_error=True,
     ),
     "curve_multiplier": Row(
         "curve_point", "1", "largest Floquet multiplier", "extra.curve.multiplier"
@@ -230,7 +230,7 @@ FIELDS = {
 }
 
 
-def collect_data(result: Result) -> Data:
+def collect_data(result: Result) -> Variables:
     """Return all arrays of a run, in SI units."""
     data = {}
     for name, row in VARIABLES.items():
@@ -240,16 +240,16 @@ def collect_data(result: Result) -> Data:
             data |= _read_row(result, f"{name}_error", error)
     if result.plan.kind == "linear":
         data = {name: one for name, one in data.items() if name not in FRICTIONLESS}
-    data |= _motion(result) | _loop(result) | _patch(result)
+    data |= _collect_motion(result) | _collect_loop(result) | _collect_patch(result)
     for face in result.faces:
-        data |= _face(face)
+        data |= _collect_face(face)
     for key, collect in COLLECTORS.items():
         if key in result.extra:
             data |= collect(result)
-    return data | _measured_readings(result) | _accuracy(result)
+    return data | _collect_readings(result) | _collect_accuracy(result)
 
 
-def _read_row(result: Result, name: str, row: Row) -> Data:
+def _read_row(result: Result, name: str, row: Row) -> Variables:
     """Return the variable of a row; codes become small integers, names become strings. {} without values."""
     found = (_look_up(result, place) for place in row.places.split())
     values = next((one for one in found if one is not None), None)
@@ -275,7 +275,7 @@ def _look_up(value, place: str):
     return value
 
 
-def _motion(result: Result) -> Data:
+def _collect_motion(result: Result) -> Variables:
     """Return the modal coordinates of a rig, and the normal load over time, which may be constant."""
     response = result.response
     if response is None:
@@ -300,7 +300,7 @@ def _motion(result: Result) -> Data:
     return data | make_columns("interface time", columns)
 
 
-def _loop(result: Result) -> Data:
+def _collect_loop(result: Result) -> Variables:
     """Return the friction loop of the last cycle, of each interface for a rig of masses; and a measured loop."""
     window = result.window
     if window is None or not np.any(window.force) or np.ptp(window.slide) == 0:
@@ -324,10 +324,10 @@ def _loop(result: Result) -> Data:
         "loop_slide": (slide, "m", "slide of the interface in the last cycle"),
         "loop_friction_force": (force, "N", "friction force in the last cycle"),
     }
-    return make_columns("interface loop_point", columns) | _measured_loop(result)
+    return make_columns("interface loop_point", columns) | _collect_measured_loop(result)
 
 
-def _measured_loop(result: Result) -> Data:
+def _collect_measured_loop(result: Result) -> Variables:
     """Return slide and force of the file that prescribes the slide of a bench, if the file contains forces."""
     source = result.plan.model.source
     slide = tomllib.loads(source.resolved).get("slide", {})
@@ -349,7 +349,7 @@ def _measured_loop(result: Result) -> Data:
     return make_columns("measured_sample", columns)
 
 
-def _patch(result: Result) -> Data:
+def _collect_patch(result: Result) -> Variables:
     """Return the fields along the interface of a solved patch; the states of wear have frames of their own."""
     surface = patch_surface(result.patch, result.fields)
     if surface is None:
@@ -367,10 +367,10 @@ def _patch(result: Result) -> Data:
         fields["time"] = fields["time"] - fields["time"][0]
     text = "gap of the unloaded surfaces, wear included"
     data |= make_columns("strip x", {"unloaded_gap": (surface.unloaded_gap, "m", text)})
-    return data | _frames(fields, surface)
+    return data | _collect_frames(fields, surface)
 
 
-def _frames(fields: dict, surface, frame: str = "frame") -> Data:
+def _collect_frames(fields: dict, surface, frame: str = "frame") -> Variables:
     """Return positions and areas of the nodes, and the fields along x in all frames."""
     area = "area of the interface that belongs to a node, summed over all pairs of pieces"
     nodes = {
@@ -379,7 +379,10 @@ def _frames(fields: dict, surface, frame: str = "frame") -> Data:
     }
     data = make_columns("x", nodes)
     data |= make_columns(frame, {f"{frame}_time": (fields["time"], "s", "time of the frame")})
-    return data | {n: _make_field(n, fields[n], frame) for n in FIELDS if n in fields}
+    for name in FIELDS:
+        if name in fields:
+            data[name] = _make_field(name, fields[name], frame)
+    return data
 
 
 def _make_field(name: str, values, frame: str) -> Variable:
@@ -389,19 +392,19 @@ def _make_field(name: str, values, frame: str) -> Variable:
     return Variable(dims, np.asarray(values), unit, text, MEANINGS.get(name, ()))
 
 
-def _face(face) -> Data:
+def _collect_face(face) -> Variables:
     """Return the fields of the patch of one interface; their names end in the number of the interface, from 1."""
     number = face.number + 1
     frame = "frame" if face.fields["time"].size > 1 else "frame_at_rest"
     data = {}
-    for name, variable in _frames(face.fields, face.surface, frame).items():
+    for name, variable in _collect_frames(face.fields, face.surface, frame).items():
         dims = tuple(f"x_{number}" if one == "x" else one for one in variable.dims)
         shown = name if name == f"{frame}_time" else f"{name}_{number}"
         data[shown] = replace(variable, dims=dims)
     return data
 
 
-def _levels(result: Result) -> Data:
+def _collect_levels(result: Result) -> Variables:
     """Return the results at the end of each level of the drive."""
     levels = result.extra["levels"]
     unit = levels[0].unit
@@ -425,7 +428,7 @@ def _levels(result: Result) -> Data:
     return data
 
 
-def _curve(result: Result) -> Data:
+def _collect_regimes(result: Result) -> Variables:
     """Return the regimes and the folds of a curve of steady motions."""
     curve = result.extra["curve"]
     regimes = encode("curve_point", curve["regime"], "regime of the steady motion")
@@ -435,7 +438,7 @@ def _curve(result: Result) -> Data:
     return {"curve_regime": regimes} | make_columns("fold", columns)
 
 
-def _response(result: Result) -> Data:
+def _collect_frequency_response(result: Result) -> Variables:
     """Return magnitude and phase of the frequency response H1 of a random drive."""
     gain = np.asarray(result.extra["spectra"].gain)
     text = "of H1, displacement of the output over base acceleration"
@@ -446,7 +449,7 @@ def _response(result: Result) -> Data:
     return make_columns("frequency", columns)
 
 
-def _wear(result: Result) -> Data:
+def _collect_wear(result: Result) -> Variables:
     """Return the measures over the cycles of wear."""
     columns = {
         f"wear_{name}": (values, result.measures[name].unit, result.measures[name].text)
@@ -456,11 +459,16 @@ def _wear(result: Result) -> Data:
     return make_columns("wear_cycle", columns)
 
 
-# what is collected for each key of `Result.extra`
-COLLECTORS = {"levels": _levels, "curve": _curve, "spectra": _response, "wear": _wear}
+# Functions that collect what a Result has only under these keys of `extra`.
+COLLECTORS = {
+    "levels": _collect_levels,
+    "curve": _collect_regimes,
+    "spectra": _collect_frequency_response,
+    "wear": _collect_wear,
+}
 
 
-def _measured_readings(result: Result) -> Data:
+def _collect_readings(result: Result) -> Variables:
     """Return the measured readings at the drive frequency, and what the sensors would indicate in the computed motion."""
     readings = find_readings(result)
     if readings is None:
@@ -517,7 +525,7 @@ def find_readings(result: Result) -> tuple[list, dict] | None:
     return rows, computed
 
 
-def _accuracy(result: Result) -> Data:
+def _collect_accuracy(result: Result) -> Variables:
     """Return the error of the run and of its coarser runs over their CPU time, if the time steps limit the accuracy."""
     curve = compute_accuracy_curve(result)
     if curve is None:

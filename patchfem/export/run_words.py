@@ -3,6 +3,8 @@
 In: a `Result` and its quantities. Out: sentences. Every number in them is a quantity with its error.
 """
 
+from collections.abc import Iterable
+
 import numpy as np
 
 from ..core import Outcome
@@ -82,23 +84,23 @@ def make_verdict(result: Result, measures: Quantities, details: dict) -> tuple[s
     """
     release, decay = describe_release(result)
     outcome = describe_outcome(result, measures, details)
-    headline = release or _headline(result, measures, details)
+    headline = release or _make_headline(result, measures, details)
     if result.outcome in (Outcome.NO_CONTACT, Outcome.NOT_CONVERGED) or not headline:
         return (outcome,)
-    sentences = [headline, decay, outcome, _compare_with_readings(details)]
+    sentences = [headline, decay, outcome, _describe_readings(details.get("measured", ()))]
     if result.plan.kind != "patch":
         sentences.append(_describe_place(details.get("contact")))
     sentences.append(describe_accuracy(result, measures))
     return tuple([sentence for sentence in sentences if sentence][:4])
 
 
-def _headline(result: Result, measures: Quantities, details: dict) -> str:
+def _make_headline(result: Result, measures: Quantities, details: dict) -> str:
     """Return the sentence with the key numbers of a run; "" if it has none."""
     kind = _choose_headline(result, measures)
     parts = []
     for name, text in HEADLINES[kind]:
         if name == "loop_area":
-            parts += _interface_parts(result, measures, text)
+            parts += _describe_interfaces(result, measures, text)
         elif _is_known(measures, name) and not quantities.is_zero(name, measures[name]):
             part = text.format(_format(name, measures))
             if (kind, name) == ("patch", "contact_fraction"):
@@ -127,7 +129,7 @@ def _is_known(measures: Quantities, name: str) -> bool:
     return name in measures and measures[name].value is not None
 
 
-def _interface_parts(result: Result, measures: Quantities, text: str) -> list[str]:
+def _describe_interfaces(result: Result, measures: Quantities, text: str) -> list[str]:
     """Return the dissipated energy of the interface, or of each of a few interfaces."""
     names = [name for name in measures if remove_interface_number(name) == "loop_area"]
     names = [
@@ -165,14 +167,14 @@ def describe_outcome(result: Result, measures: Quantities, details: dict) -> str
         )
         return f"The {error.format(names)}; use the other measures with their errors."
     if result.plan.kind == "bench" and outcome is Outcome.DONE:
-        return _bench_outcome(measures, details)
+        return _describe_bench_outcome(measures, details)
     if run_away := details.get("run_away"):
         drive, knee = (format_quantity(run_away[name], "m s-2", 4) for name in ("drive", "knee"))
         return f"{outcome.sentence} Above {knee} friction alone does not limit it; the drive is {drive}."
     if outcome is Outcome.TRANSIENT and _is_release(result):
         return "The run ended before the motion came to rest; raise drive.cycles to see more of it."
     if outcome is Outcome.STUCK and {"loop_area", "slip_amplitude"} & measures.keys():
-        return _stuck_outcome(result, measures)
+        return _describe_stuck_outcome(result, measures)
     regime = result.extra.get("regime")
     if regime is None:
         return outcome.sentence
@@ -186,7 +188,7 @@ def describe_outcome(result: Result, measures: Quantities, details: dict) -> str
     )
 
 
-def _bench_outcome(measures: Quantities, details: dict) -> str:
+def _describe_bench_outcome(measures: Quantities, details: dict) -> str:
     """Return the sentence on slip and loss factor of a bench."""
     slip = measures.get("slip_amplitude")
     if (
@@ -194,7 +196,7 @@ def _bench_outcome(measures: Quantities, details: dict) -> str:
         and slip.value is not None
         and slip.value <= max(_find_error(slip), SLIP_ROUND_OFF)
     ):
-        return _no_slip("contact_fraction" in measures, "cycle")
+        return _describe_no_slip("contact_fraction" in measures, "cycle")
     loop = details.get("loop")
     if loop is None:
         return Outcome.DONE.sentence
@@ -208,7 +210,7 @@ def _find_error(quantity: Quantity) -> float:
     return quantity.floor if quantity.error is None else quantity.error
 
 
-def _no_slip(has_patch: bool, cycles: str) -> str:
+def _describe_no_slip(has_patch: bool, cycles: str) -> str:
     """Return the sentence for an interface without slip.
 
     At an edge where the pressure of a patch ends, any force causes slip; a mesh may not show it.
@@ -217,7 +219,7 @@ def _no_slip(has_patch: bool, cycles: str) -> str:
     return f"The interface sticks: no slip in the last {cycles}{limit * has_patch}."
 
 
-def _stuck_outcome(result: Result, measures: Quantities) -> str:
+def _describe_stuck_outcome(result: Result, measures: Quantities) -> str:
     """Return the sentence for an interface that sticks as a whole."""
     has_patch = "contact_fraction" in measures
     part = "part of the patch slips" if has_patch else "part of it slips"
@@ -237,7 +239,7 @@ def _stuck_outcome(result: Result, measures: Quantities) -> str:
         if name and slipping[name].value > max(_find_error(slipping[name]), limit):
             size = texts[kind].format(quantities.format_quantity(name, slipping[name]))
             return f"The interface as a whole sticks, but {part} ({size})."
-    return _no_slip(has_patch, "cycles")
+    return _describe_no_slip(has_patch, "cycles")
 
 
 def _describe_place(contact: dict | None, form: str = "In contact: {}.") -> str:
@@ -258,12 +260,15 @@ def _describe_place(contact: dict | None, form: str = "In contact: {}.") -> str:
     return form.format(f"x = {' and '.join(texts)} {unit}")
 
 
-def _compare_with_readings(details: dict) -> str:
-    """Return a sentence on the ratio of computed and measured readings at the drive of the run; "" without a measurement."""
+def _describe_readings(readings: Iterable[dict]) -> str:
+    """Return a sentence on the computed readings over the measured ones; "" without a measurement.
+
+    readings: as `list_readings` returns them; those of repeat runs are left out.
+    """
     parts = [
-        f"the {one['reading']} is {format_number(one['ratio'], 3)} times the measured one"
-        for one in details.get("measured", ())
-        if "repeat" not in one["reading"]
+        f"the {row['reading']} is {format_number(row['ratio'], 3)} times the measured one"
+        for row in readings
+        if "repeat" not in row["reading"]
     ]
     text = " and ".join(parts)
     return f"{text[0].upper()}{text[1:]}." if parts else ""

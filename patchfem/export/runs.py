@@ -14,7 +14,7 @@ from ..runs.patch import values
 from ..runs.results.result import Result, collect_used_settings, engine_by_measure
 from ..runs.rig import plan as rig_plan
 from .answer import Answer, Quantities, Quantity, Remarks
-from .driven import describe_drive, list_changed_keys
+from .driven import describe_drive, format_changed_keys
 from .run_data import collect_data
 from .run_words import list_readings, make_captions, make_verdict
 
@@ -29,7 +29,7 @@ def make_answer(result: Result) -> Answer:
     source = run_plan.model.source
     measures = make_quantities(result.measures)
     details = make_details(result)
-    changed = list_changed_keys(source.sets)
+    changed = format_changed_keys(source.sets)
     title = f"{source.title}; changed: {changed}" if source.title and changed else source.title
     return Answer(
         kind=run_plan.kind,

@@ -25,7 +25,8 @@ FIELDS = "fields.vtkhdf"
 CPU_TIMES = "accuracy_seconds"
 # types of the entries of summary.json that `read` needs, and of those of a measure
 SUMMARY_TYPES = {"title": str, "kind": str, "origin": dict, "measures": dict}
-SUMMARY_TYPES |= dict.fromkeys(("verdict", "warnings", "notes"), list)
+SENTENCE_KEYS = ("verdict", "warnings", "notes")
+SUMMARY_TYPES |= dict.fromkeys(SENTENCE_KEYS, list)
 NUMBER_TYPES = dict.fromkeys(("value", "error", "low", "high"), float | int | None)
 NUMBER_TYPES |= {"unit": str, "floor": float | int}
 # netCDF file of each kind of answer; result.nc for all others
@@ -157,26 +158,33 @@ def read_summary(folder: Path) -> dict:
         raise Missing(f"{folder}: no such results folder")
     if not path.is_file():
         raise PatchfemError(f"{folder}: this is not a results folder: it has no {SUMMARY}")
-    text = ""
+    content = None
     try:
-        text = path.read_text("utf-8")
-        summary = json.loads(text)
+        content = path.read_bytes()
+        summary = json.loads(content)
         _check_types(summary, SUMMARY_TYPES)
         if summary["kind"] not in (*RUN_KINDS, *DETAIL_FILES):
             raise ValueError(f"kind {summary['kind']} is unknown")
-        for entry in summary["measures"].values():
-            _check_types(entry, NUMBER_TYPES)
+        for key in SENTENCE_KEYS:
+            if not all(isinstance(sentence, str) for sentence in summary[key]):
+                raise ValueError(f"{key} has an entry that is not a text")
+        for name, entry in summary["measures"].items():
+            _check_types(entry, NUMBER_TYPES, f"measures.{name}.")
             Quantity(**entry)
         return summary
     except (OSError, ValueError, TypeError, RecursionError) as error:
         reason = str(error) or type(error).__name__
-        if '"verdict"' not in text:
+        if content is not None and b'"verdict"' not in content:
             reason = "patchfem before 2.0 wrote it; run the scene again"
         raise PatchfemError(f"{path}: this summary cannot be read: {reason}") from None
 
 
-def _check_types(content: dict, types: dict) -> None:
-    """Raise ValueError if an object lacks an entry, or has one of another type than the table says."""
+def _check_types(content: dict, types: dict, place: str = "") -> None:
+    """Raise ValueError if an object lacks an entry, or has one of another type than the table says.
+
+    place: where the object is in the file, such as "measures.loop_area.", which the message names.
+    """
     for key, kind in types.items():
-        if not isinstance(content, dict) or not isinstance(content.get(key, ...), kind):
-            raise ValueError(f"{key} is missing or of a wrong type")
+        is_known = isinstance(content, dict) and key in content
+        if not is_known or not isinstance(content[key], kind):
+            raise ValueError(f"{place}{key} is missing or of a wrong type")

@@ -122,10 +122,10 @@ class Range:
     @property
     def text(self) -> str:
         """Both ends as a scene writes them."""
-        return "..".join(self.list_texts((0, 1)))
+        return "..".join(self.format_values((0, 1)))
 
-    def list_texts(self, fractions: Iterable[float]) -> list[str]:
-        """Return the values at the given fractions of the range, as a scene writes them."""
+    def format_values(self, fractions: Iterable[float]) -> list[str]:
+        """Return the values at fractions of the range, from 0 (`low`) to 1 (`high`), as a scene writes them."""
         first, last = self.ends
         if self.is_log:
             numbers = (first ** (1 - part) * last**part for part in fractions)
@@ -140,7 +140,7 @@ class Range:
 
     def make_axis(self, fractions: Iterable[float]) -> Axis:
         """Return the key with the values at the given fractions of its range."""
-        texts = self.list_texts(fractions)
+        texts = self.format_values(fractions)
         values = array("d", map(_ValueReader(self.key, texts).read, texts))
         return Axis(self.key, texts, values, self.unit)
 
@@ -286,7 +286,7 @@ def read_values(key: str, text: str, form: Form = LISTS) -> Axis | Range:
             return spread
     if not form.has_lists:
         raise ValueError(f"{text}: a range is needed, {form.usage}")
-    return make_axis(key, chain.from_iterable(_collect(reader.list_texts, pieces)))
+    return make_axis(key, chain.from_iterable(_collect(reader.list_values, pieces)))
 
 
 def _append_values(
@@ -350,8 +350,8 @@ class _ValueReader:
         )
         return number
 
-    def list_texts(self, piece: str) -> list[str]:
-        """Return the values of one part of a list: those of a range, or a single value."""
+    def list_values(self, piece: str) -> list[str]:
+        """Return the values that one part of a list stands for, as a scene writes them: those of a range, or one value."""
         if not piece:
             raise ValueError("there is no value between two commas")
         if about := _range_about(piece) if self.is_number else "":
@@ -365,7 +365,7 @@ class _ValueReader:
             raise ValueError(
                 f"{spread.text}: give the number of values after a colon, from 2 to {MAX_RANGE_VALUES}, such as :9"
             )
-        return spread.list_texts(k / (spread.count - 1) for k in range(spread.count))
+        return spread.format_values(k / (spread.count - 1) for k in range(spread.count))
 
     def parse_range(self, piece: str) -> Range | None:
         """Parse a range such as ``1..9 mm:5`` or ``5 mm +- 1 mm``; return None for any other text."""
@@ -410,7 +410,7 @@ class _ValueReader:
         if not form.has_lists:
             if not spread.low < spread.high:
                 raise ValueError(f"{spread.text}: the low bound must lie below the high bound")
-            texts = spread.list_texts((0, 1)) if spread.kind else (spread.low, spread.high)
+            texts = spread.format_values((0, 1)) if spread.kind else (spread.low, spread.high)
             for value in texts:
                 validate_value(self.key, value)
 

@@ -2,6 +2,7 @@
 
 import json
 import shutil
+from dataclasses import replace
 
 import h5py
 import numpy as np
@@ -11,7 +12,8 @@ from command_line import run_cli
 from scene_texts import BENCH
 
 from patchfem import PatchfemError
-from patchfem.export import netcdf, store
+from patchfem.export import answer as answers
+from patchfem.export import columns, netcdf, store
 from patchfem.export.answer import Answer, Quantity, Remarks, Variable
 
 
@@ -108,6 +110,12 @@ def change_summary(**entries):
     return change
 
 
+def break_text(folder) -> None:
+    """Put a byte that no UTF-8 text has into the title of summary.json."""
+    path = folder / "summary.json"
+    path.write_bytes(path.read_bytes().replace(b'"title": "', b'"title": "\xff', 1))
+
+
 def cut_netcdf(folder) -> None:
     """Cut result.nc in the middle."""
     content = (folder / "result.nc").read_bytes()
@@ -127,6 +135,8 @@ DAMAGES = {
     "huge number": change_summary(measures={"loop_area": {"value": [], "unit": "J"}}),
     "unknown kind": change_summary(kind="b"),
     "no verdict": change_summary(verdict=None),
+    "number in verdict": change_summary(verdict=[1]),
+    "byte in summary": break_text,
     "cut netCDF": cut_netcdf,
     "text as netCDF": lambda folder: (folder / "result.nc").write_text("a", "utf-8"),
     "ring in netCDF": remove_dataset,
@@ -159,3 +169,35 @@ def test_refuses_damaged_folder(bench_results, tmp_path, damage):
         assert answer.code == 2, (command, answer)
         assert "out" in answer.err and "internal fault" not in answer.err
         assert len(answer.err.strip().splitlines()) == 1
+
+
+@pytest.mark.parametrize("count, kind", [(0, "int8"), (128, "int8"), (129, "int16")])
+def test_exact_codes_of_many_texts_are_read_back(tmp_path, count, kind):
+    """Texts that are stored as codes are read back, also more of them than a byte can number."""
+    texts = [f"{number} Hz" for number in range(count)]
+    drive = answers.encode("row", texts)
+    assert drive.values.dtype == kind
+    answer = replace(make_answer(), data={"drive": drive})
+    store.write(answer, tmp_path)
+    read = store.read(tmp_path).data["drive"]
+    assert columns.list_cells(read) == texts
+    with xr.open_dataset(tmp_path / "result.nc", engine="h5netcdf") as dataset:
+        if count:  # CF conventions: the flags have the type of their variable
+            assert dataset["drive"].attrs["flag_values"].dtype == dataset["drive"].dtype == kind
+
+
+@pytest.mark.parametrize(
+    "damage, reason",
+    [
+        ("byte in summary", "invalid start byte"),
+        ("number in verdict", "verdict has an entry that is not a text"),
+        ("huge number", "measures.loop_area.value is missing or of a wrong type"),
+        ("summary of 1.1", "patchfem before 2.0 wrote it"),
+    ],
+)
+def test_refusal_of_summary_says_what_is_wrong(bench_results, tmp_path, damage, reason):
+    """The message on a damaged summary names the entry or the byte; only one without a verdict is called an old one."""
+    folder = shutil.copytree(bench_results, tmp_path / "out")
+    DAMAGES[damage](folder)
+    with pytest.raises(PatchfemError, match=reason):
+        store.read_summary(folder)

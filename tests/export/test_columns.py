@@ -78,6 +78,22 @@ def test_exact_csv_of_methods_stands_below_each_other():
     ]
 
 
+def test_exact_csv_of_methods_repeats_rows_for_each_case():
+    """A CSV of backbones for values of a key has a column with this key; what all cases share is repeated."""
+    data = {"case": answer.Variable(("case",), np.array(["1 N", "2 N"]), "", "normal.load")}
+    data |= answer.make_columns("balance_amplitude", {"balance_amplitude": ([1e-6, 2e-6], "m")})
+    forces = np.array([[3.0, np.nan], [5.0, 6.0]])
+    data |= answer.make_columns("case balance_amplitude", {"balance_force": (forces, "N")})
+    text = columns.format_curves(answer.Answer("backbone", "", (), data=data))["backbone.csv"]
+    assert text.splitlines() == [
+        "normal.load,method,amplitude [m],force [N]",
+        "1 N,balance,1e-06,3.0",
+        "1 N,balance,2e-06,",
+        "2 N,balance,1e-06,5.0",
+        "2 N,balance,2e-06,6.0",
+    ]
+
+
 def test_exact_rows_of_dimension_are_quantities():
     """The rows of a dimension have numbers with their errors as quantities, codes and words as text."""
     arrays = {

@@ -100,7 +100,8 @@ def _draw_map(panel: Panel, axes) -> None:
         options = {"cmap": ListedColormap(CODE_COLOURS[:count]), "norm": BoundaryNorm(edges, count)}
     elif np.nanmin(curve.y) < 0 < np.nanmax(curve.y):
         limit = np.nanmax(np.abs(curve.y))
-        options = {"cmap": "RdBu", "vmin": -limit, "vmax": limit}
+        # red is positive, as in the scale of plotly.js on the page
+        options = {"cmap": "RdBu_r", "vmin": -limit, "vmax": limit}
     mesh = axes.pcolormesh(curve.x, curve.rows, curve.y, shading="nearest", **options)
     bar = axes.figure.colorbar(mesh, label="" if curve.meanings else panel.colour_label)
     if curve.meanings:
@@ -162,7 +163,7 @@ def write_plot(answer: Answer, path) -> None:
         _save(figure, partial, ending[1:])
 
 
-def draw_charts(answer: Answer, titles: tuple[str, ...], axes=None, verb: str = "plot"):
+def draw_charts(answer: Answer, titles: tuple[str, ...], axes, caller: str):
     """Draw the charts of an answer with some titles, and return the first Axes; None if it has none of them.
 
     Parameters
@@ -170,20 +171,25 @@ def draw_charts(answer: Answer, titles: tuple[str, ...], axes=None, verb: str = 
     answer : Answer
     titles : tuple of str
         Titles in the table of charts; () for all charts.
-    axes : matplotlib Axes, optional
-        Where to draw the first chart alone; by default a new figure has all of them.
-    verb : str
-        Function that the message about a wrong `axes` names.
+    axes : matplotlib Axes or None
+        Where to draw the first chart alone; None for a new figure with all of them.
+    caller : str
+        Function that the message about wrong `axes` names, such as "plot.loop".
+
+    Raises
+    ------
+    PatchfemError
+        If `axes` are not those of matplotlib.
     """
     charts = [chart for chart in CHARTS[answer.kind] if not titles or chart.title in titles]
     panels = make_panels({"": answer}, tuple(charts))
     if not panels:
         return None
-    check_axes(axes, verb)
+    check_axes(axes, caller)
     return draw(panels[0], axes) if axes is not None else make_figure(panels).axes[0]
 
 
-def check_axes(axes, verb: str) -> None:
+def check_axes(axes, caller: str) -> None:
     """Raise PatchfemError if the Axes for a picture are given but are not those of matplotlib."""
     if axes is not None and not hasattr(axes, "errorbar"):
-        raise PatchfemError(f"{verb}: matplotlib Axes are needed as ax, not {axes!r:.60}")
+        raise PatchfemError(f"{caller}: matplotlib Axes are needed as ax, not {axes!r:.60}")

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from ...formatting import format_number, needs_log_scale
-from ..answer import Answers, Variable
+from ..answer import Answers, Variable, Variables
 from .panel import Axis, Curve, Panel, join_names, make_axis, thin
 from .table import Chart
 
@@ -14,7 +14,6 @@ N_SHOWN_CYCLES = 3  # number of cycles of the span "cycles"
 SWEEP_STYLES = ("relative", "menu", "maps", "shares")
 MARGIN_NODES = 3  # unloaded nodes beside the contact that the span "contact" shows
 MAX_INTERFACES = 6  # largest number of interfaces with charts of their own
-Data = dict[str, Variable]
 
 
 def make_panels(answers: Answers, charts: tuple[Chart, ...]) -> list[Panel]:
@@ -39,7 +38,7 @@ def make_panels(answers: Answers, charts: tuple[Chart, ...]) -> list[Panel]:
     return [panel for panel in panels if panel is not None]
 
 
-def _repeat_for_interfaces(chart: Chart, data: Data) -> list[Chart]:
+def _repeat_for_interfaces(chart: Chart, data: Variables) -> list[Chart]:
     """Return a chart over x for each interface that has a patch of its own, with the variables x_1, x_2, ..."""
     numbers = [number for number in range(1, MAX_INTERFACES + 1) if f"x_{number}" in data]
     if chart.x != "x" or "x" in data or not numbers:
@@ -62,15 +61,15 @@ def make_panel(answers: Answers, chart: Chart) -> Panel | None:
     has_several = len(answers) > 1
     if has_several:
         chart = replace(chart, by="")
-    parts = {name: _select(answer.data, chart) for name, answer in answers.items()}
-    parts = {name: data for name, data in parts.items() if data}
-    if not parts or (chart.style == "map" and len(parts) > 1):  # maps cannot share a chart
+    selected = {name: _select(answer.data, chart) for name, answer in answers.items()}
+    selected = {name: data for name, data in selected.items() if data}
+    if not selected or (chart.style == "map" and len(selected) > 1):  # maps cannot share a chart
         return None
-    first = next(iter(parts.values()))
-    x_axis, y_axis = axes = _make_axes(list(parts.values()), chart)
+    first = next(iter(selected.values()))
+    x_axis, y_axis = axes = _make_axes(list(selected.values()), chart)
 
     curves = []
-    for number, (label, data) in enumerate(parts.items()):
+    for number, (label, data) in enumerate(selected.items()):
         own_curves = []
         for name in chart.y.split():
             own_curves += _make_curves(data, chart, name, axes)
@@ -101,15 +100,15 @@ def make_panel(answers: Answers, chart: Chart) -> Panel | None:
     return replace(panel, y=rows_axis, colour_label=y_axis.label)
 
 
-def _make_axes(parts: list[Data], chart: Chart) -> tuple[Axis, Axis]:
-    """Return the horizontal and the vertical axis of a chart for the data of all answers."""
-    first = parts[0]
+def _make_axes(selected: list[Variables], chart: Chart) -> tuple[Axis, Axis]:
+    """Return the horizontal and the vertical axis of a chart for the selected variables of each answer."""
+    first = selected[0]
     x_name = _find_x(first, chart)
-    x_values = [data[_find_x(data, chart)].values for data in parts]
+    x_values = [data[_find_x(data, chart)].values for data in selected]
     x_label = chart.x_label or x_name
     names = [name for name in map(_split_name, chart.y.split()) if name in first]
     main = first[names[0]]
-    y_values = [data[name].values for data in parts for name in names if name in data]
+    y_values = [data[name].values for data in selected for name in names if name in data]
     y_label = main.text if chart.y_label == "*" else chart.y_label or names[0]
     return (
         _make_axis(x_label, first[x_name].unit, x_values, chart.log, "x"),
@@ -124,7 +123,7 @@ def _make_axis(name: str, unit: str, arrays: list, log: str, letter: str) -> Axi
     return make_axis(name, unit, values, is_log)
 
 
-def _find_map_rows(data: Data, variable: Variable, x_axis: Axis) -> tuple[Axis, np.ndarray]:
+def _find_map_rows(data: Variables, variable: Variable, x_axis: Axis) -> tuple[Axis, np.ndarray]:
     """Return the vertical axis of a map and its positions: a coordinate y in the units of x, the time, or frames."""
     if variable.dims[0] == "y" and "y" in data:
         axis = replace(x_axis, label=x_axis.label.replace("x [", "y ["))
@@ -141,12 +140,12 @@ def _split_name(name: str) -> str:
     return name.partition("@")[0]
 
 
-def _find_x(data: Data, chart: Chart) -> str:
+def _find_x(data: Variables, chart: Chart) -> str:
     """Return the first of the horizontal variables that the data has, or ""."""
     return next((name for name in chart.x.split() if name in data), "")
 
 
-def _select(data: Data, chart: Chart) -> Data:
+def _select(data: Variables, chart: Chart) -> Variables:
     """Return the variables restricted to the span of a chart; {} if the chart has nothing to show."""
     x_name = _find_x(data, chart)
     names = map(_split_name, chart.y.split())
@@ -164,7 +163,7 @@ def _select(data: Data, chart: Chart) -> Data:
     return _take(data, dimension, keep) if keep.size else {}
 
 
-def _find_span(data: Data, span: str, x_name: str) -> np.ndarray | None:
+def _find_span(data: Variables, span: str, x_name: str) -> np.ndarray | None:
     """Return the indices of the span of a chart along `time` or `x`; None for the whole."""
     period = float(data["period"].values) if "period" in data else np.inf
     if span == "cycles" and np.isfinite(period):
@@ -184,7 +183,7 @@ def _find_span(data: Data, span: str, x_name: str) -> np.ndarray | None:
     return None
 
 
-def _take(data: Data, dimension: str, indices: np.ndarray) -> Data:
+def _take(data: Variables, dimension: str, indices: np.ndarray) -> Variables:
     """Return the variables at some indices of a dimension; those without this dimension are unchanged."""
     taken = {}
     for name, one in data.items():
@@ -194,7 +193,9 @@ def _take(data: Data, dimension: str, indices: np.ndarray) -> Data:
     return data | taken
 
 
-def _make_curves(data: Data, chart: Chart, source: str, axes: tuple[Axis, Axis]) -> list[Curve]:
+def _make_curves(
+    data: Variables, chart: Chart, source: str, axes: tuple[Axis, Axis]
+) -> list[Curve]:
     """Return the curves of "NAME" or "NAME@X": one for each interface, case, code, or element of an overlay."""
     name, _, own_x = source.partition("@")
     own_x = own_x or _find_x(data, chart)
@@ -246,7 +247,7 @@ def _reduce_strips(variable: Variable) -> Variable:
     return replace(variable, dims=dims, values=np.mean(variable.values, axis=axis))
 
 
-def _name_elements(data: Data, dimension: str, label: str) -> list[str]:
+def _name_elements(data: Variables, dimension: str, label: str) -> list[str]:
     """Return the legend of the elements of a dimension: the values of its coordinate, or their numbers.
 
     `label` is the name of the variable in words.
@@ -270,7 +271,7 @@ def _name_elements(data: Data, dimension: str, label: str) -> list[str]:
     return names
 
 
-def _find_band(data: Data, name: str) -> tuple[np.ndarray, ...]:
+def _find_band(data: Variables, name: str) -> tuple[np.ndarray, ...]:
     """Return both ends [SI] of the error band of a variable; () without one."""
     if {f"{name}_low", f"{name}_high"} <= data.keys():
         return _as_floats(data[f"{name}_low"]), _as_floats(data[f"{name}_high"])

@@ -40,12 +40,12 @@ def _make_layout(panel: Panel) -> dict:
     """Return the layout of a panel: its axes, vertical lines, and whether it has a legend."""
     is_film = panel.style == "film"
     layout = {
-        "xaxis": _axis_layout(panel.x),
-        "yaxis": _axis_layout(panel.y),
+        "xaxis": _make_axis_layout(panel.x),
+        "yaxis": _make_axis_layout(panel.y),
         "showlegend": not is_film and sum(bool(curve.name) for curve in panel.curves) > 1,
     }
     if panel.marks:
-        layout["shapes"] = list(map(_mark, panel.marks))
+        layout["shapes"] = list(map(_make_vertical_line, panel.marks))
     if is_film or (panel.style == "map" and panel.y.label.startswith("y")):
         # equal scales of both axes, which end at the edges of the map
         layout["yaxis"] |= {"scaleanchor": "x", "constrain": "domain"}
@@ -53,12 +53,12 @@ def _make_layout(panel: Panel) -> dict:
     return layout
 
 
-def _axis_layout(axis) -> dict:
+def _make_axis_layout(axis) -> dict:
     """Return the layout of an axis."""
     return {"title": {"text": axis.label}, "type": "log" if axis.is_log else "-"}
 
 
-def _mark(position: float) -> dict:
+def _make_vertical_line(position: float) -> dict:
     """Return a dotted vertical line over the whole height."""
     line = {"color": "#8a8f98", "width": 1, "dash": "dot"}
     ends = {"x0": position, "x1": position, "y0": 0, "y1": 1}
@@ -68,7 +68,7 @@ def _mark(position: float) -> dict:
 def _make_traces(panel: Panel) -> list[dict]:
     """Return the traces of a panel; those of a film have the same range of colours."""
     if panel.style in ("map", "film"):
-        traces = [_map_trace(curve, panel.colour_label) for curve in panel.curves]
+        traces = [_make_map_trace(curve, panel.colour_label) for curve in panel.curves]
         if panel.style == "film":
             largest = float(max(np.nanmax(curve.y) for curve in panel.curves))
             traces = [trace | {"zmin": 0.0, "zmax": largest} for trace in traces]
@@ -81,9 +81,9 @@ def _make_traces(panel: Panel) -> list[dict]:
             mixed = [np.interp(place, (0, 0.5, 1), part) for part in zip(*OVERLAY_COLOURS)]
             colour = "rgb({:.0f},{:.0f},{:.0f})".format(*mixed)
         if panel.style == "bars":
-            traces.append(_bar_trace(curve, colour))
+            traces.append(_make_bar_trace(curve, colour))
         else:
-            traces += _curve_traces(curve, "line" if curve.is_line else panel.style, colour)
+            traces += _make_curve_traces(curve, "line" if curve.is_line else panel.style, colour)
     return traces
 
 
@@ -92,7 +92,7 @@ def choose_colour(curve: Curve, number: int) -> str:
     return COLOURS[(number if curve.colour < 0 else curve.colour) % len(COLOURS)]
 
 
-def _curve_traces(curve: Curve, style: str, colour: str) -> list[dict]:
+def _make_curve_traces(curve: Curve, style: str, colour: str) -> list[dict]:
     """Return the trace of a curve, and that of its error band if it is drawn as a line."""
     dash = DASHES[curve.dash % len(DASHES)]
     symbol = SYMBOLS[curve.dash % len(SYMBOLS)]
@@ -109,7 +109,7 @@ def _curve_traces(curve: Curve, style: str, colour: str) -> list[dict]:
     if style == "area":
         trace["fill"] = "tozeroy"
     if style in ("points", "dots"):
-        bars = _error_bars(curve)
+        bars = _make_error_bars(curve)
         return [trace | ({"error_y": bars | {"color": colour}} if bars else {})]
     if curve.low is None:
         return [trace]
@@ -131,7 +131,7 @@ def _curve_traces(curve: Curve, style: str, colour: str) -> list[dict]:
     return [band, trace]
 
 
-def _error_bars(curve: Curve) -> dict:
+def _make_error_bars(curve: Curve) -> dict:
     """Return the distances of the ends of an interval from the values; {} without an interval."""
     if curve.low is None:
         return {}
@@ -139,15 +139,15 @@ def _error_bars(curve: Curve) -> dict:
     return ends | {"symmetric": False, "thickness": 1.2}
 
 
-def _bar_trace(curve: Curve, colour: str) -> dict:
+def _make_bar_trace(curve: Curve, colour: str) -> dict:
     """Return horizontal bars with their intervals; `x` has the names of the bars."""
     trace = {"type": "bar", "orientation": "h", "x": pack(curve.y), "y": list(map(str, curve.x))}
-    bars = _error_bars(curve)
+    bars = _make_error_bars(curve)
     trace |= {"name": curve.name, "marker": {"color": colour}}
     return trace | ({"error_x": bars} if bars else {})
 
 
-def _map_trace(curve: Curve, label: str) -> dict:
+def _make_map_trace(curve: Curve, label: str) -> dict:
     """Return a heat map; codes have one colour each, other values a scale that is symmetric if they change their sign."""
     trace = {"type": "heatmap", "x": pack(curve.x), "y": pack(curve.rows), "z": pack(curve.y)}
     if curve.meanings:
@@ -172,9 +172,9 @@ def _add_menu(figure: dict, choices: list[Panel]) -> None:
     buttons = []
     for number, choice in enumerate(choices):
         visible = [k == number for k, group in enumerate(groups) for _ in group]
-        changes = {"shapes": list(map(_mark, choice.marks))}
+        changes = {"shapes": list(map(_make_vertical_line, choice.marks))}
         for name, axis in (("xaxis", choice.x), ("yaxis", choice.y)):
-            layout = _axis_layout(axis)
+            layout = _make_axis_layout(axis)
             changes |= {f"{name}.title.text": axis.label, f"{name}.type": layout["type"]}
         arguments = [{"visible": visible}, changes]
         buttons.append({"label": choice.title, "method": "update", "args": arguments})

@@ -14,7 +14,7 @@ import numpy as np
 from ...campaigns.sweeps.changes import MAIN_MEASURES
 from ...campaigns.sweeps.limits import NEGLIGIBLE_CHANGE
 from ...campaigns.sweeps.sweep_table import FINAL_OUTCOMES, MeasureColumn
-from ..answer import Answer, Answers, Data
+from ..answer import Answer, Answers, Variables
 from ..quantities import format_value
 from .panel import Axis, Curve, Panel, join_names, make_axis, thin
 from .table import Chart
@@ -41,7 +41,7 @@ class SweepView(NamedTuple):
         Variables of the other keys of a grid; [] if the cases are rows.
     """
 
-    data: Data
+    data: Variables
     details: dict
     axis: str
     others: list[str]

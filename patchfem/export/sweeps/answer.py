@@ -18,7 +18,7 @@ from ...campaigns.sweeps.sweep_table import SweepTable, SweptKey
 from ...core import PatchfemError
 from ...runs.results.result import describe_measure
 from ...scene.keys.lookup import find_key
-from ..answer import Answer, Data, Quantities, Quantity, Remarks, Variable
+from ..answer import Answer, Quantities, Quantity, Remarks, Variable, Variables
 from ..runs import list_versions
 from .tables import sort_measures
 from .words import describe_place, make_peak_quantities, make_verdict
@@ -149,7 +149,7 @@ def _make_quantities(table: SweepTable, analysis: SweepAnalysis) -> Quantities:
     return quantities
 
 
-def _make_data(table: SweepTable, case_folders: Sequence[str]) -> Data:
+def _make_data(table: SweepTable, case_folders: Sequence[str]) -> Variables:
     """Return the variables of sweep.nc: keys, measures with errors and floors, outcome, messages.
 
     There is a dimension for each swept key, or the dimension `case` if the cases are rows.

@@ -17,7 +17,7 @@ def to_dataset(answer: Answer):
     return netcdf.to_dataset(answer).set_coords(list_keys(answer))
 
 
-def sweep_axes(dataset, measure: str, axes=None):
+def draw_sweep(dataset, measure: str, axes=None):
     """Draw a measure of a sweep on matplotlib Axes and return them; hollow points miss the tolerance.
 
     Parameters

@@ -60,6 +60,7 @@ def read_chunk(path: Path) -> tuple[np.ndarray, CaseResults]:
     try:
         data, attributes = read_netcdf(path)
         outcome = data["outcome"]
+        # netCDF separates the names of codes by spaces, so that `read_netcdf` takes each underscore for a space
         words = [word.replace(" ", "_") for word in outcome.meanings]
         results = CaseResults(np.array(words, object)[outcome.values])
         results.units.update(json.loads(attributes["measures"]))
