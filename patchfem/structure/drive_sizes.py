@@ -154,7 +154,7 @@ def is_release(drive) -> bool:
     return len(drive.segments) == 1 and find_max_acceleration(drive) == 0
 
 
-def choose_samples_per_cycle(drive, cycles: float, *, needs_history: bool = False) -> int:
+def choose_samples_per_cycle(drive, cycles: float) -> int:
     """Return the number of equally spaced samples per cycle that are stored for all cycles.
 
     They are `SAMPLES_PER_CYCLE`, or fewer so that the run has at most `MAX_STORED_SAMPLES`. They are 0, so that
@@ -165,10 +165,8 @@ def choose_samples_per_cycle(drive, cycles: float, *, needs_history: bool = Fals
     drive
     cycles : float
         Drive cycles of the run.
-    needs_history : bool
-        Whether a measure needs the history of the whole run, so that it is stored under a drive too.
     """
-    if not (needs_history or is_release(drive)):
+    if not is_release(drive):
         return 0
     count = int(min(SAMPLES_PER_CYCLE, MAX_STORED_SAMPLES / max(cycles, 1e-300)))
     return count if count >= MIN_SAMPLES_PER_CYCLE else 0
