@@ -33,7 +33,7 @@ class Joints(NamedTuple):
 
     laws: tuple = ()
     elements: tuple = ()
-    contact: object = None
+    contact: "joints.Joint | None" = None
     stick_tolerance: float = 0.0
 
     @property
