@@ -142,8 +142,7 @@ def with_static_measures(patches, tolerance: float | None, points=None) -> tuple
     patches : sequence of Patch or None
         One patch on meshes from fine to coarse; None where there is no such mesh.
     tolerance : float or None
-        Measures that miss it are extrapolated if the mesh is automatic (`PatchMesh`); a tolerance
-        of the mesh itself takes its place.
+        Measures that miss it are extrapolated if the mesh is automatic (`PatchMesh`).
     points : PointSolution, optional
         Solution on the points of a profile, added to the finest patch.
 
@@ -155,8 +154,7 @@ def with_static_measures(patches, tolerance: float | None, points=None) -> tuple
     fine, *coarse = patches
     if points is not None:
         fine = replace(fine, points=points, averaging=points.spacing)
-    mesh = fine.model.mesh
-    used_tolerance = (mesh.tolerance or tolerance) if mesh.is_automatic else None
+    used_tolerance = tolerance if fine.model.mesh.is_automatic else None
     measures = estimate_static_measures(fine, *coarse, tolerance=used_tolerance)
     return replace(fine, measures=measures), *coarse
 

@@ -51,7 +51,6 @@ def solve_with_coarser(patch_model, tolerance: float, estimate: bool = True) -> 
         has the static measures with the errors that follow from all of them (`Patch.measures`).
     """
     mesh = patch_model.mesh
-    tolerance = mesh.tolerance or tolerance
     if mesh.shared is None:
         if mesh.is_automatic:
             return solve_on_refined_meshes(patch_model, tolerance, estimate)
@@ -243,7 +242,7 @@ def solve_on_static_meshes(patch_model, tolerance: float, estimate: bool = True)
     ):
         return ()
     static = patch_model.with_mesh(is_static=True, slip=None)
-    return solve_on_refined_meshes(static, patch_model.mesh.tolerance or tolerance, estimate)
+    return solve_on_refined_meshes(static, tolerance, estimate)
 
 
 def resolves_slip_work(patch_model, patches, tolerance: float) -> bool:

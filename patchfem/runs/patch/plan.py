@@ -61,8 +61,8 @@ def count_unknowns(model: Model) -> dict:
     points = 0
     nodes = 0
     for patch in patches.values():
-        tolerance = patch.mesh.tolerance or model.accuracy.tolerance
-        finest = [body for body in _predict_mesh_levels(patch, tolerance)[0] if body is not None]
+        levels = _predict_mesh_levels(patch, model.accuracy.tolerance)
+        finest = [body for body in levels[0] if body is not None]
         points += finest[0].x.size
         nodes += sum(body.n_nodes for body in finest)
     return {"interface_points": points, "elastic_unknowns_about": 2 * nodes}

@@ -54,7 +54,6 @@ def geometry_key(patch_model) -> tuple:
         mesh.edge_motion,
         file,
         modification_time,
-        mesh.tolerance,
         gap.jumps,
         gap.profile,
         gap.average,
@@ -82,7 +81,6 @@ def choose_shared_meshes(
     patch_model = patches[0]
     if not patch_model.mesh.is_automatic:
         return name_shared_meshes(mesh_levels.make_file_meshes(patch_model))
-    tolerance = patch_model.mesh.tolerance or tolerance
     cases, are_all_patches = select_distinct_patches(patches)
     load_variants = chain.from_iterable(map(grids.make_load_variants, cases))
     has_partial_slip = any(patch.interface.partial_slip for patch in patches)
