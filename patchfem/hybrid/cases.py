@@ -1,6 +1,6 @@
 """Arrays of a case from modes, interfaces and a drive, and a whole case from the records of a rig or bench."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -88,13 +88,6 @@ class Case:
     samples: np.ndarray
     n_friction: int
     first_stiffness: float = 0.0
-
-    def with_tolerance(self, rtol: float, step_ratio: float = 1.0) -> "Case":
-        """Return the case with another step tolerance and a longest step that is longer by a factor."""
-        settings = self.rig.settings.copy()
-        settings[Setting.RTOL] = rtol
-        settings[Setting.LONGEST_STEP] *= step_ratio
-        return replace(self, rig=self.rig._replace(settings=settings))
 
 
 class Options(NamedTuple):

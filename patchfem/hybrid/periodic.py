@@ -1,7 +1,6 @@
 """Periodic motions by Newton's method on the map of a period (shooting), and their Floquet multipliers.
 
-The unknowns are the modes, the states of the laws, and those reversal points of the laws that the period moves. A free
-limit cycle has its period as one more unknown, and an output that is at rest at the start as one more equation.
+The unknowns are the modes, the states of the laws, and those reversal points of the laws that the period moves.
 """
 
 from dataclasses import replace
@@ -10,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from .cases import Case, make_batch
-from .records import N_FACE_INTEGRALS, N_INTEGRALS, Clock, Memory, Mode, Setting, State
+from .records import N_FACE_INTEGRALS, N_INTEGRALS, Clock, Memory, Setting, State
 from .runs import Batch, run_batch
 
 MIN_DIFFERENCE = (
@@ -66,14 +65,13 @@ class PeriodicMotion(NamedTuple):
 
     @property
     def is_stable(self) -> bool:
-        """Whether all multipliers are within the unit circle; that of the phase of a limit cycle is 1."""
+        """Whether all multipliers are within the unit circle."""
         return bool(np.abs(self.multipliers).max(initial=0.0) < MAX_STABLE_MULTIPLIER)
 
 
 def find_periodic_motion(
     case: Case,
     *,
-    is_free: bool = False,
     n_first: int = N_FIRST_CYCLES,
     start: State | None = None,
     has_kinks: bool = False,
@@ -84,8 +82,6 @@ def find_periodic_motion(
     ----------
     case : Case
         Its start is that of the first cycles; its schedule is not used.
-    is_free : bool
-        Whether there is no drive, so that the period is unknown; that of the case is the first estimate.
     n_first : int
         Number of first cycles.
     start : State, optional
@@ -94,7 +90,7 @@ def find_periodic_motion(
         Whether a law has many elements, so that a change of MAX_KINKED_CHANGE counts as none. The derivatives of the
         map are then those between two kinks; stability and error follow from N_CHECKED periods of the motion itself.
     """
-    shooting = _Shooting(case, is_free=is_free)
+    shooting = _Shooting(case)
     if start is not None:
         shooting.state = _copy(start)
     shooting.relax(n_first - 1)
@@ -130,7 +126,7 @@ def find_periodic_motion(
         multipliers,
         shooting.period,
         shooting.n_periods,
-        grows=not is_free and may_grow and _grows_for_ever(case, size),
+        grows=may_grow and _grows_for_ever(case, size),
     )
 
 
@@ -155,8 +151,7 @@ def _grows_for_ever(case: Case, size: float) -> bool:
 class _Shooting:
     """State of a motion at the start of a period, and its map."""
 
-    def __init__(self, case: Case, *, is_free: bool = False):
-        self.is_free = is_free
+    def __init__(self, case: Case):
         self.case = case
         self.state = make_batch([case])[1]
         self.n = case.y.size - N_INTEGRALS - N_FACE_INTEGRALS * case.rig.faces.shape[0]
@@ -166,29 +161,25 @@ class _Shooting:
         # The errors of a period, of the size of the step tolerance, and of the difference are equal.
         self.difference = max(MIN_DIFFERENCE, float(case.rig.settings[Setting.RTOL]) ** 0.5)
 
-    def run(self, states: State | None = None, periods=None, *, has_windows: bool = False) -> Batch:
+    def run(self, states: State | None = None, *, has_windows: bool = False) -> Batch:
         """Advance the motion, or several of them, by a period; the clocks start at 0.
 
         Parameters
         ----------
         states : State, optional
             States of several motions; default: that of this motion, which goes on.
-        periods : sequence of float, optional
-            Period [s] of each motion.
         has_windows : bool
             Whether the measures of the period are computed.
         """
         own = states is None
         states = _copy(self.state) if own else states
-        periods = [self.period] * len(states.y) if periods is None else periods
         states.clock[:] = 0.0
         states.clock[:, Clock.STEP] = 0.1 * self.case.rig.settings[Setting.LONGEST_STEP]
-        one = [
-            replace(self.case, ends=np.array([period]), windows=np.zeros(1), samples=np.zeros(0))
-            for period in periods
-        ]
-        batch = run_batch(one, states=states, has_windows=has_windows)
-        self.n_periods += len(one)
+        ends = np.array([self.period])
+        case = replace(self.case, ends=ends, windows=np.zeros(1), samples=np.zeros(0))
+        count = len(states.y)
+        batch = run_batch([case] * count, states=states, has_windows=has_windows)
+        self.n_periods += count
         if own:
             self.state = batch.states
         return batch
@@ -309,27 +300,20 @@ class _Shooting:
     def _compute_slopes(self, before: State, columns, scale, end) -> np.ndarray:
         """Return the derivatives (k, k) of the map of a period with respect to the unknowns, by differences.
 
-        A free motion has a column more, the derivative with respect to the period. `end` is the end of the period.
+        `end` is the end of the period.
         """
-        states = _repeat(before, columns.size + self.is_free)
+        states = _repeat(before, columns.size)
         packed = _pack(states, self.n)
         steps = self.difference * scale
         packed[np.arange(columns.size), columns] += steps
         _unpack(states, packed, self.n)
-        periods = [self.period] * columns.size + [
-            self.period * (1 + self.difference)
-        ] * self.is_free
-        after = _pack(self.run(states, periods).states, self.n)
-        slopes = (after - end)[:, columns].T
-        slopes[:, : columns.size] /= steps
-        if self.is_free:
-            slopes[:, -1] /= self.difference * self.period
-        return slopes
+        after = _pack(self.run(states).states, self.n)
+        return (after - end)[:, columns].T / steps
 
     def find_multipliers(self, before: State) -> tuple[np.ndarray, float]:
         """Return the eigenvalues of the map of a period from a state, and the largest part of the next Newton step."""
         columns, change, slopes, scale = self._differentiate(before)
-        square = slopes[:, : columns.size] * scale / scale[:, None]
+        square = slopes * scale / scale[:, None]
         if not np.isfinite(square).all():
             return np.full(columns.size, np.nan), np.inf
         # A state that nothing determines, such as that of an interface at rest, has no error.
@@ -339,31 +323,16 @@ class _Shooting:
     def correct(self, before: State) -> None:
         """Replace the state by a Newton step from another one, which a period takes to it."""
         columns, change, slopes, scale = self._differentiate(before)
-        count = columns.size
-        matrix = slopes[:, :count] * scale / scale[:, None]
-
-        # Newton step for a state that a period does not change.
-        system = np.eye(count) - matrix
-        right = change / scale
-        if self.is_free:
-            n_modes = self.case.rig.modes.shape[1]
-            row = np.zeros(count)
-            row[n_modes : 2 * n_modes] = self.case.rig.modes[Mode.OUTPUT]
-            column = -slopes[:, -1:] * self.period / scale[:, None]
-            system = np.block([[system, column], [row, np.zeros((1, 1))]])
-            speed = row @ (before.y[0, columns[:count].clip(max=self.n - 1)] / scale)
-            right = np.append(right, -speed)
-
-        # Singular where a state does not matter, such as bonds that have long been forgotten.
-        step = np.linalg.lstsq(system, right, rcond=1e-13)[0]
-        if self.is_free:
-            self.period *= 1 + float(np.clip(step[-1], -0.2, 0.2))
+        # Newton step for a state that a period does not change. The matrix is singular where a state does not matter, such
+        # as bonds that have long been forgotten.
+        matrix = slopes * scale / scale[:, None]
+        step = np.linalg.lstsq(np.eye(columns.size) - matrix, change / scale, rcond=1e-13)[0]
 
         # Regimes are those at the end of the period, where the motion has brought them.
         start = _pack(before, self.n)
         state = _copy(self.state)
         packed = _pack(state, self.n)
-        packed[0, columns] = start[0, columns] + step[:count] * scale
+        packed[0, columns] = start[0, columns] + step * scale
         _unpack(state, packed, self.n)
         self.state = state
 

@@ -283,12 +283,6 @@ def estimate_errors(values: dict, coarse: dict, rtol: float) -> dict:
     return errors
 
 
-def with_larger_steps(case: Case) -> Case:
-    """Return the case of the comparison run, with larger steps."""
-    rtol = float(case.rig.settings[Setting.RTOL])
-    return case.with_tolerance(COARSE * rtol, COARSE_STEP)
-
-
 def run_case(
     case: Case,
     *,

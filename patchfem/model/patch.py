@@ -222,8 +222,6 @@ class PatchMesh:
     - is_static: whether no part of the patch moves, so that all the time goes into the mesh.
     - edge_motion: cause of a motion of the edges of the contact: ``"load"``, ``"wear"`` or ``""``.
     - shared: meshes that serve all cases of a sweep.
-    - can_gather_points: whether no fields of the motion are needed, so that few points may
-      represent the patch.
     - slip: slide whose partial slip the mesh has to resolve.
     - n_finer: halvings of the elements beyond those that the static measures need.
     """
@@ -233,7 +231,6 @@ class PatchMesh:
     is_static: bool = False
     edge_motion: str = ""
     shared: SharedMeshes | None = None
-    can_gather_points: bool = False
     slip: PrescribedSlip | None = None
     n_finer: int = 0
 

@@ -26,7 +26,6 @@ PUBLIC = {
         "N_SHEAR_MODES",
         "comparison_mode_count",
         "find_sufficient_modes",
-        "find_fewest_gauss_points",
         "jenkins_set",
         "scale_limits",
     ),

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..friction.bonds.parameters import Bonds
-from .shear_modes import N_SHEAR_MODES, find_fewest_modes, find_sufficient_modes, shear_modes
+from .shear_modes import N_SHEAR_MODES, find_sufficient_modes, shear_modes
 
 
 class ShearFields(NamedTuple):
@@ -72,9 +72,7 @@ def point_fields(patch, shear, snapshots) -> ShearFields:
     return ShearFields(traction, local_slip)
 
 
-def bond_shear_modes(
-    patch, law: Bonds, count: int | None, tolerance: float, *, fewest: bool = False, sigma=None
-):
+def bond_shear_modes(patch, law: Bonds, count: int | None, tolerance: float, *, sigma=None):
     """Return the ShearModes of a pressed patch whose nodes follow a bond law.
 
     The friction limit [N] of a node is mu_s sigma_n times its area. Its bonds are springs in series with the pieces.
@@ -89,8 +87,6 @@ def bond_shear_modes(
         Number of modes; None to determine it from the tolerance.
     tolerance : float
         Largest error of the backbone / friction limit.
-    fewest : bool
-        Whether to search for the smallest number of modes, instead of doubling the number.
     sigma : (m,) ndarray, optional
         Pressure [Pa] that replaces that of the patch.
 
@@ -103,8 +99,6 @@ def bond_shear_modes(
     weakening = 1 / law.ratio if law.ratio > 0 else np.inf
     if count is not None:
         return shear_modes(patch.slip_compliance, limit, law.length, count, weakening)
-    if fewest:
-        return find_fewest_modes(patch.slip_compliance, limit, law.length, tolerance, weakening)
     return find_sufficient_modes(
         patch.slip_compliance, limit, law.length, N_SHEAR_MODES, tolerance, weakening
     )

@@ -31,11 +31,6 @@ MAX_SORTING_PASSES = 2
 # Number of modes with which a reduction starts; without an asperity layer its error is 1e-6 of the
 # friction limit
 N_SHEAR_MODES = 4
-N_REFERENCE_MODES = 16  # smallest number of modes of the reference for an error
-# Largest error of an accepted reduction relative to the tolerance; modes beyond the reference cause
-# the rest of the error
-MODE_ERROR_FRACTION = 0.8
-GAUSS_POINT_COUNTS = (16, 32, 64)  # numbers of Gauss points that may represent the nodes of a patch
 # Largest backward motion of a node in a Newton step, in bond lengths; the law there is exp(2) times
 # as steep as at rest
 MAX_BACKWARD_LENGTHS = 2.0
@@ -141,36 +136,24 @@ class Spectrum:
         """Backbones that have been computed, by number of modes."""
         return {}
 
-    def backbone(self, count: int, shape=None, limit=None) -> np.ndarray:
+    def backbone(self, count: int) -> np.ndarray:
         """Compute the friction force [N] of the first `count` modes at `displacements`.
 
         Newton's method starts from the cached backbone with the largest number of modes up to `count`.
-
-        Parameters
-        ----------
-        count : int
-            Number of modes.
-        shape : (k, count) ndarray, optional
-            Shapes of the modes at other points than the nodes.
-        limit : (k,) ndarray, optional
-            Friction limits [N] of these points.
         """
         count = min(count, self.compliance.size)
-        if shape is None and count in self.cache:
+        if count in self.cache:
             return self.cache[count].force
         n_cached = max((number for number in self.cache if number <= count), default=0)
         start = np.zeros((self.displacements.size, count))
         if n_cached:
             start[:, :n_cached] = self.cache[n_cached].coordinates
-        is_own = shape is None
-        if is_own:
-            shape = self.shape[:, :count]
-            limit = self.limit
+        shape = self.shape[:, :count]
         with use_one_blas_thread(), np.errstate(over="ignore", invalid="ignore"):
             backbone = _solve_backbone(
-                limit, shape, self.compliance[:count], self.length, self.displacements, start
+                self.limit, shape, self.compliance[:count], self.length, self.displacements, start
             )
-        if is_own and np.isfinite(backbone.force).all():
+        if np.isfinite(backbone.force).all():
             self.cache[count] = backbone
         return backbone.force
 
@@ -495,162 +478,12 @@ def find_sufficient_modes(
     return modes
 
 
-def find_fewest_modes(
-    tangential: np.ndarray,
-    limit: np.ndarray,
-    bond_length: float,
-    tolerance: float,
-    weakening: float = 1.0,
-    max_modes: int = 64,
-) -> ShearModes:
-    """Return the smallest set of modes, at least two, whose backbone meets a tolerance.
-
-    The reference has four times as many modes, and at least N_REFERENCE_MODES. The difference may be
-    MODE_ERROR_FRACTION of the tolerance.
-
-    Parameters
-    ----------
-    tangential : (m, m) ndarray
-        Compliance C [m/N].
-    limit : (m,) ndarray
-        Friction limits D [N]; the bonds of a node have the stiffness limit/bond_length.
-    bond_length : float
-        Bond length [m].
-    weakening : float
-        Static / kinetic friction coefficient.
-    tolerance : float
-        Largest error of the backbone / friction limit.
-    max_modes : int
-        Largest number of modes.
-
-    Returns
-    -------
-    ShearModes
-    """
-    spectrum = _make_spectrum(tangential, limit, bond_length, weakening)
-    for count in range(2, max_modes):
-        # The backbone of a few modes is the initial guess for that of the reference.
-        backbone = spectrum.backbone(count)
-        reference = spectrum.backbone(max(N_REFERENCE_MODES, 4 * count))
-        error = spectrum.relative_difference(reference, backbone)
-        if error <= MODE_ERROR_FRACTION * tolerance:
-            return spectrum.modes(count)
-    return spectrum.modes(max_modes)
-
-
 def comparison_mode_count(count: int) -> int:
     """Return the number of modes for a second run, which is compared to estimate the error of `count` modes.
 
     It is half as many. Of two or three modes of a symmetric patch only the first acts, so it is then four times as many.
     """
     return count // 2 if count >= N_SHEAR_MODES else 4 * count
-
-
-class GaussModes(NamedTuple):
-    """Modes at Gauss points that represent the nodes.
-
-    - modes: shear modes, whose `points` are the indices 0 to k - 1 of the Gauss points
-    - limit (k,): friction limits [N] of the Gauss points
-    - error: largest error of the backbone / friction limit
-    """
-
-    modes: ShearModes
-    limit: np.ndarray
-    error: float
-
-
-def find_fewest_gauss_points(modes: ShearModes, x: np.ndarray, tolerance: float) -> GaussModes:
-    """Return the modes at the smallest number of Gauss points that meets a tolerance.
-
-    All nodes are kept if the rule would need more than half as many points. Traction and slip of the nodes cannot be
-    recovered from Gauss points.
-
-    Parameters
-    ----------
-    modes : ShearModes
-        Modes at the a nodes.
-    x : (a,) ndarray
-        Positions [m] of the nodes.
-    tolerance : float
-        Largest error of the backbone / friction limit.
-
-    Returns
-    -------
-    GaussModes
-    """
-    for count in GAUSS_POINT_COUNTS:
-        if 2 * count > x.size:
-            break
-        on_gauss = modes_at_gauss_points(modes, x, count)
-        if on_gauss.error <= tolerance:
-            return on_gauss
-    every_point = frozen_array(np.arange(x.size), np.int64)
-    return GaussModes(replace(modes, points=every_point), modes.spectrum.limit, 0.0)
-
-
-def modes_at_gauss_points(modes: ShearModes, x: np.ndarray, count: int) -> GaussModes:
-    """Return the modes at `count` points of the Gauss rule whose weight is the friction limit.
-
-    Parameters
-    ----------
-    modes : ShearModes
-        Modes at the a nodes.
-    x : (a,) ndarray
-        Positions [m] of the nodes.
-    count : int
-        Number of Gauss points.
-
-    Returns
-    -------
-    GaussModes
-    """
-    spectrum = modes.spectrum
-    n_modes = modes.stiffness.size
-    positions, limit = reduce_to_gauss_points(x, spectrum.limit, count)
-    shape = np.stack([np.interp(positions, x, mode) for mode in modes.shape.T], axis=1)
-    error = spectrum.relative_difference(
-        spectrum.backbone(n_modes), spectrum.backbone(n_modes, shape, limit)
-    )
-    points = frozen_array(np.arange(count), np.int64)
-    return GaussModes(replace(modes, points=points, shape=frozen_array(shape)), limit, error)
-
-
-def reduce_to_gauss_points(
-    x: np.ndarray, weight: np.ndarray, count: int
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return a few points and weights whose weighted sum of a function equals that over many given points.
-
-    It is exact for polynomials up to the degree 2 count - 1, as Gauss's rule is for an integral. The points follow from
-    Lanczos' method, in which each vector is made orthogonal to all previous ones.
-
-    Parameters
-    ----------
-    x, weight : (a,) ndarray
-        Positions and weights > 0 of the given points.
-    count : int
-        Number k of points of the rule.
-
-    Returns
-    -------
-    positions, weights : (k,) ndarray
-        In the units of `x` and `weight`.
-    """
-    scaled = 2 * (x - x.mean()) / np.ptp(x)
-    total = weight.sum()
-    basis = [np.sqrt(weight / total)]
-    diagonal = []
-    off_diagonal = []
-    for _ in range(count):
-        new = scaled * basis[-1]
-        diagonal.append(new @ basis[-1])
-        # The orthogonalization is repeated because rounding errors of the first pass remain.
-        for _ in range(2):
-            new = new - np.array(basis).T @ (np.array(basis) @ new)
-        off_diagonal.append(np.linalg.norm(new))
-        basis.append(new / off_diagonal[-1])
-    sides = np.diag(off_diagonal[:-1], 1)
-    positions, vectors = np.linalg.eigh(np.diag(diagonal) + sides + sides.T)
-    return x.mean() + positions * np.ptp(x) / 2, total * vectors[0] ** 2
 
 
 class _Backbone(NamedTuple):

@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
-from hybrid_cases import coulomb, make_modes, make_oscillator
+from hybrid_cases import coulomb, make_oscillator
 
-from patchfem.hybrid import cases, drives, runs
+from patchfem.hybrid import runs
 from patchfem.hybrid.laws import masing
 from patchfem.hybrid.periodic import find_periodic_motion
 from patchfem.hybrid.records import LawNumbers, Memory, Window
@@ -62,26 +62,3 @@ def test_multipliers_of_a_linear_rig():
     multipliers = find_periodic_motion(case).multipliers
     exact = np.exp((-zeta + 1j * np.sqrt(1 - zeta**2) * np.array([1, -1])) * 2 * np.pi / omega)
     assert np.sort_complex(multipliers) == pytest.approx(np.sort_complex(exact), abs=1e-5)
-
-
-def test_unstable_limit_cycle_of_flutter_and_friction():
-    """A mode of negative damping holds by friction on a cycle of amplitude close to 2 mu N/(pi |zeta|), and unstable."""
-    zeta, limit = -0.01, 0.05
-    modes = make_modes(zeta=zeta)
-    signal = drives.make_tones([], 2 * np.pi)
-    interface = cases.Interface(LawNumbers("tanh", (limit, 0.02)), cases.Load(1.0), np.ones(1))
-    rig = cases.make_rig(modes, signal, [interface], (1.0, 1.0), cases.Options(rtol=1e-9))
-    guess = 2 * limit / (np.pi * abs(zeta))
-
-    class Start:
-        z = np.array([1.02 * guess])
-        v = np.zeros(1)
-
-    schedule = cases.make_schedule(1, signal.period, 1)
-    case = cases.Case(rig, cases.make_start(rig, [interface], Start), *schedule, np.zeros(0), 1)
-    cycle = find_periodic_motion(case, is_free=True, n_first=0)
-    assert cycle.change < cycle.tolerance
-    assert cycle.batch.windows[0][AMPLITUDE][0] == pytest.approx(guess, rel=2e-2)
-    assert not cycle.is_stable
-    # The multipliers are finite differences of motions with the step tolerance 1e-9.
-    assert np.abs(np.abs(cycle.multipliers) - 1).min() < 5e-4

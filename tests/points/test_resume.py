@@ -27,6 +27,7 @@ from scene_texts import (
 )
 
 from patchfem import new
+from patchfem.export import run_folder
 from patchfem.export.folder import is_state
 from patchfem.points import checkpoint, time_march
 from patchfem.runs import refine
@@ -153,9 +154,9 @@ def test_exact_run_is_resumed_in_its_second_pass(tmp_path, save_counter, monkeyp
     assert_same_results(tmp_path / "out", tmp_path / "whole")
 
 
-def test_refuses_to_resume_from_other_or_damaged_state(tmp_path, save_counter):
-    """A saved state of another scene or a damaged one is refused with a message. A complete run is
-    reported as complete."""
+def test_refuses_to_resume_from_other_or_damaged_state(tmp_path, save_counter, monkeypatch):
+    """A saved state of another scene, of another version or a damaged one is refused with a message. A
+    complete run is reported as complete."""
     scene = tmp_path / "scene.toml"
     scene.write_text(RIGS["one slide"], "utf-8")
     command = ("run", scene, "--no-page", "-o", tmp_path / "out", "--resume")
@@ -171,6 +172,10 @@ def test_refuses_to_resume_from_other_or_damaged_state(tmp_path, save_counter):
     state = tmp_path / "out.partial" / "march_1.npz"
     for change in ("friction.static=0.31", "drive.cycles=20", "accuracy.steps_per_cycle=80"):
         answer = run_cli(*command, "--set", change)
+        assert answer.code == 2 and "belongs to another scene or to another version" in answer.err
+    with monkeypatch.context() as other:
+        other.setattr(run_folder, "__version__", "1.0.0")
+        answer = run_cli(*command)
         assert answer.code == 2 and "belongs to another scene or to another version" in answer.err
     data = state.read_bytes()
     for damaged in (data[:-100], b"", b"PK nothing", data[:2000]):

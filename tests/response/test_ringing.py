@@ -75,6 +75,27 @@ def test_exact_strongest_of_several_ringings_is_found(modes):
     assert fit_ringing(t, value, 3.0).frequency == pytest.approx(modes[0][0], rel=1e-6)
 
 
+SIGNALS_WITHOUT_RINGING = {
+    "forced motion alone": lambda t: make_signal(t, 20.0, 1.0, 0.0, size=0.0),
+    "noise": lambda t: (
+        make_signal(t, 20.0, 50.0, 0.01) + 0.2 * np.random.default_rng(3).normal(size=t.size)
+    ),
+    "harmonic of the drive": lambda t: make_signal(t, 20.0, 60.0, 0.0),
+    "overdamped": lambda t: make_signal(t, 20.0, 30.0, 0.7),
+    "growing": lambda t: make_signal(t, 20.0, 50.0, -0.1),
+    "one period": lambda t: make_signal(t, 0.0, 2 * np.pi, 0.05),
+    "few samples": lambda t: make_signal(t, 20.0, 400.0, 0.01)[:15],
+}
+
+
+@pytest.mark.parametrize("name", SIGNALS_WITHOUT_RINGING)
+def test_signal_without_ringing_has_no_fit(name):
+    """Neither forced motion nor a vibration in noise, that grows, is damped too much or is too short counts as ringing."""
+    t = np.linspace(0, 1.0, 301)
+    value = SIGNALS_WITHOUT_RINGING[name](t)
+    assert fit_ringing(t[: value.size], value, 20.0) is None
+
+
 def test_exact_ringing_error_covers_noise():
     """In 1 % noise, the errors of at least 38 of 40 fits cover the true frequency; their median is below 0.02."""
     source = np.random.default_rng(7)

@@ -14,8 +14,8 @@ from slip_paths import draw_paths, jenkins_forces
 from patchfem.contact import tangential_stiffness
 from patchfem.contact.gaps import crown, tilt
 from patchfem.core import PatchfemError
-from patchfem.slip import find_fewest_gauss_points, jenkins_set, scale_limits
-from patchfem.slip.shear_modes import find_fewest_modes, shear_modes
+from patchfem.slip import jenkins_set, scale_limits
+from patchfem.slip.shear_modes import shear_modes
 
 MU = 0.3
 
@@ -229,32 +229,6 @@ def test_exact_all_shear_modes_reproduce_compliance(angle):
         assert solve_with_modes(modes, limit, 1e-6, slide) == pytest.approx(reference, rel=1e-12)
 
 
-@pytest.mark.parametrize("angle", [1e-4])
-def test_always_reduced_points_preserve_backbone(angle):
-    """16 or 32 integration points reproduce the backbone within 2e-5 of the friction limit at 72
-    slides, three times as many as were used to choose them. With a tolerance of 1e-16 all points
-    remain."""
-    pair = make_coated_pair(200)
-    limit = friction_limit(200, angle)
-    modes = shear_modes(pair.tangential, limit, 1e-6, 4)
-    reduced, reduced_limit, _ = find_fewest_gauss_points(
-        modes, pair.interface.x[modes.points], 1e-5
-    )
-    assert reduced.points.size in (16, 32) and reduced_limit.sum() == pytest.approx(
-        limit.sum(), rel=1e-12
-    )
-    for slide in 8e-6 * (np.arange(1, 73) / 72) ** 2:
-        reference = solve_with_modes(modes, limit, 1e-6, slide)
-        assert (
-            abs(solve_with_modes(reduced, reduced_limit, 1e-6, slide) - reference)
-            <= 2e-5 * limit.sum()
-        )
-    unreduced, unreduced_limit, _ = find_fewest_gauss_points(
-        modes, pair.interface.x[modes.points], 1e-16
-    )
-    assert unreduced.shape is modes.shape and (unreduced_limit == limit[modes.points]).all()
-
-
 def test_refuses_unstable_slip_weakening():
     """Slip weakening above the stability limit of the patch is refused, and just below the limit it
     is accepted."""
@@ -281,19 +255,3 @@ def test_refuses_patch_without_friction():
     """A patch whose friction limit is zero at every point is refused."""
     with pytest.raises(PatchfemError, match="the friction limit is 0 at every point"):
         jenkins_set(make_coated_pair(40).tangential, np.zeros(41))
-
-
-@pytest.mark.parametrize("angle", [1e-4])
-@pytest.mark.parametrize("tolerance", [1e-4, 1e-6])
-def test_always_number_of_modes_is_minimal(angle, tolerance):
-    """The chosen number of modes meets the tolerance, and one mode less does not (within a factor
-    of 1.3)."""
-    pair = make_coated_pair(100)
-    limit = friction_limit(100, angle)
-    modes = find_fewest_modes(pair.tangential, limit, 1e-6, tolerance)
-    count = modes.stiffness.size
-    fewer = shear_modes(pair.tangential, limit, 1e-6, count - 1)
-    assert modes.backbone_error <= tolerance and (
-        count == 2 or tolerance < 1.3 * fewer.backbone_error
-    )
-    np.testing.assert_allclose(modes.shape, shear_modes(pair.tangential, limit, 1e-6, count).shape)

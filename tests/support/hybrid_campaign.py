@@ -12,8 +12,8 @@ from motion_laws import LAWS, PressedSpringsLaw
 from motion_read import compute_measures, evaluate_state
 from motion_reference import ModalSystem, Motion
 
-from patchfem.hybrid import runs
-from patchfem.hybrid.records import Setting, Status
+from patchfem.hybrid import cases, runs
+from patchfem.hybrid.records import Status
 
 REFERENCE_ERROR = 1e-6  # relative
 ZERO = 1e-12  # relative to the values that the drive alone would give
@@ -151,10 +151,11 @@ def integrate(spec: dict, rtol: float = 1e-9) -> dict:
     return measures | {"friction_work": evaluate_state(pieces, end)[-1]}
 
 
-def find_errors(case, values: dict) -> dict:
-    """Return the errors of the measures of a case, from a run with larger steps."""
-    rough = runs.run_case(runs.with_larger_steps(case)).values
-    return runs.estimate_errors(values, rough, float(case.rig.settings[Setting.RTOL]))
+def find_errors(spec: dict, values: dict) -> dict:
+    """Return the errors of the measures of a spec at the default tolerance, from a run with larger steps."""
+    rtol = cases.DEFAULT_RTOL
+    coarse = make_case(spec, runs.COARSE * rtol, cases.MIN_STEPS / runs.COARSE_STEP)
+    return runs.estimate_errors(values, runs.run_case(coarse).values, rtol)
 
 
 def compare_rig(seed: int, folder, earlier) -> dict:
@@ -163,7 +164,7 @@ def compare_rig(seed: int, folder, earlier) -> dict:
     begin = process_time()
     case = make_case(spec)
     motion = runs.run_case(case)
-    errors = find_errors(case, motion.values)
+    errors = find_errors(spec, motion.values)
     line = {
         "seconds": process_time() - begin,
         "engine": "hybrid",

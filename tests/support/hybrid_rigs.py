@@ -158,7 +158,11 @@ def make_interface_law(face: dict) -> LawNumbers:
     return make_law(SimpleNamespace(**keys), face["load"], 1.0, varies=varies)
 
 
-def make_case(spec: dict, rtol: float = cases.DEFAULT_RTOL, samples=()) -> cases.Case:
+def make_case(
+    spec: dict,
+    rtol: float = cases.DEFAULT_RTOL,
+    n_steps: float = cases.MIN_STEPS,
+) -> cases.Case:
     """Return the case of a spec."""
     modes = make_basis(spec)
     if spec["rows"] is not None:
@@ -178,9 +182,9 @@ def make_case(spec: dict, rtol: float = cases.DEFAULT_RTOL, samples=()) -> cases
         )
         interfaces.append(cases.Interface(make_interface_law(face), load, slide))
     size = spec["length"]
-    options = cases.Options(spec["kind"] != "release", rtol=rtol)
+    options = cases.Options(spec["kind"] != "release", rtol=rtol, n_steps=n_steps)
     rig = cases.make_rig(modes, signal, interfaces, (size, size * spec["omega"][0]), options)
     window = int(max(1, min(10, spec["cycles"] // 10)))
     schedule = cases.make_schedule(spec["cycles"], spec["period"], window)
     start = cases.make_start(rig, interfaces, SimpleNamespace(z=spec["z"], v=spec["v"]))
-    return cases.Case(rig, start, *schedule, np.asarray(samples, float), len(interfaces))
+    return cases.Case(rig, start, *schedule, np.zeros(0), len(interfaces))

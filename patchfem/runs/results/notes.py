@@ -16,9 +16,9 @@ from .result import Advice
 
 # Largest relative difference of the friction works from samples and from energies without a
 # warning.
-# Smallest ratio of created to exchanged energy of which a warning tells.
-MIN_CREATED_FRACTION = 1e-6
 MAX_WORK_CHECK = 1e-3
+# Largest ratio of created to exchanged energy without a warning.
+MAX_CREATED_FRACTION = 1e-6
 # Largest ratio of the slip during the formation of a bond to the bond length without a warning.
 MAX_FORMING_RATIO = 0.3
 # Smallest excess of the friction force over mu_s N, relative to it, that a note reports.
@@ -260,7 +260,7 @@ def warn_of_created_energy(model, created: float, exchanged: float) -> list:
     """
     if model.friction is None or model.friction.reading != "report":
         return []
-    if created <= MIN_CREATED_FRACTION * exchanged:
+    if created <= MAX_CREATED_FRACTION * exchanged:
         return []
     return [
         f"the law as printed in the report created {created:.3g} J, which is {100 * created / exchanged:.2g} % of the work "

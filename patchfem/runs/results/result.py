@@ -289,7 +289,7 @@ def can_estimate_mesh_error(model, patch, coarse) -> bool:
 def collect_used_settings(result) -> dict:
     """Return a dict of the numerical settings that a run used.
 
-    These are the engine, the steps per cycle or the step tolerance, cycles and window, shear modes
+    These are the engine, the steps per cycle or the harmonics, the cycles of the window, shear modes
     or elements of the pieces, the summation method for bonds, nodes and strips of the patch, and
     the averaging length [m] of its profile. map: "events" or "yields", the map by which the steady
     motion was found.
@@ -305,8 +305,6 @@ def collect_used_settings(result) -> dict:
     if steps is not None:
         settings["steps_per_cycle"] = int(steps)
     settings |= {name: int(extra[name]) for name in COUNT_SETTINGS if extra.get(name) is not None}
-    if (local := extra.get("step_tolerance")) is not None:
-        settings |= {"step_tolerance": float(local), "steps": int(extra["steps_taken"])}
     if (summed := extra.get("quadrature")) is not None:
         settings["quadrature"] = summed
     if (window := extra.get("window")) is not None:

@@ -1,4 +1,4 @@
-"""Steps and CPU times of the engines of a rig, for the choice of an engine and for refusals, and memory of histories.
+"""Steps and CPU times of the engines of a rig, for the choice of an engine and for refusals.
 
 In: a Model. Out: numbers of steps, CPU times, and reasons for a time integration with constant steps
 instead of steps from event to event.

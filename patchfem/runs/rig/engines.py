@@ -189,7 +189,7 @@ def _list_march_space_runs(model: Model, numerics, patch, coarse, solution) -> l
 
     - a coarser mesh, if the run has a coarser patch and its load varies or it slips in part;
     - another number of shear modes, if the load varies, the slide goes over grooves, or a law with bonds
-      acts at the nodes of a patch that is not reduced to a few points;
+      acts at the nodes of a patch;
     - other settings of a bond summation, see `_list_bond_sum_runs`.
     """
     quarter = _divide_steps(numerics, 4)
@@ -204,12 +204,8 @@ def _list_march_space_runs(model: Model, numerics, patch, coarse, solution) -> l
         meshes = [coarser, *meshes]
     coarser_runs = [CoarserRuns((mesh,), second_order_errors, quarter, "mesh") for mesh in meshes]
     climbs = model.grooves is not None
-    gathers = model.patch is not None and model.patch.mesh.can_gather_points
-    # A patch that is reduced to a few points has its own error estimate for shear modes.
-    has_points = coarse is not None and not gathers
-    if shape is not None and (
-        varies or climbs or (has_points and law_has_trait(model.friction.law, "bonds"))
-    ):
+    has_node_bonds = coarse is not None and law_has_trait(model.friction.law, "bonds")
+    if shape is not None and (varies or climbs or has_node_bonds):
         coarser = replace(quarter, shear_modes=shear_modes.comparison_mode_count(shape.size))
         coarser_runs.append(CoarserRuns((coarser,), second_order_errors, quarter, "modes"))
     return [*coarser_runs, *_list_bond_sum_runs(model, quarter, patch, solution)]

@@ -35,7 +35,7 @@ def collect_interface_fields(model, numerics, patch, solution) -> dict:
     f = model.friction
     window = solution.window
     # Strips that slide independently have no common shear stress.
-    if model.patch.mesh.can_gather_points or (model.partial_slip and patch.strips is not None):
+    if model.partial_slip and patch.strips is not None:
         return collect_rest_frame(patch)
     if model.rig.friction.load_varies:
         return _collect_varying_load_fields(patch, solution)

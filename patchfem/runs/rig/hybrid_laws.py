@@ -33,7 +33,7 @@ class Joints(NamedTuple):
 
     laws: tuple = ()
     elements: tuple = ()
-    contact: object = None
+    contact: "joints.Joint | None" = None
     stick_tolerance: float = 0.0
 
     @property
@@ -78,7 +78,9 @@ def make_joints(model: Model, numerics: Numerics, patch) -> Joints:
             laws.append((law, Load(float(joint.load))))
     return Joints(
         tuple(laws),
-        tuple(list_elements(model, numerics, patch)) if is_soft else _list_single_elements(laws),
+        tuple(joint.list_elements(speed) for joint in listed)
+        if is_soft
+        else _list_single_elements(laws),
         listed[0] if is_soft and len(listed) == 1 else None,
         _find_stick_tolerance(listed, [law for law, _ in laws]),
     )

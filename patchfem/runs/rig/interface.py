@@ -21,9 +21,6 @@ from .bond_lists import choose_bond_summation
 from .joints import list_joints
 from .numerics import Numerics
 
-# Largest ratio of the error of the backbone curve to the tolerance, in the reduction to few modes
-# and in that to few points.
-REDUCTION_TOL_FRACTION = 1e-3
 # Pressure that is added to each node in the weights of shear modes under a changing load, relative to the mean pressure.
 MIN_PRESSURE_FRACTION = 1.0
 
@@ -132,22 +129,14 @@ def _compute_shear_modes(patch, law, n_modes: int | None, model) -> tuple:
     Both are cached for all runs with the same Patch.
     """
     tolerance = model.accuracy.tolerance
-    has_few_points = model.patch.mesh.can_gather_points
 
     def make() -> tuple:
         """Compute the shear modes, and the normal forces of the points."""
-        if not has_few_points:
-            reduced = fields.bond_shear_modes(patch, law, n_modes, 0.1 * tolerance, fewest=False)
-            force = patch.pressure.sigma_n * patch.pieces.interface.weight
-            return reduced, force[reduced.points]
-        mode_tolerance = REDUCTION_TOL_FRACTION * tolerance
-        reduced = fields.bond_shear_modes(patch, law, n_modes, mode_tolerance, fewest=True)
-        reduced, limit, _ = shear_modes.find_fewest_gauss_points(
-            reduced, patch.x[reduced.points], mode_tolerance
-        )
-        return reduced, limit / law.static
+        reduced = fields.bond_shear_modes(patch, law, n_modes, 0.1 * tolerance)
+        force = patch.pressure.sigma_n * patch.pieces.interface.weight
+        return reduced, force[reduced.points]
 
-    key = ("shear modes", patch, law, n_modes, tolerance, has_few_points)
+    key = ("shear modes", patch, law, n_modes, tolerance)
     return store.get_or_compute(key, make)
 
 

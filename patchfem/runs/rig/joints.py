@@ -13,7 +13,8 @@ from ...friction.laws.stretch import points_element
 from ...friction.protocol import Element
 from ...friction.record import make_law
 from ...model.law import InterfaceLaw, make_bond_parameters
-from ...model.model import Model
+from ...model.model import MIN_RIG_REST_SPEED, Model
+from ...slip import shear_modes
 from ..patch import faces, jenkins_elements
 from . import strips
 
@@ -32,7 +33,7 @@ class Joint(NamedTuple):
     load: float
     stiffness: np.ndarray | None = None
     yields: np.ndarray | None = None
-    reduction: object = None
+    reduction: "shear_modes.JenkinsSet | None" = None
 
     def make_element(self, speed: float) -> Element:
         """Return the Element of the interface; the expected slip speed [m/s] is that of bonds that grow."""
@@ -40,7 +41,7 @@ class Joint(NamedTuple):
             return parallel_element(self.stiffness, self.yields)
         law = self.interface.numbers
         if law_has_trait(law.law, "bonds"):
-            return points_element(make_bond_parameters(law, speed, 1e-12), self.load)
+            return points_element(make_bond_parameters(law, speed, MIN_RIG_REST_SPEED), self.load)
         return make_law(law, self.load).element(self.load)
 
     def list_elements(self, speed: float) -> tuple[np.ndarray, np.ndarray]:

@@ -70,8 +70,6 @@ def march_in_time(model, numerics, patch, frames: int = 0, say=None, progress=No
     slide_apart = rig.friction.strips_slide_apart
     progress = BondListGuard(progress) if has_bond_list(model, numerics) else progress
     travel = find_travel(rig)
-    # The histories of a patch that is reduced to a few points are not used.
-    is_gathered = model.patch is not None and model.patch.mesh.can_gather_points
 
     def integrate(drive, before, watch, is_last, cycles=numerics.cycles):
         """Integrate under a drive from the end of another run, None for the start of the rig."""
@@ -85,7 +83,7 @@ def march_in_time(model, numerics, patch, frames: int = 0, say=None, progress=No
             travel=travel,
             start=rig.start if before is None else before,
             frames=0 if slide_apart or not is_last else frames,
-            keeps_samples=numerics.whole and not is_gathered,
+            keeps_samples=numerics.whole,
             progress=watch,
         )
         if run.outcome is Outcome.EXCEEDS_TRAVEL:

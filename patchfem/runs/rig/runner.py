@@ -61,8 +61,7 @@ class Runner:
         say = None
         if coarser_model is None:
             say = self.inputs.say
-            has_fields = self.inputs.patch is not None and not model.patch.mesh.can_gather_points
-            if has_fields or model.rig.friction.has_partial_slip:
+            if self.inputs.patch is not None or model.rig.friction.has_partial_slip:
                 frames = N_FRAMES
         patch = self.inputs.patch
         if numerics.coarse_patch:
