@@ -43,11 +43,6 @@ def test_always_remedies_of_19_in_20_scenes_have_promised_effect():
     assert len(failed) <= 0.05 * 200
 
 
-def run_text(text: str):
-    """Return the result of a scene."""
-    return run(text)
-
-
 def test_error_without_order_of_convergence_meets_tolerance_with_proposed_steps():
     """The steps of the first three runs are too long for bonds that age, so their results show no
     order. The warning proposes twice the steps, which suffice here."""
@@ -64,10 +59,10 @@ def test_always_unresolved_free_vibration_is_solved_without_prescribed_steps():
     """Steps of 1/800 cycle are too large for a free vibration with 88 periods per cycle. The
     warning advises to leave out method and steps, which reduces the error at least tenfold."""
     loose = "[accuracy]\ntolerance = 0.3\n"
-    marched = run_text(JOINT_SHAKEN + loose + 'method = "march"\nsteps_per_cycle = 200\n')
+    marched = run(JOINT_SHAKEN + loose + 'method = "march"\nsteps_per_cycle = 200\n')
     advice = "leave out accuracy.method and accuracy.steps_per_cycle"
     assert marched.extra["engine"] == "march" and advice in marched.warnings[0]
-    exact = run_text(JOINT_SHAKEN + loose)
+    exact = run(JOINT_SHAKEN + loose)
     errors = [result.measures["equivalent_damping"].error for result in (marched, exact)]
     assert errors[1] < errors[0] / 10
 
