@@ -92,7 +92,7 @@ MODULES_OF_SCENES = {  # run from Python -> text of the scene, modules that are 
     "point on a rig": (
         COULOMB_RIG,
         "hybrid.runs structure.modes",
-        "structure.matrices structure.masses structure.arrays structure.universal structure.modal_fit structure.drives "
+        "structure.matrices structure.masses structure.arrays structure.universal structure.drives "
         "dynamics.harmonic.equations dynamics.harmonic.continuation dynamics.harmonic.steady "
         "points.time_march runs.rig.steady " + " ".join(RIG_KEYS),
     ),

@@ -60,9 +60,9 @@ def import_(
 ):
     """Convert a laboratory file into a table or into the modes of a scene. The table can be used as `drive.file`, as
     `slide.file` and with `fit --to`. The laboratory file may be .uff (datasets 58, with the units of dataset 164),
-    .mat, or .csv with units in its header. Modes are computed from an input and a response, from a free decay, from
-    mode shapes (dataset 55) or from frequency responses. With --decay the table gives frequency and damping ratio of
-    the decay against its amplitude, with 95 % intervals.
+    .mat, or .csv with units in its header. Modes are computed from an input and a response, from a free decay or from
+    mode shapes (dataset 55). With --decay the table gives frequency and damping ratio of the decay against its
+    amplitude, with 95 % intervals.
 
     Example: patchfem import bench.uff --map "force=Load cell [lbf]" --map displacement=12:+x -o loop.csv
     """

@@ -1,7 +1,7 @@
 """Natural modes fitted to the time record of one response, without windows that widen peaks.
 
 The model is that of `sinusoids` with the columns L f_-2 + U f + c, where L and U are the residuals of modes below
-and above the band as in `structure.modal_fit`. The input is assumed to be band-limited, and the response is computed by
+and above the band (Ewins, Modal testing, 2000). The input is assumed to be band-limited, and the response is computed by
 Fourier transform, which is periodic. Free decays of the same modes represent the initial state and the jump between
 the end and the start of the record. Modes are added at the spectral line where the residual depends most on the input.
 """

@@ -55,9 +55,6 @@ PUBLIC = {
         "SI_UNITS",
     ),
     "universal": (
-        "FunctionType",
-        "OrdinateType",
-        "find_axis_scale",
         "find_unit_factors",
         "read_datasets",
     ),

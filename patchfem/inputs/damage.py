@@ -1,6 +1,7 @@
 """Errors for damaged files."""
 
 import struct
+import tokenize
 import zipfile
 import zlib
 from collections.abc import Iterator
@@ -20,6 +21,8 @@ DAMAGE_ERRORS = (
     OSError,
     EOFError,
     struct.error,
+    SyntaxError,  # raised by NumPy for a damaged header, as the next one
+    tokenize.TokenError,
     zipfile.BadZipFile,
     zlib.error,
 )

@@ -230,7 +230,7 @@ def _read_records(file: Path, requests) -> tuple[dict[str, np.ndarray], list[str
 def _read_shapes(
     file: Path, requests: Iterable[str], settings: EstimateOptions
 ) -> measured_modes.ListedModes | None:
-    """Return the modes of mode shapes or frequency responses in a universal file; None for a file of records."""
+    """Return the modes of the mode shapes in a universal file; None for a file of records."""
     names = {text.partition("=")[0].strip() for text in requests}
     is_universal = file.suffix.lower() in laboratory.UNIVERSAL_EXTENSIONS
     if not is_universal or settings != EstimateOptions() or names & set(CHANNEL_UNITS):

@@ -129,7 +129,7 @@ def write_histories(
 def write_response(path: Path, estimate, drive: str, response: str) -> None:
     """Write an estimated frequency response and its coherence.
 
-    Response and reference are at point 1 in direction +x. If the input is a force, structure.file can read the file.
+    Response and reference are at point 1 in direction +x.
 
     Parameters
     ----------

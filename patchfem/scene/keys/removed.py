@@ -19,6 +19,15 @@ REMOVED_NAMES = {
         "give contact.load, or leave out [contact.load_line] and contact.holder.rotational_stiffness",
     ),
     "files of Nastran": ("1.3", "convert the matrix, with pyNastran for example"),
+    "fit of responses": (
+        "1.10",
+        "write the modes of your modal analysis as dataset 55, list them in [[structure.mode]], or fit modes to the "
+        "records over time with `patchfem import`",
+    ),
+    "modes as arrays": (
+        "1.10",
+        "write M = m I, K = m diag(omega^2) and C = m D with the modal mass m, or list the modes in [[structure.mode]]",
+    ),
     "fit --placebo": (
         "1.2",
         "set another value of the key with --set and compare the scores of the fits",

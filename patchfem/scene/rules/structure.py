@@ -53,7 +53,7 @@ def _check_file(structure: TableFacts) -> None:
         advice = advise_on_name(extension, (*ARRAY_EXTENSIONS, ".uff"))
         structure.add_mistake(
             "file",
-            f"{_describe_extension(extension)}; {advice}: matrices or modes as arrays, or universal files",
+            f"{_describe_extension(extension)}; {advice}: matrices as arrays, or universal files",
         )
     if extension not in UNIVERSAL_EXTENSIONS:
         keys = LOCATION_KEYS if extension in ARRAY_EXTENSIONS else ()

@@ -68,7 +68,7 @@ MISTAKES = {
     "structure.damper & !structure.masses & contact": JOINS_MASSES,
     **dict.fromkeys(
         (f"structure.{key} & !structure.file" for key in LOCATION_KEYS),
-        "names a place in a file of modes or responses, but the scene has no such file; give structure.file",
+        "names a place in a universal file, but the scene has no such file; give structure.file",
     ),
     "structure.measured_joint & !structure.measured=stuck": "names the joint that is subtracted from the modes, but nothing "
     'is subtracted; add measured = "stuck" or leave `measured_joint` out',
