@@ -26,8 +26,6 @@ PUBLIC = {
     "matrices": (
         "Matrix",
         "align_rows",
-        "compute_form_deviation",
-        "estimate_rounding",
         "read_matrix",
     ),
     "measured": (
