@@ -13,7 +13,6 @@ from cyclopts import Parameter
 from .. import core
 from ..campaigns.sweeps import executors, parse_request
 from ..export.sweeps import run
-from ..scene import assignments
 from .shared import (
     DEFAULT_OUTPUT,
     NOT_CONVERGED,
@@ -164,7 +163,7 @@ def sweep(
         answer = run.collect_shards(sweep_scene, cases, target, output.has_page)
     else:
         if not output.is_quiet:
-            _print_notes(sweep_scene, cases, what)
+            _print_notes(sweep_scene, cases)
         place = run.SweepTarget(target, resume, keep or "", part, output.has_page)
         answer = _run_cases(sweep_scene, cases, place, by, is_quiet=output.is_quiet)
     if answer is None:
@@ -173,14 +172,9 @@ def sweep(
         _print_sweep(answer, output, perf_counter() - start_time)
 
 
-def _print_notes(sweep_scene, cases, what: CaseOptions | None) -> None:
-    """Print notes on the ranges of the keys, on invalid cases and on a bolted joint."""
-    texts = [
-        *assignments.describe_ranges(what.over if what else ()),
-        cases.warning,
-        sweep_scene.note_bolted_joint(),
-    ]
-    for text in texts:
+def _print_notes(sweep_scene, cases) -> None:
+    """Print notes on invalid cases and on a bolted joint."""
+    for text in (cases.warning, sweep_scene.note_bolted_joint()):
         if text:
             note(text)
 

@@ -165,7 +165,7 @@ def test_exact_printed_command_repeats_random_cases(tmp_path, monkeypatch, words
     )
     scene.write_text(BENCH, encoding="utf-8")
     sweep_into(
-        first, scene, "--over", "friction.static=0.3 +- 20 %", *words, "--set", "normal.load=90 N"
+        first, scene, "--over", "friction.static=0.24..0.36", *words, "--set", "normal.load=90 N"
     )
     monkeypatch.chdir(tmp_path)
 

@@ -28,6 +28,7 @@ REMOVED_NAMES = {
         "1.10",
         "write M = m I, K = m diag(omega^2) and C = m D with the modal mass m, or list the modes in [[structure.mode]]",
     ),
+    "value with a tolerance": ("1.10", "write the range as low..high"),
     "fit --placebo": (
         "1.2",
         "set another value of the key with --set and compare the scores of the fits",

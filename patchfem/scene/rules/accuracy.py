@@ -7,7 +7,6 @@ from typing import Any, NamedTuple
 from ...effects import LAWS, law_has_trait, needs_bond_list
 from ..keys.accuracy import Accuracy
 from ..keys.tables import Tables
-from .contact import iterate_patches
 from .methods import MotionFeatures, find_motion_features
 from .scene_draft import SceneDraft
 
@@ -76,10 +75,10 @@ def check_settings(draft: SceneDraft, kind: str) -> None:
             draft.add_remark(
                 f"accuracy.{setting}", f"is not used, because it has no effect {where}"
             )
-        where = _find_reason_without_repetition(draft, kind)
-        if draft.tables.accuracy.max_seconds is not None and where:
+        if draft.tables.accuracy.max_seconds is not None and not _is_repeated(draft.tables, kind):
             draft.add_remark(
-                "accuracy.max_seconds", f"is not used, because no run {where} is repeated"
+                "accuracy.max_seconds",
+                "is not used, because this run is never repeated with a finer mesh or more steps",
             )
 
 
@@ -108,22 +107,19 @@ def list_repeated_axes(
     return ("mesh",) * has_automatic_mesh + ("steps",) * has_free_steps
 
 
-def _find_reason_without_repetition(draft: SceneDraft, kind: str) -> str:
-    """Return why a run is never repeated with finer meshes or more steps, "" if it may be."""
-    tables = draft.tables
-    patches = [patch for _, patch in iterate_patches(draft)]
-    if list_repeated_axes(
+def _is_repeated(tables: Tables, kind: str) -> bool:
+    """Return whether a run that misses its tolerance may be repeated."""
+    interfaces = tables.structure.interface if tables.structure is not None else ()
+    patches = filter(None, (tables.contact, *(interface.contact for interface in interfaces)))
+    axes = list_repeated_axes(
         kind,
         has_wear=bool(tables.wear),
-        has_automatic_mesh=any(one.element_size is None and one.mesh is None for one in patches),
+        has_automatic_mesh=any(
+            patch.element_size is None and patch.mesh is None for patch in patches
+        ),
         has_fixed_steps=bool(tables.accuracy.steps_per_cycle),
-    ):
-        return ""
-    if kind == "patch" or tables.wear:
-        return "of a pressed patch" if kind == "patch" else "with [wear]"
-    if kind == "bench":
-        return "with accuracy.steps_per_cycle"
-    return "with fixed meshes" if patches else "without a patch"
+    )
+    return bool(axes)
 
 
 def find_unused_settings(tables: Tables, kind: str) -> dict[str, str]:
