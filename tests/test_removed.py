@@ -109,6 +109,10 @@ TRIED = {  # removed feature -> (function that uses it, replacement that the mes
         partial(load, RIG, {"friction.breakaway": 0.2}),
         "law 'iwan' or 'elastic-plastic' does not creep",
     ),
+    "value with a tolerance": (
+        lambda folder: pf.sweep(RIG, {"friction.static": "0.3 +- 5 %"}),
+        "write the range as low..high",
+    ),
     "fit --placebo": (
         partial(run_failing_command, ("fit", "a.toml", "--placebo", "friction.static=0.3")),
         "set another value of the key with --set",

@@ -10,7 +10,7 @@ from __future__ import annotations
 import re
 from array import array
 from collections import Counter
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from itertools import chain
 from typing import Any, NamedTuple, get_origin
@@ -196,16 +196,15 @@ def read_positive_values(text: str, name: str, kind: str = "length") -> list[flo
 
     Raises PatchfemError, whose message begins with `name`, for any other text.
     """
-    axes: list[Axis] = []
-    mistakes: list[str] = []
     key, example = POSITIVE_KEYS[kind]
-    _append_values(axes, mistakes, name, (key, text), LISTS)
-    if mistakes:
-        raise PatchfemError("; ".join(mistakes))
-    values = sorted(axes[0].values)
+    try:
+        axis = read_values(key, text)
+    except ValueError as error:
+        raise PatchfemError(f"{name}: {error}") from None
+    values = sorted(axis.values)
     if values[0] <= 0:
         raise PatchfemError(
-            f"{name}: {values[0]:g} {axes[0].unit}; {kind}s above 0 are needed, such as {example}"
+            f"{name}: {values[0]:g} {axis.unit}; {kind}s above 0 are needed, such as {example}"
         )
     return values
 
@@ -225,11 +224,11 @@ def make_axis(key: str, texts: Iterable[str], *, distinct: bool = True) -> Axis:
     Raises
     ------
     ValueError
-        With one line for each value that the key does not accept.
+        If the key does not accept a value.
     """
     texts = tuple(texts)
     reader = _ValueReader(key, texts)
-    values = _collect(reader.read, texts)
+    values = [reader.read(text) for text in texts]
     if distinct and len(set(values)) < len(values):
         twice = next(k for k, value in enumerate(values) if values.index(value) < k)
         raise ValueError(f"{texts[twice]} is given twice")
@@ -254,7 +253,7 @@ def read_values(key: str, text: str, form: Form = LISTS) -> Axis | Range:
     Raises
     ------
     ValueError
-        With one line for each mistake.
+        If the text is no value, list or range of the key.
     """
     pieces = _split_at_commas(text)
     reader = _ValueReader(key, pieces)
@@ -273,31 +272,17 @@ def read_values(key: str, text: str, form: Form = LISTS) -> Axis | Range:
             return spread
     if not form.has_lists:
         raise ValueError(f"{text}: a range is needed, {form.usage}")
-    return make_axis(key, chain.from_iterable(_collect(reader.list_values, pieces)))
+    return make_axis(key, chain.from_iterable(map(reader.list_values, pieces)))
 
 
 def _append_values(
     given: list, mistakes: list[str], name: str, assignment: tuple[str, str], form: Form
 ) -> None:
-    """Read the values of a key, and append them to `given`, or their mistakes after `name` to `mistakes`."""
+    """Read the values of a key, and append them to `given`, or the mistake in them after `name` to `mistakes`."""
     try:
         given.append(read_values(*assignment, form))
     except ValueError as error:
-        mistakes += [f"{name}: {line}" if name else line for line in str(error).split("\n")]
-
-
-def _collect(read: Callable, texts: Iterable[str]) -> list:
-    """Apply a function to texts and return its results; raise one ValueError with the sentences of all that it raises."""
-    values = []
-    mistakes = []
-    for text in texts:
-        try:
-            values.append(read(text))
-        except ValueError as error:
-            mistakes.append(str(error))
-    if mistakes:
-        raise ValueError("\n".join(mistakes))
-    return values
+        mistakes.append(f"{name}: {error}" if name else str(error))
 
 
 class _ValueReader:

@@ -37,7 +37,7 @@ __all__ = [
     "remember_written",
 ]
 
-# Largest number of characters of the effects, and of the --set values, in the repr of a Scene.
+# Largest number of characters of the effects and the --set values in the repr of a Scene.
 MAX_LISTED_CHARACTERS = 160
 
 
@@ -78,11 +78,8 @@ class Scene:
     written: Scene | None = None
 
     def __repr__(self) -> str:
-        effects = shorten(", ".join(self.effect_names()), MAX_LISTED_CHARACTERS)
-        sets = (
-            f"\n  with {shorten(', '.join(self.sets), MAX_LISTED_CHARACTERS)}" if self.sets else ""
-        )
-        return f"Scene of {self.path.name}: {self.kind}; {effects}{sets}"
+        words = ", ".join((*self.effect_names(), *self.sets))
+        return f"Scene of {self.path.name}: {self.kind}; {shorten(words, MAX_LISTED_CHARACTERS)}"
 
     def with_(self, **sets: Any) -> Scene:
         """Return a copy of the scene with the values of the given keys replaced.

@@ -114,13 +114,8 @@ def normalize_unit(unit: str) -> str:
 
 def _describe_non_text(value: object, kind: str) -> str:
     """Return the message about a value that is not a string."""
-    reason = "not a quantity"
-    if isinstance(value, bool):
-        reason = f"{str(value).lower()} is not a quantity"
-    elif isinstance(value, list | dict):
-        reason = f"{'an array' if isinstance(value, list) else 'a table'} is not a quantity"
-    elif isinstance(value, int | float):
-        reason = "a bare number without a unit"
+    is_number = isinstance(value, int | float) and not isinstance(value, bool)
+    reason = "a bare number without a unit" if is_number else "not a quantity"
     return f"{reason}; {describe_requirement(kind)}"
 
 

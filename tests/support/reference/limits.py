@@ -34,7 +34,6 @@ neglect.
 """
 SIZES = {  # Constant -> description of the quantity that it bounds.
     "scene.toml_text.MAX_BYTES": "bytes of a scene file",
-    "scene.lines.MAX_KEY_PARTS": "number of parts, separated by dots, of a key",
     "scene.rules.contact.MAX_ELEMENTS": "number of elements along an interface that has element_size",
     "effects.MAX_COORDINATES": "number of masses or modes that a scene lists",
     "scene.assignments.MAX_RANGE_VALUES": "number of values in one range of a sweep",
