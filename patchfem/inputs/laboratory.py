@@ -121,11 +121,8 @@ def _read_matlab(path: Path, requests: list) -> Records:
             continue
         if 1 in values.shape:
             channels.append(Channel(name, "", "", "", values.ravel()))
-        if len(values) > 1:
-            columns = values.T[:MAX_COLUMNS]
-            channels += [
-                Channel(f"{name}(:,{number})", "", "", "", column)
-                for number, column in enumerate(columns, 1)
-            ]
+        else:
+            columns = enumerate(values.T[:MAX_COLUMNS], 1)
+            channels += [Channel(f"{name}(:,{k})", "", "", "", column) for k, column in columns]
     requests = [request._replace(source=request.source.replace(" ", "")) for request in requests]
     return select_channels(path, channels, requests, [])
