@@ -64,10 +64,8 @@ def build_reduced_modes(scene) -> ReducedModes:
         counts = [table.modes]
         if not reduction.modes.is_complete or table.modes < n_computed:
             counts += [n_computed, table.modes // 2][: 1 + (table.modes > 1)]
-        modes, *other_modes = [
-            reduced.build_basis(reduction, count, pairs, output, driven_mass, ratio, names)
-            for count in counts
-        ]
+        arguments = (pairs, output, driven_mass, ratio, names)
+        modes, *other_modes = [reduced.build_basis(reduction, n, *arguments) for n in counts]
     max_modes = n_computed
     if not reduction.modes.is_complete:
         max_modes = reduction.lowest.size - len(reduction.boundary)
@@ -119,11 +117,15 @@ def read_matrix(path: Path, key: str) -> matrices.Matrix:
 def _reduce(paths: tuple[Path, ...], keys: tuple[str, ...], table, is_base_driven: bool):
     """Reduce the matrices in files; return the `structure.reduced.Reduction` and notes."""
     files = _read_files(dict(zip(keys, paths)), table, is_base_driven)
-    stiffness, mass, damping = (
-        files.values[key] / table.unit if key in files.values else None for key in MATRIX_KEYS
-    )
+    values = {key: matrix / table.unit for key, matrix in files.values.items()}
     reduction = reduced.reduce_matrices(
-        stiffness, mass, damping, files.boundary, table.modes, table.method, files.moved
+        values["stiffness"],
+        values["mass"],
+        values.get("damping"),
+        files.boundary,
+        table.modes,
+        table.method,
+        files.moved,
     )
     return reduction, files.notes
 

@@ -1,6 +1,7 @@
 """Measured modes of a universal file: the shapes of its datasets 55."""
 
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -11,6 +12,14 @@ from .places import DIRECTION_NAMES, MeasuredModes
 
 NORMAL_MODE_TYPE = 2  # analysis type of a real mode in dataset 55
 COMPLEX_MODE_TYPES = (3, 7)  # analysis types of a complex mode in dataset 55
+
+
+class _ModalNumbers(NamedTuple):
+    """Natural frequency [Hz], damping ratio and modal mass, in the units of the file, of a mode."""
+
+    frequency: float
+    zeta: float
+    modal_mass: float
 
 
 def read_universal(path: Path) -> MeasuredModes:
@@ -49,8 +58,7 @@ def read_universal(path: Path) -> MeasuredModes:
     factors = find_unit_factors(path, datasets)
     mass_unit = 1.0 if factors is None else factors["length"] / factors["force"]
 
-    frequencies = []
-    zetas = []
+    all_numbers = []
     notes = []
     columns = []
     for number, dataset in enumerate(modes, 1):
@@ -58,33 +66,35 @@ def read_universal(path: Path) -> MeasuredModes:
         motion = _collect_motion(dataset)
         values = np.array(list(motion.values()))
         if dataset["analysis_type"] == NORMAL_MODE_TYPE:
-            frequency, zeta, modal_mass = _read_normal_mode(name, dataset, notes)
+            numbers = _read_normal_mode(name, dataset, notes)
             rotated = _rotate_to_real(values) if np.iscomplexobj(values) else values
         else:
-            frequency, zeta, modal_mass = _read_complex_mode(name, dataset)
+            numbers = _read_complex_mode(name, dataset)
             rotated = _rotate_to_real(values.astype(complex))
             imaginary = np.linalg.norm(rotated.imag) / max(np.linalg.norm(rotated), 1e-300)
             notes.append(
                 f"{name} is complex; the shape is rotated in phase and only its real part is used, "
                 f"which leaves out {100 * imaginary:.2g} % of the shape"
             )
-        if not modal_mass > 0:
+        if not numbers.modal_mass > 0:
             raise PatchfemError(
-                f"{name} ({frequency:.5g} Hz) has no modal mass, so its shape has no scale; export the "
+                f"{name} ({numbers.frequency:.5g} Hz) has no modal mass, so its shape has no scale; export the "
                 "modal mass (dataset 55: record 8; complex modes: modal A)"
             )
-        if zeta < 0 or frequency < 0:
+        if numbers.zeta < 0 or numbers.frequency < 0:
             raise PatchfemError(
-                f"{name} has frequency {frequency:.5g} Hz and damping {zeta:.3g}; both must be >= 0"
+                f"{name} has frequency {numbers.frequency:.5g} Hz and damping {numbers.zeta:.3g}; both "
+                "must be >= 0"
             )
-        frequencies.append(frequency)
-        zetas.append(zeta)
-        columns.append(dict(zip(motion, rotated.real / np.sqrt(modal_mass * mass_unit))))
+        all_numbers.append(numbers)
+        scale = np.sqrt(numbers.modal_mass * mass_unit)
+        columns.append(dict(zip(motion, rotated.real / scale)))
 
     # A place that a shape lacks does not move in this mode.
     places = dict.fromkeys(place for column in columns for place in column)
     motion = {place: np.array([column.get(place, 0.0) for column in columns]) for place in places}
-    return MeasuredModes(np.array(frequencies), np.array(zetas), motion, notes)
+    frequency, zeta, _ = np.array(all_numbers).T
+    return MeasuredModes(frequency, zeta, motion, notes)
 
 
 def _collect_motion(dataset: dict) -> dict:
@@ -98,8 +108,8 @@ def _collect_motion(dataset: dict) -> dict:
     return motion
 
 
-def _read_normal_mode(name: str, dataset: dict, notes: list) -> tuple[float, float, float]:
-    """Return frequency [Hz], damping ratio and modal mass of a real mode.
+def _read_normal_mode(name: str, dataset: dict, notes: list) -> _ModalNumbers:
+    """Return the numbers of a real mode.
 
     If the viscous damping ratio is missing, it is half the hysteretic damping, and `notes` says so.
     """
@@ -107,11 +117,11 @@ def _read_normal_mode(name: str, dataset: dict, notes: list) -> tuple[float, flo
     if not zeta and dataset["modal_damp_his"]:
         zeta = dataset["modal_damp_his"] / 2
         notes.append(f"{name}: half of the hysteretic damping is used as the viscous damping ratio")
-    return dataset["freq"], zeta, dataset["modal_m"]
+    return _ModalNumbers(dataset["freq"], zeta, dataset["modal_m"])
 
 
-def _read_complex_mode(name: str, dataset: dict) -> tuple[float, float, float]:
-    """Return frequency [Hz], damping ratio and modal mass of the real mode nearest to a complex one.
+def _read_complex_mode(name: str, dataset: dict) -> _ModalNumbers:
+    """Return the numbers of the real mode nearest to a complex one.
 
     With the eigenvalue s, the circular frequency is |s|, the damping ratio -Re s/|s| and the modal mass
     |modal A|/(2 |Im s|).
@@ -124,7 +134,7 @@ def _read_complex_mode(name: str, dataset: dict) -> tuple[float, float, float]:
         )
     omega = abs(eigenvalue)
     modal_mass = abs(dataset["modal_a"]) / (2 * abs(eigenvalue.imag))
-    return omega / (2 * np.pi), -eigenvalue.real / omega, modal_mass
+    return _ModalNumbers(omega / (2 * np.pi), -eigenvalue.real / omega, modal_mass)
 
 
 def _rotate_to_real(values):

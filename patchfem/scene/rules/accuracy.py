@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 from ...effects import LAWS, law_has_trait, needs_bond_list
 from ..keys.accuracy import Accuracy
 from ..keys.tables import Tables
+from .contact import iterate_patches
 from .methods import MotionFeatures, find_motion_features
 from .scene_draft import SceneDraft
 
@@ -75,7 +76,7 @@ def check_settings(draft: SceneDraft, kind: str) -> None:
             draft.add_remark(
                 f"accuracy.{setting}", f"is not used, because it has no effect {where}"
             )
-        if draft.tables.accuracy.max_seconds is not None and not _is_repeated(draft.tables, kind):
+        if draft.tables.accuracy.max_seconds is not None and not _is_repeated(draft, kind):
             draft.add_remark(
                 "accuracy.max_seconds",
                 "is not used, because this run is never repeated with a finer mesh or more steps",
@@ -107,16 +108,14 @@ def list_repeated_axes(
     return ("mesh",) * has_automatic_mesh + ("steps",) * has_free_steps
 
 
-def _is_repeated(tables: Tables, kind: str) -> bool:
+def _is_repeated(draft: SceneDraft, kind: str) -> bool:
     """Return whether a run that misses its tolerance may be repeated."""
-    interfaces = tables.structure.interface if tables.structure is not None else ()
-    patches = filter(None, (tables.contact, *(interface.contact for interface in interfaces)))
+    tables = draft.tables
+    patches = [patch for _, patch in iterate_patches(draft)]
     axes = list_repeated_axes(
         kind,
         has_wear=bool(tables.wear),
-        has_automatic_mesh=any(
-            patch.element_size is None and patch.mesh is None for patch in patches
-        ),
+        has_automatic_mesh=any(one.element_size is None and one.mesh is None for one in patches),
         has_fixed_steps=bool(tables.accuracy.steps_per_cycle),
     )
     return bool(axes)
