@@ -34,6 +34,7 @@ def read_records(path, requests: list, exported_names: Mapping = EXPORTED_NAMES)
     Parameters
     ----------
     path : path-like
+        File to read.
     requests : list of RequestedChannel
         Without any, the channels whose quantity the file states are read.
     exported_names : Mapping

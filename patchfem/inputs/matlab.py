@@ -32,6 +32,7 @@ def read_variables(path, data: bytes | None = None) -> dict[str, np.ndarray | sp
     Parameters
     ----------
     path : path-like
+        File to read.
     data : bytes, optional
         Content of the file, if it has been read.
 

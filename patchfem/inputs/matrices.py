@@ -66,6 +66,8 @@ def align_rows(*matrices: Matrix) -> list[Matrix]:
             "some of the files name nodes and directions and others do not; export all files in the "
             "same way"
         )
+
+    # The rows of all files are those of the sorted degrees of freedom.
     if with_places:
         places, index = _rank_dofs(np.vstack([matrix.places for matrix in matrices]))
         ends = np.cumsum([len(matrix.places) for matrix in matrices])
@@ -74,6 +76,8 @@ def align_rows(*matrices: Matrix) -> list[Matrix]:
             Matrix(_insert_empty_rows(matrix.values, rows, len(places)), places)
             for matrix, rows in zip(matrices, parts)
         ]
+
+    # A file without size may end before the last row, which then has no entry.
     n = max(matrix.values.shape[0] for matrix in matrices)
     sizes = {matrix.values.shape[0] if matrix.has_size else n: None for matrix in matrices}
     if len(sizes) > 1:
@@ -137,6 +141,8 @@ def _read_market(path: Path, matrix_name: str) -> Matrix:
             )
         if symmetry == "skew-symmetric":
             raise PatchfemError(f"{path}: the {matrix_name} is not symmetric; {SKEW_REFUSAL}")
+
+        # The size is checked before memory is reserved for it.
         lines = (line for line in file if line.strip() and line[0] != "%")
         n_rows, n_columns, *count = map(int, next(lines, "").split())
         n_numbers = count[0] if count else n_rows * n_columns
@@ -150,6 +156,8 @@ def _read_market(path: Path, matrix_name: str) -> Matrix:
         table = np.zeros((0, width))
         if n_numbers:
             table = np.loadtxt(lines, comments=None, ndmin=2)
+
+    # A full matrix is stored column by column.
     if count:
         rows, columns = _to_integers(path, table[:, :2]).T - 1
     elif symmetry == "general":
@@ -180,6 +188,8 @@ def _read_abaqus(path: Path) -> Matrix:
         if first:
             separator = "," if "," in first else None
             table = np.loadtxt(chain([first], lines), delimiter=separator, ndmin=2)
+
+    # The number of columns tells rows from degrees of freedom.
     if table.shape[1] not in (3, 5) or not table.size:
         raise PatchfemError(
             f"{path}: is not a matrix: write a Matrix Market file, or lines of row, column, number, or "
@@ -196,6 +206,8 @@ def _read_abaqus(path: Path) -> Matrix:
     else:
         rows, columns = labels.T - 1
         n = labels.max()
+
+    # A file that has one triangle only stands for both.
     values = sparse.coo_array((table[:, -1], (rows, columns)), (n, n)).tocsr()
     if (rows <= columns).all() or (rows >= columns).all():
         values = _complete_symmetric_matrix(values)

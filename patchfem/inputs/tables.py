@@ -106,6 +106,7 @@ def split_cells(location: str, line: str, separator: str) -> list[str]:
     location : str
         Beginning of the error message, such as ``a.csv:3``.
     line : str
+        Line of the table, without its line break.
     separator : str
         Sign between the cells.
 
@@ -130,6 +131,7 @@ def read_text(path: Path, contents: str, remedy: str = "") -> TextTable:
     Parameters
     ----------
     path : Path
+        File to read.
     contents, remedy : str
         Words of the error messages, as in `TableFormat`.
 
@@ -195,6 +197,7 @@ def parse_number(location: str, cell: str, factor: float) -> float:
     location : str
         Beginning of the error message, such as ``a.csv:3: force``.
     cell : str
+        Text of the cell.
     factor : float
         Factor to SI.
 

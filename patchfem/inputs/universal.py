@@ -37,6 +37,7 @@ def read_datasets(path) -> list[dict]:
     Parameters
     ----------
     path : path-like
+        File to read.
 
     Returns
     -------

@@ -36,6 +36,7 @@ def find_file_faults(
     Parameters
     ----------
     tables : Tables
+        Tables of the scene, as far as they could be read.
     folder : Path
         Folder of the scene; files that do not exist are left out.
     is_valid : bool

@@ -238,6 +238,7 @@ def _build(scene: Scene) -> Model:
         grooves=grooves,
         motion=find_motion_features(scene, scene.kind),
     )
+
     source = Source(
         path=scene.path,
         title=scene.title,

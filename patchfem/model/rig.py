@@ -259,6 +259,7 @@ def build_rig(scene, joint: float | None = None) -> Rig:
     Parameters
     ----------
     scene : Scene
+        Checked scene with [structure] and [drive].
     joint : float, optional
         Stiffness [N/m] of a pressed patch, which is subtracted from modes measured with it.
 
@@ -311,6 +312,8 @@ def build_drive(scene, modes: ModalBasis) -> RigDrive:
     signal = build_signal(scene, modes)
     waveform = find_waveform(keys)
     levels = DriveLevels()
+
+    # Number of cycles of the whole run.
     if waveform.has_levels:
         amplitudes = tuple(segment.amplitude for segment in signal.segments)
         levels = DriveLevels(
@@ -322,6 +325,7 @@ def build_drive(scene, modes: ModalBasis) -> RigDrive:
     else:
         duration = signal.duration if keys.duration is None else keys.duration
         cycles = max(duration / signal.period, MIN_RUN_CYCLES)
+
     return RigDrive(
         signal=signal,
         kind=keys.kind,

@@ -37,6 +37,7 @@ def build_modes(scene, own_modes: ModalBasis | None = None) -> ModalBasis:
     Parameters
     ----------
     scene : Scene
+        Checked scene with [structure] and [drive].
     own_modes : ModalBasis, optional
         Result of `build_own_modes`, if it is known.
 
@@ -75,20 +76,26 @@ def build_own_modes(scene, joint: float | None = None) -> ModalBasis:
     Parameters
     ----------
     scene : Scene
+        Checked scene with [structure] and [drive].
     joint : float, optional
         Stiffness [N/m] of the joint; by default it follows from the friction laws. Modes that
         were measured with a pressed patch are not changed until its stiffness is given.
     """
     modes = _build_given_modes(scene)
+
+    # Modes without a joint are complete; a pressed patch must be solved first.
     bolted_scene = find_bolted_scene(scene)
     if scene.structure.measured == "free" or (joint is None and has_pressed_joint(bolted_scene)):
         return modes
+
+    # The bonded spring and its damper act beside the first interface.
     bonded = bolted_scene.structure.bonded
     stiffness = np.array(compute_joint_stiffnesses(bolted_scene) if joint is None else [joint])
     damping = 0.0
     if bonded is not None:
         damping = bonded.damping
         stiffness[:1] += bonded.stiffness
+
     try:
         return import_effect("structure.bonded").remove_springs(modes, stiffness, damping)
     except PatchfemError as error:
@@ -278,6 +285,7 @@ def find_first_elastic_mode(scene, own_modes: ModalBasis) -> tuple:
     Parameters
     ----------
     scene : Scene
+        Checked scene with [structure] and [drive].
     own_modes : ModalBasis
         Modes without the bonded spring, from `build_own_modes`.
     """
@@ -311,6 +319,7 @@ def compute_strip_slides(modes: ModalBasis, offsets) -> np.ndarray:
     Parameters
     ----------
     modes : ModalBasis
+        Modes of the rig, with their yaw.
     offsets : (s,) array_like
         Distance y [m] of each strip from the middle of the patch.
 

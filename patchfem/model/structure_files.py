@@ -81,6 +81,7 @@ def _build_modes(
             modes, [*content.notes, *([] if is_forced else places.note_missing_mass(modes))]
         )
 
+    # Matrices of a file name no place; an error names the file.
     pairs = [interface.between for interface in structure.interface]
     try:
         modes = arrays.build_basis(content, pairs, mass if is_forced else None, is_forced=is_forced)

@@ -112,6 +112,7 @@ class BaseScene:
         scene : Scene
             What `override` returned for these keys.
         keys : sequence of str
+            Dotted keys whose numbers differ.
 
         Returns
         -------

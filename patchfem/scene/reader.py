@@ -152,6 +152,8 @@ def apply_set(draft: SceneDraft, assignment: str) -> None:
             return
         if depth == len(pieces) - 1:
             break
+
+        # A table may be made, an item of an array may not.
         inner = holder[piece] if isinstance(holder, list) else holder.get(piece)
         if inner is None and _is_array_of_tables(path):
             draft.add_set_mistake(f"{key}: the scene has no [[{path}]]")
@@ -163,6 +165,8 @@ def apply_set(draft: SceneDraft, assignment: str) -> None:
             draft.add_set_mistake(f"{key}: {path} is a value, not a table")
             return
         holder = inner
+
+    # The value is read as TOML, and as text otherwise.
     path = ".".join(pieces)
     holder[piece] = read_set_value(path, text)
     draft.record_set(path)
@@ -180,6 +184,7 @@ def _find_item(draft: SceneDraft, items: list[Any], path: str) -> int | None:
     Parameters
     ----------
     draft : SceneDraft
+        Scene that is being read.
     items : list
         The array.
     path : str

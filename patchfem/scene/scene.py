@@ -123,13 +123,14 @@ def load(
     Parameters
     ----------
     path : str or Path
+        File to read.
     sets : iterable of str
         ``table.key=value`` as of --set, applied in their order.
     faults : Callable, optional
         faults(tables, folder, is_valid) returns (key, message) of further mistakes, such as those inside the files that
         the scene names. `tables` are as far as they could be read; `is_valid` is True if they have no mistake.
     prepare : Callable, optional
-        As in `loads`.
+        prepare(raw) changes the plain values before they are read.
 
     Raises
     ------
@@ -159,12 +160,13 @@ def loads(
     Parameters
     ----------
     text : str
+        Content of a scene file.
     path : str or Path
         File that messages name, and to whose folder the paths in the scene are relative.
     sets : iterable of str
         ``table.key=value`` as of --set. A key among them is no longer an axis of [sweep].
     faults : Callable, optional
-        faults(tables, is_valid) returns (key, message) of further mistakes, as in `load`.
+        faults(tables, is_valid) returns (key, message) of further mistakes.
     prepare : Callable, optional
         prepare(raw) changes the plain values of the text and of the sets before they are read.
 
@@ -208,7 +210,7 @@ def finish_scene(
     draft : SceneDraft
         Its tables are not read yet.
     path, text, sets, faults
-        As in `loads`.
+        File, its content, assignments of --set, and function of the tables that returns further mistakes.
 
     Raises
     ------
@@ -249,10 +251,11 @@ def remember_written(scene: Scene, n_written: int = 0, prepare: Callable | None 
     Parameters
     ----------
     scene : Scene
+        Checked scene with [structure] and [drive].
     n_written : int
         Number of the first assignments in `scene.sets` that belong to the scene as written.
     prepare : Callable, optional
-        As in `loads`.
+        prepare(raw) changes the plain values before they are read.
 
     Raises
     ------

@@ -33,6 +33,7 @@ def read_arrays(path: Path) -> dict:
     Parameters
     ----------
     path : Path
+        File to read.
 
     Returns
     -------
@@ -133,9 +134,11 @@ def build_basis(
             data,
             "output (n,), what the accelerometer measures; slide (n,) serves as output if output is missing",
         )
+
     force = None
     if is_forced:
         force = np.eye(n)[driven_mass - 1] if driven_mass else data.get("force", output)
+
     return matrices.build_basis(
         M,
         K,

@@ -55,6 +55,8 @@ def read_universal(path: Path) -> MeasuredModes:
         raise PatchfemError(
             f"{path} has no mode shapes (dataset 55, normal or complex modes); its datasets: {types}; {removed}"
         )
+
+    # The shapes of the file are in its units of length and force.
     factors = find_unit_factors(path, datasets)
     mass_unit = 1.0 if factors is None else factors["length"] / factors["force"]
 
@@ -76,6 +78,8 @@ def read_universal(path: Path) -> MeasuredModes:
                 f"{name} is complex; the shape is rotated in phase and only its real part is used, "
                 f"which leaves out {100 * imaginary:.2g} % of the shape"
             )
+
+        # Without a modal mass a shape has no scale.
         if not numbers.modal_mass > 0:
             raise PatchfemError(
                 f"{name} ({numbers.frequency:.5g} Hz) has no modal mass, so its shape has no scale; export the "

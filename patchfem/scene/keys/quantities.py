@@ -124,6 +124,8 @@ def _describe_malformed_text(words: str, kind: str) -> str:
     displayed_text = (
         words if len(words) <= _MAX_SHOWN_CHARACTERS else f"{words[: _MAX_SHOWN_CHARACTERS - 3]}..."
     )
+
+    # The first cause that fits is named.
     glued = _JOINED_UNIT_PATTERN.fullmatch(words)
     if _BARE_NUMBER_PATTERN.fullmatch(words):
         reason = f"'{displayed_text}' is a bare number without a unit"
@@ -141,6 +143,7 @@ def _describe_malformed_text(words: str, kind: str) -> str:
         reason = (
             f"'{displayed_text}' does not consist of one number and one unit ({_list_units(kind)})"
         )
+
     return f"{reason}; {describe_requirement(kind)}"
 
 

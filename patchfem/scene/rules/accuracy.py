@@ -10,6 +10,7 @@ from ..keys.tables import Tables
 from .contact import iterate_patches
 from .methods import MotionFeatures, find_motion_features
 from .scene_draft import SceneDraft
+from .view import UNKNOWN_VALUE
 
 
 class SettingScope(NamedTuple):
@@ -42,6 +43,7 @@ def has_effect(setting: str, kind: str, method: str) -> bool:
     Parameters
     ----------
     setting : str
+        Key of [accuracy].
     kind : str
         Kind of the scene.
     method : str
@@ -59,13 +61,11 @@ def list_fixed_settings(accuracy: Accuracy) -> list[str]:
 def check_quadrature(draft: SceneDraft, kind: str) -> None:
     """Add a remark on a quadrature if there is no sum over bonds."""
     scene = draft.values
-    quadrature = scene.accuracy.quadrature
     laws = [table.law for table in (scene.friction, *scene.structure.interface)]
     is_summed = kind in ("bench", "rig") and any(law_has_trait(law, "bonds") for law in laws)
-    if quadrature and quadrature != "auto" and not is_summed:
+    if scene.accuracy.quadrature not in ("auto", UNKNOWN_VALUE) and not is_summed:
         draft.add_remark(
-            "accuracy.quadrature",
-            f"= '{quadrature}' has no meaning without law 'nonlocal' and is not used",
+            "accuracy.quadrature", "has no meaning without law 'nonlocal' and is not used"
         )
 
 
@@ -145,6 +145,8 @@ def _find_reason_without_effect(setting: str, accuracy: Any, motion: MotionFeatu
     laws = [joint.law for joint in motion.joints]
     if trait and not any(law_has_trait(law.law, trait) for law in laws):
         return f"without law '{next(name for name in LAWS if law_has_trait(name, trait))}'"
+
+    # Sums by recursion have neither a tail nor merged bonds.
     if trait == "bonds":
         engine = accuracy.quadrature
         if engine in ("direct", "recursion") or (engine, setting) == ("truncated", "merge"):
@@ -153,6 +155,8 @@ def _find_reason_without_effect(setting: str, accuracy: Any, motion: MotionFeatu
         return "" if is_summed else "for a law that is summed by recursion"
     if setting != "shear_modes":
         return ""
+
+    # Elements in closed form need no shear modes.
     if not motion.compliance:
         return "for pieces that are rigid in shear"
     if (

@@ -161,6 +161,7 @@ def holds(draft: SceneDraft, kind: str, condition: str) -> bool:
     Parameters
     ----------
     draft : SceneDraft
+        Scene with its written values.
     kind : str
         Kind of the scene.
     condition : str
