@@ -60,6 +60,18 @@ def test_exact_force_vector_defines_modal_forces():
     )
 
 
+def test_exact_modes_written_as_matrices():
+    """Modes with modal mass m, written as m I, m omega^2 and m 2 zeta omega, keep frequencies, damping and participations."""
+    mass, omega, zeta = 0.884, 2 * np.pi * np.array([143.0, 990.0]), np.array([0.003, 0.01])
+    slide, base = np.array([1.0, 0.2]), np.array([0.9, 0.1])
+    data = {"M": mass * np.eye(2), "K": mass * np.diag(omega**2), "slide": slide, "base": base}
+    basis = arrays.build_basis(data | {"C": mass * np.diag(2 * zeta * omega)})
+    np.testing.assert_allclose(basis.omega, omega, rtol=1e-12)
+    np.testing.assert_allclose(basis.zeta, zeta, rtol=1e-12)
+    np.testing.assert_allclose(basis.slide * basis.base, slide * base, rtol=1e-12)
+    np.testing.assert_allclose(basis.slide**2, slide**2 / mass, rtol=1e-12)
+
+
 @pytest.mark.parametrize("change, message", [
     ({"K": None}, "lacks the matrix K; the file contains M, C"), ({"slide": None}, "lacks output"),
     ({"slide": np.ones(3)}, "slide has shape (3,), but there are 2 coordinates or modes; shape (2,) or (k, 2) is needed"),
