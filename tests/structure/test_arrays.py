@@ -61,7 +61,7 @@ def test_exact_force_vector_defines_modal_forces():
 
 
 def test_exact_modes_written_as_matrices():
-    """Modes with modal mass m, written as m I, m omega^2 and m 2 zeta omega, keep frequencies, damping and participations."""
+    """Modes of mass m, written as m I, m omega^2 and m 2 zeta omega, keep frequencies, damping and participations."""
     mass, omega, zeta = 0.884, 2 * np.pi * np.array([143.0, 990.0]), np.array([0.003, 0.01])
     slide, base = np.array([1.0, 0.2]), np.array([0.9, 0.1])
     data = {"M": mass * np.eye(2), "K": mass * np.diag(omega**2), "slide": slide, "base": base}
