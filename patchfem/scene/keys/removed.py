@@ -26,7 +26,8 @@ REMOVED_NAMES = {
     ),
     "modes as arrays": (
         "1.10",
-        "write M = m I, K = m diag(omega^2) and C = m D with the modal mass m, or list the modes in [[structure.mode]]",
+        "write M = m I, K = m diag(omega^2) and C = 2 m diag(zeta omega) with the modal mass m, or list the modes in "
+        "[[structure.mode]]",
     ),
     "value with a tolerance": ("1.10", "write the range as low..high"),
     "fit --placebo": (
