@@ -20,9 +20,6 @@ from . import structure_files, structure_reduced
 from .law import InterfaceLaw, build_interface_laws, find_normal_load
 from .source import name_key
 
-# Fraction of the squared motion of the output below which a mode
-# moves the output by round-off only.
-MIN_MODE_FRACTION = 1e-12
 _build_listed_modes = memoize(listed_modes.build_basis)
 
 
@@ -273,35 +270,6 @@ def compute_natural_frequencies(structure, modes: ModalBasis) -> np.ndarray:
         # Frequencies that the scene states are returned without the round-off of the modes.
         return np.array([mode.frequency for mode in structure.mode])
     return modes.omega / (2 * pi)
-
-
-def find_first_elastic_mode(scene, own_modes: ModalBasis) -> tuple:
-    """Return the frequency [Hz] and the modal mass [kg] of the first mode that is not rigid.
-
-    The mass is structure.moving_mass, or else the modal mass at the output. If the mode does not move
-    the output, it is the mass of all coordinates at the output. The frequency is 0 if all modes are
-    rigid.
-
-    Parameters
-    ----------
-    scene : Scene
-        Checked scene with [structure] and [drive].
-    own_modes : ModalBasis
-        Modes without the bonded spring, from `build_own_modes`.
-    """
-    structure = scene.structure
-    frequencies = own_modes.omega / (2 * pi)
-    if structure.mode and structure.measured == "free":
-        frequencies = np.array([mode.frequency for mode in structure.mode])
-    elastic = np.flatnonzero(frequencies > 0)
-    first = int(elastic[0]) if elastic.size else 0
-    frequency = float(frequencies[first]) if elastic.size else 0.0
-    if structure.mode or (structure.file is not None and structure.moving_mass is not None):
-        return frequency, structure.moving_mass
-    squared = np.square(own_modes.output)
-    total = max(float(squared.sum()), 1e-300)
-    moves_output = squared[first] > MIN_MODE_FRACTION * total
-    return frequency, float(own_modes.mass / (squared[first] if moves_output else total))
 
 
 def needs_strip_displacements(scene) -> bool:
