@@ -53,6 +53,7 @@ PUBLIC = {
         "SI_UNITS",
     ),
     "universal": (
+        "Dataset",
         "find_unit_factors",
         "read_datasets",
     ),

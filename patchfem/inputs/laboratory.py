@@ -38,7 +38,7 @@ def read_records(path, requests: list, exported_names: Mapping = EXPORTED_NAMES)
     requests : list of RequestedChannel
         Without any, the channels whose quantity the file states are read.
     exported_names : Mapping
-        Quantity -> names of `patchfem export` that stand for it, as in `loops.find_standard_name`.
+        Quantity -> names of `patchfem export` that stand for it, the preferred one first.
 
     Returns
     -------

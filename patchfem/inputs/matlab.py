@@ -18,6 +18,7 @@ MAX_NESTING = 8  # largest depth of nested structures
 # Signature at the beginning of an HDF5 file, or after the user block that MATLAB puts there.
 HDF5_SIGNATURE = b"\x89HDF\r\n\x1a\n"
 NUMBER_KINDS = "iufbc"  # kinds of NumPy types that contain numbers
+Arrays = dict[str, np.ndarray | sparse.csc_array]  # arrays of a file by name
 NUMBER_CLASSES = (
     "",
     "double",
@@ -26,7 +27,7 @@ NUMBER_CLASSES = (
 )  # MATLAB classes with numbers, besides integers
 
 
-def read_variables(path, data: bytes | None = None) -> dict[str, np.ndarray | sparse.csc_array]:
+def read_variables(path, data: bytes | None = None) -> Arrays:
     """Read the arrays of numbers of a MATLAB file.
 
     Parameters
@@ -74,7 +75,7 @@ def read_real_arrays(path, data: bytes | None = None) -> dict[str, np.ndarray]:
     }
 
 
-def _read_version_5(data: bytes, arrays: dict) -> None:
+def _read_version_5(data: bytes, arrays: Arrays) -> None:
     """Add the variables of a file of version 4 to 7."""
     from scipy.io import loadmat, matlab
 
@@ -88,7 +89,7 @@ def _read_version_5(data: bytes, arrays: dict) -> None:
             _add_value(arrays, name, value)
 
 
-def _add_value(arrays: dict, name: str, value, depth: int = 0) -> None:
+def _add_value(arrays: Arrays, name: str, value, depth: int = 0) -> None:
     """Add an array that SciPy has read, or the fields of a structure."""
     if sparse.issparse(value):
         arrays[name] = _check_sparse(sparse.csc_array(value))
@@ -105,7 +106,7 @@ def _to_numbers(values) -> np.ndarray:
     return values if values.dtype.kind == "c" else np.asarray(values, float)
 
 
-def _add_group(arrays: dict, group, prefix: str, depth: int) -> None:
+def _add_group(arrays: Arrays, group, prefix: str, depth: int) -> None:
     """Add the arrays of a group, and those of the structures in it; links to other files are not followed."""
     import h5py
 
@@ -130,7 +131,7 @@ def _find_class(item) -> str:
     return name.decode("latin-1") if isinstance(name, bytes) else ""
 
 
-def _add_dataset(arrays: dict, name: str, dataset) -> None:
+def _add_dataset(arrays: Arrays, name: str, dataset) -> None:
     """Add the numbers of a dataset; other programs than MATLAB may write fewer than two dimensions."""
     values = np.asarray(dataset[()])
     if "MATLAB_empty" in dataset.attrs:  # such a dataset contains the shape

@@ -133,7 +133,7 @@ def read_text(path: Path, contents: str, remedy: str = "") -> TextTable:
     path : Path
         File to read.
     contents, remedy : str
-        Words of the error messages, as in `TableFormat`.
+        What the file is, such as "a drive", and the end of the message if there is no file.
 
     Raises
     ------

@@ -7,6 +7,7 @@ precision.
 
 from enum import IntEnum
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -15,6 +16,7 @@ from .damage import refuse_damage
 from .records import Channel, check_file
 from .units import CHANNEL_UNITS, normalize_unit
 
+Dataset = dict[str, Any]  # dataset of a universal file as pyuff returns it
 DIRECTION_NAMES = ("x", "y", "z", "rx", "ry", "rz")  # directions 1 to 6 of a node
 TIME_ABSCISSA_TYPE = 17  # type code of the abscissa "time"
 GENERAL_TYPE = 0  # function type of a dataset 58 that may be anything
@@ -31,7 +33,7 @@ class OrdinateType(IntEnum):
     FORCE = 13
 
 
-def read_datasets(path) -> list[dict]:
+def read_datasets(path) -> list[Dataset]:
     """Read the datasets 55, 58 and 164 of a universal file in order, as pyuff returns them.
 
     Parameters
@@ -71,7 +73,7 @@ def read_datasets(path) -> list[dict]:
     return datasets
 
 
-def make_channels(path, datasets: list, notes: list) -> list[Channel]:
+def make_channels(path, datasets: list[Dataset], notes: list[str]) -> list[Channel]:
     """Return the time records among the datasets as channels.
 
     A record along a negative axis is reversed, so that it points along the positive one.
@@ -105,7 +107,7 @@ def make_channels(path, datasets: list, notes: list) -> list[Channel]:
     return channels
 
 
-def find_unit_factors(path, datasets: list) -> dict | None:
+def find_unit_factors(path, datasets: list[Dataset]) -> Dataset | None:
     """Return dataset 164, whose `length` and `force` are units of the file per SI unit; None without it."""
     factors = next((dataset for dataset in datasets if dataset["type"] == 164), None)
     if factors is not None and not min(factors["length"], factors["force"]) > 0:
@@ -116,7 +118,9 @@ def find_unit_factors(path, datasets: list) -> dict | None:
     return factors
 
 
-def _make_channel(path, number: int, dataset: dict, factors: dict | None, notes: list) -> Channel:
+def _make_channel(
+    path, number: int, dataset: Dataset, factors: Dataset | None, notes: list[str]
+) -> Channel:
     """Make a channel of a record from a dataset of a universal file.
 
     Its factor to SI is that of its unit label if this is a unit of its quantity, else that of dataset 164, else 1.

@@ -15,7 +15,7 @@ class FileModes(NamedTuple):
     """Modes from a file, with sentences for the user on what was neglected or changed."""
 
     modes: ModalBasis
-    notes: list
+    notes: list[str]
 
 
 def read_scene_modes(scene) -> FileModes:

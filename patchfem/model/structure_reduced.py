@@ -2,7 +2,7 @@
 
 import re
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -30,17 +30,17 @@ class ReducedModes(NamedTuple):
 
     modes: ModalBasis
     other_modes: tuple[ModalBasis, ...]
-    notes: list
+    notes: list[str]
     max_modes: int
 
 
 class _ReducedFiles(NamedTuple):
     """Matrices of the files by key, boundary rows (b,), motion (n,) for a unit motion of the base or None, and notes."""
 
-    values: dict
+    values: dict[str, Any]
     boundary: np.ndarray
     moved: np.ndarray | None
-    notes: list
+    notes: list[str]
 
 
 def build_reduced_modes(scene) -> ReducedModes:

@@ -27,7 +27,7 @@ ARRAY_NAMES = ("M", "K", "C", "slide", "base", "output", "force", *PATCH_MOTIONS
 MAX_NUMBER_BYTES = 16
 
 
-def read_arrays(path: Path) -> dict:
+def read_arrays(path: Path) -> dict[str, np.ndarray]:
     """Read the arrays of a structure from a .npz or .mat file.
 
     Parameters
@@ -83,7 +83,11 @@ def _refuse_large(name: str, shape: tuple[int, ...], itemsize: int = MAX_NUMBER_
 
 
 def build_basis(
-    data: dict, pairs=(), driven_mass: int | None = None, *, is_forced: bool = False
+    data: dict[str, np.ndarray],
+    pairs=(),
+    driven_mass: int | None = None,
+    *,
+    is_forced: bool = False,
 ) -> ModalBasis:
     """Build the modal basis of a rig from the matrices of a file.
 
@@ -151,7 +155,7 @@ def build_basis(
     )
 
 
-def _refuse_missing(data: dict, missing_name: str) -> None:
+def _refuse_missing(data: dict[str, np.ndarray], missing_name: str) -> None:
     """Raise PatchfemError for an array that the file does not contain."""
     names = ", ".join(data) or "none that patchfem knows"
     removed = ""

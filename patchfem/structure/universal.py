@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..core import PatchfemError
-from ..inputs.universal import find_unit_factors, read_datasets
+from ..inputs.universal import Dataset, find_unit_factors, read_datasets
 from ..scene.keys.removed import describe_removed
 from .places import DIRECTION_NAMES, MeasuredModes
 
@@ -101,7 +101,7 @@ def read_universal(path: Path) -> MeasuredModes:
     return MeasuredModes(frequency, zeta, motion, notes)
 
 
-def _collect_motion(dataset: dict) -> dict:
+def _collect_motion(dataset: Dataset) -> dict[tuple[int, int], float]:
     """Return the component of a mode shape in each direction (node, axis)."""
     motion = {}
     for axis in range(len(DIRECTION_NAMES)):
@@ -112,7 +112,7 @@ def _collect_motion(dataset: dict) -> dict:
     return motion
 
 
-def _read_normal_mode(name: str, dataset: dict, notes: list) -> _ModalNumbers:
+def _read_normal_mode(name: str, dataset: Dataset, notes: list[str]) -> _ModalNumbers:
     """Return the numbers of a real mode.
 
     If the viscous damping ratio is missing, it is half the hysteretic damping, and `notes` says so.
@@ -124,7 +124,7 @@ def _read_normal_mode(name: str, dataset: dict, notes: list) -> _ModalNumbers:
     return _ModalNumbers(dataset["freq"], zeta, dataset["modal_m"])
 
 
-def _read_complex_mode(name: str, dataset: dict) -> _ModalNumbers:
+def _read_complex_mode(name: str, dataset: Dataset) -> _ModalNumbers:
     """Return the numbers of the real mode nearest to a complex one.
 
     With the eigenvalue s, the circular frequency is |s|, the damping ratio -Re s/|s| and the modal mass
