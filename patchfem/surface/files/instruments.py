@@ -11,11 +11,11 @@ import numpy as np
 
 from ...core import Missing, PatchfemError
 from .content import Content
-from .spellings import HEADER_EXAMPLE, shorten
 from .table import MAX_POINTS, Table
+from .units import HEADER_EXAMPLE, shorten
 
 
-def read_instrument(content: Content, _units=None) -> Table:
+def read_instrument(content: Content) -> Table:
     """Read a file in the format of an instrument with the package SurfaceTopography.
 
     Raises Missing without the package, and PatchfemError if it cannot read the file.

@@ -49,7 +49,6 @@ SEEDS = {
                      lambda xml: write.make_x3p(xml, RAW)),
     "x3p heights": ("a.x3p", RAW, lambda raw: write.make_x3p(
         write.make_main_xml(AXES, write.format_matrix(6, 4) + write.format_link(raw)), raw)),
-    "zip": ("a.zip", write.make_zip({"a.csv": f"x [um],y [um],z [um]\n{LINES}".encode()}), bytes),
 }  # fmt: skip
 
 
