@@ -17,11 +17,6 @@ PUBLIC = {
         "read_profile",
         "read_surface",
     ),
-    "fine": (
-        "ELEMENTS_PER_WAVE",
-        "describe_lost_waves",
-        "fine_fraction",
-    ),
     "nodes": (
         "average_at_nodes",
         "is_note",
@@ -55,8 +50,10 @@ PUBLIC = {
         "fitting_cutoff",
         "make_report",
     ),
-    "roughness.spectrum": (
+    "spectrum": (
         "BAND",
-        "Spectrum",
+        "ELEMENTS_PER_WAVE",
+        "describe_lost_waves",
+        "fine_fraction",
     ),
 }

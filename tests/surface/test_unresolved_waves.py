@@ -10,7 +10,7 @@ from synthetic import self_affine, waves
 
 from patchfem.closed_forms import contact as closed_forms
 from patchfem.surface import Profile, describe_lost_waves, fine_fraction, level
-from patchfem.surface.fine import wave_spectrum
+from patchfem.surface.spectrum import wave_spectrum
 
 LENGTH = 12.7e-3
 X = np.linspace(0, LENGTH, 4001)

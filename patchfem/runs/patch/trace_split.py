@@ -15,9 +15,9 @@ import numpy as np
 from ...core import PatchfemError
 from ...formatting import format_length, format_quantity
 from ...model import profile
-from ...surface.fine import NEGLIGIBLE_LOST, unrepresented_fraction, wave_spectrum
 from ...surface.profile import Profile
 from ...surface.roughness.peaks import PERSSON, trace_moments
+from ...surface.spectrum import NEGLIGIBLE_LOST, unrepresented_fraction, wave_spectrum
 
 PROFILE_KEY = "contact.profile.file"
 

@@ -9,7 +9,7 @@ from ..profile import find_runs
 from ..quantity import Quantity
 from ..roughness.filter import mean_surface
 from ..roughness.report import fitting_cutoff
-from ..roughness.spectrum import BAND
+from ..spectrum import BAND
 from .depth_map import DepthMap
 from .records import DEFINITIONS, name_quantity, name_unknown
 from .track import get_margin

@@ -1,4 +1,4 @@
-"""Fraction of the height of a trace that lies in waves too short for the elements."""
+"""Spectrum of a trace: its dominant waves, and those that are too short for the elements."""
 
 from typing import NamedTuple
 
@@ -8,6 +8,9 @@ from ..core import PatchfemError
 from ..formatting import format_length
 from .profile import Profile, level, resample_evenly
 
+BAND = (60e-6, 110e-6)  # wavelengths [m] of `band_amplitude`: the 80 um waves of the 1985 report
+MIN_WAVES = 2  # smallest number of waves in a trace of those that may dominate
+N_SMOOTHED = 9  # number of neighbouring waves whose mean is the density at their middle
 ELEMENTS_PER_WAVE = 2  # number of elements per wave; nodes cannot represent a shorter wave
 # Fraction of the rms height in waves that are too short for the elements,
 # above which a warning is given.
@@ -16,10 +19,39 @@ NEGLIGIBLE_LOST = MAX_LOST / 10  # same fraction, below which the elements repre
 
 
 class WaveSpectrum(NamedTuple):
-    """Mean squares of the waves of a trace by wavelength, longest first."""
+    """Mean squares (n,) [m2] of the waves (n,) [m] of a trace, longest first; waves[0] is twice its length."""
 
     waves: np.ndarray
     power: np.ndarray
+
+    @property
+    def density(self) -> np.ndarray:
+        """One-sided power spectral density (n,) [m3], smoothed."""
+        from scipy.ndimage import uniform_filter1d
+
+        return uniform_filter1d(self.power, N_SMOOTHED, mode="nearest") * self.waves[0]
+
+    def find_dominant_wave(self) -> float | None:
+        """Return the centroid [m] of the octave that contains most of the mean square, None for a flat trace.
+
+        The trace holds at least two of its waves.
+        """
+        frequency = 1 / self.waves
+        total = np.append(0.0, np.cumsum(self.power))
+        first, last = (np.searchsorted(frequency, frequency * end) for end in (0.5**0.5, 2**0.5))
+        octaves = np.where(
+            self.waves <= self.waves[0] / 2 / MIN_WAVES, total[last] - total[first], 0.0
+        )
+        best = int(np.argmax(octaves))
+        if not octaves[best] > 0:
+            return None
+        part = slice(first[best], last[best])
+        return float(self.power[part].sum() / (frequency[part] @ self.power[part]))
+
+    def measure_band(self) -> float:
+        """Return the amplitude [m] of the sine that has the mean square of the waves of `BAND`."""
+        inside = (self.waves >= BAND[0]) & (self.waves <= BAND[1])
+        return float(np.sqrt(2 * self.power[inside].sum()))
 
     def lost_fraction(self, length: float) -> float:
         """Return the fraction of the rms height in waves shorter than a given length [m]."""
@@ -67,12 +99,13 @@ class WaveSpectrum(NamedTuple):
         return float(self.waves[is_resolved].min(initial=np.inf))
 
 
-def wave_spectrum(profile: Profile) -> WaveSpectrum:
+def wave_spectrum(profile: Profile, *, is_tapered: bool = False) -> WaveSpectrum:
     """Compute the spectrum of a levelled trace by a discrete cosine transform.
 
     The mirror image of the trace continues it without a jump, so the ends add no false short waves,
     as those of a Fourier series do. The mean squares add up to that of the trace by the trapezoidal
-    rule. Uneven samples are first resampled. Raises PatchfemError for missing heights.
+    rule. With the window of Hann, whose mean square is 3/8, the ends have no kinks either, which blur a single wave, but
+    count less than the middle. Uneven samples are first resampled. Raises PatchfemError for missing heights.
     """
     from scipy.fft import dct
 
@@ -82,6 +115,8 @@ def wave_spectrum(profile: Profile) -> WaveSpectrum:
         )
     z = level(resample_evenly(profile)).z
     count = z.size - 1
+    if is_tapered:
+        z = z * np.sqrt(8 / 3) * np.sin(np.pi * np.arange(z.size) / count) ** 2
     power = (dct(z, type=1) / count)[1:] ** 2 / 2
     power[-1] /= 2  # the transform counts the wave of two samples twice
     return WaveSpectrum(2 * profile.length / np.arange(1, count + 1), power)
