@@ -34,7 +34,6 @@ PUBLIC = {
         "average_quantities",
     ),
     "roughness.filter": ("mean_line",),
-    "roughness.form": ("parse_form_option",),
     "roughness.parameters": ("abbott_curve",),
     "roughness.peaks": (
         "Moments",
