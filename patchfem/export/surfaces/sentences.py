@@ -52,7 +52,8 @@ SCANS = {
     ),
     "no_wear": (
         VERDICTS["no_wear"],
-        "A worn square of {side} x {side} points is not seen below a mean depth of {detection_limit}.",
+        "A worn square as large as those that are tested, up to 25 x 25 points, is not seen below a mean depth of "
+        "{detection_limit}.",
     ),
 }
 
@@ -69,8 +70,6 @@ IN_VERDICT = {
 WARNINGS = {
     "other_gain": "All heights after wear are {gain} times those before, as another gain of the instrument would make "
     "them, and wear does not; calibrate z of both measurements.",
-    "other_step": "The traces have different steps, {before} before and {after} after; slopes and the largest depth depend "
-    "on them.",
     "likely_place": "The place is likely, not sure: there the surfaces agree by {significance} standard deviations more "
     "than at other places, and more than {sure} make a place sure; compare their curves.",
     "drift": "The datum drifts by {height} (rms), more than the noise of neighbouring depths ({noise}); the intervals "

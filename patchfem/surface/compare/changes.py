@@ -133,16 +133,11 @@ def find_shallow_track(depth) -> ShallowTrack:
     return ShallowTrack(slice(edges[first], edges[stop]), limit)
 
 
-def find_largest_window(shape: tuple[int, int]) -> int:
-    """Return the side, in points, of the largest squares of a scan whose mean depth is tested."""
-    return max(side for side in WINDOWS[2] if side <= max(min(shape) / 4, 1))
-
-
 def find_detection_limit(depth, noise) -> float:
     """Return the mean depth [m] from which on a track of a trace is found, or below which a square of a scan is not."""
     if depth.ndim == 1:
         return find_shallow_track(depth).limit
-    side = find_largest_window(depth.shape)
+    side = max(side for side in WINDOWS[2] if side <= max(min(depth.shape) / 4, 1))
     mean = ndimage.uniform_filter(np.clip(depth / noise, -MAX_PULL[2], MAX_PULL[2]), side)
     scatter = max(estimate_one_sided_scale(mean.ravel(), UNCHANGED_FRACTION[2]), 1 / side)
     threshold = compute_threshold(len(WINDOWS[2]) * depth.size)
