@@ -11,7 +11,7 @@ from .profile import Profile
 MEANS_OVER_WAVES = "means over the waves of the trace"
 # Parts of the notes that cast no doubt on a result.
 NOTES = ("the trace is centred on the patch", MEANS_OVER_WAVES, "is rounded to")
-ROUND_OFF = 1e-3  # digit to which notes state x, relative to its step; smaller digits are round-off
+N_DIGITS = 11  # number of digits of x [m] in notes, which state no round-off
 # Largest number of elements that a trace may lack at either end, with round-off.
 MAX_MISSING_ELEMENTS = 0.5000001
 MAX_STEP_ELEMENTS = 1.5  # largest sample spacing in elements without a note
@@ -47,8 +47,7 @@ def place_over_patch(profile: Profile, x: np.ndarray) -> Profile:
     notes = profile.notes
     if not _covers(known, x):
         shift = float(x[0] + x[-1] - known[0] - known[-1]) / 2
-        digit = 10.0 ** np.floor(np.log10(ROUND_OFF * np.median(np.diff(known))))
-        rounded = digit * np.rint(np.array([known[0], known[-1], shift]) / digit)
+        rounded = np.round([known[0], known[-1], shift], N_DIGITS)
         first, last, added = map(format_length, rounded.tolist())
         notes += (
             f"{profile.source}: x runs from {first} to {last} in the file and does not cover the patch, from "

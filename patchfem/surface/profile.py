@@ -179,7 +179,7 @@ def find_spikes(profile: Profile) -> np.ndarray:
 
 
 def remove_spikes(profile: Profile) -> Profile:
-    """Mark spikes, dropouts and specks of dust as not measured, and count them in a note.
+    """Mark spikes, dropouts and specks of dust as not measured.
 
     Spikes and dropouts are those of `find_spikes`. A speck stands as far above the median of 15 or 31
     samples, and both of its walls are as many deviations steeper than the steps of the trace. A
@@ -206,13 +206,7 @@ def remove_spikes(profile: Profile) -> Profile:
         return profile
     heights = np.array(profile.z)
     heights[known[removed]] = np.nan
-    count = len(find_runs(removed))
-    note = (
-        f"{profile.source}: spikes, dropouts or dust at {count} place{'s' * (count > 1)} (the "
-        f"first at x = {format_length(profile.x[known[np.argmax(removed)]])}) are left out, {removed.sum()} "
-        f"of {z.size} heights with their neighbours; use --keep-spikes to keep them"
-    )
-    return replace(profile, z=frozen_array(heights), notes=(*profile.notes, note))
+    return replace(profile, z=frozen_array(heights))
 
 
 def robust_deviation(values) -> float:

@@ -34,9 +34,9 @@ from .records import (
     name_quantity,
     name_unknown,
 )
-from .statistics import find_mirror_finish, remove_long_waves
+from .statistics import remove_long_waves
 from .track import find_spans, get_margin, measure_track
-from .verdict import find_sure_loss, judge_change, limit_wear, measure_sharp_loss
+from .verdict import find_sure_loss, judge_change, measure_sharp_loss
 
 END_SAMPLES = 7  # number of lines from an end at which growth includes it
 MIN_GROWN_LINE = 0.5  # fraction of a line near an end that grew, from which on the end grew
@@ -201,29 +201,28 @@ def _measure(
         placement = Placement(_name_unknowns(names.place, "elsewhere"), basis="flanks")
         hidden = name_unknown("hidden_wear", "not_hidden")
     if depths is None:
-        numbers = {}
-        if aligned.reason == "no_datum":
-            numbers["unworn"] = float(aligned.fit.unworn.mean())
-        if aligned.reason == "mirror_finish":
-            numbers = find_mirror_finish([fill_gaps(raster.z) for raster in rasters])
         unknown = (*names.wear, *names.place, "hidden_wear")
         values = _name_unknowns(unknown, aligned.reason)
-        return Comparison(*surfaces, Finding(aligned.reason, numbers), values)
+        return Comparison(*surfaces, Finding(aligned.reason, aligned.numbers), values)
 
     # What the same tests find above the first surface is a control for what they find below it.
     spans = find_spans(depths) if is_trace else []
-    area, error = depths.integrate(_cover_loss(depths, spans))
+    covered = _cover_loss(depths, spans)
+    area, error = depths.integrate(covered)
     is_grown = _enlarge(depths.grown) & depths.inside & ~depths.worn
     grown, grown_error = depths.integrate(is_grown, -1.0)
-    sure_area = depths.integrate(depths.worn)[0]
     is_placed = placement.basis == "place"
     # The flanks of a track were compared with random traces, which choose their deepest place too.
     sure_loss = find_sure_loss(depths) if is_placed else SIDE
     # Drift may be as large as the loss of sharp tops, but is no cause of it.
     sharp = measure_sharp_loss(depths) if is_placed else 0.0
     drift = 0.0 if sharp > 0 else error
-    loss = _bound_loss(depths, spans, sharp)
-    code = judge_change(loss.value, drift, sure_loss, sure_area, grown, grown_error)
+    largest = max(area, sharp)
+    lowest = max(area - SIDE * error, (1 - SIDE * depths.errors.model) * sharp, 0.0)
+    highest = max(area + SIDE * error + depths.measure_hidden(covered), sharp)
+    loss = name_quantity(names.lost, largest, lowest, highest)
+    sure_area = depths.integrate(depths.worn)[0]
+    code = judge_change(largest, drift, sure_loss, sure_area, grown, grown_error)
     if not is_placed and code != "worn":
         code = "elsewhere"
     tracks = ()
@@ -231,7 +230,8 @@ def _measure(
         # The area of a single track is that of the common part.
         whole = loss[:3] if len(spans) == 1 else None
         tracks = tuple(measure_track(depths, span, whole) for span in spans)
-    bend = _get_bend(aligned)
+    # The subtracted parabola of a trace, 0 without one.
+    bend = float(aligned.fit.state[-2]) if is_trace and is_placed else 0.0
     code, possible = _doubt(code, depths, spans, tracks, (area, grown, bend))
     tracks = tracks if code.startswith("worn") else ()
 
@@ -253,22 +253,13 @@ def _measure(
         if is_trace and is_placed:
             regions, cutoff = waves.measure_roughness(depths, spans)
     limit = _find_detection_limit(depths) if is_placed else None
-    numbers = {"lost": area, "grown": grown, "basis": placement.basis}
-    numbers |= limit_wear(loss.high / depths.size, limit) | possible
-    verdict = Finding(code, numbers)
+    # A track over a third of the common part may be as deep as the limit without being found.
+    at_most = max(highest / depths.size, (limit or 0.0) / 3)
+    numbers = {"lost": area, "grown": grown, "basis": placement.basis, "at_most": at_most}
+    verdict = Finding(code, numbers | {"detection_limit": limit} | possible)
     evidence = Evidence(placement, depths, regions, cutoff)
     findings = _collect_findings(verdict, evidence, bend, tracks)
     return Comparison(*surfaces, verdict, values, tracks, findings, evidence)
-
-
-def _bound_loss(depths: DepthMap, spans: list[tuple[int, int]], sharp: float) -> Quantity:
-    """Return the lost area [m2] or volume [m3] with its interval; sharp: what sure tops of it have lost."""
-    covered = _cover_loss(depths, spans)
-    area, error = depths.integrate(covered)
-    low = max(area - SIDE * error, (1 - SIDE * depths.errors.model) * sharp, 0.0)
-    high = area + SIDE * error + depths.measure_hidden(covered)
-    name = NAMES[depths.depth.ndim].lost
-    return name_quantity(name, max(area, sharp), low, max(high, sharp))
 
 
 def _find_detection_limit(depths: DepthMap) -> float:
@@ -281,13 +272,6 @@ def _find_detection_limit(depths: DepthMap) -> float:
     middle[count // 3 : 2 * count // 3] = True
     # The loss is found although its own error may lower it.
     return max(limit, 2 * SIDE * depths.integrate(middle)[1] / (middle.sum() * depths.cell))
-
-
-def _get_bend(aligned: Aligned) -> float:
-    """Return the height [m] of the subtracted parabola of traces, 0 without one."""
-    if aligned.reason or aligned.model.n_axes > 1:
-        return 0.0
-    return float(aligned.fit.state[-2])
 
 
 def _describe_place(aligned: Aligned) -> Placement:

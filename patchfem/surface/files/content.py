@@ -15,7 +15,7 @@ HEAD_BYTES = 4096  # number of bytes at the start of a file that determine its f
 BLOCK_BYTES = 65_536  # number of bytes read at a time, so that memory is allocated only as needed
 _FIRST_BYTES = {  # format of a file by its first bytes
     b"\x1f\x8b": "gzip",
-    b"PK\x03\x04": "zip",
+    b"PK\x03\x04": "instrument",  # such as X3P
     b"\x93NUMPY": "npy",
     b"MATLAB 5.0 MAT-file": "mat",
     b"MATLAB 7.3 MAT-file": "mat",
@@ -34,7 +34,7 @@ DAMAGED = "the file is cut off or damaged; save or export it anew"
 class Content(NamedTuple):
     """Content of a surface file after unpacking.
 
-    path: name for messages; kind: "text", "npy", "mat", "zip" or "instrument"; suffix: of the unpacked
+    path: name for messages; kind: "text", "npy", "mat" or "instrument"; suffix: of the unpacked
     file in lower case; data: bytes; is_packed: whether the file itself has other bytes.
     """
 

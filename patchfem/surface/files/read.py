@@ -10,9 +10,8 @@ from .content import TEXT_SUFFIXES, fetch
 from .instruments import read_instrument
 from .table import make_surface
 from .text import read_text
-from .x3p import read_x3p
 
-READERS = {"npy": read_npy, "mat": read_mat, "zip": read_x3p, "instrument": read_instrument}
+READERS = {"npy": read_npy, "mat": read_mat, "instrument": read_instrument}
 
 
 def read_surface(path, units: tuple[str, str] | None = None) -> Profile | Areal:

@@ -124,7 +124,8 @@ def compute_core(z) -> dict[str, float | None]:
     slope = float(centred @ (part - part.mean()) / (centred @ centred))
     top = float(part.mean() - slope * ratio.mean())
     bottom = top + slope
-    first, second = (_find_ratio_above(z, level) for level in (top, bottom))
+    levels = np.array((top, bottom))
+    first, second = np.interp(-levels, -z, (np.arange(n) + 0.5) / n, 0.0, 1.0).tolist()
     peaks = 2 * float(np.maximum(z - top, 0.0).sum()) / n
     valleys = 2 * float(np.maximum(bottom - z, 0.0).sum()) / n
     return {
@@ -134,16 +135,6 @@ def compute_core(z) -> dict[str, float | None]:
         "Mr1": first,
         "Mr2": second,
     }
-
-
-def _find_ratio_above(z, level: float) -> float:
-    """Return the fraction of descending heights (n,) above a level, linear between them."""
-    n = z.size
-    k = int(np.searchsorted(-z, -level))
-    if k in (0, n):
-        return k / n
-    fall = z[k - 1] - z[k]
-    return float((k - 0.5 + (z[k - 1] - level) / (fall if fall > 0 else 1.0)) / n)
 
 
 def abbott_curve(z, count: int = 501) -> tuple[np.ndarray, np.ndarray]:

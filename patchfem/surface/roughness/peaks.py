@@ -77,16 +77,26 @@ def trace_moments(trace: Profile, cutoff: float | None = None) -> TraceMoments:
     PatchfemError for fewer than 16 samples, for a flat trace and for a cut-off of fewer than four
     steps.
     """
-    clean = _remove_spikes(trace)
-    removed = int((clean.missing & ~trace.missing).sum())
-    flat = _filter_short_waves(clean, cutoff)
+    clean = remove_spikes(trace)
+    is_removed = clean.missing & ~trace.missing
+    dust = ()
+    if is_removed.mean() > MAX_SPIKE_FRACTION:
+        # So many apparent spikes belong to the surface.
+        clean = trace
+    elif is_removed.any():
+        dust = (
+            f"{is_removed.sum()} of {trace.z.size} heights are spikes, dropouts or dust and are left out",
+        )
+    tilted = resample_evenly(clean)
+    flat = level(tilted)
+    if flat.z.size >= MIN_SAMPLES and not np.ptp(flat.z) > ROUND_OFF * np.ptp(tilted.z):
+        raise PatchfemError(
+            f"{trace.source}: the trace is flat, so it has no peaks; leave [contact.asperities] out"
+        )
+    if cutoff is not None and cutoff < flat.length:
+        flat = filter_surface(flat, cutoff)[1]
     fine = rms_moments(flat)
     coarse = rms_moments(flat, 2) if flat.z.size >= 2 * MIN_SAMPLES - 1 else None
-    dust = ()
-    if removed:
-        dust = (
-            f"{removed} of {trace.z.size} heights are spikes, dropouts or dust and are left out",
-        )
     dust += _describe_sharpest(flat)
     return TraceMoments(fine, coarse, _describe_skew(flat.z, fine, flat.length), dust)
 
@@ -106,22 +116,6 @@ def rms_moments(trace: Profile, every: int = 1) -> Moments:
     return Moments(
         *(float(np.sqrt(np.mean(np.diff(z, order) ** 2)) / step**order) for order in range(3))
     )
-
-
-def _remove_spikes(trace: Profile) -> Profile:
-    """Remove the spikes of a trace, unless they are too numerous to be spikes."""
-    clean = remove_spikes(trace)
-    return clean if (clean.missing & ~trace.missing).mean() <= MAX_SPIKE_FRACTION else trace
-
-
-def _filter_short_waves(trace: Profile, cutoff: float | None) -> Profile:
-    tilted = resample_evenly(trace)
-    flat = level(tilted)
-    if flat.z.size >= MIN_SAMPLES and not np.ptp(flat.z) > ROUND_OFF * np.ptp(tilted.z):
-        raise PatchfemError(
-            f"{trace.source}: the trace is flat, so it has no peaks; leave [contact.asperities] out"
-        )
-    return flat if cutoff is None or cutoff >= flat.length else filter_surface(flat, cutoff)[1]
 
 
 def _describe_sharpest(trace: Profile) -> tuple[str, ...]:
