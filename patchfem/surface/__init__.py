@@ -53,6 +53,5 @@ PUBLIC = {
         "BAND",
         "ELEMENTS_PER_WAVE",
         "describe_lost_waves",
-        "fine_fraction",
     ),
 }

@@ -39,7 +39,6 @@ def place_over_patch(profile: Profile, x: np.ndarray) -> Profile:
     -------
     Profile
     """
-    x = _check_nodes(x)
     known = profile.x[~profile.missing]
     if known.size < 2:
         raise PatchfemError(f"{profile.source}: {known.size} heights; a trace needs at least two")
@@ -94,7 +93,6 @@ def average_at_nodes(profile: Profile, x: np.ndarray, integral=None) -> np.ndarr
     -------
     (m,) array [m]
     """
-    x = _check_nodes(x)
     if profile.missing.any():
         raise PatchfemError(
             f"{profile.source}: {profile.missing.sum()} heights are missing; clean the trace first"
@@ -114,13 +112,6 @@ def average_at_nodes(profile: Profile, x: np.ndarray, integral=None) -> np.ndarr
     high = np.minimum(np.arange(x.size) + 1, x.size - 1)
     slope = (mean[high] - mean[low]) / (middle[high] - middle[low])
     return frozen_array(mean + slope * (x - middle))
-
-
-def _check_nodes(x) -> np.ndarray:
-    x = np.asarray(x, dtype=np.float64)
-    if x.ndim != 1 or x.size < 2 or not (np.diff(x) > 0).all():
-        raise PatchfemError("a profile needs two or more nodes with rising x")
-    return x
 
 
 def _covers(places, x) -> bool:

@@ -47,7 +47,12 @@ class Profile:
     @property
     def step(self) -> float:
         """Mean distance of neighbouring samples [m]."""
-        return self.length / (self.x.size - 1)
+        return measure_step(self.x)
+
+
+def measure_step(axis: np.ndarray) -> float:
+    """Return the mean distance [m] of neighbouring positions (n,) [m]."""
+    return float(axis[-1] - axis[0]) / (axis.size - 1)
 
 
 def level(profile: Profile) -> Profile:
@@ -172,8 +177,8 @@ def find_spikes(profile: Profile) -> np.ndarray:
     if known.size < WINDOW:
         return is_spike
     z = profile.z[known]
-    digit = np.diff(np.unique(z)).min(initial=np.inf)
-    distance, deviation = _compare_with_neighbours(z, WINDOW, digit if np.isfinite(digit) else 0.0)
+    digit = np.diff(np.unique(z)).min(initial=np.ptp(z))
+    distance, deviation = _compare_with_neighbours(z, WINDOW, digit)
     is_spike[known] = np.abs(distance) > SPIKE_DEVIATIONS * deviation
     return is_spike
 
@@ -216,5 +221,5 @@ def robust_deviation(values) -> float:
 
 def find_runs(flags) -> list[tuple[int, int]]:
     """Return the first and the last index of each run of true values."""
-    change = np.flatnonzero(np.diff(np.concatenate([[0], flags.astype(np.int8), [0]])))
-    return list(zip(change[::2].tolist(), (change[1::2] - 1).tolist()))
+    changes = np.flatnonzero(np.diff(np.concatenate([[0], flags.astype(np.int8), [0]])))
+    return [(first, stop - 1) for first, stop in changes.reshape(-1, 2).tolist()]

@@ -52,7 +52,6 @@ class Aligned:
     """Two surfaces after alignment, or the code of the reason why they cannot be compared.
 
     - numbers: what the sentence on the reason needs.
-    - gain: factor by which the heights of the second surface were divided; 1 if no other one shows.
     - gain_error: standard deviation of the gain, as far as the unworn heights show it.
     """
 
@@ -61,7 +60,6 @@ class Aligned:
     model: Model | None = None
     fit: Fit | None = None
     place: Place | None = None
-    gain: float = 1.0
     gain_error: float = MAX_GAIN_ERROR
 
 
@@ -91,7 +89,7 @@ def align(
     digit = max(digit, MIN_NOISE)
     fit = _fit_datum(model, state, digit, is_straight=is_straight)
     fit, gain_error = _fit_gain(model, fit, digit)
-    aligned = Aligned("", None, model, fit, place, 1 + float(fit.state[-1]), gain_error)
+    aligned = Aligned("", None, model, fit, place, gain_error)
 
     if shift is None and not _is_same_place(aligned):
         return _refuse(first, second)
@@ -123,14 +121,11 @@ def _use_all_points(aligned: Aligned, first: Raster, second: Raster, digit: floa
     model = aligned.model
     if model.own.z.shape == order(first, second)[0].z.shape:
         return aligned
-    place = aligned.place._replace(
-        shift=fit.state[: model.n_axes], turn=float(fit.state[model.n_axes])
-    )
-    model = _make_model(first, second, place, stride=1)
-    model.max_gain_change = aligned.model.max_gain_change
-    return replace(
-        aligned, model=model, fit=evaluate(model, fit.state, fit.free, digit), place=place
-    )
+    shift = fit.state[: model.n_axes]
+    place = aligned.place._replace(shift=shift, turn=float(fit.state[model.n_axes]))
+    whole = _make_model(first, second, place, stride=1)
+    whole.max_gain_change = model.max_gain_change
+    return replace(aligned, model=whole, fit=evaluate(whole, fit.state, fit.free, digit))
 
 
 def _is_same_place(aligned: Aligned) -> bool:

@@ -46,7 +46,6 @@ MAX_TRACK_FRACTION = 0.8
 MIN_SCAR_FRACTION = 0.9  # fraction of worn heights in such a scar; worn tops have a smaller one
 # Mean height of a bow relative to the short waves, from which on it may be a scar.
 MIN_BOW = 3.0
-MIN_DEPOSITS = 0.05  # smallest grown area or volume that is reported, relative to the lost one
 MIN_OTHER_LENGTH = 5e-4  # smallest error of length that is reported
 MAX_STEP_RATIO = 1.01  # ratio of two sampling intervals that counts as equal
 # Fraction of worn heights in a track below which it consists of worn tops.
@@ -258,7 +257,7 @@ def _measure(
     numbers = {"lost": area, "grown": grown, "basis": placement.basis, "at_most": at_most}
     verdict = Finding(code, numbers | {"detection_limit": limit} | possible)
     evidence = Evidence(placement, depths, regions, cutoff)
-    findings = _collect_findings(verdict, evidence, bend, tracks)
+    findings = _collect_findings(evidence, bend, tracks)
     return Comparison(*surfaces, verdict, values, tracks, findings, evidence)
 
 
@@ -281,7 +280,7 @@ def _describe_place(aligned: Aligned) -> Placement:
     placed = dict(zip(("shift_y", "shift_x", "rotation"), zip(state, errors)))
     if aligned.model.n_axes == 1:
         placed = {"shift": (-state[0], errors[0]), "scale": (1 / (1 + state[1]), errors[1])}
-    placed["gain"] = (aligned.gain, aligned.gain_error)
+    placed["gain"] = (1 + state[-1], aligned.gain_error)
     values = {name: name_estimate(name, *estimate) for name, estimate in placed.items()}
     place = aligned.place
     if np.isfinite(place.significance):
@@ -290,7 +289,7 @@ def _describe_place(aligned: Aligned) -> Placement:
 
 
 def _collect_findings(
-    verdict: Finding, evidence: Evidence, bend: float, tracks: tuple[Track, ...]
+    evidence: Evidence, bend: float, tracks: tuple[Track, ...]
 ) -> tuple[Finding, ...]:
     """Return what a reader must know of the place, the datum, the gain and the tracks."""
     placement = evidence.placement
@@ -306,17 +305,8 @@ def _collect_findings(
     bow = abs(bend)
     bow_area = bow * (2 if bend > 0 else 1) / 3 * float(np.ptp(depths.x))
     has_tops = bool(tracks) and _is_broken(depths, find_spans(depths)[0], MIN_TOPS_FRACTION)
-    grown = verdict.numbers["grown"]
-    has_deposits = (
-        verdict.code.startswith("worn") and grown > MIN_DEPOSITS * verdict.numbers["lost"]
-    )
-    significance = placement.values.get("significance")
-    place_code = ""
-    place = {}
-    if significance and significance.value:
-        place_code = "sure_place" if significance.value > SURE_SIGNIFICANCE else "likely_place"
-        # Rounded up, 11.7 would look as sure as 12.
-        place = {"significance": float(np.floor(significance.value)), "sure": SURE_SIGNIFICANCE}
+    known = placement.values.get("significance")
+    significance = known.value if known else np.inf
     # The noise of the depths contains the drift; that of neighbours does not.
     drift = depths.errors.drift
     short_noise = robust_deviation(np.diff(depths.depth)) / np.sqrt(2)
@@ -325,15 +315,17 @@ def _collect_findings(
         (not is_placed, "no_old_surface_left", {"from": float(first), "to": float(last)}),
         (bow, "bow_subtracted", {"height": bow, "area": bow_area}),
         (is_placed, "hidden_even_wear", {"limit": None}),
-        (place_code, place_code, place),
+        (
+            significance <= SURE_SIGNIFICANCE,
+            "likely_place",
+            # Rounded up, 11.7 would look as sure as 12.
+            {"significance": float(np.floor(significance)), "sure": SURE_SIGNIFICANCE},
+        ),
         (placement.mirrored, "mirrored", {}),
         (gain not in (None, 1.0), "other_gain", {"gain": gain}),
         (lengths, "other_length", lengths),
         (drift > short_noise, "drift", {"height": drift, "noise": short_noise}),
-        (len(tracks) > 1, "other_tracks", {"count": len(tracks) - 1}),
-        (tracks and any(tracks[0].cut), "track_cut", {}),
         (has_tops, "worn_tops", {}),
-        (has_deposits, "deposits", {"area" if depths.y is None else "volume": grown}),
     )
     return tuple(Finding(code, numbers) for applies, code, numbers in rows if applies)
 

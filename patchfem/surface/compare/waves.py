@@ -76,7 +76,7 @@ def compare_waves(
     values = {}
     errors = (band_noise, noise / step)
     for name, sizes, error in zip(RATIO_NAMES, (passed, slopes), errors):
-        blocks = [_average_squares(size, n_blocks, axis) for size in sizes]
+        blocks = [_average_squares(np.array_split(size, n_blocks, axis)) for size in sizes]
         smallest = min(block.mean() for block in blocks)
         if not smallest > 0 or error**2 > MAX_NOISE_FRACTION * smallest:
             values[name] = name_unknown(name, "noise")
@@ -91,9 +91,9 @@ def _subtract_polynomial(z, degree: int) -> np.ndarray:
     return z - z @ basis @ basis.T
 
 
-def _average_squares(values, n_blocks: int, axis: int) -> np.ndarray:
-    """Return the mean squares (n_blocks,) of blocks of values (k, n)."""
-    return np.array([np.mean(part**2) for part in np.array_split(values, n_blocks, axis)])
+def _average_squares(parts: list[np.ndarray]) -> np.ndarray:
+    """Return the mean squares (k,) of parts of values."""
+    return np.array([np.mean(part**2) for part in parts])
 
 
 def _divide_means(before, after, power: float) -> np.ndarray:
@@ -192,6 +192,6 @@ def _measure_sections(sections: list[np.ndarray], step: float) -> dict[str, np.n
     """Return the mean (k,) in each section of the absolute height [m], of its square, and of the squared slope."""
     return {
         "Ra": np.array([np.abs(part).mean() for part in sections]),
-        "Rq": np.array([np.mean(part**2) for part in sections]),
-        "slope": np.array([np.mean(np.diff(part) ** 2) for part in sections]) / step**2,
+        "Rq": _average_squares(sections),
+        "slope": _average_squares([np.diff(part) / step for part in sections]),
     }

@@ -12,7 +12,6 @@ MIB = 2**20  # number of bytes in a mebibyte
 MAX_BYTES = 512 * MIB  # largest size of a file, or of its unpacked content, in bytes
 MAX_TEXT_BYTES = 64 * MIB  # largest size of a text file, in bytes: four million samples
 HEAD_BYTES = 4096  # number of bytes at the start of a file that determine its format
-BLOCK_BYTES = 65_536  # number of bytes read at a time, so that memory is allocated only as needed
 _FIRST_BYTES = {  # format of a file by its first bytes
     b"\x1f\x8b": "gzip",
     b"PK\x03\x04": "instrument",  # such as X3P
@@ -81,8 +80,7 @@ def _read_limited(path: Path, suffix: str, file) -> Content:
     kind = next((name for mark, name in _FIRST_BYTES.items() if data.startswith(mark)), kind)
 
     limit = MAX_TEXT_BYTES if kind == "text" else MAX_BYTES
-    while len(data) <= limit and (block := file.read(BLOCK_BYTES)):
-        data += block
+    data += file.read(limit + 1 - len(data))
     if len(data) > limit:
         remedy = " of text; thin out the samples of the profile" if kind == "text" else ""
         raise PatchfemError(f"{path}: more than {limit // MIB} MiB{remedy}")

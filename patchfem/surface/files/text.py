@@ -26,7 +26,6 @@ from .units import HEADER_EXAMPLE, SIZE_LINES, parse_length_unit, shorten
 NOT_TEXT = f"export the profile as text with two columns and {HEADER_EXAMPLE}"
 _QUOTED_NUMBER = re.compile(r'"\s*([+-]?[0-9]*),([0-9]+(?:[eE][+-]?[0-9]+)?)\s*"')
 _CONTROL = re.compile(r"[\x00-\x08\x0e-\x1f\x7f]")
-_NOT_FINITE = re.compile(r"[+-]?(?:nan|inf)", re.IGNORECASE)
 
 
 def read_text(content: Content, *, has_units: bool = False) -> Table:
@@ -189,7 +188,7 @@ def _read_rows(
 
 def _parse_cell(place: str, role: str, cell: str) -> float:
     """Return the number in a cell, NaN for a missing height; raise PatchfemError for other text."""
-    if NUMBER_PATTERN.fullmatch(cell) or _NOT_FINITE.fullmatch(cell):
+    if NUMBER_PATTERN.fullmatch(cell):
         return float(cell)
     if role == "index" or (role == "z" and MISSING.fullmatch(cell)):
         return np.nan

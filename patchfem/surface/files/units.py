@@ -34,7 +34,6 @@ ROLES = {name: role for role, names in _COLUMN_NAMES.items() for name in names.s
 
 GIVE_UNITS = 'state the units of x and z by --units "mm,um" (in Python, by units=("mm", "um"))'
 HEADER_EXAMPLE = "write the header as `x [um],z [um]`"
-SCAN_HEADER_EXAMPLE = "write the header as `x [um],y [um],z [um]`"
 SIZE_LINES = "write `# Width: 1.2 mm` and `# Height: 0.8 mm` and `# Value units: um` above its rows"
 
 

@@ -49,11 +49,10 @@ def compute_areal_parameters(z, steps: tuple[float, float]) -> dict[str, float |
         Spacings along y and along x [m].
     """
     heights = z[~np.isnan(z)]
-    values = {f"S{name}": value for name, value in compute_moments(heights).items()}
-    core = compute_core(heights)
-    values |= {f"S{name.lower()}": value for name, value in core.items()}
+    distribution = compute_moments(heights) | compute_core(heights)
+    values = {f"S{name.lower()}": value for name, value in distribution.items()}
     values |= {"Sp": float(heights.max()), "Sv": float(-heights.min())}
-    values["Sz"] = float(np.ptp(heights))
+    values["Sz"] = values["Sp"] + values["Sv"]
     slopes = [np.diff(z, axis=axis) / step for axis, step in enumerate(steps)]
     values["Sdq"] = float(np.sqrt(sum(np.nanmean(slope**2) for slope in slopes)))
     values["Sdr"] = _compute_area_ratio(*(slope**2 for slope in slopes))

@@ -9,7 +9,7 @@ from scipy import fft
 from ...core import PatchfemError, frozen_array
 from ...formatting import format_length
 from ..areal import Areal
-from ..profile import Profile, level, resample_evenly
+from ..profile import Profile, level, measure_step, resample_evenly
 
 # Width of the weights relative to the cut-off; a wave of the cut-off keeps half its height.
 ALPHA = np.sqrt(np.log(2) / np.pi)
@@ -32,8 +32,7 @@ def filter_surface(surface: Profile | Areal, cutoff: float) -> tuple[Profile | A
     kept = []
     cutoffs = []
     for name, axis in axes.items():
-        length = float(np.ptp(axis))
-        step = length / (axis.size - 1)
+        step = measure_step(axis)
         if not np.isfinite(cutoff) or cutoff < MIN_CUTOFF_STEPS * step * (1 - 1e-9):
             raise PatchfemError(
                 f"{surface.source}: a cut-off of {format_length(cutoff)} is shorter than {MIN_CUTOFF_STEPS} steps of "
@@ -43,7 +42,7 @@ def filter_surface(surface: Profile | Areal, cutoff: float) -> tuple[Profile | A
         if 2 * edge > axis.size - 2:
             raise PatchfemError(
                 f"{surface.source}: half a cut-off of {format_length(cutoff)} is trimmed at each end, so that it must be "
-                f"shorter than the length along {name}, {format_length(length)}"
+                f"shorter than the length along {name}, {format_length(axis[-1] - axis[0])}"
             )
         kept.append(slice(edge, axis.size - edge))
         cutoffs.append(cutoff / step)

@@ -41,7 +41,6 @@ PROFILE = {
 }
 # The same of the waves of the levelled trace.
 WAVES = {
-    "dominant_wavelength": ("m", "wavelength of the octave with the largest mean square height"),
     "band_amplitude": (
         "m",
         "amplitude of a sine with the mean square of the waves from 60 to 110 um",
@@ -120,9 +119,7 @@ def compute_core(z) -> dict[str, float | None]:
     start = int(np.argmin(z[: n - size + 1] - z[size - 1 :]))
     part = z[start : start + size]
     ratio = (np.arange(start, start + size) + 0.5) / n
-    centred = ratio - ratio.mean()
-    slope = float(centred @ (part - part.mean()) / (centred @ centred))
-    top = float(part.mean() - slope * ratio.mean())
+    slope, top = np.polyfit(ratio, part, 1).tolist()
     bottom = top + slope
     levels = np.array((top, bottom))
     first, second = np.interp(-levels, -z, (np.arange(n) + 0.5) / n, 0.0, 1.0).tolist()

@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...core import PatchfemError
-from ...formatting import format_length, format_number
+from ...formatting import format_length
 from ..profile import Profile, level, remove_spikes, resample_evenly
 from .filter import filter_surface
 from .parameters import MIN_SAMPLES, ROUND_OFF
@@ -97,7 +97,15 @@ def trace_moments(trace: Profile, cutoff: float | None = None) -> TraceMoments:
         flat = filter_surface(flat, cutoff)[1]
     fine = rms_moments(flat)
     coarse = rms_moments(flat, 2) if flat.z.size >= 2 * MIN_SAMPLES - 1 else None
-    dust += _describe_sharpest(flat)
+
+    # A few heights, such as those of wide dust, may make up most of m_4.
+    bend = np.diff(flat.z, 2) ** 2
+    order = np.argsort(bend)[::-1][: max(int(SHARPEST_FRACTION * bend.size), 1)]
+    if bend[order].sum() > MAX_SHARPEST_POWER * bend.sum():
+        dust += (
+            f"{order.size} of {flat.z.size} heights, the sharpest at x = {format_length(flat.x[order[0] + 1])}, make up "
+            "most of the mean square curvature, as dust does; if they are dust, write nan for them",
+        )
     return TraceMoments(fine, coarse, _describe_skew(flat.z, fine, flat.length), dust)
 
 
@@ -115,23 +123,6 @@ def rms_moments(trace: Profile, every: int = 1) -> Moments:
         )
     return Moments(
         *(float(np.sqrt(np.mean(np.diff(z, order) ** 2)) / step**order) for order in range(3))
-    )
-
-
-def _describe_sharpest(trace: Profile) -> tuple[str, ...]:
-    """Describe the few heights, such as those of wide dust, that make up most of m_4; () if none do."""
-    bend = np.diff(trace.z, 2) ** 2
-    order = np.argsort(bend)
-    count = max(int(SHARPEST_FRACTION * bend.size), 1)
-    fraction = float(bend[order[-count:]].sum()) / max(float(bend.sum()), 1e-300)
-    if fraction < MAX_SHARPEST_POWER:
-        return ()
-    curvature = float(np.sqrt(bend[order[:-count]].mean())) / trace.step**2
-    place = format_length(float(trace.x[order[-1] + 1]))
-    return (
-        f"{count} of {trace.z.size} heights, the sharpest at x = {place}, make up {100 * fraction:.3g} % of the mean "
-        f"square curvature, as dust does; without them rms_curvature is {format_number(curvature, 4)} 1/m; if they are "
-        "dust, write nan for them",
     )
 
 

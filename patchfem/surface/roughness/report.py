@@ -9,7 +9,7 @@ from scipy import special
 from ...core import PatchfemError, frozen_array
 from ...formatting import format_length
 from ..areal import Areal, find_scan_spikes, level_plane
-from ..profile import Profile, find_spikes, level, resample_evenly
+from ..profile import Profile, find_spikes, level, measure_step, resample_evenly
 from ..quantity import Quantity
 from ..spectrum import BAND, WaveSpectrum, wave_spectrum
 from .areal import AREAL, compute_areal_parameters
@@ -134,11 +134,13 @@ def make_report(
     else:
         parts = TraceParts(primary, waviness, roughness, wave_spectrum(primary, is_tapered=True))
         quantities, notes = _measure_trace(parts, cutoff)
-    length = float(np.ptp(whole.x))
     return RoughnessReport(
         source=whole.source,
         sampling=Sampling(
-            length, length / (whole.x.size - 1), whole.z.shape, None if is_scan else part.x.size
+            float(np.ptp(whole.x)),
+            measure_step(whole.x),
+            whole.z.shape,
+            None if is_scan else part.x.size,
         ),
         treatment=Treatment(short, cutoff, window),
         values=tuple(quantities),
@@ -160,12 +162,9 @@ def _measure_trace(
         for name, value in values.items()
     ]
     has_band = 2 * BAND[1] <= primary.length and BAND[0] >= 2 * primary.step
-    waves = {
-        "dominant_wavelength": (parts.spectrum.find_dominant_wave(), "undetermined"),
-        "band_amplitude": (parts.spectrum.measure_band() if has_band else None, "band"),
-    }
-    for name, (value, reason) in waves.items():
-        quantities.append(_name_value(name, value, *WAVES[name], "levelled trace", reason))
+    amplitude = parts.spectrum.measure_band() if has_band else None
+    name = "band_amplitude"
+    quantities.append(_name_value(name, amplitude, *WAVES[name], "levelled trace", "band"))
     rough = parts.roughness
     if rough is None:
         return quantities, ()
@@ -202,7 +201,7 @@ def _measure_scan(scan: Areal) -> tuple[list[Quantity], tuple[str, ...]]:
         raise PatchfemError(
             f"{scan.source}: no measured height is left within half a cut-off of the borders"
         )
-    steps = tuple(float(np.ptp(axis)) / (axis.size - 1) for axis in (scan.y, scan.x))
+    steps = (measure_step(scan.y), measure_step(scan.x))
     quantities = []
     for name, value in compute_areal_parameters(scan.z, steps).items():
         number, reason = (None, value) if isinstance(value, str) else (value, "")
@@ -241,7 +240,7 @@ def crop(surface: Profile | Areal, *ends: float) -> Profile | Areal:
     parts = []
     for name, first, last in zip(names, ends[::2], ends[1::2]):
         axis = getattr(surface, name)
-        near = 1e-6 * float(np.ptp(axis)) / (axis.size - 1)
+        near = 1e-6 * measure_step(axis)
         if not axis[0] - near <= first < last <= axis[-1] + near:
             raise PatchfemError(
                 f"{surface.source}: the window runs from {format_length(first)} to {format_length(last)}, but the "

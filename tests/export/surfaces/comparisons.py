@@ -72,17 +72,13 @@ VERDICTS = {
 }
 FINDINGS = {
     "mirrored": {},
-    "sure_place": {"significance": 57.3, "sure": 12.0},
     "likely_place": {"significance": 7.3, "sure": 12.0},
     "no_old_surface_left": {"from": 1e-3, "to": 2e-3},
     "bow_subtracted": {"height": 4e-7, "area": 3e-10},
     "other_length": {"scale": 1.002, "low": 1.0018, "high": 1.0022},
     "other_gain": {"gain": 0.97},
     "hidden_even_wear": {"limit": 3e-7},
-    "deposits": {"area": 5e-11},
     "drift": {"height": 2e-8, "noise": 1.5e-8},
-    "other_tracks": {"count": 2},
-    "track_cut": {},
     "left_out": {"before": 3, "after": 41},
     "worn_tops": {},
 }

