@@ -27,7 +27,7 @@ class Areal:
     y: np.ndarray
     z: np.ndarray
     source: str
-    notes: tuple = ()
+    notes: tuple[str, ...] = ()
 
     @property
     def missing(self) -> np.ndarray:

@@ -42,6 +42,8 @@ def place_over_patch(profile: Profile, x: np.ndarray) -> Profile:
     known = profile.x[~profile.missing]
     if known.size < 2:
         raise PatchfemError(f"{profile.source}: {known.size} heights; a trace needs at least two")
+
+    # A trace that does not cover the patch is centred on it.
     shift = 0.0
     notes = profile.notes
     if not _covers(known, x):
@@ -54,10 +56,13 @@ def place_over_patch(profile: Profile, x: np.ndarray) -> Profile:
         )
     known = known + shift
     _require_cover(profile.source, known, x)
+
+    # One sample beyond each end of the patch stays, if there is one.
     first = max(int(np.searchsorted(known, x[0], "right")) - 1, 0)
     last = min(int(np.searchsorted(known, x[-1], "left")), known.size - 1)
     places = profile.x + shift
     kept = (places >= known[first]) & (places <= known[last])
+
     step = float(np.median(np.diff(places[kept])))
     element = float(np.diff(x).max())
     if step > MAX_STEP_ELEMENTS * element:

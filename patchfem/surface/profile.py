@@ -32,7 +32,7 @@ class Profile:
     x: np.ndarray
     z: np.ndarray
     source: str
-    notes: tuple = ()
+    notes: tuple[str, ...] = ()
 
     @property
     def missing(self) -> np.ndarray:
@@ -98,6 +98,8 @@ def _bridge(profile: Profile, usable, max_gap: float = np.inf) -> Profile:
         )
     if usable.all():
         return profile
+
+    # A gap reaches from one usable height to the next.
     gaps = np.where(np.diff(np.flatnonzero(usable)) > 1, np.diff(places), 0.0)
     first = int(np.argmax(gaps))
     longest = float(gaps[first])
@@ -107,6 +109,7 @@ def _bridge(profile: Profile, usable, max_gap: float = np.inf) -> Profile:
             f"{format_length(places[first + 1])}, and a straight line may bridge at most {format_length(max_gap)}; "
             "measure this part of the trace anew or use a larger contact.element_size"
         )
+
     notes = profile.notes
     if profile.missing.any():
         notes += (
@@ -196,6 +199,8 @@ def remove_spikes(profile: Profile) -> Profile:
     z = profile.z[known]
     is_spike = find_spikes(profile)[known]
     min_wall = SPIKE_DEVIATIONS * robust_deviation(z[2:] - z[:-2]) / 2
+
+    # A group goes with one sample on each side, which its flank may touch.
     removed = is_spike.copy()
     for window in (WINDOW, *SPECK_WINDOWS):
         distance, deviation = _compare_with_neighbours(z, window)
@@ -207,6 +212,7 @@ def remove_spikes(profile: Profile) -> Profile:
             is_speck = is_high and has_walls and last - first < window // 2
             if is_speck or is_spike[group].any():
                 removed[max(first - 1, 0) : last + 2] = True
+
     if not removed.any():
         return profile
     heights = np.array(profile.z)

@@ -49,6 +49,7 @@ def find_changed(depth, noise) -> np.ndarray:
     limit = compute_threshold(len(windows) * known.sum())
     pull = MAX_PULL[depth.ndim]
     remainder = np.clip(relative, -pull, pull)
+
     for side in windows:
         if side > min(depth.shape) / 4:
             break
@@ -66,6 +67,7 @@ def find_changed(depth, noise) -> np.ndarray:
             changed |= ndimage.binary_opening(high, np.ones((spot,) * depth.ndim))
         else:
             changed |= ndimage.binary_dilation(high, np.ones((side,) * depth.ndim))
+
     side = MIN_SIDE
     if depth.ndim == 1:
         places = np.flatnonzero(known)

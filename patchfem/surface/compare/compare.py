@@ -146,6 +146,8 @@ def compare_surfaces(
     removed = tuple(
         int(clean.missing.sum() - raw.missing.sum()) for clean, raw in zip(cleaned, surfaces)
     )
+
+    # Equal heights would have no noise.
     first, second = (make_raster(surface) for surface in cleaned)
     names = NAMES[first.z.ndim]
     if np.array_equal(first.z, second.z, equal_nan=True) and (first.origin == second.origin).all():
@@ -156,6 +158,7 @@ def compare_surfaces(
         result = _measure(surfaces, (first, second), aligned)
         ratios = _compare_waves((first, second), result, options.direction)
         result = replace(result, values=result.values | ratios)
+
     evidence = replace(result.evidence, removed=removed)
     findings = result.findings
     if any(removed):
@@ -301,12 +304,14 @@ def _collect_findings(
     if is_placed and scale is not None:
         if not scale.low - MIN_OTHER_LENGTH < 1 < scale.high + MIN_OTHER_LENGTH:
             lengths = {"scale": scale.value, "low": scale.low, "high": scale.high}
+
     # A scar is deepest in the middle of its parabola, wear of both ends at its ends.
     bow = abs(bend)
     bow_area = bow * (2 if bend > 0 else 1) / 3 * float(np.ptp(depths.x))
     has_tops = bool(tracks) and _is_broken(depths, find_spans(depths)[0], MIN_TOPS_FRACTION)
     known = placement.values.get("significance")
     significance = known.value if known else np.inf
+
     # The noise of the depths contains the drift; that of neighbours does not.
     drift = depths.errors.drift
     short_noise = robust_deviation(np.diff(depths.depth)) / np.sqrt(2)

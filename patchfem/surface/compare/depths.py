@@ -39,6 +39,7 @@ def make_depths(model: Model, fit: Fit, gain_error: float = 0.0) -> DepthMap:
         for k in fit.free
         if model.n_axes < k <= model.n_axes + len(model.datum)
     ]
+
     depth = fill_gaps(model.draw(fit.depth))[box]
     noise = model.draw(fit.noise)[box]
     noise = np.where(np.isnan(noise), np.median(fit.noise), noise)
@@ -51,12 +52,14 @@ def make_depths(model: Model, fit: Fit, gain_error: float = 0.0) -> DepthMap:
         first = first / (1 + fit.state[-1]) + depth
     base = model.datum[(terms, *box)]
     before = subtract_plane(first, base[: 1 + model.n_axes])
+
     # An error of the gain moves the heights of the second surface that stand out of the datum.
     unworn = masks["unworn"]
     shifts = [gain_error * (subtract_plane(before, base, unworn) - depth)]
     if model.n_axes == 1:
         shifts.append(_bend_datum(depth, unworn, base))
     errors = estimate_errors(depth, noise, unworn, base, shifts)
+
     model_error = float(np.hypot(MODEL_ERROR, gain_error))
     # Holes of missing heights belong to the common part.
     inside = ndimage.binary_fill_holes(model.common[box])

@@ -220,6 +220,8 @@ def measure_track(
         area = lost[0]
         error = (lost[2] - area) / SIDE
         gross = name_quantity("area_gross", *lost)
+
+    # The mean has the errors of the area and of the width.
     mean = area / width
     mean_error = float(np.hypot(error / width, mean * max(shorter, longer) / SIDE / width))
     piled, piled_error = _measure_pile_up(depths, (start, end), width)

@@ -55,6 +55,7 @@ def compare_waves(
     length = count * step
     if length < MIN_WAVES * BAND[1] or step > BAND[0] / MIN_STEPS:
         return {name: name_unknown(name, "band") for name in RATIO_NAMES}
+
     columns = np.arange(count)
     kept = np.all([np.abs(columns - end) > BAND[1] / step for end in ends], axis=0)
     if kept.sum() * step < MIN_WAVES * BAND[1]:
@@ -65,6 +66,7 @@ def compare_waves(
     lines = [z - smooth(z, deviations[1]) for z in lines]
     passed = [(smooth(z, deviations[0]) - smooth(z, deviations[1]))[:, kept] for z in lines]
     slopes = [(np.diff(z, axis=1) / step)[:, kept[1:]] for z in lines]
+
     # White noise has the slope noise sqrt(2)/step, and the fraction of its band in the amplitude.
     band_noise = noise / np.sqrt(2) * np.sqrt(2 * step * (1 / BAND[0] - 1 / BAND[1]))
     # Blocks are parts of a single line, or groups of lines.
@@ -132,6 +134,7 @@ def measure_roughness(depths: DepthMap, spans: list[tuple[int, int]]) -> tuple[d
     cutoff : float or None
         Cut-off [m] that fits both regions.
     """
+    # Half a flank belongs neither to the track nor to what is beside it.
     step = depths.cell
     outside = np.ones(depths.x.size, bool)
     for first, last in spans:

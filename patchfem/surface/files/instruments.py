@@ -31,6 +31,8 @@ def read_instrument(content: Content) -> Table:
             f"{path}: an X3P file or one in an instrument's own format; the package SurfaceTopography can read many such "
             f"formats: pip install 'patchfem[profiles]', or export the surface as text and {HEADER_EXAMPLE}"
         ) from None
+
+    # x runs along the first axis of SurfaceTopography, and a missing height is masked.
     try:
         reader = open_topography(io.BytesIO(content.data) if content.is_packed else str(path))
         channel = reader.default_channel
@@ -42,6 +44,7 @@ def read_instrument(content: Content) -> Table:
         unit = topography.unit
         if unit is not None:
             topography = topography.to_unit("m")
+
         z = np.ma.filled(np.ma.asarray(topography.heights(), float), np.nan)
         if z.ndim == 1:
             columns = {"x": np.asarray(topography.positions(), float), "z": z}
@@ -54,6 +57,7 @@ def read_instrument(content: Content) -> Table:
         raise PatchfemError(
             f"{path}: SurfaceTopography cannot read this file ({reason}); export the surface as text"
         ) from None
+
     name = type(reader).__name__.removesuffix("Reader")
     note = f"{path}: read as {name} by SurfaceTopography {SurfaceTopography.__version__}"
     return Table(

@@ -79,6 +79,7 @@ def make_surface(table: Table, units: tuple[str, str] | None = None) -> Profile 
         raise PatchfemError(
             f'{table.path}: the units {units!r} are not those of x and of z, such as ("mm", "um"); use two of {UNIT_LIST}'
         )
+
     size = table.columns["z"].size
     if size > MAX_POINTS:
         raise PatchfemError(
@@ -87,6 +88,8 @@ def make_surface(table: Table, units: tuple[str, str] | None = None) -> Profile 
     if units is not None and table.are_units_fixed:
         table = table.add_note("the file states its own units; the units that you gave are ignored")
         units = None
+
+    # All that follows is in metres.
     for role in table.columns:
         table = _convert_column(table, role, units and units[role == "z"])
         _check_numbers(table, role)
@@ -98,6 +101,8 @@ def make_surface(table: Table, units: tuple[str, str] | None = None) -> Profile 
     if count <= z.ndim:
         kind = ("a trace needs at least two", "a scan needs at least three")[z.ndim - 1]
         raise PatchfemError(f"{table.path}: {count} heights; {kind}")
+
+    # Positions of a surface increase, whatever the direction of the measurement.
     axes = []
     for axis, role in enumerate("yx"[2 - z.ndim :]):
         places = table.columns[role]
@@ -157,6 +162,8 @@ def _fill_raster(table: Table) -> Table:
         return table._replace(columns={"x": x, "z": z})
     if columns.size == 1:
         return table._replace(columns={"x": y, "z": z})
+
+    # Scattered points would leave nearly all cells of a grid empty.
     count = rows.size * columns.size
     if count > max(MAX_CELLS_PER_POINT * z.size, 16) or count > MAX_POINTS:
         raise PatchfemError(
@@ -170,6 +177,7 @@ def _fill_raster(table: Table) -> Table:
             f"{table.locate(second)}: a second height at x = {format_length(x[second])}, y = "
             f"{format_length(y[second])}; keep one scan per file"
         )
+
     heights = np.full((rows.size, columns.size), np.nan)
     heights[in_row, in_column] = z
     return table._replace(columns={"x": columns, "y": rows, "z": heights}, lines=None)
@@ -213,6 +221,8 @@ def _undo_rounding(table: Table, role: str, x) -> tuple[Table, np.ndarray]:
     """
     if x.size < MIN_ROUNDED or not x[-1] > x[0]:
         return table, x
+
+    # The printed digit is the smallest difference of two steps.
     gaps = np.diff(np.sort(np.diff(x)))
     gaps = gaps[gaps > EVEN_TOL * np.ptp(x) / x.size]
     digit = (
@@ -220,11 +230,13 @@ def _undo_rounding(table: Table, role: str, x) -> tuple[Table, np.ndarray]:
         if gaps.size
         else MIN_PRINTED_DIGIT
     )
+
     count = np.arange(x.size) - (x.size - 1) / 2
     evens = [x.mean() + float(count @ x / (count @ count)) * count]
     if table.length is not None:
         lengths = [table.length / n * np.arange(x.size) for n in (x.size, x.size - 1)]
         evens = [*(x[0] + places for places in lengths), *evens]
+
     for even in evens:
         distance = float(np.abs(x - even).max())
         step = float(even[1] - even[0])
@@ -249,6 +261,8 @@ def _check_span(path, length: float, z, unit_source: str) -> tuple[str, ...]:
         raise PatchfemError(
             f"{path}: the profile is {format_length(length, 3)} long; is the unit of x right?"
         )
+
+    # A few heights that stand out, such as 999 um for no signal, do not count.
     low, first, last, high = np.nanquantile(z, [0.0, FAULT_FRACTION, 1 - FAULT_FRACTION, 1.0])
     if high - low <= length:
         return ()

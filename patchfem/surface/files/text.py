@@ -77,20 +77,22 @@ def _find_roles(
     place: str, header: Header, *, has_units: bool
 ) -> tuple[list[Column], tuple[str, ...]]:
     """Return the columns with their roles, by order if units are given and names are unknown, and a note on that."""
-    if header.count < 2:
-        raise PatchfemError(f"{place}: only one column, but x and z are needed; {HEADER_EXAMPLE}")
-    columns = header.columns or [Column(role) for role in ("xz" if header.count == 2 else "xyz")]
+    names = {2: "xz", 3: "xyz"}.get(header.count, "z")
+    columns = header.columns or [Column(role) for role in names]
     data = [column for column in columns if column.role != "index"]
     if len(data) not in (2, 3):
         raise PatchfemError(
             f"{place}: {len(data)} columns of numbers, but x and z, or x, y and z, are needed; keep one trace of two "
             f"columns and {HEADER_EXAMPLE}"
         )
+
+    # Roles by name, or in their order where the user knows the units.
     known = ["x", "z"] if len(data) == 2 else ["x", "y", "z"]
     roles = [column.role for column in data]
     if sorted(roles) == ["x", "y"]:
         # Columns x and y are a trace whose heights are named y.
         roles = [role.replace("y", "z") for role in roles]
+
     notes = ()
     if sorted(roles) != known:
         listed = ", ".join(f"'{shorten(column.name)}'" for column in data)
@@ -100,6 +102,7 @@ def _find_roles(
             )
         notes = (f"{place}: columns {listed} are taken as {', '.join(known)} in this order",)
         roles = known
+
     named = iter(roles)
     return [
         column if column.role == "index" else column._replace(role=next(named))

@@ -53,6 +53,8 @@ def compute_areal_parameters(z, steps: tuple[float, float]) -> dict[str, float |
     values = {f"S{name.lower()}": value for name, value in distribution.items()}
     values |= {"Sp": float(heights.max()), "Sv": float(-heights.min())}
     values["Sz"] = values["Sp"] + values["Sv"]
+
+    # Slopes of the sides of each cell of the raster.
     slopes = [np.diff(z, axis=axis) / step for axis, step in enumerate(steps)]
     values["Sdq"] = float(np.sqrt(sum(np.nanmean(slope**2) for slope in slopes)))
     values["Sdr"] = _compute_area_ratio(*(slope**2 for slope in slopes))

@@ -115,12 +115,16 @@ def compute_core(z) -> dict[str, float | None]:
     n = z.size
     if n < 5 or z[0] == z[-1]:
         return dict.fromkeys(("k", "pk", "vk", "Mr1", "Mr2"))
+
+    # The flattest 40 % of the curve, and the line through it.
     size = max(round(CORE_FRACTION * n), 2)
     start = int(np.argmin(z[: n - size + 1] - z[size - 1 :]))
     part = z[start : start + size]
     ratio = (np.arange(start, start + size) + 0.5) / n
     slope, top = np.polyfit(ratio, part, 1).tolist()
     bottom = top + slope
+
+    # What is above and below the core becomes triangles of the same area.
     levels = np.array((top, bottom))
     first, second = np.interp(-levels, -z, (np.arange(n) + 0.5) / n, 0.0, 1.0).tolist()
     peaks = 2 * float(np.maximum(z - top, 0.0).sum()) / n

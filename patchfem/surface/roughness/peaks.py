@@ -66,7 +66,7 @@ class TraceMoments(NamedTuple):
     fine: Moments
     coarse: Moments | None
     not_gaussian: str
-    dust: tuple = ()
+    dust: tuple[str, ...] = ()
 
 
 def trace_moments(trace: Profile, cutoff: float | None = None) -> TraceMoments:

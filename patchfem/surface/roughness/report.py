@@ -126,6 +126,7 @@ def make_report(
     if np.nanmax(np.abs(primary.z)) <= ROUND_OFF * np.nanmax(np.abs(whole.z)):
         primary = replace(primary, z=frozen_array(primary.z * 0.0))
 
+    # Without a cut-off, the primary profile or the levelled scan is evaluated.
     waviness, roughness = (None, None) if cutoff is None else filter_surface(primary, cutoff)
     evaluated = roughness or primary
     if is_scan:
@@ -134,6 +135,7 @@ def make_report(
     else:
         parts = TraceParts(primary, waviness, roughness, wave_spectrum(primary, is_tapered=True))
         quantities, notes = _measure_trace(parts, cutoff)
+
     return RoughnessReport(
         source=whole.source,
         sampling=Sampling(

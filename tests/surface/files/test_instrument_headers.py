@@ -212,7 +212,7 @@ REMEDIES = {  # refused text, message, text after the remedy, and given units
     ),
     "one column": (
         "1\n2\n3\n",
-        "only one column, but x and z are needed; write the header as `x [um],z [um]`",
+        "1 columns of numbers, but x and z, or x, y and z, are needed; keep one trace",
         "x [um],z [um]\n0,1\n1,2\n4,3\n",
         None,
     ),

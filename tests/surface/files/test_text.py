@@ -163,7 +163,8 @@ REFUSED = {
                       f"`x [um],z [um]`, {GIVE}",
     "\nx [um],z []\n0,1\n": "{path}:2: unknown unit '' of z; use one of m, km, cm, mm, um, nm, in, ft, mil",
     "x [um],z [furlong]\n0,1\n": "{path}:1: unknown unit 'furlong' of z; use one of m, km, cm, mm, um, nm, in, ft, mil",
-    "x [um]\n0\n": "{path}:2: only one column, but x and z are needed; write the header as `x [um],z [um]`",
+    "x [um]\n0\n": "{path}:2: 1 columns of numbers, but x and z, or x, y and z, are needed; keep one trace of two columns "
+                    "and write the header as `x [um],z [um]`",
     "x [um],y [um],z [um],w [um]\n0,0,1,1\n": "{path}:1: 4 columns of numbers, but x and z, or x, y and z, are needed; keep "
                                                "one trace of two columns and write the header as `x [um],z [um]`",
     "x [um],x [um]\n0,1\n": "{path}:1: the columns 'x [um]', 'x [um]' are not x, z, which are needed; write the header "
