@@ -43,7 +43,7 @@ PROFILE = {
 WAVES = {
     "band_amplitude": (
         "m",
-        "amplitude of a sine with the mean square of the waves from 60 to 110 um",
+        "amplitude of a sine with the mean square of the waves from 60 to 110 um, of the levelled trace",
     ),
 }
 

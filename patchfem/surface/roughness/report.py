@@ -166,7 +166,8 @@ def _measure_trace(
     has_band = 2 * BAND[1] <= primary.length and BAND[0] >= 2 * primary.step
     amplitude = parts.spectrum.measure_band() if has_band else None
     name = "band_amplitude"
-    quantities.append(_name_value(name, amplitude, *WAVES[name], "levelled trace", "band"))
+    reason = "" if has_band else "band"
+    quantities.append(Quantity(amplitude, None, None, *WAVES[name], reason, name))
     rough = parts.roughness
     if rough is None:
         return quantities, ()
@@ -212,11 +213,9 @@ def _measure_scan(scan: Areal) -> tuple[list[Quantity], tuple[str, ...]]:
     return quantities, (note,) if count else ()
 
 
-def _name_value(
-    name: str, value: float | None, unit: str, text: str, profile: str, reason="undetermined"
-) -> Quantity:
+def _name_value(name: str, value: float | None, unit: str, text: str, profile: str) -> Quantity:
     """Return a parameter of a profile, with the code of the reason where it has no value."""
-    reason = reason if value is None else ""
+    reason = "undetermined" if value is None else ""
     return Quantity(value, None, None, unit, f"{text}, of the {profile}", reason, name)
 
 
