@@ -10,10 +10,10 @@ from ..core import PatchfemError, frozen_array
 from ..exceptions import UnresolvedTrace
 from ..formatting import format_length
 from ..surface.files.read import read_profile
-from ..surface.fine import ELEMENTS_PER_WAVE, describe_lost_waves, fine_fraction
 from ..surface.nodes import MEANS_OVER_WAVES, average_at_nodes, place_over_patch
 from ..surface.profile import Profile, clean, level, resample_evenly
 from ..surface.roughness.filter import mean_line
+from ..surface.spectrum import ELEMENTS_PER_WAVE, describe_lost_waves, wave_spectrum
 from .file_cache import cache_by_file
 from .source import name_key
 
@@ -149,7 +149,7 @@ def _filter_waviness(trace: Profile, cutoff: float) -> Profile:
 
 def _describe_short_waves(trace: Profile, cutoff: float) -> tuple:
     """Return sentences about the waves shorter than a cut-off [m], or () if there are none."""
-    fraction = fine_fraction(trace, cutoff)
+    fraction = wave_spectrum(trace).lost_fraction(cutoff)
     if not fraction > 0:
         return ()
     return (

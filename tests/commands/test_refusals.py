@@ -79,11 +79,11 @@ REFUSED = {  # command -> [(arguments, texts of the lines of the message)]; exit
     "compare": [
         (
             ("trace.csv", "trace.csv", "--direction", "z"),
-            ("direction 'z': x or y is needed",),
+            ("direction 'z': the datum is straight, and the direction x or y",),
         ),
         (
             ("trace.csv", "trace.csv", "--datum", "bent"),
-            ("datum 'bent': straight is needed, or nothing",),
+            ("datum 'bent', direction '': the datum is straight",),
         ),
         (("trace.csv", "trace.csv", "bare.csv"), ("give two files BEFORE and AFTER",)),
         (
@@ -117,7 +117,7 @@ REFUSED = {  # command -> [(arguments, texts of the lines of the message)]; exit
             ("trace.csv", "--window", "1 mm,9 mm"),
             ("from 1 mm to 9 mm, but the surface along x from 0 um to 2 mm",),
         ),
-        (("trace.csv", "--units", "mm"), ("give two units, of x and of z",)),
+        (("trace.csv", "--units", "mm"), ("the units ('mm',) are not those of x and of z",)),
         (("bare.csv",), ("units are never guessed",)),
     ],
     "new": [

@@ -7,7 +7,6 @@ import json
 import meshio
 import numpy as np
 import pytest
-import surfaces as write
 from command_line import run_cli
 from scene_texts import BENCH, COATED, COULOMB, POINT, STRUCTURE, find_line
 
@@ -55,8 +54,8 @@ FAULTS = {
     "profile": (PROFILE, "a.csv", "0,1\n1,2\n", "contact.profile.file", "a.csv:1: the unit of x is not given"),
     "profile, short": (PROFILE, "a.csv", "x [mm],z [um]\n0,1\n2,2\n4,1\n", "contact.profile.file",
                        "the profile is 4 mm long, but the patch is 12.7 mm"),
-    "profile, areal": (PROFILE, "a.x3p", write.heights_to_x3p(write.draw_scan()), "contact.profile.file",
-                       "an areal scan of 4 x 6 heights, but a single trace is needed"),
+    "profile, areal": (PROFILE, "a.csv", "x [um],y [um],z [um]\n0,0,1\n9,0,2\n0,9,3\n9,9,4\n", "contact.profile.file",
+                       "an areal scan of 2 x 2 heights, but a single trace is needed"),
     "slide": (SLIDE, "p.csv", "time [s],displacement [um]\n0,0\n1,x\n", "slide.file",
               "p.csv:3: displacement: 'x' is not a finite number"),
     "drive": (DRIVE, "d.csv", "time [s],acceleration [g]\n0,0\n0,1\n", "drive.file",

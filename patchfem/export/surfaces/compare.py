@@ -15,7 +15,7 @@ from ...surface.compare.compare import DEFAULTS, Options
 from ...surface.compare.records import Comparison, Track
 from ...surface.profile import level, resample_evenly
 from ...surface.quantity import LEVEL, SIDE, Quantity
-from ...surface.roughness.spectrum import BAND
+from ...surface.spectrum import BAND
 from ..answer import Answer, Remarks, Variable
 from ..surface_definitions import name_in_track
 from . import predicted as predicted_wear

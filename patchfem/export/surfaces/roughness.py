@@ -12,12 +12,13 @@ from ...surface.quantity import LEVEL, Mean, Quantity, average_quantities
 from ...surface.roughness import peaks, report
 from ...surface.roughness.parameters import abbott_curve
 from ...surface.roughness.report import RoughnessReport
-from ...surface.roughness.spectrum import BAND
+from ...surface.spectrum import BAND
 from ..answer import Answer, Remarks, Variable
 from . import sentences
 from .variables import make_variables, maps
 
 KINDS = {"profile": "traces", "areal": "scans"}
+FORMS = {"profile": "line", "areal": "plane"}  # what is subtracted first
 CONFIDENCE = 0.9  # probability of the interval of a parameter of a single trace, from 5 to 95 %
 MAX_SIZE_RATIO = (
     1.001  # of lengths or steps of several files, above which their means mix quantities
@@ -48,7 +49,7 @@ def answer_files(paths: list[Path], units: tuple[str, str] | None = None, **opti
     units : tuple of str, optional
         Units of x (and y) and of z, for files that state none.
     **options
-        `cutoff`, `window`, `form`, `short` of `surface.roughness.report.make_report`.
+        `cutoff`, `window`, `short` of `surface.roughness.report.make_report`.
 
     Returns
     -------
@@ -162,7 +163,7 @@ def describe_treatment(each: RoughnessReport) -> str:
     text = f"{shape} heights over {format_length(size.length)}, every {format_length(size.step)}"
     if size.measured not in (None, size.shape[-1]):
         text = f"{size.measured} heights, resampled to {text}"
-    text += f", about the least-squares {treatment.form}"
+    text += f", about the least-squares {FORMS[each.kind]}"
     if treatment.window is not None:
         text += f", window {', '.join(map(format_length, treatment.window))}"
     if treatment.short:
@@ -191,7 +192,7 @@ def report_to_dict(each: RoughnessReport) -> dict:
         "shape": list(size.shape),
         "cutoff": treatment.cutoff,
         "window": None if treatment.window is None else list(treatment.window),
-        "form": treatment.form,
+        "form": FORMS[each.kind],
         "s_filter": treatment.short,
         "confidence": CONFIDENCE if any(value.low is not None for value in each.values) else None,
         "measures": sentences.to_json({value.name: value for value in each.values}),
@@ -233,6 +234,9 @@ def _make_data(reports: list[RoughnessReport]) -> dict[str, Variable]:
         data |= make_variables(
             "x_rough", x_rough=rough.x, roughness=rough.z, waviness=surface.waviness.z
         )
-    is_wave = surface.spectrum.frequency > 0
-    data |= make_variables("wavelength", wavelength=1 / surface.spectrum.frequency[is_wave])
-    return data | make_variables("wavelength", "m3", density=surface.spectrum.density[is_wave])
+    spectrum = surface.spectrum
+    return (
+        data
+        | make_variables("wavelength", wavelength=spectrum.waves)
+        | make_variables("wavelength", "m3", density=spectrum.density)
+    )
