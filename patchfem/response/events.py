@@ -1,7 +1,6 @@
-"""Stick-slip events of a run, detected in samples, and the stick intervals between them.
+"""Stick-slip events of a run, from its engine or from samples.
 
-In: samples of slip and relative displacement, or event rows of an engine. Out: `Events`, and stick
-intervals.
+In: the window of a run and its drive, or event rows of an engine. Out: `Events`, and whether the interfaces stick.
 """
 
 from dataclasses import dataclass
@@ -9,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..core import STICK_SPEED_RATIO
+from .measures import slip_round_off
 
 # Kinds of events, as indices of EVENT_KIND_NAMES.
 STOP = 0
@@ -192,45 +192,49 @@ def _detect_interface_events(
     return [*zip(times, [number] * k.size, kind, np.interp(times, time, slide))]
 
 
-def find_stick_spans(events: Events, begin: float, end: float, always_slips) -> list:
-    """Return the start and end times [s] of the intervals in which the first interface sticks.
+def slips_and_displacements(response) -> tuple:
+    """Return the slip and the relative displacement (k, i) [m] of each interface."""
+    extra = response.extra
+    if "slides" in extra:
+        return extra.get("slips", extra["slides"]), extra["slides"]
+    return response.slip[:, None], response.slide[:, None]
 
-    With several interfaces, only the intervals with the same states of all other interfaces are returned,
-    for the states that last longest in total.
+
+def find_segment_borders(drive) -> list:
+    """Return the times [s] at which a drive changes from one segment to the next."""
+    return [segment.start for segment in drive.segments[1:]]
+
+
+def list_events(window, drive, log=None, max_stick_slip: float = 0.0) -> Events:
+    """Return the events that the engine recorded, or if there are none, those detected in the last cycles.
 
     Parameters
     ----------
-    events : Events
-    begin, end : float
-        Start and end of the window [s].
-    always_slips : (i,) of bool
-        Whether each interface slips during the whole window if it has no events.
+    window : Response
+    drive
+    log : Events, optional
+        Events that the engine recorded.
+    max_stick_slip : float
+        Largest slip amplitude of a sticking interface in a cycle [m].
     """
-    count = len(always_slips)
-    sliding = [bool(slips) for slips in always_slips]
-    for number in range(count):
-        kinds = events.kind[events.interface == number + 1]
-        if kinds.size:
-            sliding[number] = kinds[0] not in (RELEASE_UP, RELEASE_DOWN)
-    # the last event of each interface before `begin` determines its initial state
-    first = int(np.searchsorted(events.time, begin))
-    for number in range(count):
-        kinds = events.kind[:first][events.interface[:first] == number + 1]
-        if kinds.size:
-            sliding[number] = bool(kinds[-1] != STOP)
-    intervals = {}
-    last_time = -np.inf
-    rows = zip(
-        *(column[first:].tolist() for column in (events.time, events.interface, events.kind))
+    if log is not None:
+        return log
+    slips, slides = slips_and_displacements(window)
+    return detect_events(
+        window.time,
+        slips,
+        slides,
+        drive.period,
+        max(max_stick_slip, slip_round_off(window)),
+        find_segment_borders(drive),
     )
-    for time, number, kind in [*rows, (np.inf, 0, SEGMENT_BORDER)]:
-        start = max(last_time, begin)
-        stop = min(time, end)
-        if stop > start and not sliding[0]:
-            intervals.setdefault(tuple(sliding), []).append((float(start), float(stop)))
-        if number:
-            sliding[number - 1] = kind != STOP
-        last_time = time
-    return max(
-        intervals.values(), key=lambda spans: sum(stop - start for start, stop in spans), default=[]
-    )
+
+
+def is_all_stuck(window, max_stick_slip: float) -> bool:
+    """Return whether no interface or strip slips by more than a given distance [m] in a window.
+
+    The limit applies to half the range of the slip, and is at least its round-off.
+    """
+    slips = slips_and_displacements(window)[0]
+    slips = np.column_stack([window.slip, slips])
+    return bool(np.ptp(slips, axis=0).max() / 2 <= max(max_stick_slip, slip_round_off(window)))

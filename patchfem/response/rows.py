@@ -576,12 +576,6 @@ ROWS = (
         "energy",
     ),
     MeasureDefinition(
-        "ring_frequency", "Hz", 1e-3, "frequency of the free vibration (ringing) during stick"
-    ),
-    MeasureDefinition(
-        "ring_damping", "1", 1e-6, "damping ratio of the free vibration (ringing) during stick"
-    ),
-    MeasureDefinition(
         "onset_level",
         "m s-2",
         0.0,

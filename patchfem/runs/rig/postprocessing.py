@@ -8,11 +8,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ...core import ErrorCauses, Outcome
+from ...core import Outcome
 from ...model.rig import MAX_TRAVEL
-from ...response import reasons, run_events, stationary
+from ...response import reasons, stationary
 from ...response.decay_curve import DecayCurve
 from ...response.errors import add_run_error_estimates
+from ...response.events import list_events
 from ...response.outcome import judge_outcome, remove_errors
 from ...structure.drive_sizes import find_decay_rate
 from ..patch import faces
@@ -144,69 +145,29 @@ def add_missing_value_reasons(run: CoupledRun) -> CoupledRun:
 def add_decay_curve(run: CoupledRun) -> CoupledRun:
     """Return a released run with its decay curve, including mesh errors.
 
-    The mesh error of the ringing is that at its amplitude in the last stick interval. Notes name
-    the results whose mesh error is unknown.
+    A note says where the mesh error is unknown.
     """
     model = run.model
     solution = run.solution
     run = replace(run, decay=decays.compute_decay_curve(solution))
-    if not (model.partial_slip or model.rig.friction.has_partial_slip):
+    has_partial_slip = model.partial_slip or model.rig.friction.has_partial_slip
+    if run.decay is None or not has_partial_slip:
         return run
+    decay = run.decay
     coarse = run.inputs.coarse[0]
-    causes = {}
-    ringing_amplitude = _find_ringing_amplitude(run)
-    if ringing_amplitude > 0:
-        errors, causes["ring_frequency and ring_damping"] = decays.estimate_stuck_mode_mesh_errors(
-            np.array([ringing_amplitude]),
-            run.measures["ring_frequency"].value,
-            model,
-            run.patch,
-            coarse,
-            run.inputs.stiffer,
-        )
-        measures = dict(run.measures)
-        for name, error in zip(("ring_frequency", "ring_damping"), errors[:, 0]):
-            measure = measures[name]
-            if error > measure.error:
-                measures[name] = replace(
-                    measure, error=float(error), causes=ErrorCauses({"mesh": float(error)})
-                )
-        run = replace(run, measures=measures)
-    if run.decay is not None:
-        errors, causes["the decay curve"] = decays.estimate_stuck_mode_mesh_errors(
-            run.decay.amplitude,
-            run.decay.frequency[-1],
-            model,
-            run.patch,
-            coarse,
-            run.inputs.stiffer,
-        )
-        decay = run.decay._replace(
-            frequency_error=np.fmax(run.decay.frequency_error, errors[0]),
-            damping_error=np.fmax(run.decay.damping_error, errors[1]),
-        )
-        run = replace(run, decay=decay)
+    stiffer = run.inputs.stiffer
+    errors, reason = decays.estimate_stuck_mode_mesh_errors(
+        decay.amplitude, decay.frequency[-1], model, run.patch, coarse, stiffer
+    )
+    decay = decay._replace(
+        frequency_error=np.fmax(decay.frequency_error, errors[0]),
+        damping_error=np.fmax(decay.damping_error, errors[1]),
+    )
+    if not reason:
+        return replace(run, decay=decay)
     engine = ENGINES[run.numerics.engine]
-    notes = decays.describe_unknown_mesh_errors(
-        causes,
-        lambda: engine.coarser_in_space(model, run.numerics, run.patch, coarse, solution),
-    )
-    return replace(run, notes=tuple(notes))
-
-
-def _find_ringing_amplitude(run: CoupledRun) -> float:
-    """Return the amplitude [m] of the output in the last stick interval with ringing."""
-    solution = run.solution
-    window = solution.window
-    ring = run.measures.get("ring_frequency")
-    if ring is None or not ring.value or ring.error is None:
-        return 0.0
-    sticks = run_events.find_stick_intervals(
-        window, run.drive, solution.log, solution.stick_tolerance
-    )
-    if not sticks:
-        return 0.0
-    return np.ptp(window.output[window.time >= sticks[-1][0]]) / 2
+    coarser = engine.coarser_in_space(model, run.numerics, run.patch, coarse, solution)
+    return replace(run, decay=decay, notes=(decays.describe_unknown_mesh_error(reason, coarser),))
 
 
 def add_flutter_amplitude(run: CoupledRun) -> CoupledRun:
@@ -261,7 +222,7 @@ def collect_summary_data(run: CoupledRun, measures: dict, notes: list) -> dict:
     if rig.friction.has_partial_slip and snapshots and hasattr(snapshots[0], "faces"):
         extra["shots"] = snapshots
     if run.has_friction:
-        extra["events"] = run_events.list_events(
+        extra["events"] = list_events(
             solution.window, run.drive, solution.log, solution.stick_tolerance
         )
     reduced = getattr(solution.contact, "reduction", None)
