@@ -279,7 +279,7 @@ ENGINES = [  # Scene, changes and the engine that a plan chooses.
     (POINT + NONLOCAL + SLIDE, "", "bench, recursion"),
     (POINT + NONLOCAL + SLIDE, "friction.order=2", "bench, merged bond list"),
     (POINT + NONLOCAL + SLIDE, "friction.reading=report", "bench, truncated bond list"),
-    (TILTED + NONLOCAL + SLIDE, "contact.tilt.on=lower", "bench, law step by step"),
+    (TILTED + NONLOCAL + SLIDE, "contact.tilt.on=lower", "bench, recursion"),
     (TILTED + NONLOCAL + SLIDE, "contact.shear={}", "bench, bond points"),
 ]  # fmt: skip
 

@@ -33,10 +33,8 @@ from ..results.travel import (
     warn_of_large_slide,
 )
 from . import bench, shear
-from .engine import steps_per_cycle
+from .engine import nodal_element_limit, steps_per_cycle
 from .errors import BenchErrors, estimate_bench_errors
-from .law import nodal_element_limit
-from .ledger import BenchOptions
 
 MAX_EXTRA_CYCLES = 4  # Largest number of added cycles in the search for a steady loop.
 MAX_EVALUATIONS = 2e6  # Largest number of evaluations (points x samples) in this search.
@@ -48,8 +46,7 @@ def run_prescribed(inputs: RunInputs) -> Result:
     patch = inputs.patch
     steps = steps_per_cycle(model)
     frames = N_FRAMES if patch is not None else 0
-    options = BenchOptions(None, inputs.say, inputs.progress)
-    fine = bench.run_bench(model, patch, steps, frames, options=options)
+    fine = bench.run_bench(model, patch, steps, frames, say=inputs.say, progress=inputs.progress)
     inputs.seconds["bench"] = fine.seconds
     error_estimates = BenchErrors([], 0.0, [])
     if inputs.estimate:
