@@ -583,20 +583,6 @@ ROWS = (
         "counts as the onset; for a force drive the level is in N",
         group="friction",
     ),
-    MeasureDefinition(
-        "jump_level",
-        "m s-2",
-        0.0,
-        "drive level just after the largest jump of the amplitude; a step from one level to the next counts as a jump "
-        "if the amplitude changes by at least 1.5 times the factor of the level; for a force drive the level is in N",
-    ),
-    MeasureDefinition(
-        "level_hysteresis",
-        "m",
-        0.0,
-        "hysteresis: largest difference between the amplitudes reached at the same level while the levels "
-        "increase and while they decrease",
-    ),
     *SINGLE_RUN_ROWS,
 )
 # Values that only set the floors of measures (`larger_term`); results do not contain them.

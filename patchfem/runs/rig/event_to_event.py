@@ -27,7 +27,6 @@ from ...hybrid.laws.masing import has_stick
 from ...hybrid.records import Margin, Memory, State, Status
 from ...response.errors import ERROR_MEASURES, absolute_change, convergence_error
 from ...response.events import (
-    EXACT_SOURCE,
     SEGMENT_BORDER,
     Events,
     classify_changes,
@@ -360,7 +359,7 @@ class LumpedEvaluator(RunEvaluator):
             changed = np.flatnonzero(states[:-1] != states[1:])
             kinds = classify_changes(states[changed], states[changed + 1])
             events += zip(rows[changed, 0], [k + 1] * changed.size, kinds, slides[changed, k])
-        return sort_events(events, source=EXACT_SOURCE)
+        return sort_events(events)
 
     def _list_snapshots(self, motion, response: Response, times, start) -> list[ElementSnapshot]:
         """Return the stretches of the elements of patches at given times, from all reversals before.

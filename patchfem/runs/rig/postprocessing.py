@@ -13,7 +13,6 @@ from ...model.rig import MAX_TRAVEL
 from ...response import reasons, stationary
 from ...response.decay_curve import DecayCurve
 from ...response.errors import add_run_error_estimates
-from ...response.events import list_events
 from ...response.outcome import judge_outcome, remove_errors
 from ...structure.drive_sizes import find_decay_rate
 from ..patch import faces
@@ -77,19 +76,11 @@ class CoupledRun:
         )
 
 
-def add_level_measures(run: CoupledRun) -> CoupledRun:
-    """Return the run with the measures over all drive levels."""
-    solution = run.solution
+def add_onset_level(run: CoupledRun) -> CoupledRun:
+    """Return the run with the drive level at the onset of slip."""
     model = run.model
-    measures = levels.compute_level_measures(
-        model.rig,
-        solution.levels,
-        solution.run_level,
-        model.accuracy.tolerance,
-        has_friction=run.has_friction,
-        coarser=solution.coarser,
-    )
-    return replace(run, measures=run.measures | measures)
+    onset = levels.measure_onset_level(model.rig, run.solution, model.accuracy.tolerance)
+    return replace(run, measures=run.measures | {"onset_level": onset})
 
 
 def add_outcome_and_errors(run: CoupledRun) -> CoupledRun:
@@ -221,10 +212,8 @@ def collect_summary_data(run: CoupledRun, measures: dict, notes: list) -> dict:
     snapshots = solution.snapshots
     if rig.friction.has_partial_slip and snapshots and hasattr(snapshots[0], "faces"):
         extra["shots"] = snapshots
-    if run.has_friction:
-        extra["events"] = list_events(
-            solution.window, run.drive, solution.log, solution.stick_tolerance
-        )
+    if solution.log is not None:
+        extra["events"] = solution.log
     reduced = getattr(solution.contact, "reduction", None)
     if reduced is not None:
         name = "elements" if hasattr(reduced, "yield_displacement") else "shear_modes"

@@ -65,8 +65,8 @@ def run_rig(inputs: RunInputs) -> Result:
     numerics = choose_numerics(model)
     refuse_long_run(model, numerics)
     run = run_refined(inputs, numerics)
-    if run.solution.levels:
-        run = postprocessing.add_level_measures(run)
+    if run.solution.levels and run.has_friction:
+        run = postprocessing.add_onset_level(run)
     run = postprocessing.add_outcome_and_errors(run)
     run = postprocessing.add_missing_value_reasons(run)
     if rig.drive.kind == "free" and run.has_errors:
