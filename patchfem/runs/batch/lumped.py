@@ -127,7 +127,6 @@ def refusal_reason(model: Model) -> str:
         model.kind != "rig"
         or model.patch is not None
         or model.wear is not None
-        or model.heat is not None
         or has_unreadable_measurements(model)
     ):
         return "the contact of the case is not a single point, or its table of measured responses cannot be read"

@@ -15,13 +15,11 @@ from ..results.interfaces import merge_sentences
 from ..results.notes import (
     note_on_groove_slope,
     note_on_growth,
-    note_on_heating,
     warn_of_bonds,
     warn_of_created_energy,
     warn_of_work_check,
 )
 from ..results.travel import warn_of_large_slide
-from . import strips
 from .costs import explain_time_steps
 from .engines import ENGINES, find_obstacle_of_map
 from .hybrid_laws import list_elements
@@ -52,7 +50,6 @@ def collect_warnings(run) -> list:
     warnings = [
         *model.rig.structure.notes,
         *_warn_of_single_point(model, patch, run.numerics),
-        *note_on_heating(model, patch, solution.response, book["friction"]),
     ]
     if run.has_friction:
         speed = float(np.abs(solution.window.slide_rate).max())
@@ -223,22 +220,10 @@ def _note_on_release(run) -> list:
 
 def _note_on_lateral_motion(run) -> list:
     """Return a list with a note on the neglected lateral motion of strips that yaw."""
-    if (
-        not run.model.rig.friction.strips_slide_apart
-        or run.patch.strips.offsets.size < 2
-        or not run.patch.strips.load
-    ):
+    if not run.model.rig.friction.strips_slide_apart:
         return []
-    amplitude, lengthening = strips.estimate_lateral_motion(
-        run.patch, run.solution.window, run.drive.period
-    )
-    if not amplitude > 0:
-        return []
-    computed = "friction is" if run.model.wear is None else "friction and the wear are"
     return [
-        f"the yaw moves the ends of the patch by up to {format_length(amplitude)} across x, but the "
-        f"{computed} computed without this motion, which would lengthen the sliding path of the last cycle by "
-        f"{100 * lengthening:.2g} % (mean over the patch, weighted by the pressure)"
+        "the yaw also moves the ends of the patch across x; this motion and its friction are neglected"
     ]
 
 
