@@ -18,7 +18,7 @@ from ...structure.drive_sizes import find_decay_rate
 from ..patch import faces
 from ..results.result import RunInputs, can_estimate_mesh_error
 from ..results.travel import check_pieces_overlap
-from . import decays, flutter, levels, motion_warnings
+from . import decays, flutter, levels
 from .engines import ENGINES, describe_balance_error
 from .numerics import Numerics
 from .solution import Solution
@@ -165,15 +165,6 @@ def add_flutter_amplitude(run: CoupledRun) -> CoupledRun:
     """Return the run with the amplitude of the unstable limit cycle of a self-excited mode."""
     measures, notes = flutter.compute_flutter_amplitude(run)
     return replace(run, measures=run.measures | measures, notes=(*run.notes, *notes))
-
-
-def collect_warnings(run: CoupledRun) -> list:
-    """Return all warnings of a completed run."""
-    plan = run.inputs.plan
-    return [
-        *motion_warnings.collect_warnings(run),
-        *motion_warnings.warn_of_peak_at_sweep_end(run, lambda: plan.modes(plan.chain)),
-    ]
 
 
 def find_final_outcome(run: CoupledRun) -> Outcome:
