@@ -4,7 +4,7 @@ In: a model with [slide] and its Patch with the static contact solution, or None
 Out: a `BenchRun`. The pieces may be rigid or deform in shear.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from time import perf_counter
 
 import numpy as np
@@ -58,7 +58,7 @@ class BenchRun:
 
 
 def run_bench(
-    model, patch, steps: int, frames: int = 0, path=None, choice=None, **options
+    model, patch, steps: int, frames: int = 0, path=None, choice=None, springs=None, **callbacks
 ) -> BenchRun:
     """Compute the friction response of a model to its prescribed displacement.
 
@@ -75,8 +75,10 @@ def run_bench(
         Displacement path in the form of `SlidePath.samples`; default: the path of the model.
     choice : EngineChoice, optional
         Method of bond summation; default: chosen by the tolerance.
-    **options
-        Fields `say`, `progress`, `springs` and `modes` of `SlideTask`.
+    springs : callable, optional
+        See `BenchEngine`.
+    **callbacks
+        Fields `say` and `progress` of `SlideTask`.
 
     Returns
     -------
@@ -95,9 +97,9 @@ def run_bench(
         start = time[first]
         time, slide = model.point.refine_samples(model.slide, time, slide, steps)
         first = int(np.searchsorted(time, start))
-    engine = choose_bench_engine(model, slide, choice)
+    engine = replace(choose_bench_engine(model, slide, choice), springs=springs)
     stored = _choose_frames(slide.size, frames)
-    histories = follow_path(SlideTask(model, patch, time, slide, stored, engine, **options))
+    histories = follow_path(SlideTask(model, patch, time, slide, stored, engine, **callbacks))
     jumps = reversal_force_rule(model) == "jumps"
     values = _compute_measures(model, histories, first)
     values |= _compute_loop_measures(model, time, slide, histories, first, omega) if omega else {}

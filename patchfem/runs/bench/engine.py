@@ -4,6 +4,7 @@ In: a model with [slide]. Out: `BenchEngine`, steps per cycle and `BenchSizes`. 
 closed form. Recursion, bond lists and parallel elements use the compiled kernels of the rigs.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from enum import Enum
 from math import ceil
@@ -44,10 +45,13 @@ class BenchEngine:
 
     - method: Method.
     - choice: engine of bond summation with its settings; None for other methods.
+    - springs: function that replaces the stiffnesses and yield displacements of parallel elements; None: they are used
+      unchanged.
     """
 
     method: Method
     choice: "bond_engines.EngineChoice | None" = None
+    springs: Callable | None = None
 
     @property
     def name(self) -> str:

@@ -41,7 +41,8 @@ class CoarseRun(NamedTuple):
     - steps: steps per cycle.
     - level: index of the mesh; 0 is the finest one.
     - choice: engine of bond summation with its settings.
-    - springs, modes: see `SlideTask`.
+    - springs: see `BenchEngine`.
+    - modes: number of shear modes of the pieces; None: set by the scene or the tolerance.
     """
 
     steps: int
@@ -84,14 +85,17 @@ def estimate_bench_errors(model, patches: list, fine_run, steps: int, say=None) 
     def solve(variant: CoarseRun):
         """Compute a bench run with coarser settings."""
         begin = process_time()
+        coarse_model = model
+        if variant.modes is not None:
+            accuracy = model.accuracy.model_copy(update={"shear_modes": variant.modes})
+            coarse_model = replace(model, accuracy=accuracy)
         coarse_run = bench.run_bench(
-            model,
+            coarse_model,
             patches[variant.level],
             variant.steps,
             choice=variant.choice,
-            say=say,
             springs=variant.springs,
-            modes=variant.modes,
+            say=say,
         )
         cpu_seconds[variant] = process_time() - begin
         return coarse_run

@@ -51,9 +51,6 @@ class SlideTask(NamedTuple):
     - frames (f,): indices of the samples at which fields are stored.
     - engine: method of the friction force.
     - say, progress: callbacks for messages about compilation and for the completed fraction, or None.
-    - springs: function that replaces the stiffnesses and yield displacements of parallel elements; None: they are used
-      unchanged.
-    - modes: number of shear modes of the pieces; None: set by the scene or the tolerance.
     """
 
     model: object
@@ -64,8 +61,6 @@ class SlideTask(NamedTuple):
     engine: BenchEngine
     say: Callable | None = None
     progress: Callable | None = None
-    springs: Callable | None = None
-    modes: int | None = None
 
     @property
     def weight(self) -> np.ndarray:
@@ -391,12 +386,13 @@ def _make_contact(task: SlideTask) -> tuple:
         length = make_law(friction, 1.0).element(1.0).length
         jenkins_set = jenkins_elements.elements(patch, friction.static, length)
         springs = jenkins_set.stiffness, jenkins_set.yield_displacement
-        if task.springs is not None:
-            springs = task.springs(*springs)
+        if task.engine.springs is not None:
+            springs = task.engine.springs(*springs)
         return contacts.make_parallel_contact(*springs, row), jenkins_set
     element = make_law(friction, load).element(load)
-    if task.springs is not None:
-        element = elastic_plastic.parallel_element(*task.springs(*np.split(element.numbers[2:], 2)))
+    if task.engine.springs is not None:
+        springs = task.engine.springs(*np.split(element.numbers[2:], 2))
+        element = elastic_plastic.parallel_element(*springs)
     return contacts.make_contact([element], [row]), None
 
 
@@ -411,7 +407,7 @@ def _make_bond_contact(task: SlideTask, load: float, row) -> "contacts.Contact":
         return contacts.make_pressed_contact(law, load, row, None, bond_sum, load=point.evaluate)
     modes = None
     if model.partial_slip:
-        modes = shear.compute_point_shear_modes(model, patch, task.modes)
+        modes = shear.compute_point_shear_modes(model, patch)
     if model.side == "lower":
         return shear.make_lower_contact(model, patch, row, modes, bond_sum)
     if modes is None:
