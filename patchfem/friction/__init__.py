@@ -56,7 +56,6 @@ PUBLIC = {
     ),
     "bonds.points_kernels": ("point_list",),
     "bonds.spread": ("carried_fraction",),
-    "bonds.temperature": ("surface_temperature_rise",),
     "grooves": ("Grooves",),
     "laws.coulomb": ("Coulomb",),
     "laws.elastic_plastic": (

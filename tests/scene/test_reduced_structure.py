@@ -99,7 +99,6 @@ def test_always_reduction_errors_cover_full_matrices(matrix_folder, method):
             for name, measure in reduced.measures.items()
             if measure.error is not None
             and full.measures.get(name) is not None
-            and not name.startswith("ring_")
             and name not in ERROR_MEASURES
         }
         assert len(errors) > 10

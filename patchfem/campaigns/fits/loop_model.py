@@ -11,7 +11,6 @@ from ...model.source import locate_errors
 from ...runs.batch import meshes
 from ...runs.bench import bench as law_bench
 from ...runs.bench.engine import choose_smooth_bond_summation
-from ...runs.bench.ledger import BenchOptions
 from ...scene.overrides import BaseScene
 from ...scene.scene import Scene, SceneError
 from .loop_path import count_warm_up_rows, prepend_warm_up
@@ -135,8 +134,9 @@ class BenchModel:
         number = np.arange(corner[-1] + 1)
         time = np.interp(number, corner, path.time)
         displacement = np.interp(number, corner, path.displacement)
-        options = BenchOptions(choose_smooth_bond_summation(model, displacement), self.say)
-        run = law_bench.run_bench(model, patch, 4, 0, (time, displacement, 0, 0.0), options)
+        choice = choose_smooth_bond_summation(model, displacement)
+        samples = (time, displacement, 0, 0.0)
+        run = law_bench.run_bench(model, patch, 4, path=samples, choice=choice, say=self.say)
         if not run.load[0] > 0:
             raise PatchfemError(
                 "the normal load is 0 or less; give a load that presses the pieces together", ""
