@@ -783,7 +783,7 @@ def fit(
         File of the measurements: a friction loop for a bench; a table of responses, or frequency and damping against
         amplitude, for a rig; a worn depth for a scene with [wear].
     options : FitOptions, optional
-        Validation rows, offsets of a loop, and settings of the search.
+        Validation rows, and the number of starting points of the search.
     free : dict
         Range of each free parameter by its key: (low, high), or a string such as "0.1..0.6".
     out : path, optional
@@ -847,11 +847,7 @@ def _check_fit_options(options: Any, changes: dict) -> FitOptions:
     if not isinstance(options, FitOptions):
         raise PatchfemError(f"fit: options: FitOptions are needed, not {options!r:.60}")
     options = replace(options, **changes)
-    return replace(
-        options,
-        hold=_require_strings(options.hold, "fit: hold"),
-        offset=_require_strings(options.offset, "fit: offset"),
-    )
+    return replace(options, hold=_require_strings(options.hold, "fit: hold"))
 
 
 def _format_bounds(key: str, ends: Any) -> str:

@@ -6,7 +6,7 @@ then checked and corrected by further runs.
 """
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import NamedTuple
@@ -21,7 +21,6 @@ from ...runs.patch.press import nodal_areas
 from ...runs.wear import evolve
 from ...scene.assignments import Range
 from ...scene.keys.quantities import parse_quantity
-from .problem import parse_ranges
 
 # Names of the wear depths in compare.json, the more accurate one first.
 QUANTITIES = ("worn_depth_mean", "worn_depth_max")
@@ -142,7 +141,7 @@ def _read_depth_file(path: Path) -> MeasuredDepth:
 
 
 def fit_wear(
-    model: Model, measured_depth: str, free_parameters, progress=None
+    model: Model, measured_depth: str, ranges: Sequence[Range], progress: Callable | None = None
 ) -> FittedCoefficient:
     """Fit the wear coefficient so that the computed worn depth equals the measured one.
 
@@ -152,8 +151,8 @@ def fit_wear(
         Model with wear.
     measured_depth : str
         Measured depth, in the format of `read_measured_depth`.
-    free_parameters : sequence of str
-        Range of the coefficient, ("wear.coefficient=low..high",).
+    ranges : sequence of Range
+        Bounds of the coefficient alone.
     progress : Callable, optional
         Called with the completed fraction of a run.
 
@@ -168,7 +167,6 @@ def fit_wear(
     NotConverged
         If the runs do not converge to a coefficient.
     """
-    ranges = parse_ranges(free_parameters)
     if [bound.key for bound in ranges] != [COEFFICIENT_KEY]:
         raise PatchfemError(
             f"--free: in a scene with [wear] only {COEFFICIENT_KEY} can be fitted, for example {COEFFICIENT_KEY}=1e-16 "

@@ -28,6 +28,18 @@ REMOVED_NAMES = {
         "run the scene with its patch, or fit the law of a point to a loop that `run` and `export` wrote",
     ),
     "fit --amplitudes": ("1.2", "leave it out: it belonged to --from-patch"),
+    "fit --offset": ("1.10", "subtract the offset from the record"),
+    "fit --warm-up": (
+        "1.10",
+        "repeat the rows of the first cycle before the record, label them in a further column, and hold them out, as --hold "
+        "cycle=1",
+    ),
+    "fit --resume": ("1.10", "repeat the fit with fewer --starts"),
+    "fit --seed": ("1.10", "give more --starts"),
+    "fit --unstable": (
+        "1.10",
+        "rows flagged U are lower bounds; hold them out with --hold flag=U, or delete the flag",
+    ),
     "export --of": ("1.2", "leave it out: choose the field in ParaView"),
 }
 
