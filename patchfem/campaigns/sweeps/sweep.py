@@ -68,7 +68,6 @@ def compute_chunk(
     work: WorkerData,
     numbers: Sequence[int],
     say: Callable | None = None,
-    rewrite: Callable[[str], str] = str,
 ) -> tuple[float, tuple[CaseResults, list]]:
     """Compute the results of a chunk of cases.
 
@@ -79,8 +78,6 @@ def compute_chunk(
         Numbers of the cases.
     say : callable, optional
         Called with a line of text.
-    rewrite : callable, optional
-        Changes the messages of failed cases.
 
     Returns
     -------
@@ -94,7 +91,6 @@ def compute_chunk(
         models = [_build_case_model(work, number) for number in numbers]
     keep = work.keep and (lambda case, result: work.keep(numbers[case], result))
     results = batches.solve_models(models, keep, say, True, len(work.cases))
-    results.messages = {case: rewrite(text) for case, text in results.messages.items()}
     extras = []
     if work.extract is not None:
         for case, (number, model) in enumerate(zip(numbers, models)):
