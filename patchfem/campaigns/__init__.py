@@ -13,7 +13,6 @@ PUBLIC = {
     "compare": (
         "SurfaceRuns",
         "run_both_surfaces",
-        "surface_runs_to_dict",
         "write_common_traces",
     ),
     "cost": (
@@ -46,11 +45,7 @@ PUBLIC = {
         "find_applicable_settings",
     ),
     "rows.fit": ("FittedRows",),
-    "surface_pairs": (
-        "average_pairs",
-        "find_group",
-        "read_pairs",
-    ),
+    "surface_pairs": ("read_pairs",),
     "sweeps.case_models": ("SweepScene",),
     "sweeps.cases": ("Cases",),
     "sweeps.parse_request": (
