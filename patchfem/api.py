@@ -1186,8 +1186,8 @@ def compare(
         The contents of compare.json, in SI units. `verdict` and `sentences` summarise the comparison. Measures such as
         `shift`, `worn_depth_mean` and `amplitude_ratio` have `value`, `low`, `high`, `unit`, and a `reason` if the value is
         None. Scans also have `worn_volume`, `grown_volume`, `worn_share` and the `registration` in x, y and rotation. With
-        the option `pairs`, the entry `pairs` lists the comparisons; a pair that fails has a `message`. For results folders, the dict contains the wear between the two runs over the
-        whole patch, and the measures of both runs in `runs`. With the option `predicted`, the entry `predicted` contains
+        the option `pairs`, the entry `pairs` lists the comparisons; a pair that fails has a `message`. For results
+        folders, the dict contains the wear between the two runs over the whole patch, and the measures of both runs in `runs`. With the option `predicted`, the entry `predicted` contains
         the fitted wear `coefficient`, the `difference_rms` and a `sentence`.
 
     Raises

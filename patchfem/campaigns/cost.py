@@ -24,20 +24,17 @@ from ..runs.plan import plan
 from ..runs.results.result import Result
 from ..runs.run import run as run_plan
 from .numerical_settings import (
+    TOLERANCE,
     Setting,
     find_applicable_settings,
-    list_tolerances,
     make_setting_values,
 )
 
-# Name of the setting for a curve over tolerances, in addition to NUMERICAL_SETTINGS.
-TOLERANCE = "tolerance"
+MIN_RUNS = 3  # smallest number of runs of a curve over a setting
 # Number of timings of a short run; the shortest one is used, because disturbances only add time.
 N_TIMINGS = 3
 # Smallest CPU time [s] of a run that is timed only once; longer runs scatter by a few percent.
 MIN_SECONDS_TIMED_ONCE = 0.3
-# Smallest ratio of elapsed to CPU time at which both times are reported.
-MIN_ELAPSED_TO_CPU_RATIO = 1.5
 EQUAL_COST_RATIO = 1.1  # Largest ratio of the CPU times of equally expensive runs.
 TIMING_SCATTER = 2e-3  # Scatter of the CPU time of repeated short runs [s].
 
@@ -121,28 +118,22 @@ def compute_setting_costs(
     Raises
     ------
     PatchfemError
-        If the scene does not have this setting, or if fewer than three runs succeed.
+        If the scene does not have this setting.
     NotConverged
-        If no run succeeds at any tolerance.
+        If fewer than three runs succeed, or none at any tolerance.
     """
     with locate_errors(model.source):
-        if setting_name == TOLERANCE:
-            runs = _time_settings(list_tolerances(model), say)
-            if not runs:
-                raise NotConverged("cost: no run of this scene succeeded", "")
-            return runs
         possible = find_applicable_settings(model)
-        if setting_name not in possible:
+        if setting_name not in (TOLERANCE, *possible):
             raise PatchfemError(
                 f"cost --over {setting_name}: the cost of this setting cannot be measured for this scene; "
                 f"possible settings: {', '.join(possible) or 'none'}",
                 "",
             )
         runs = _time_settings(make_setting_values(model, setting_name), say)
-    if len(runs) < 3:
-        raise PatchfemError(
-            f"cost --over {setting_name}: runs with fewer than three values of this setting succeeded",
-            "",
+    if not runs or (len(runs) < MIN_RUNS and setting_name != TOLERANCE):
+        raise NotConverged(
+            f"cost --over {setting_name}: runs with only {len(runs)} values of it succeeded"
         )
     return runs
 
@@ -150,35 +141,28 @@ def compute_setting_costs(
 def _time_settings(settings: list[Setting], say: Callable | None) -> list[Cost]:
     """Run and time a model with each of some settings; settings that fail are left out."""
     # The first run includes imports and compilation, which the timings must not contain.
-    _run_setting(settings[0], "first run, not timed", None)
+    _run_setting(settings[0], None)
     runs = []
     for setting in settings:
         # a short run is timed several times, and one that compiles once more
         timings = []
+        result = None
         is_short = True
         while is_short and len(timings) < N_TIMINGS:
             compile_seconds = compiled.COMPILE_SECONDS[0]
             begin = (_measure_cpu_time(), perf_counter())
-            finished = _run_setting(setting, setting.label, say)
-            if finished is None:
+            result = _run_setting(setting, say)
+            if result is None:
                 break
             timings.append((_measure_cpu_time() - begin[0], perf_counter() - begin[1]))
             has_compiled = compiled.COMPILE_SECONDS[0] > compile_seconds
             is_short = has_compiled or timings[-1][0] < MIN_SECONDS_TIMED_ONCE
-        if finished is None:
+        if result is None:
             continue
-        runs.append(_make_cost(setting, timings, finished))
+        runs.append(_make_cost(setting, timings, result))
         if say is not None:
-            say(_describe_timing(runs[-1]))
+            say(f"{setting.words}: {runs[-1].seconds:.2f} CPU s")
     return runs
-
-
-def _describe_timing(cost: Cost) -> str:
-    """Describe the time of a run."""
-    text = f"{cost.words}: {cost.seconds:.2f} CPU s"
-    if cost.wall_seconds > MIN_ELAPSED_TO_CPU_RATIO * cost.seconds:
-        text += f" ({cost.wall_seconds:.2f} s elapsed)"
-    return text + ", timed once" * (cost.timings == 1)
 
 
 def _make_cost(setting: Setting, timings: list[tuple[float, float]], result: Result) -> Cost:
@@ -209,26 +193,16 @@ def _measure_cpu_time() -> float:
     return process_time() + children.children_user + children.children_system
 
 
-def _run_setting(setting: Setting, label: str, say: Callable | None) -> Result | None:
-    """Run a model with a numerical setting; return None if the run fails.
+def _run_setting(setting: Setting, say: Callable | None) -> Result | None:
+    """Run a model with a numerical setting; return None if it does not converge or runs out of memory.
 
-    A run fails if it does not converge or runs out of memory. The pieces are condensed again instead
-    of being loaded from the cache.
-
-    Parameters
-    ----------
-    setting : Setting
-        Setting with its model.
-    label : str
-        Name of the run in a message.
-    say : callable or None
-        Called with a line of text.
+    The pieces are condensed again instead of being loaded from the cache. say: called with the reason of a failure.
     """
     try:
         return run_plan(plan(setting.model), fresh=True)
     except (NotConverged, MemoryError) as error:
         if say is not None:
-            say(f"{label}: left out ({error or 'out of memory'})")
+            say(f"{setting.label}: left out ({error or 'out of memory'})")
         return None
 
 
