@@ -1062,8 +1062,7 @@ def import_(
     file : path
         Laboratory record.
     out : path
-        Output file, whose extension determines its contents: a table (.csv), modes for a scene (.toml) or a frequency
-        response (.uff).
+        Output file, whose extension determines its contents: a table (.csv) or modes for a scene (.toml).
     map : str or list of str
         Quantity of each channel, such as "force=Load cell [lbf]".
     zero : bool
@@ -1071,7 +1070,7 @@ def import_(
     decay : bool
         Whether the record is a free decay.
     **how
-        Options `segment`, `window`, `band` and `begin` as strings, such as segment="2 s".
+        Options `band` and `begin` as strings, such as begin="2 s".
 
     Returns
     -------
@@ -1187,8 +1186,9 @@ def compare(
         `shift`, `worn_depth_mean` and `amplitude_ratio` have `value`, `low`, `high`, `unit`, and a `reason` if the value is
         None. Scans also have `worn_volume`, `grown_volume`, `worn_share` and the `registration` in x, y and rotation. With
         the option `pairs`, the entry `pairs` lists the comparisons; a pair that fails has a `message`. For results
-        folders, the dict contains the wear between the two runs over the whole patch, and the measures of both runs in `runs`. With the option `predicted`, the entry `predicted` contains
-        the fitted wear `coefficient`, the `difference_rms` and a `sentence`.
+        folders, the dict contains the wear between the two runs over the whole patch, and the measures of both runs in
+        `runs`. With the option `predicted`, the entry `predicted` contains the fitted wear `coefficient`, the
+        `difference_rms` and a `sentence`.
 
     Raises
     ------
