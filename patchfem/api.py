@@ -428,7 +428,7 @@ def cost(
         `runs`. Each run has its `label`, `tolerance`, CPU `seconds`, `wall_seconds`, the `worst` measure with its error
         (relative to the allowed error at a tolerance of 1), `meets_tolerance`, the advice from its warnings as `remedies`,
         and for each measure its value in `values` and its error estimate in `errors`, in SI units. For a setting,
-        the entry has `cheapest` and `sentence`.
+        the entry has `sentence`.
 
     Raises
     ------

@@ -21,7 +21,6 @@ PUBLIC = {
         "TOLERANCE",
         "describe_fastest_setting",
         "find_best_run",
-        "find_fastest_settings",
         "find_measures_with_error",
         "compute_setting_costs",
         "find_worst_error",
@@ -53,7 +52,6 @@ PUBLIC = {
         "read_cases",
         "read_sweep",
     ),
-    "sweeps.plan": ("plan_sweep",),
     "sweeps.sweep": (
         "WorkerData",
         "iterate_chunks",

@@ -19,21 +19,14 @@ from ..surface.compare.records import Comparison
 from ..surface.profile import Profile, level, resample_evenly
 
 SIDES = ("before", "after")
-# Compared measures in words, and the tables that a scene needs for them.
-COMPARED_MEASURES = {
-    "pressure_peak": ("largest pressure", "[contact]"),
-    "contact_fraction": ("fraction of the patch length that is in contact", "[contact]"),
-    "normal_stiffness": ("normal stiffness K_n", "[contact]"),
-    "tangential_stiffness": ("tangential stiffness K_t", "[contact.shear] or [contact.asperities]"),
-    "onset_level": (
-        "drive level at which slip begins",
-        '[structure] and [drive] with waveform = "levels"',
-    ),
-    "loop_area": (
-        "energy dissipated by friction per cycle",
-        "[friction] with [slide], or with [structure] and [drive]",
-    ),
-}
+COMPARED_MEASURES = (
+    "pressure_peak",
+    "contact_fraction",
+    "normal_stiffness",
+    "tangential_stiffness",
+    "onset_level",
+    "loop_area",
+)
 
 
 class SurfaceRuns(NamedTuple):
@@ -62,18 +55,12 @@ class SurfaceRuns(NamedTuple):
         return found
 
     def as_dict(self) -> dict:
-        """Return measures, outcomes, failures and warnings as a dict in SI units.
-
-        `lacking` has a sentence for each compared measure that no run has, if any run succeeded.
-        """
+        """Return measures, outcomes, failures and warnings as a dict in SI units."""
         measures = {}
-        lacking = []
-        for name, (text, tables) in COMPARED_MEASURES.items():
+        for name in COMPARED_MEASURES:
             found = {side: one.measures.get(name) for side, one in self.results.items()}
             if any(one is not None and one.value is not None for one in found.values()):
                 measures[name] = {side: _measure_to_dict(found.get(side)) for side in SIDES}
-            elif self.results:
-                lacking.append(f"{text}: not computed, because the scene lacks {tables}")
         warnings = []
         for side, result in self.results.items():
             texts = [*result.warnings, *result.extra["notes"]]
@@ -83,7 +70,6 @@ class SurfaceRuns(NamedTuple):
             "scene": self.title,
             "measures": measures,
             "failed": list(self.failed),
-            "lacking": lacking,
             "outcome": dict.fromkeys(SIDES) | outcomes,
             "warnings": warnings,
         }

@@ -206,15 +206,6 @@ def _run_setting(setting: Setting, say: Callable | None) -> Result | None:
         return None
 
 
-def find_fastest_settings(runs: list[Cost], tolerance: float) -> dict[str, str | None]:
-    """Return, for each measure, the label of the fastest run whose error is within the tolerance, or None."""
-    labels = {}
-    for name in find_measures_with_error(runs):
-        fastest = find_fastest_run(runs, tolerance, [name])
-        labels[name] = None if fastest is None else fastest.label
-    return labels
-
-
 def find_fastest_run(runs: list[Cost], tolerance: float, names: Sequence[str] = ()) -> Cost | None:
     """Return the run with the shortest CPU time whose errors are within a tolerance; None if there is none.
 

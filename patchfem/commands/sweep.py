@@ -75,10 +75,6 @@ class CaseOptions:
         "--of",
     ) = ""
 
-    def selects_cases(self) -> bool:
-        """Return whether any option selects cases."""
-        return bool(self.over or self.cases or self.random or self.sobol)
-
     def request(self):
         """Return the request for cases; raise UsageError if the options are incompatible."""
         if self.random and self.sobol:

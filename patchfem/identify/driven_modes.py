@@ -6,14 +6,12 @@ Fourier transform, which is periodic. Free decays of the same modes represent th
 the end and the start of the record. Modes are added at the spectral line where the residual depends most on the input.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 from scipy.fft import irfft, rfft, rfftfreq
 
 from ..core import PatchfemError
 from ..response.welch import average_segments, transform_segments
-from .sinusoids import Limits, SinusoidFit, SinusoidProblem
+from .sinusoids import FittedModes, Limits, SinusoidFit, SinusoidProblem
 
 # order of the time derivative of the displacement, by the quantity of the response
 DERIVATIVE_ORDERS = {"displacement": 0, "velocity": 1, "acceleration": 2}
@@ -37,24 +35,6 @@ MIN_INPUT_POWER = 1e-6
 MAX_NYQUIST_FRACTION = 0.8
 # Initial peak widths zeta f of a further mode, in spectral lines of a segment.
 START_PEAK_WIDTHS = (0.1, 1.0, 5.0)
-
-
-@dataclass(frozen=True, eq=False, slots=True)
-class DrivenModes:
-    """Natural modes fitted to one response and its input, in order of increasing frequency.
-
-    - frequency: natural frequencies (n,) [Hz].
-    - damping: damping ratios (n,).
-    - residue: residues A (n,) of sum A / (w_r^2 - w^2 + 2i zeta w_r w).
-    - damping_error: half-widths (n,) of the 95 % intervals of the damping ratios.
-    - misfit: root mean square of the residual relative to that of the response.
-    """
-
-    frequency: np.ndarray
-    damping: np.ndarray
-    residue: np.ndarray
-    damping_error: np.ndarray
-    misfit: float
 
 
 class _DrivenRecord:
@@ -119,7 +99,7 @@ def fit_driven_modes(
     response,
     quantity: str,
     band: tuple[float, float] = (0.0, np.inf),
-) -> DrivenModes:
+) -> FittedModes:
     """Fit natural modes to the time records of a response and its input.
 
     Parameters
@@ -132,10 +112,6 @@ def fit_driven_modes(
         Kind of the response, a key of `DERIVATIVE_ORDERS`.
     band : (float, float)
         Frequency band [Hz] of the returned modes; modes outside are fitted, too.
-
-    Returns
-    -------
-    DrivenModes
 
     Raises
     ------
@@ -170,12 +146,4 @@ def fit_driven_modes(
         raise PatchfemError(
             f"no mode is visible in the response between {min_frequency:g} and {max_frequency:g} Hz"
         )
-    order = np.flatnonzero(is_kept)[np.argsort(w[is_kept])]
-    frequency = w[order] / (2 * np.pi)
-    return DrivenModes(
-        frequency=frequency,
-        damping=zeta[order],
-        residue=fit.coefficients[order, 2],
-        damping_error=problem.estimate_damping_errors(fit)[order],
-        misfit=float(np.sqrt(fit.mean_square)) / problem.scale,
-    )
+    return problem.select_modes(fit, is_kept)

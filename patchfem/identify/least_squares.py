@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.optimize import least_squares
 
-from ..core import NotConverged, Outcome, frozen_array
+from ..core import NotConverged, Outcome
 from .intervals import FitIntervals, compute_intervals, make_unknown_intervals
 from .space import (
     SearchCounts,
@@ -260,7 +260,7 @@ def _assemble_fit(model: UnitCubeResidual, best: Descent, descents: Descents, ki
     n_near = np.count_nonzero(descents.rms <= SAME_MINIMUM_RATIO * np.sqrt(cost / model.rows))
     is_converged = best.is_converged or n_near > 1
     return Fit(
-        values=frozen_array(model.space.to_values(u)),
+        values=model.space.to_values(u),
         at_bound=tuple(np.where(u <= 0, "low", np.where(u >= 1, "high", "")).tolist()),
         intervals=intervals,
         rms=float(np.sqrt(cost / model.rows)),

@@ -8,8 +8,9 @@ import numpy as np
 from ..core import PatchfemError
 from ..response.decay_curve import HalfCycles, fit_decay_curve, fit_slopes
 from .decay import fit_decay
-from .driven_modes import DERIVATIVE_ORDERS, MAX_FITTED_SAMPLES, DrivenModes, fit_driven_modes
+from .driven_modes import DERIVATIVE_ORDERS, MAX_FITTED_SAMPLES, fit_driven_modes
 from .half_cycles import describe_missing_samples_at_end, find_half_cycles
+from .sinusoids import FittedModes
 
 INPUT_QUANTITIES = ("force", "base_acceleration")  # possible inputs of a record
 # Largest error of a sample time in time steps; times in text files may have only six digits.
@@ -146,7 +147,7 @@ def identify_driven_modes(
     )
 
 
-def _convert_force_residues(modes: DrivenModes) -> _ModeRows:
+def _convert_force_residues(modes: FittedModes) -> _ModeRows:
     """Return mode-shape components at the drive point and the modal mass, from residues.
 
     The components are relative to that of the first mode, whose residue is the reciprocal of the modal mass.
@@ -167,7 +168,7 @@ def _convert_force_residues(modes: DrivenModes) -> _ModeRows:
     return _ModeRows({"slide": motion, "output": motion}, 1 / float(first), notes)
 
 
-def _convert_base_residues(modes: DrivenModes) -> _ModeRows:
+def _convert_base_residues(modes: FittedModes) -> _ModeRows:
     """Split the residues of a base excitation into participation and mode-shape component.
 
     The residue is the negative product of both factors, which are assumed to have the same magnitude before
@@ -283,7 +284,8 @@ def identify_decay_modes(values: dict, begin: float | None = None) -> ListedMode
     """
     decay = fit_decay(*_select_decay(values, begin))
     descriptions = []
-    for zeta, error, decrement in zip(decay.damping, decay.damping_error, decay.decrement()):
+    for zeta, error in zip(decay.damping, decay.damping_error):
+        decrement = 2 * np.pi * zeta / np.sqrt(1 - zeta**2)
         descriptions.append(
             f"damping {zeta:.4g} +- {error:.1g}, logarithmic decrement {decrement:.4g}"
         )

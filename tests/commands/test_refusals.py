@@ -64,7 +64,7 @@ REFUSED = {  # command -> [(arguments, texts of the lines of the message)]; exit
     ],
     "sweep own.toml": [(("--set", "friction.static=0.3"), ("sets friction.static in every",))],
     "plan rig.toml": [
-        ((*STATIC, "--probe"), ("--probe works for a single case",)),
+        (STATIC, ("plan --over was removed",)),
     ],
     **{
         f"{verb} refused.toml": [((), ("must be >= 0", "must be >= 0"))]

@@ -440,15 +440,11 @@ def _note_different_methods(method: str, measured: MeasuredCurve) -> str:
     """Return a note if the measured and the computed curve come from different methods, else ""."""
     if measured.method == method:
         return ""
-    k = int(np.argmax(measured.value[1]))
-    amplitude_loss = -np.expm1(-2 * np.pi * measured.value[1, k])
-    amplitude = format_length(measured.amplitude[k], 3)
+    amplitude_loss = -np.expm1(-2 * np.pi * measured.value[1].max())
     return (
-        f"the measured curve is compared with the curve by {method} at the same amplitudes, not "
-        "with a computed decay; a decay gives mean values over a cycle, so the two differ most "
-        f"where the damping is largest: at {amplitude} one cycle reduces the amplitude by "
-        f"{100 * amplitude_loss:.2g} %. The intervals do not contain this difference; a run of a release "
-        "computes the decay"
+        f"the measured curve is compared with the curve by {method} at the same amplitudes, not with a computed decay, which "
+        f"gives mean values over a cycle, in which the amplitude falls by up to {100 * amplitude_loss:.2g} %. The intervals do "
+        "not contain this difference; a run of a release computes the decay"
     )
 
 
@@ -490,15 +486,9 @@ def _widen_by_missing_modes(
     ends = fit.intervals.ends + shifts[:, None] * [-1, 1]
     ends = frozen_array(np.clip(ends, bounds[:, :1], bounds[:, 1:]))
 
-    # what the note tells
-    texts = []
-    for bound, shift, value in zip(curves.ranges, shifts, fit.values):
-        size = f"{100 * shift / abs(value):.2g} %" if value else f"{shift:.2g}"
-        texts.append(f"{bound.key} by {size}")
     frequency, damping = 100 * np.nanmax(np.abs(change / reference), axis=1)
     note = (
         "the intervals contain the error of the modes left out of the structure; a computation "
-        f"with more modes changes frequencies by up to {frequency:.2g} % and damping ratios by up "
-        f"to {damping:.2g} %, and moves {', '.join(texts)}"
+        f"with more modes changes frequencies by up to {frequency:.2g} % and damping ratios by up to {damping:.2g} %"
     )
     return replace(fit, intervals=replace(fit.intervals, ends=ends)), note

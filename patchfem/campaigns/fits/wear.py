@@ -79,13 +79,6 @@ class WearCurve(NamedTuple):
     fraction: np.ndarray
     depth: np.ndarray
 
-    def make_inverse(self) -> Callable:
-        """Return a function that interpolates the fraction of the cycles at a given wear depth."""
-        is_growing = np.diff(self.depth, prepend=-1.0) > 0
-        return PchipInterpolator(
-            self.depth[is_growing], self.fraction[is_growing], extrapolate=False
-        )
-
 
 def read_measured_depth(text: str) -> MeasuredDepth:
     """Read a measured depth from a string, or from a JSON file written by `compare`.
@@ -206,7 +199,8 @@ def fit_wear(
         )
 
     # the interpolated coefficient is corrected until a run with it has the measured depth
-    inverse = curve.make_inverse()
+    is_growing = np.diff(curve.depth, prepend=-1.0) > 0
+    inverse = PchipInterpolator(curve.depth[is_growing], curve.fraction[is_growing])
     value = float(bounds.high * inverse(target.value))
     n_runs = 1
     while n_runs < MAX_RUNS:

@@ -298,6 +298,6 @@ def _add_pressed(answer: Answer, runs: SurfaceRuns) -> Answer:
     return replace(
         answer,
         data=data,
-        remarks=Remarks(warnings, (*answer.remarks.notes, *pressed["lacking"])),
+        remarks=Remarks(warnings, answer.remarks.notes),
         details=answer.details | {"pressed": pressed},
     )

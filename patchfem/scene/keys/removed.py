@@ -40,6 +40,7 @@ REMOVED_NAMES = {
         "1.10",
         "rows flagged U are lower bounds; hold them out with --hold flag=U, or delete the flag",
     ),
+    "plan --over": ("1.10", "give the values of one case with --set"),
     "import of mode shapes": ("1.10", "give the file as structure.file of the scene"),
     "import -o .uff": ("1.10", "estimate it with scipy.signal.csd from a table of the records"),
     "import --segment": ("1.10", "leave it out: modes are fitted to the time record"),
