@@ -569,7 +569,6 @@ def sweep(
     draw: int = 0,
     seed: int = 0,
     sobol: bool = False,
-    of: str = "",
     jobs: int = 1,
     executor: str = "",
     resume: bool = False,
@@ -592,8 +591,6 @@ def sweep(
         Seed of the random numbers.
     sobol : bool
         Whether the random cases form a Sobol sequence instead of independent samples.
-    of : str
-        Measure of the attribute `answer`, such as "equivalent_damping".
     jobs : int
         Number of processes.
     executor : str
@@ -630,9 +627,9 @@ def sweep(
         raise SceneError(mistakes)
     if empty := [key for key, values in values_by_key.items() if _is_empty(values)]:
         raise SceneError([f"{key}: the sweep has no value for this key" for key in empty])
-    sweep_scene = _read_sweep_scene(scene, of)
+    sweep_scene = _read_sweep_scene(scene)
     ranges = [f"{key}={format_values(key, values)}" for key, values in values_by_key.items()]
-    request = parse_request.Request(ranges, None, draw, sobol, seed, of)
+    request = parse_request.Request(ranges, None, draw, sobol, seed)
     cases = parse_request.read_cases(sweep_scene, request)
     pool = executors.make_executor(executor, jobs)
     if out is None:
@@ -1234,10 +1231,10 @@ def compare(
     return compared.answer_files(*files, options, folder, piece).details
 
 
-def _read_sweep_scene(scene: str | Path | Scene, measure: str) -> case_models.SweepScene:
+def _read_sweep_scene(scene: str | Path | Scene) -> case_models.SweepScene:
     """Return the scene text of a sweep without validating the scene.
 
-    `scene` is as for `load`; `measure` is the requested measure of the sweep.
+    `scene` is as for `load`.
     """
     sets: tuple = ()
     if isinstance(scene, Mapping):
@@ -1253,7 +1250,7 @@ def _read_sweep_scene(scene: str | Path | Scene, measure: str) -> case_models.Sw
     else:
         path = _require_path(scene, "a scene")
         text = read_text(scene)
-    return case_models.SweepScene(path, text, sets, measure, len(sets))
+    return case_models.SweepScene(path, text, sets, len(sets))
 
 
 def _count_written(scene) -> int:

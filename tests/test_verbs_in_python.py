@@ -123,7 +123,7 @@ def test_exact_backbone_accepts_amplitudes_in_any_form(amplitudes):
         (
             pf.new("bench"),
             {"starts": 3, "leave_out": "cycle"},
-            "leave_out applies only to fits to rows of a rig; starts applies only to fits to rows of a rig or",
+            "leave_out applies only to fits to rows of a rig, and this is a fit to a loop",
         ),
         (
             pf.new("bench"),

@@ -206,7 +206,7 @@ def _run_setting(setting: Setting, say: Callable | None) -> Result | None:
         return None
 
 
-def find_fastest_run(runs: list[Cost], tolerance: float, names: Sequence[str] = ()) -> Cost | None:
+def find_fastest_run(runs: list[Cost], tolerance: float) -> Cost | None:
     """Return the run with the shortest CPU time whose errors are within a tolerance; None if there is none.
 
     An error that is unknown is not within the tolerance. A coarse run that is accurate by chance is excluded: those of all
@@ -219,14 +219,12 @@ def find_fastest_run(runs: list[Cost], tolerance: float, names: Sequence[str] = 
         Runs from coarse to fine.
     tolerance : float
         Largest error, relative to the value.
-    names : sequence of str
-        Measures that count; by default those with an error estimate in any run.
     """
-    counted = names or find_measures_with_error(runs)
+    names = find_measures_with_error(runs)
     confirmed = []
     is_confirmed = True
     for run in reversed(runs):
-        is_accurate = judge_run(run, counted, tolerance) is Judgement.MEETS
+        is_accurate = judge_run(run, names, tolerance) is Judgement.MEETS
         if run.value is not None:
             is_confirmed = is_confirmed and is_accurate
         if is_accurate and (is_confirmed or run.value is None):
@@ -274,34 +272,21 @@ def judge_run(run: Cost, names: Sequence[str], tolerance: float) -> Judgement:
 
 
 def describe_fastest_setting(runs: list[Cost], tolerance: float) -> str:
-    """Describe the fastest setting that meets a tolerance, or the measure that misses it.
-
-    If no setting meets the tolerance, the description contains the worst measure of the best run.
-    """
+    """Describe the fastest setting that meets a tolerance, or the worst measure of the best run if none meets it."""
     names = find_measures_with_error(runs)
     best = find_best_run(runs, tolerance)
     seconds = format_number(best.seconds, 2)
-    if find_fastest_run(runs, tolerance) is not None:
-        measures = "every measure"
-        if any(name not in names for name in best.values):
-            measures += " that has an error estimate"
-        return (
-            f"{best.words}: {seconds} CPU s per run, with {measures} within the tolerance "
-            f"{tolerance:g}"
-        )
-
-    # A run without error estimates may be accurate enough: the sentence says then that none is known to meet it.
-    is_unknown = any(judge_run(run, names, tolerance) is Judgement.UNKNOWN for run in runs)
-    text = (
-        f"no setting {'is known to meet' if is_unknown else 'meets'} the tolerance {tolerance:g}: "
-    )
     worst = find_worst_error(best, names, tolerance)
+    if find_fastest_run(runs, tolerance) is not None:
+        estimated = " that has an error estimate" if best.values.keys() - set(names) else ""
+        return f"{best.words}: {seconds} CPU s per run, with every measure{estimated} within the tolerance {tolerance:g}"
+    # a run without error estimates may be accurate enough
+    is_unknown = any(judge_run(run, names, tolerance) is Judgement.UNKNOWN for run in runs)
+    text = f"no setting {'is known to meet' if is_unknown else 'meets'} the tolerance {tolerance:g}"
     if not all(name in best.errors for name in names):
-        return f"{text}no run has an error estimate of every measure"
-    return (
-        f"{text}the best run, with {best.words}, has an error of {format_number(worst.fraction, 2)} in "
-        f"{worst.name} and takes {seconds} CPU s"
-    )
+        return f"{text}: no run has an error estimate of every measure"
+    error = format_number(worst.fraction, 2)
+    return f"{text}: the best run, with {best.words}, has an error of {error} in {worst.name} and takes {seconds} CPU s"
 
 
 class WorstError(NamedTuple):

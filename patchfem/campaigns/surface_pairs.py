@@ -41,7 +41,7 @@ def read_pairs(table: Path) -> list[TableLine]:
     path = Path(table)
     text = read_text(path, "the table")
     find_factors(text, TableFormat({}, COLUMNS, ",".join(COLUMNS), "the table"))
-    lines: dict[tuple, TableLine] = {}
+    lines = []
     for number, row in text.iterate_rows(skips_blank=True):
         cells = dict(zip(text.names, row))
         names = tuple(cells.pop(column) for column in COLUMNS)
@@ -53,14 +53,10 @@ def read_pairs(table: Path) -> list[TableLine]:
             raise PatchfemError(
                 f"{path}:{number}: direction: must be x, y or empty, not '{direction[:40]}'"
             )
-        if names in lines:
-            raise PatchfemError(
-                f"{path}:{number}: repeats the pair of line {lines[names].line}; this pair would count twice in a mean"
-            )
         paths = tuple(path.parent / name for name in names)
-        lines[names] = TableLine(number, names, paths, direction, cells)
+        lines.append(TableLine(number, names, paths, direction, cells))
     if not lines:
         raise PatchfemError(
             f"{path}: no pair below its header; a line such as `new.csv,worn.csv` is needed for each"
         )
-    return list(lines.values())
+    return lines

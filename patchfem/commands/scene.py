@@ -83,8 +83,8 @@ def plan(
         "list also the effects that the scene does not name", "-v", "--verbose"
     ) = False,
 ):
-    """Print what a run of SCENE would compute: sizes, the stiffnesses in series and dimensionless groups. A table [sweep]
-    is left out.
+    """Print what a run of SCENE would compute: sizes, the stiffnesses in series and dimensionless groups. Of a
+    scene with [sweep], give the values of one case with --set.
 
     Example: patchfem plan rig.toml --set contact.tilt.angle="1 mrad"
     """

@@ -91,8 +91,8 @@ def make_answer(curves: dict[str, list[Cost]], model: Model) -> Answer:
 def describe_runs(knob: str, runs: list[Cost], tolerance: float) -> dict:
     """Return the runs of a curve as an entry of cost.json, in SI units.
 
-    `runs`: the attributes of each `Cost`, with `worst` {`measure`, `error`} and `meets_tolerance`. `sentence`: the cost of all
-    measures; None for TOLERANCE, because its runs have different tolerances.
+    `runs`: the attributes of each `Cost`, with `worst` {`measure`, `error`} and `meets_tolerance`. `sentence`: the cost of
+    all measures; None for TOLERANCE, because its runs have different tolerances.
 
     Parameters
     ----------

@@ -51,27 +51,15 @@ def fit_decay(time, value) -> FittedModes:
     is_kept = fit.damping > DAMPING_ROUND_OFF
     is_kept &= energy > MIN_AMPLITUDE_RATIO**2 * energy.max()
     if not is_kept.any():
-        errors = problem.estimate_damping_errors(fit)
-        raise PatchfemError(_describe_growth(fit.damping, errors, energy))
-    return problem.select_modes(fit, is_kept)
-
-
-def _describe_growth(damping, errors, energy) -> str:
-    """Describe why a record without a decaying sinusoid has no damping: it grows, or it does neither within its error.
-
-    damping, errors, energy: of each sinusoid (n,).
-    """
-    largest = int(np.argmax(energy))
-    error = max(float(errors[largest]), DAMPING_ROUND_OFF)
-    if damping[largest] < -error:
-        return (
-            "the oscillation in the record grows instead of decaying; begin the record after the drive "
-            "has ended"
+        largest = int(np.argmax(energy))
+        error = max(float(problem.estimate_damping_errors(fit)[largest]), DAMPING_ROUND_OFF)
+        behaviour = (
+            f"neither decays nor grows beyond its error of {error:.1g}; give a longer record"
         )
-    return (
-        f"the damping ratio of the oscillation in the record is zero within its error of {error:.1g}: it neither decays nor "
-        "grows; give a longer record"
-    )
+        if fit.damping[largest] < -error:
+            behaviour = "grows instead of decaying; begin the record after the drive has ended"
+        raise PatchfemError(f"the oscillation in the record {behaviour}")
+    return problem.select_modes(fit, is_kept)
 
 
 def _find_starts(time, fit: SinusoidFit) -> list[np.ndarray]:

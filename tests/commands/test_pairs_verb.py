@@ -104,7 +104,6 @@ def test_always_interval_of_mean_covers_true_value():
             "before,after,direction\na.csv,b.csv,z\n",
             ":2: direction: must be x, y or empty, not 'z'",
         ),
-        ("before,after\na.csv,b.csv\na.csv,b.csv\n", ":3: repeats the pair of line 2"),
         ("", ":1: a header like `before,after` is needed"),
     ],
 )

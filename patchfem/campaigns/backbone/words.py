@@ -53,8 +53,8 @@ def write_notes(joint: JointMode, amplitudes, backbone: Backbone) -> tuple[str, 
         if backbone.exponents.micro_theory is not None and backbone.exponents.micro is None:
             edge = format_length(MAX_MICRO_SLIP_RATIO * joint.slip_amplitude, 2)
             notes.append(
-                f"the exponent of micro-slip cannot be determined: fewer than two amplitudes below {edge} have an energy loss "
-                f"of at least {MIN_LOSS_RATIO:g} times the error of the loss"
+                f"the exponent of micro-slip cannot be determined: fewer than two amplitudes below {edge} have an energy "
+                f"loss of at least {MIN_LOSS_RATIO:g} times the error of the loss"
             )
         notes += _note_missing_mesh(joint)
     if model.wear is not None:
@@ -183,10 +183,8 @@ def describe_band_width(backbone: Backbone) -> str:
     content = "the numerical error"
     if any(match_amplitudes(curve, other)[0].size for other in others):
         content += " and the difference of the two methods"
-    # as many digits as show the width of the band
-    digits = int(np.clip(2 - np.log10(max(damping[k], 1e-6)), 3, 6))
     ends = np.array([band.damping_low, band.damping_high, curve.damping])[:, k].tolist()
-    low, high, best = (format_number(value, digits) for value in ends)
+    low, high, best = (format_number(value, 6) for value in ends)
     return (
         f"Its band is {content}; it is widest at {format_length(curve.amplitude[k], 3)}, where the damping ratio is "
         f"{low} to {high} beside {best}, and the frequency is "
@@ -202,11 +200,9 @@ def describe_static_curve(curves: dict[str, Curve]) -> list[str]:
     if len(curves) < 2:
         return []
     here, there = match_amplitudes(curves["balance"], curves["quasi-static"])
-    if not here.size:
-        return []
     balance = curves["balance"].at(here)
     static = curves["quasi-static"].at(there)
-    agrees = np.ones(balance.amplitude.size, bool)
+    agrees = np.ones(here.size, bool)
     for name in ("frequency", "damping"):
         value = getattr(balance, name)
         error = getattr(balance, f"{name}_error") + getattr(static, f"{name}_error")
@@ -214,18 +210,13 @@ def describe_static_curve(curves: dict[str, Curve]) -> list[str]:
         agrees &= np.abs(getattr(static, name) - value) <= limit
 
     # the range ends at the first amplitude at which they differ
-    tolerance = f"{100 * AGREEMENT:g} % and both errors"
-    if agrees.all():
-        return [
-            f"The quasi-static curve holds within {tolerance} at all amplitudes of both curves."
-        ]
-    first = int(np.argmin(agrees))
-    if not first:
-        return [
-            f"The quasi-static curve differs by more than {tolerance} from its smallest amplitude on."
-        ]
-    edge = format_length(balance.amplitude[first - 1], 3)
-    return [f"The quasi-static curve holds up to {edge} within {tolerance}."]
+    count = agrees.size if agrees.all() else int(np.argmin(agrees))
+    if not count:
+        return []
+    edge = format_length(balance.amplitude[count - 1], 3)
+    return [
+        f"The quasi-static curve holds up to {edge} within {100 * AGREEMENT:g} % and both errors."
+    ]
 
 
 def _describe_coupling(joint: JointMode, curve: Curve) -> list[str]:

@@ -442,9 +442,9 @@ def _note_different_methods(method: str, measured: MeasuredCurve) -> str:
         return ""
     amplitude_loss = -np.expm1(-2 * np.pi * measured.value[1].max())
     return (
-        f"the measured curve is compared with the curve by {method} at the same amplitudes, not with a computed decay, which "
-        f"gives mean values over a cycle, in which the amplitude falls by up to {100 * amplitude_loss:.2g} %. The intervals do "
-        "not contain this difference; a run of a release computes the decay"
+        f"the measured curve is compared with the curve by {method} at the same amplitudes, not with a computed decay, "
+        f"which gives mean values over a cycle, in which the amplitude falls by up to {100 * amplitude_loss:.2g} %. "
+        "The intervals do not contain this difference; a run of a release computes the decay"
     )
 
 

@@ -30,7 +30,6 @@ MAX_STEPS_PER_ROW = 64
 STEP_FRACTION = 0.1
 # Ratio of the rest speed of growing bonds to the largest measured speed.
 REST_SPEED_FRACTION = 1e-3
-AMPLITUDE_TOL = 0.02  # largest relative difference of two amplitudes that is not reported
 # Smallest fraction of independent rows for which no warning about correlation is issued.
 MIN_INDEPENDENT = 0.6
 # Ratio of the residual to the peak force up to which round-off dominates the residual.
@@ -243,7 +242,6 @@ def fit_hysteresis_loop(
     for selector in options.hold:
         held_out |= loop.select_rows(selector)
     time, notes = _find_row_times(scene, loop)
-    notes += _note_amplitude(scene, loop)
     keys = FreeKeys(scene, ranges, _set_rest_speed(scene, ranges, loop, time), notes)
     keys.require_enough_rows(loop_file, np.count_nonzero(~held_out), "rows")
 
@@ -295,21 +293,6 @@ def _find_row_times(scene: Scene, loop: Loop) -> tuple[np.ndarray, list[str]]:
         f"which does not affect the force of law '{law.law}'"
     )
     return np.arange(float(loop.reading.size)), [note]
-
-
-def _note_amplitude(scene: Scene, loop: Loop) -> list[str]:
-    """Return a note if the amplitude of the slide differs from the measured one, or []."""
-    slide = scene.slide
-    amplitude = float(np.ptp(loop.displacement)) / 2
-    if slide.kind not in ("sine", "triangle"):
-        return []
-    if abs(slide.amplitude - amplitude) <= AMPLITUDE_TOL * amplitude:
-        return []
-    return [
-        f"slide.amplitude is {slide.amplitude:.4g} m, but the amplitude of the measured "
-        f"displacement is {amplitude:.4g} m; the fit follows the measured displacement; for a run "
-        "of the fitted scene set slide.amplitude"
-    ]
 
 
 def _set_rest_speed(

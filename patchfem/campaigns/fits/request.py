@@ -17,22 +17,17 @@ from .wear import FittedCoefficient, fit_wear
 
 
 class Kind(NamedTuple):
-    """Kind of fit: what is fitted, what scene that needs, and the options that it has."""
+    """Kind of fit: what is fitted, and the options that it has."""
 
     target: str
-    scene: str
     options: tuple[str, ...] = ()
 
 
 KINDS = {
-    "loop": Kind("a loop under a prescribed slide", "a bench", ("hold",)),
-    "rows": Kind("rows of a rig", "a rig", ("hold", "starts", "leave_out")),
-    "curve": Kind(
-        "frequency and damping of a rig against amplitude",
-        "a rig, fitted to a curve of frequency and damping against amplitude",
-        ("starts",),
-    ),
-    "wear": Kind("a worn depth", "one with [wear]"),
+    "loop": Kind("a loop under a prescribed slide", ("hold",)),
+    "rows": Kind("rows of a rig", ("hold", "starts", "leave_out")),
+    "curve": Kind("frequency and damping of a rig against amplitude", ("starts",)),
+    "wear": Kind("a worn depth"),
 }
 
 
@@ -108,16 +103,13 @@ def check_options(kind: str, options: FitOptions, format_option: Callable) -> No
 
     format_option: function that turns the name of an option into the words of a message.
     """
-    reasons = []
     for name in ("hold", "leave_out", "starts"):
         targets = [other.target for other in KINDS.values() if name in other.options]
         if getattr(options, name) and KINDS[kind].target not in targets:
-            reasons.append(f"{format_option(name)} applies only to fits to {' or '.join(targets)}")
-    if reasons:
-        these = "this option" if len(reasons) == 1 else "these options"
-        raise PatchfemError(
-            f"{'; '.join(reasons)}; this scene is {KINDS[kind].scene}; leave {these} out"
-        )
+            raise PatchfemError(
+                f"{format_option(name)} applies only to fits to {' or '.join(targets)}, and this is a fit to "
+                f"{KINDS[kind].target}; leave this option out"
+            )
     starts = options.starts
     if starts is not None and (not isinstance(starts, int) or starts < 1):
         raise PatchfemError(f"{format_option('starts')} {starts}: at least one is needed")

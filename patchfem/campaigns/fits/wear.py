@@ -187,20 +187,17 @@ def fit_wear(
     curve = compute(bounds.high)
     max_depth = float(curve.depth[-1])
     if not max_depth >= target.value:
-        advice = "raise the high bound"
-        if curve.fraction[-1] < 1:
-            advice = (
-                "with this bound as the coefficient the coating is worn through before the last "
-                "cycle"
-            )
         raise PatchfemError(
             f"--free {COEFFICIENT_KEY}: with the high bound {bounds.high:.4g} m^2/N the scene reaches only "
-            f"{target.name} = {max_depth:.4g}, but {target.value:.4g} was measured; {advice}"
+            f"{target.name} = {max_depth:.4g}, but {target.value:.4g} was measured; raise the high bound, "
+            "unless the coating is worn through"
         )
 
     # the interpolated coefficient is corrected until a run with it has the measured depth
     is_growing = np.diff(curve.depth, prepend=-1.0) > 0
-    inverse = PchipInterpolator(curve.depth[is_growing], curve.fraction[is_growing])
+    inverse = PchipInterpolator(
+        curve.depth[is_growing], curve.fraction[is_growing], extrapolate=False
+    )
     value = float(bounds.high * inverse(target.value))
     n_runs = 1
     while n_runs < MAX_RUNS:

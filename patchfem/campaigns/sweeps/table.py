@@ -31,7 +31,7 @@ def read_case_table(path: Path) -> tuple[Cases | None, list[str]]:
         lines = list(table.iterate_rows(skips_blank=True))
     except PatchfemError as error:
         return None, [str(error)]
-    keys = table.names[: (table.names + [OUTCOME_COLUMN]).index(OUTCOME_COLUMN)]
+    keys = table.names[: [*table.names, OUTCOME_COLUMN].index(OUTCOME_COLUMN)]
     if not all(keys) or not keys or not lines:
         return None, [
             f"{path}:1: the first line must be a header such as `{HEADER}`, and each line after it must give one case"
