@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import surfaces
 from command_line import run_cli
-from lab_files import make_record, write_universal
+from lab_files import SI, make_record, write_universal
 from scene_texts import COATED, COULOMB, DRIVE, MODE, NONLOCAL, POINT, TRIANGLE
 
 import patchfem as pf
@@ -96,6 +96,16 @@ def write_rig(folder):
     return path
 
 
+def import_shapes(folder: Path) -> None:
+    """Import a universal file with a mode shape (data set 55) as modes."""
+    pytest.importorskip("pyuff")
+    shape = {"type": 55, "analysis_type": 2, "data_ch": 2, "spec_data_type": 8, "load_case": 1}
+    shape |= {"mode_n": 1, "node_nums": [11, 12], "freq": 100.0, "modal_m": 1.0}
+    shape |= {f"r{k}": np.zeros(2) for k in (1, 2, 3)}
+    shape |= {"modal_damp_vis": 0.01, "modal_damp_his": 0.0}
+    pf.import_(write_universal(folder / "shapes.uff", [SI, shape]), folder / "modes.toml")
+
+
 TRIED = {  # removed feature -> (function that uses it, replacement that the message names)
     "structure.mode.lateral": (
         partial(load, RIG, {"structure.mode.axial.lateral": 0.2}),
@@ -125,6 +135,46 @@ TRIED = {  # removed feature -> (function that uses it, replacement that the mes
         partial(run_failing_command, ("fit", "a.toml", "--amplitudes", "1 um,2 um")),
         "leave it out",
     ),
+    "fit --offset": (
+        partial(run_failing_command, ("fit", "a.toml", "--offset", "force")),
+        "subtract the offset",
+    ),
+    "fit --warm-up": (
+        partial(run_failing_command, ("fit", "a.toml", "--warm-up")),
+        "hold them out",
+    ),
+    "fit --resume": (
+        partial(run_failing_command, ("fit", "a.toml", "--resume")),
+        "fewer --starts",
+    ),
+    "fit --seed": (
+        partial(run_failing_command, ("fit", "a.toml", "--seed", "1")),
+        "give more --starts",
+    ),
+    "fit --unstable": (
+        partial(run_failing_command, ("fit", "a.toml", "--unstable", "out")),
+        "--hold flag=U",
+    ),
+    "sweep --of": (
+        partial(run_failing_command, ("sweep", "a.toml", "--of", "loop_area")),
+        "choose the measure on the page",
+    ),
+    "plan --over": (
+        partial(run_failing_command, ("plan", "a.toml", "--over", "friction.static=0.2,0.3")),
+        "give the values of one case with --set",
+    ),
+    "import --segment": (
+        partial(run_failing_command, ("import", "a.uff", "-o", "b.toml", "--segment", "2 s")),
+        "fitted to the time record",
+    ),
+    "import --window": (
+        partial(run_failing_command, ("import", "a.uff", "-o", "b.toml", "--window", "hann")),
+        "fitted to the time record",
+    ),
+    "import -o .uff": (
+        partial(run_failing_command, ("import", "a.uff", "-o", "b.uff")),
+        "scipy.signal.csd",
+    ),
     "export --of": (
         partial(run_failing_command, ("export", "out", "-o", "a.vtu", "--of", "sigma_yy")),
         "choose the field in ParaView",
@@ -135,12 +185,17 @@ TRIED = {  # removed feature -> (function that uses it, replacement that the mes
     ),
     "export of a structure as .npz": (export_structure, "exported as .mat"),
     "export of a script for ParaView": (export_script, "write .pvd for older versions"),
-    "backbone by decay": (
+    "backbone --method decay": (
         lambda folder: pf.backbone(write_rig(folder), method="decay"),
         'drive.kind = "free"',
     ),
     "fit of responses": (read_responses, "write the modes of your modal analysis as dataset 55"),
     "modes as arrays": (read_modes_as_arrays, "write M = m I, K = m diag(omega^2)"),
+    "backbone --method all": (
+        lambda folder: pf.backbone(write_rig(folder), method="all"),
+        "leave it out: both methods are the default",
+    ),
+    "import of mode shapes": (import_shapes, "give the file as structure.file"),
     "matrix of Nastran": (
         lambda folder: pf.load(f"[structure.reduced]\n{FILES.format('k.op4')}{DRIVE}"),
         "use one of .mtx, .mat, .npz",

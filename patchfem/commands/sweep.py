@@ -69,14 +69,6 @@ class CaseOptions:
         ),
     ] = 0
     seed: Annotated[int, Parameter(name="--seed", help="seed of the random cases, such as 1")] = 0
-    of: text_option(
-        "measure that the printed answer and the first picture of the page show, such as equivalent_damping",
-        "--of",
-    ) = ""
-
-    def selects_cases(self) -> bool:
-        """Return whether any option selects cases."""
-        return bool(self.over or self.cases or self.random or self.sobol)
 
     def request(self):
         """Return the request for cases; raise UsageError if the options are incompatible."""
@@ -89,7 +81,7 @@ class CaseOptions:
                 "--random and --sobol draw values from ranges; give each range by --over table.key=low..high"
             )
         return parse_request.Request(
-            self.over, self.cases, self.random or self.sobol, bool(self.sobol), self.seed, self.of
+            self.over, self.cases, self.random or self.sobol, bool(self.sobol), self.seed
         )
 
 

@@ -106,10 +106,6 @@ QUANTITIES: dict[str, Definition] = {
         "1", "exponent of the energy loss per cycle over the amplitude in gross slip; 1 in theory"
     ),
     # fit; of keys of a scene, see FITTED_KEY
-    "offset_force": Definition("N", "constant force that is fitted to the whole record"),
-    "offset_displacement": Definition(
-        "m", "fitted distance of the first row from the position without stress"
-    ),
     "residual_rms": Definition("1", "root mean square of fitted minus measured values", 3),
     "residual_fraction": Definition(
         "1", "root mean square of fitted minus measured values, over the largest measured value"

@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.optimize import least_squares
 
-from ..core import NotConverged, Outcome, frozen_array
+from ..core import NotConverged, Outcome
 from .intervals import FitIntervals, compute_intervals, make_unknown_intervals
 from .space import (
     SearchCounts,
@@ -127,17 +127,13 @@ class Search:
     - seed: seed of random starting points, for a residual that is expensive to evaluate: derivatives are one-sided
       differences, and the best descent is continued with central ones. None: the start of the problem and the best of
       some trial points.
-    - before_descent: called before each descent.
-    - report: called with 1 after each descent.
-    - load, save: functions of the number of a start that return the stored descent or None, and store one.
+    - before_descent, report: called before and after each descent.
     """
 
     starts: int
     seed: int | None = None
     before_descent: Callable = lambda: None
-    report: Callable = lambda count: None
-    load: Callable = lambda start: None
-    save: Callable = lambda start, descent: None
+    report: Callable = lambda: None
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -147,7 +143,7 @@ class Problem:
     - residual: function of the parameters (n,) that returns the residual (r,), each row divided by its
       standard deviation. An evaluation fails if it raises a PatchfemError or is not finite.
     - low, high: bounds (n,).
-    - start: parameters (n,) from which the first descent starts, or None.
+    - start: parameters (n,) from which the first descent starts, NaN for the middle of a range; None without them.
     """
 
     residual: Callable
@@ -194,14 +190,11 @@ class Problem:
                 raise ValueError(f"{model.rows} rows of data cannot determine {n} values")
 
         ends = []
-        for number, start in enumerate(starts):
-            end = search.load(number)
-            if end is None:
-                search.before_descent()
-                end = descend(model, start, range(n))
-                search.save(number, end)
+        for start in starts:
+            search.before_descent()
+            end = descend(model, start, range(n))
             ends.append(end)
-            search.report(1)
+            search.report()
             # a fit that is exact to round-off is not repeated
             if not is_random and end.cost <= (EXACT_FIT_RATIO * model.largest) ** 2 * model.rows:
                 break
@@ -214,7 +207,7 @@ class Problem:
         if not is_random:
             return _assemble_fit(model, best, descents, interval_kind)
 
-        # the best descent is continued with central differences; all descents may be stored ones
+        # the best descent is continued with central differences
         search.before_descent()
         central = UnitCubeResidual(self.residual, model.space)
         best = descend(central, best.u, range(n))
@@ -267,7 +260,7 @@ def _assemble_fit(model: UnitCubeResidual, best: Descent, descents: Descents, ki
     n_near = np.count_nonzero(descents.rms <= SAME_MINIMUM_RATIO * np.sqrt(cost / model.rows))
     is_converged = best.is_converged or n_near > 1
     return Fit(
-        values=frozen_array(model.space.to_values(u)),
+        values=model.space.to_values(u),
         at_bound=tuple(np.where(u <= 0, "low", np.where(u >= 1, "high", "")).tolist()),
         intervals=intervals,
         rms=float(np.sqrt(cost / model.rows)),

@@ -48,10 +48,7 @@ PUBLIC = {
         "read_columns",
         "read_text",
     ),
-    "units": (
-        "CHANNEL_UNITS",
-        "SI_UNITS",
-    ),
+    "units": ("SI_UNITS",),
     "universal": (
         "Dataset",
         "find_unit_factors",

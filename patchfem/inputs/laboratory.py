@@ -75,7 +75,7 @@ def _read_universal(path: Path, requests: list, exported_names: Mapping) -> Reco
     if not channels:
         raise PatchfemError(
             f"{path}: contains no record over time (dataset 58, function type 1), only modes or "
-            "frequency responses; write modes as those of a scene with -o modes.toml"
+            "frequency responses; name a file of mode shapes in the scene as structure.file"
         )
     return select_channels(path, channels, requests, notes)
 

@@ -141,7 +141,6 @@ PUBLIC = {
         "warn_if_short",
     ),
     "welch": (
-        "CrossDensities",
         "average_segments",
         "transform_segments",
     ),

@@ -41,8 +41,7 @@ REFUSED = {  # command -> [(arguments, texts of the lines of the message)]; exit
         (("--random", "4"), ("give each range by --over",)),
         (("--random", "4", "--sobol", "4", "--over", "friction.static=0.1..0.2"), ("one of them",)),
         ((*STATIC, "--shard", "5/4"), ("--shard 5/4",)),
-        ((*STATIC, "--of", "damping"), ("'equivalent_damping'?",)),
-        ((*STATIC, "--of", "zzz"), ("--of zzz: unknown measure; use a name that",)),
+        ((*STATIC, "--of", "damping"), ("sweep --of was removed",)),
         ((*STATIC, "-o", "."), ("bare.csv",)),
         ((*STATIC, "--keep", "pages", "--no-page"), ("--no-page",)),
         (
@@ -64,11 +63,11 @@ REFUSED = {  # command -> [(arguments, texts of the lines of the message)]; exit
     ],
     "sweep own.toml": [(("--set", "friction.static=0.3"), ("sets friction.static in every",))],
     "plan rig.toml": [
-        ((*STATIC, "--probe"), ("--probe works for a single case",)),
+        (STATIC, ("plan --over was removed",)),
     ],
     **{
         f"{verb} refused.toml": [((), ("must be >= 0", "must be >= 0"))]
-        for verb in ("check", "plan", "sweep")
+        for verb in ("check", "sweep")
     },
     "check shipped.toml": [
         (

@@ -201,18 +201,14 @@ def test_always_isolated_start_is_not_converged():
     assert Problem(residual, [0.0], [1.0], start=[0.0]).solve().outcome is Outcome.NOT_CONVERGED
 
 
-def test_always_lower_end_that_no_start_reached_is_not_converged():
+def test_always_lower_end_that_no_start_reached_is_not_converged(monkeypatch):
     """Two starts with the same end do not confirm the lower end of an unfinished last descent."""
-
-    def residual(v):
-        if v[0] > 0.0:
-            raise PatchfemError("no value")
-        return v[0] - np.array([1.0, 1.1])
-
-    problem = Problem(residual, [0.0], [1.0])
+    problem = Problem(lambda v: v[0] - np.array([1.0, 1.1]), [0.0], [1.0])
     for cost, outcome in ((9.0, Outcome.NOT_CONVERGED), (2.21, Outcome.DONE)):
-        end = least_squares.Descent(np.array([0.0]), cost, False, 2)
-        assert problem.search(Search(2, seed=1, load=lambda _, end=end: end), "").outcome is outcome
+        ends = [least_squares.Descent(np.array([0.0]), one, False, 2) for one in (cost, cost, 2.21)]
+        following = iter(ends)
+        monkeypatch.setattr(least_squares, "descend", lambda *_, ends=following: next(ends))
+        assert problem.search(Search(2, seed=1), "").outcome is outcome
 
 
 def test_refuses_unsolvable_fits():

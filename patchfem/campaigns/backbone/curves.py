@@ -14,6 +14,7 @@ from ...model.model import Model
 from ...model.source import locate_errors
 from ...response.errors import finer_errors
 from ...runs.joint import find_stuck_patch_stiffness
+from ...scene.keys.removed import describe_removed
 from . import words
 from .amplitudes import default_amplitudes, find_amplitudes_of_forces
 from .balance import compute_balance_curve
@@ -35,11 +36,6 @@ CURVES = {"balance": compute_balance_curve, "quasi-static": compute_static_curve
 # Ratio of the smallest amplitude of gross slip to the amplitude at which the complete contact
 # begins to slip.
 MIN_GROSS_SLIP_RATIO = 3.0
-REMOVED_METHODS = {
-    "decay": 'was removed in patchfem 1.3; run a release with drive.kind = "free", whose result has frequency and damping '
-    "over the amplitude",
-    "all": "was removed in patchfem 1.3; leave it out: both methods are the default",
-}
 # Relative error of the flutter amplitude, smaller than the digits that are printed.
 FLUTTER_TOL = 1e-8
 
@@ -67,12 +63,10 @@ def choose_methods(method: str | None) -> tuple[str, ...]:
     """
     if not method:
         return METHODS
-    if method in REMOVED_METHODS:
-        raise PatchfemError(f"backbone: method {method!r} {REMOVED_METHODS[method]}")
     if method not in METHODS:
-        raise PatchfemError(
-            f"backbone: method {method!r} does not exist; use one of {', '.join(METHODS)}"
-        )
+        shown = f"backbone: method {method!r}"
+        removed = describe_removed(f"backbone --method {method}", shown)
+        raise PatchfemError(removed or f"{shown} does not exist; use one of {', '.join(METHODS)}")
     return (method,)
 
 

@@ -16,7 +16,9 @@ from ...scene.backbone_scene import ASSUMED_MASS, BackboneTables, GivenMode, par
 # Fraction of the stiffness of a mode that a joint of unknown `slide` is assumed to contribute.
 ASSUMED_JOINT_FRACTION = 0.1
 MAX_JOINT_FRACTION = 0.5  # Largest sum of these fractions over all modes.
-IGNORED_TABLES_NOTE = "{tables} {verb} ignored: a backbone is the motion of a mode at every amplitude, without a drive"
+IGNORED_TABLE_NOTE = (
+    "{table} is ignored: a backbone is the motion of a mode at every amplitude, without a drive"
+)
 ASSUMED_SIGNS_NOTE = (
     "every assumed `slide` is positive, so these modes are assumed to move the contact in the same direction when they "
     "move the output in the same direction; the curves of all methods depend on this assumption, so give the signs of "
@@ -108,12 +110,9 @@ def _assumed_fraction(n_modes: int) -> float:
     return min(ASSUMED_JOINT_FRACTION, MAX_JOINT_FRACTION / n_modes)
 
 
-def _note_ignored_tables(names: list) -> tuple:
-    """Return a note on tables of the scene that are ignored."""
-    if not names:
-        return ()
-    tables = " and ".join(f"[{name}]" for name in names)
-    return (IGNORED_TABLES_NOTE.format(tables=tables, verb="is" if len(names) == 1 else "are"),)
+def _note_ignored_tables(names: list[str]) -> tuple[str, ...]:
+    """Return a note on each table of the scene that is ignored."""
+    return tuple(IGNORED_TABLE_NOTE.format(table=f"[{name}]") for name in names)
 
 
 def _note_modes(modes: tuple, *, is_assumed: bool, is_stuck: bool) -> tuple:

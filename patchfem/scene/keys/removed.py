@@ -39,6 +39,29 @@ REMOVED_NAMES = {
         "run the scene with its patch, or fit the law of a point to a loop that `run` and `export` wrote",
     ),
     "fit --amplitudes": ("1.2", "leave it out: it belonged to --from-patch"),
+    "backbone --method decay": (
+        "1.3",
+        'run a release with drive.kind = "free", whose result has frequency and damping over the amplitude',
+    ),
+    "backbone --method all": ("1.3", "leave it out: both methods are the default"),
+    "fit --offset": ("1.10", "subtract the offset from the record"),
+    "fit --warm-up": (
+        "1.10",
+        "repeat the rows of the first cycle before the record, label them in a further column, and hold them out, as --hold "
+        "cycle=1",
+    ),
+    "fit --resume": ("1.10", "repeat the fit with fewer --starts"),
+    "fit --seed": ("1.10", "give more --starts"),
+    "fit --unstable": (
+        "1.10",
+        "rows flagged U are lower bounds; hold them out with --hold flag=U, or delete the flag",
+    ),
+    "sweep --of": ("1.10", "choose the measure on the page, or its column of sweep.csv"),
+    "plan --over": ("1.10", "give the values of one case with --set"),
+    "import of mode shapes": ("1.10", "give the file as structure.file of the scene"),
+    "import -o .uff": ("1.10", "estimate it with scipy.signal.csd from a table of the records"),
+    "import --segment": ("1.10", "leave it out: modes are fitted to the time record"),
+    "import --window": ("1.10", "leave it out: modes are fitted to the time record"),
     "export --of": ("1.2", "leave it out: choose the field in ParaView"),
 }
 
