@@ -83,14 +83,17 @@ def copy_package(folder: Path, page: str) -> Path:
     return copy
 
 
-def run_commands(folder: Path, lines: list) -> str:
-    """Run commands with a copied package in a new process and return their output; AssertionError if one of them fails."""
+def run_commands(folder: Path, lines: list, **variables: str) -> str:
+    """Run commands with a copied package in a new process and return their output; AssertionError if one of them fails.
+
+    `variables` are added to the environment.
+    """
     process = subprocess.run(
         [sys.executable, "-c", COMMANDS, *lines],
         cwd=folder,
         capture_output=True,
         text=True,
-        env=os.environ | {"PYTHONPATH": str(folder)},
+        env=os.environ | {"PYTHONPATH": str(folder)} | variables,
         check=False,
     )
     assert process.returncode == 0, (

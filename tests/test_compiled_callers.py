@@ -8,7 +8,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from numba.core.registry import CPUDispatcher
 
 from patchfem.compiled import jit, njit
 from patchfem.compiled.jit import InlinedDispatcher
@@ -100,14 +99,6 @@ def test_always_installed_numba_supports_inlining():
     """The installed numba has the methods that inlining needs; without them compilation takes three times as long."""
     called, total = compile_pair(njit())
     assert isinstance(called, InlinedDispatcher) and isinstance(total, InlinedDispatcher)
-
-
-def test_exact_missing_hooks_fall_back_to_numba(monkeypatch):
-    """If numba lacks the methods that inlining needs, its own dispatcher is used and gives the same sum."""
-    monkeypatch.setattr("patchfem.compiled.jit.LIBRARY_METHODS", ("something_else",))
-    called, total = compile_pair(njit(**ALIKE))
-    assert type(called) is type(total) is CPUDispatcher
-    assert total(np.arange(3.0), np.array([0.5, 1.75])) == 0 + 0.5 / 1.5 + 2 + 0.25 / 2.75
 
 
 def test_always_kernels_use_inlining_decorator():

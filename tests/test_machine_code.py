@@ -61,12 +61,6 @@ def double_positive(value):
     return value * 2
 
 
-def exceeds_one(value, out):
-    """Store a value and return whether it exceeds one."""
-    out[0] = value
-    return value > 1
-
-
 def allocated_size(count):
     """Return the size of a newly allocated array."""
     return np.zeros(count).size
@@ -187,15 +181,6 @@ def test_exact_none_and_exceptions_are_passed_on(tmp_path):
         code(pack_arguments(-1.0))
 
 
-def test_exact_booleans_are_returned(tmp_path):
-    """A stored function returns True and False as Python booleans."""
-    out = np.zeros(1)
-    answer, code = compile_and_reload(tmp_path / "above.code", exceeds_one, 2.0, out)
-    assert answer is True is code(pack_arguments(3.0, out))
-    assert code(pack_arguments(1.0, out)) is False
-    assert out[0] == 1
-
-
 def test_refuses_code_that_needs_numba(tmp_path):
     """Functions that allocate and arguments of unsupported types are not stored."""
     assert compile_and_reload(tmp_path / "a.code", allocated_size, 3) == (
@@ -251,16 +236,14 @@ rig = '[normal]\\nload = "40 N"\\n[friction]\\nlaw = "LAW"\\nstatic = 0.3\\nMORE
     '[structure]\\nmoving_mass = "1 kg"\\n' \\
     '[[structure.mode]]\\nname = "a"\\nfrequency = "100 Hz"\\ndamping = 0.01\\nslide = 1.0\\n' \\
     '[drive]\\nkind = "base"\\nfrequency = "90 Hz"\\nacceleration = "5 g"\\ncycles = 1\\n'
-out = []
-for law, more in (("coulomb", ""), ("elastic-plastic", 'bond_length = "2 um"'), ("nonlocal", 'bond_length = "5 um"')):
-    found = pf.run(rig.replace("LAW", law).replace("MORE", more))
-    out.append([found.measures[name].value for name in ("slip_amplitude", "friction_work")])
+found = pf.run(rig.replace("LAW", "elastic-plastic").replace("MORE", 'bond_length = "2 um"'))
+out = [found.measures[name].value for name in ("slip_amplitude", "friction_work")]
 print(json.dumps([out, "numba" in sys.modules]))
 """
 
 
 def test_exact_motions_agree_without_compilation(monkeypatch):
-    """With NUMBA_DISABLE_JIT=1, where Python checks every index, the motions agree with compiled code within 1e-8.
+    """With NUMBA_DISABLE_JIT=1, where Python checks every index, a motion agrees with compiled code within 1e-8.
 
     Round-off changes the lengths of the steps, whose tolerance is larger.
     """

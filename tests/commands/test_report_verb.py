@@ -21,16 +21,6 @@ def folders(tmp_path_factory):
     return base
 
 
-@pytest.mark.parametrize("name", ["low", "sweep"])
-def test_exact_page_is_made_again(folders, name):
-    """The page of a run and that of a sweep are made again with equal bytes."""
-    page = folders / name / "report.html"
-    before = page.read_bytes()
-    page.unlink()
-    answer = run_cli("report", folders / name)
-    assert answer.out.strip() == str(page) and page.read_bytes() == before
-
-
 def test_exact_two_runs_share_charts_and_measures(folders):
     """The page of two runs has a curve and a column of measures for each; the forces are 0.2 and 0.4 of the load."""
     page = folders / "both.html"

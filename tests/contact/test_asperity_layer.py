@@ -10,7 +10,7 @@ from pieces import LENGTH, LOAD, WIDTH, draw_gap, make_coated_pair
 from pressed import press
 from scipy.integrate import quad
 from scipy.stats import norm
-from skins import layer_stiffness, press_layer, stretch_law
+from skins import press_layer, stretch_law
 
 from patchfem.contact import (
     ExponentialAsperities,
@@ -115,22 +115,6 @@ def test_exact_separation_inverts_pressure(layer):
     step = 1e-12
     slope = -(layer.pressure(separations + step) - layer.pressure(separations - step)) / (2 * step)
     assert np.abs(slope / layer.stiffness(separations) - 1).max() <= 1e-5
-
-
-# ---- scaling and stiffness
-def test_exact_tangential_stiffness_of_layer_and_bodies():
-    """The tangential stiffness is that of the layer and the bodies in series, over the nodes in contact."""
-    compliance, _, weight = pair_arrays()
-    k = np.full(weight.size, 1e13)
-    partial_stiffness = np.where(np.arange(weight.size) < 40, k, 0.0)
-    contact_block = np.ix_(partial_stiffness > 0, partial_stiffness > 0)
-    assert layer_stiffness(compliance, weight, partial_stiffness) == pytest.approx(
-        np.linalg.solve(
-            compliance[contact_block] + np.diag(1 / (1e13 * weight[:40])), np.ones(40)
-        ).sum(),
-        rel=1e-11,
-    )
-    assert layer_stiffness(compliance, weight, 0 * k) == 0.0
 
 
 # ---- convergence for random input

@@ -90,16 +90,3 @@ def test_always_hertz_edges_are_accurate_to_fraction_of_element(hertz_block):
         assert computed_half_width == pytest.approx(
             half_width, abs=0.05 * HALF_WIDTH / 10 + 2e-3 * half_width
         )
-
-
-def test_exact_edges_of_separate_zones_and_full_contact():
-    """Each separate contact zone has its edges, and a full contact has none."""
-    x = np.linspace(-1.0, 1.0, 9)
-    force = np.array([1.0, 1, 0, 0, 1, 1, 0, 1, 1])
-    gap = np.where(force > 0, 0.0, 1e-6)
-    pressed = edges.SetFactor(np.eye(9) * 1e-6, force > 0)
-    edge_list = edges.find_edges(pressed, x, force, gap, np.full(9, 1e-6))
-    assert [(end.node, end.side) for end in edge_list] == [(1, 1), (4, -1), (5, 1), (7, -1)]
-    assert edges.contact_intervals(x, force, edge_list).shape == (3, 2)
-    full = edges.SetFactor(np.eye(9), np.ones(9, bool))
-    assert edges.find_edges(full, x, np.ones(9), np.zeros(9)) == []

@@ -15,7 +15,6 @@ from pressed import press, press_to_approach
 from patchfem.contact import StripCompliance, patch_problem, solve_by_gradients
 from patchfem.contact.active_set import solve_primal_dual
 from patchfem.contact.gaps import crown, tilt
-from patchfem.contact.unilateral import explain_singular_set
 from patchfem.core import Compliance, Interface, NotConverged, Outcome, PatchfemError
 
 RESIDUAL_TOL = 1e-12  # largest relative residual of a pressed patch, as `press_strips` states it
@@ -159,19 +158,6 @@ def test_refuses_indefinite_compliance(moment):
         press(make_pair(make_coated_pair(100).interface.x, c), np.zeros(101), LOAD, moment)
     # a different load would not help
     assert "raise the load" not in str(caught.value) and "holder" not in str(caught.value)
-
-
-def test_refuses_undetermined_rotation_with_advice():
-    """The message about an undetermined free rotation advises to set or raise the rotational stiffness of the holder."""
-    pair = make_coated_pair(100)
-
-    def message(**control):
-        problem = patch_problem(pair.interface.x, np.zeros(101), LOAD, **control)
-        return explain_singular_set(pair.normal, problem)
-
-    assert "name contact.holder.rotational_stiffness" in message(moment=0.0)
-    assert "raise contact.holder.rotational_stiffness" in message(moment=0.0, spring=1.0)
-    assert "holder" not in message()
 
 
 # ---- limit of tipping

@@ -5,20 +5,15 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from pieces import (
-    COATED,
-    COATING,
     LENGTH,
     LOAD,
     TILTS,
     WIDTH,
-    draw_gap,
     make_coated_pair,
-    make_compliance,
 )
-from pressed import press, solve_forces
+from pressed import press
 
 from patchfem.contact.gaps import tilt
-from patchfem.mesh import graded_grid
 
 
 @pytest.mark.parametrize("offset", [0.0, 1e-3, 3e-3])
@@ -29,35 +24,6 @@ def test_always_load_line_on_right_opens_left_side(offset):
     assert np.sign(np.round(state.rotation, 16)) == -np.sign(offset)
     fixed = press(pair, tilt(pair.interface.x, 1e-5), LOAD)
     assert fixed.moment < 0
-
-
-def random_cases(n_cases):
-    """Yield pairs with smooth, noisy and spiked gaps of 1 nm to 100 um, loads and load lines."""
-    rng = np.random.default_rng(2026)
-    pair = make_compliance(graded_grid(LENGTH, 6.35e-3, LENGTH / 40, COATING), COATED)
-    x = pair.interface.x
-    for k in range(n_cases):
-        amplitude = 10 ** rng.uniform(-9, -4)
-        gap = (
-            draw_gap(rng, x, amplitude),
-            amplitude * rng.normal(size=x.size),
-            amplitude * rng.standard_cauchy(x.size),
-        )[k % 3]
-        yield pair, gap, 10 ** rng.uniform(0, 4), rng.uniform(-0.499, 0.499) * LENGTH
-
-
-def test_always_initial_active_set_does_not_affect_forces():
-    """The initial active set does not affect the forces."""
-    rng = np.random.default_rng(8)
-    for pair, gap, load, offset in random_cases(12):
-        x = pair.interface.x
-        for target in (np.array([load]), np.array([load, load * offset])):
-            reference, _, _ = solve_forces(pair.normal, x, gap, target)
-            for _ in range(3):
-                restarted, _, _ = solve_forces(
-                    pair.normal, x, gap, target, rng.random(x.size) < rng.random()
-                )
-                assert np.abs(restarted - reference).max() <= 1e-8 * load
 
 
 # contact fraction, tangential stiffness [N/m], peak pressure [Pa] and approach [m] of the coated pair at 200 cells, from

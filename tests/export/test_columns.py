@@ -1,4 +1,4 @@
-"""Heading lines of CSV files and tables, rows of tables, and the JSON form of details."""
+"""Units and rows of CSV files, and the JSON form of details."""
 
 import csv
 import json
@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from patchfem.export import answer, columns, page
+from patchfem.export import answer, columns
 
 G_N = 9.80665
 
@@ -28,27 +28,6 @@ class Record:
     point: Point
 
 
-def test_exact_heading_line():
-    """A column has a heading, the name of its variable and a style; the heading is the name if it has no other."""
-    heads = columns.parse_columns("x, height = before, at = value:quantity, error:rounded")
-    assert [tuple(column) for column in heads] == [
-        ("x", "x", ""),
-        ("height", "before", ""),
-        ("at", "value", "quantity"),
-        ("error", "error", "rounded"),
-    ]
-
-
-def test_always_heading_lines_have_names_and_known_styles():
-    """Each column of the tables has a name, and a style that the page knows."""
-    tables = [one.columns for tables in page.TABLES.values() for one in tables]
-    files = [file.columns for files in columns.CSV_FILES.values() for file in files.values()]
-    for line in tables + [line for line in files if line]:
-        for column in columns.parse_columns(line):
-            assert column.name and " " not in column.name, line
-            assert column.style in ("", "name", "quantity", "rounded", "percent"), line
-
-
 def test_exact_csv_of_fit_has_units_of_its_headings():
     """A column whose heading names a unit has its values in this unit, others in SI; missing numbers are empty."""
     arrays = {
@@ -62,20 +41,6 @@ def test_exact_csv_of_fit_has_units_of_its_headings():
     assert lines[0] == ["frequency [Hz]", "input [g]", "flag", "computed displacement [mil]"]
     assert [line[2:] for line in lines[1:]] == [["U", "1.0"], ["", ""]]
     assert [float(line[1]) for line in lines[1:]] == pytest.approx([2.0, 1.0], rel=1e-15)
-
-
-def test_exact_csv_of_methods_stands_below_each_other():
-    """A CSV of a backbone has the rows of all methods; a variable that one method lacks is empty there."""
-    data = answer.make_columns("balance_amplitude", {"balance_amplitude": ([1e-6, 2e-6], "m")})
-    data |= answer.make_columns("balance_amplitude", {"balance_force": ([3.0, 4.0], "N")})
-    data |= answer.make_columns("quasi_static_amplitude", {"quasi_static_amplitude": ([5e-6], "m")})
-    text = columns.format_curves(answer.Answer("backbone", "", (), data=data))["backbone.csv"]
-    assert text.splitlines() == [
-        "method,amplitude [m],force [N]",
-        "balance,1e-06,3.0",
-        "balance,2e-06,4.0",
-        "quasi-static,5e-06,",
-    ]
 
 
 def test_exact_csv_of_methods_repeats_rows_for_each_case():
@@ -92,35 +57,6 @@ def test_exact_csv_of_methods_repeats_rows_for_each_case():
         "2 N,balance,1e-06,5.0",
         "2 N,balance,2e-06,6.0",
     ]
-
-
-def test_exact_rows_of_dimension_are_quantities():
-    """The rows of a dimension have numbers with their errors as quantities, codes and words as text."""
-    arrays = {
-        "force": ([1.0, np.nan], "N"),
-        "force_error": ([0.1, np.nan], "N"),
-        "setting": (["a", "b"], ""),
-    }
-    data = answer.make_columns("run", arrays) | {
-        "result": answer.encode("run", ["meets", "misses"])
-    }
-    first, second = columns.list_rows(answer.Answer("cost", "", (), data=data), "run")
-    assert first["force"] == answer.Quantity(1.0, "N", 0.1) and second["force"].value is None
-    assert (first["setting"], second["result"]) == ("a", "misses")
-
-
-def test_exact_rows_of_details_are_objects_by_name():
-    """The rows of an object in the details have its names, and the quantities of a nested object."""
-    details = {
-        "pressed": {
-            "measures": {"peak_depth": {"before": {"value": 2.0, "unit": "m", "floor": 0.0}}}
-        }
-    }
-    (row,) = columns.list_rows(
-        answer.Answer("compare", "", (), details=details), "pressed/measures"
-    )
-    assert row == {"name": "peak depth", "before": answer.Quantity(2.0, "m")}
-    assert columns.list_rows(answer.Answer("compare", "", ()), "pressed/measures") == []
 
 
 def test_exact_details_are_plain_json():

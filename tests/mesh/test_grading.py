@@ -36,28 +36,6 @@ def test_always_column_widths_follow_layout(position, min_size, slope, span):
     assert cells[np.argmin(np.abs((x[1:] + x[:-1]) / 2 - position))] <= 2.5 * min_size * (1 + slope)
 
 
-def test_exact_linear_size_gives_geometric_columns():
-    """For a size that grows linearly the distances of the columns form a geometric series."""
-    layout = Layout(-0.5, 0.5, ((-0.5, -0.5, 1e-3),), (-0.5, 0.5), 1.0, 1.0, 0.25)
-    x = divide_into_columns(layout) + 0.5 + 1e-3 / 0.25
-    ratio = x[1:] / x[:-1]
-    assert ratio == pytest.approx(np.full(ratio.size, ratio[0]), rel=2e-4)
-    assert x.size == 25 and np.log(ratio[0]) == pytest.approx(np.log(251) / 24, rel=2e-4)
-
-
-def test_exact_columns_respect_band_and_fixed_positions():
-    """Columns in a band have the prescribed width, a column is at each fixed position, and their number is even."""
-    layout = Layout(-1.0, 1.0, ((-0.2, 0.1, 0.01),), (-1.0, 1.0), 0.1, 0.1, 0.5)
-    x = divide_into_columns(layout, (0.37,))
-    cells = np.diff(x)
-    middle = (x[1:] + x[:-1]) / 2
-    inside = (middle > -0.19) & (middle < 0.09)
-    assert 0.37 in x and cells.size % 2 == 0
-    assert cells[inside] == pytest.approx(
-        np.full(inside.sum(), 0.01), rel=0.06
-    )  # the band contains a whole number of columns
-
-
 @pytest.mark.parametrize("coating", [0.0, 0.2])
 def test_exact_row_boundary_at_coating(coating):
     """A boundary of rows is exactly at the coating thickness."""

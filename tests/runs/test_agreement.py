@@ -90,8 +90,9 @@ PAIRS = {
         POINT + NONLOCAL + STRUCTURE, VANISHING, "", "accuracy.method=march", MAIN, "hybrid march", 5e-5,
     ),
     "interlock": (
-        RIG, INTERLOCK + "friction.static=0.05; friction.bond_length=20 um; drive.frequency=180 Hz",
-        "accuracy.method=harmonic", "accuracy.method=march; drive.cycles=200", MAIN, "harmonic march", 3e-5,
+        RIG, INTERLOCK + "friction.static=0.05; friction.bond_length=20 um; drive.frequency=180 Hz; "
+        "structure.mode.axial.damping=0.05",
+        "accuracy.method=harmonic", "accuracy.method=march; drive.cycles=60", MAIN, "harmonic march", 3e-5,
     ),
     "sheared patch with interlock": (
         SHEARED, INTERLOCK + "structure.mode.axial.damping=0.05", "accuracy.method=harmonic",

@@ -95,7 +95,7 @@ def test_exact_batch_agrees_with_single_runs(kind):
 @pytest.mark.parametrize("law", LAWS)
 def test_always_95_of_100_measures_lie_within_both_errors(law):
     """Outcomes are those of single runs, and at least 95 % of the measures agree within the sum of both errors."""
-    cases = draw_points(law, 11, 12)
+    cases = draw_points(law, 11, 8)
     results = batches.solve_models(cases, n_study_cases=MANY)
     assert sum(one["engine"] == lumped.ENGINE for one in results.numerics.values()) >= 4
     singles = one_by_one.solve(cases)
@@ -130,7 +130,7 @@ OTHER_KINDS = [
     "friction.law=convolution; friction.bond_length=1 um",
     "normal.amplitude=10 N; normal.frequency=50 Hz",
     "structure.stiffening.cubic=1e12 N/m^3",
-    "accuracy.method=march",
+    "accuracy.method=march; drive.cycles=24",
     "normal.load=0 N",
 ]
 

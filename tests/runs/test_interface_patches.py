@@ -19,7 +19,7 @@ from patchfem.runs.patch import faces
 SPRING, DAMPER, MASS = 1e6, 10.0, 0.5
 LAW = 'law = "coulomb"\nstatic = 0.3\n'
 STIFF_LAW = 'law = "elastic-plastic"\nstatic = 0.3\nbond_length = "50 nm"\n'
-DRIVE = '[drive]\nkind = "base"\nfrequency = "240 Hz"\nacceleration = "8 g"\ncycles = 40\n'
+DRIVE = '[drive]\nkind = "base"\nfrequency = "240 Hz"\nacceleration = "8 g"\ncycles = 10\n'
 
 
 def format_contact(table: str, load: float, radius: float, keys: str = "") -> str:
@@ -217,11 +217,12 @@ def test_exact_chain_agrees_with_independent_integration():
 
 
 def test_exact_engines_of_chain_agree_within_errors(chain_result):
-    """The march and the harmonic balance agree with the exact engine within the errors."""
-    for method in ("march", "harmonic"):
+    """The march and, once the motion is steady, the harmonic balance agree with the exact engine within the errors."""
+    steady = pf.run(CHAIN, **{"drive.cycles": 40.0})
+    for method, exact in (("march", chain_result), ("harmonic", steady)):
         result = pf.run(CHAIN, **{"accuracy.method": method})
         names = "relative_displacement_amplitude loop_area loop_area_2 slip_amplitude_2"
-        assert_agree(chain_result.measures, result.measures, names)
+        assert_agree(exact.measures, result.measures, names)
 
 
 def test_exact_patch_without_load_changes_nothing():

@@ -90,22 +90,6 @@ def solve_all_points(c, limit, path):
     return np.array(resultants)
 
 
-@pytest.mark.parametrize("cells", [200])
-@pytest.mark.parametrize("angle", TILTS[::3])
-def test_exact_elements_have_friction_limit_and_stick_stiffness(cells, angle):
-    """The elements carry the friction limit of the patch within 1e-12, and their total stiffness is
-    that of full stick within 1e-11."""
-    pair = make_coated_pair(cells)
-    limit = friction_limit(cells, angle)
-    group = jenkins_set(pair.tangential, limit)
-    assert group.stiffness @ group.yield_displacement == pytest.approx(limit.sum(), rel=1e-12)
-    assert group.stiffness.sum() == pytest.approx(
-        tangential_stiffness(pair.tangential, limit > 0), rel=1e-11
-    )
-    assert group.stiffness.min() > 0
-    assert np.all(np.diff(group.yield_displacement) >= 0) and group.yield_displacement[0] > 0
-
-
 def test_exact_point_forces_agree_with_box_problem():
     """The force at every point, computed from the stretch of the elements, agrees with the
     box-constrained solution within 1e-10 of the friction limit."""

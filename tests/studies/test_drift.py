@@ -21,12 +21,9 @@ def test_exact_drift_of_the_bond_law_agrees_with_closed_form(table):
 def test_always_oscillating_load_causes_drift_only_at_order_zero(table):
     """At a constant tangential force, an oscillating load causes drift only with bonds of order 0."""
     for name, engine in table.engines(False).items():
-        expected = {"load +-10 %": 0.2048, "load +-20 %": 0.4420}
-        if name != "stretch p = 0":
-            expected = dict.fromkeys(expected, 0.0)
-        for case, drift in expected.items():
-            tolerance = 5e-4 if drift else 1e-12
-            assert table.row(name, engine, case, 3).last == pytest.approx(drift, abs=tolerance)
+        drift = 0.4420 if name == "stretch p = 0" else 0.0
+        tolerance = 5e-4 if drift else 1e-12
+        assert table.row(name, engine, "load +-20 %", 3).last == pytest.approx(drift, abs=tolerance)
 
 
 def test_exact_drift_of_the_report_law_decays_with_the_square(table):

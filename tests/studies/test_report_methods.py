@@ -7,7 +7,6 @@ import problems
 import pytest
 from report_methods import (
     coulomb,
-    duhamel_maps,
     elastic_plastic,
     solve_duhamel,
     solve_euler,
@@ -15,8 +14,7 @@ from report_methods import (
 )
 from scipy.linalg import expm
 
-from patchfem.core import DriveSegment, InitialState, SineDrive
-from patchfem.structure import make_release
+from patchfem.core import DriveSegment, SineDrive
 from patchfem.structure.drives import PiecewiseDrive
 
 DRIVE = SineDrive(1.3, 0.9)
@@ -37,27 +35,6 @@ def free_motion(modes, drive: SineDrive, time: float) -> np.ndarray:
     return (expm(system * time) @ np.append(np.zeros(2 * n + 1), 1.0))[: 2 * n]
 
 
-@pytest.mark.parametrize("omega, zeta", [(0.0, 0.0), (1.0, 1.0), (7.0, 0.01)])
-def test_exact_duhamel_maps_satisfy_the_equation_of_motion(omega, zeta):
-    """The maps satisfy z'' + 2 zeta omega z' + omega^2 z = f0 + (f1 - f0) t/h at the end of a step."""
-    modes = problems.basis([omega], [zeta], [1.0], [1.0])
-    start = np.array([0.2, -0.4, 0.3, -0.8])  # z, z', f0, f1
-    h = 0.7
-    small = 1e-4
-
-    def state(time):
-        """Return displacement and velocity at a time within the step."""
-        force = start[2] + (start[3] - start[2]) * time / h
-        return duhamel_maps(modes, time)[0] @ [*start[:3], force]
-
-    z, v = state(h)
-    before = state(h - small)
-    after = state(h + small)
-    assert (after[0] - before[0]) / (2 * small) == pytest.approx(v, abs=1e-6)
-    acceleration = (after[1] - before[1]) / (2 * small)
-    assert acceleration + 2 * zeta * omega * v + omega**2 * z == pytest.approx(start[3], abs=1e-6)
-
-
 @pytest.mark.parametrize(
     "solve, steps, order",
     [
@@ -76,28 +53,6 @@ def test_order_of_time_integrators_without_friction(solve, steps, order):
         errors.append(np.abs(state - free_motion(MODES, DRIVE, motion.time[-1])).max())
     assert np.log2(errors[0] / errors[1]) == pytest.approx(order, abs=0.1)
     assert errors[0] < {1: 0.1, 2: 1e-3}[order]
-
-
-@pytest.mark.parametrize("needs_force, order", [(True, 2), (False, 1)])
-def test_order_of_newmark_in_the_first_slip(needs_force, order):
-    """Newmark's method is of order 2 up to the first reversal, and of order 1 without a force criterion.
-
-    The closed form is 1 + 10.5 cos t for t < pi.
-    """
-    start = InitialState(np.array([11.5]), np.zeros(1))
-    errors = []
-    for steps in (200, 400):
-        motion = solve_newmark(
-            problems.UNDAMPED_MASS,
-            make_release(2 * np.pi),
-            coulomb(1.0, 1e-3),
-            (3.0, steps),
-            needs_force=needs_force,
-            start=start,
-        )
-        assert motion.force[1] == -1.0
-        errors.append(np.abs(motion.z[:, 0] - 1 - 10.5 * np.cos(motion.time)).max())
-    assert np.log2(errors[0] / errors[1]) == pytest.approx(order, abs=0.1)
 
 
 # ---- the report's problems

@@ -108,6 +108,8 @@ def test_always_page_links_resolve_and_its_python_parses(page):
     """Every link and list of a page leads to an existing page and heading; its Python code parses."""
     text = read_page_text(page)
     prose = re.sub(r"^```.*?^```|`[^`\n]*`", "", text, flags=re.S | re.M)
+    for image in re.findall(r'<img src="([^"]+)"', prose):
+        assert image.startswith("http") or (page.parent / image).exists(), image
     for link, name in re.findall(r"\]\(([^)#\s]*)#?([^)]*)\)", prose):
         if link.startswith(("http", "made/")):
             assert (

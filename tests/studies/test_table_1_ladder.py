@@ -9,20 +9,6 @@ from patchfem.campaigns.rows.cells import read_response_table
 fitting = make_study_fixture("table_1/fitting.py")
 
 
-def test_exact_numbers_of_training_and_left_out_readings(fitting):
-    """The numbers of training and left-out readings are those counted in Table 1.
-
-    Over the four frequencies every reading is left out once.
-    """
-    cells = read_response_table(fitting.TABLE)
-    assert int(cells.is_acceleration.sum()) == 27 and cells.row.size == 35
-    assert int(fitting.training(cells, "143").sum()) == 13 and fitting.training(cells, "all").all()
-    masks = [~fitting.training(cells, f"without {frequency}") for frequency in (135, 143, 150, 155)]
-    assert [int(frequency.sum()) for frequency in masks] == [12, 13, 5, 5] and (
-        np.sum(masks, axis=0) == 1
-    ).all()
-
-
 def test_exact_gain_comes_from_training_readings_only(fitting):
     """The gain is the mean ratio of the training readings at 4 g, where the block sticks.
 

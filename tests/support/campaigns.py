@@ -35,19 +35,14 @@ KINDS = {  # Name on the command line -> module and function.
     "shear-chains": ("shear_scenes", "compare_chain"),
     "static": ("static_scenes", "compare_coarse_patch"),
     "static-fine": ("static_scenes", "compare_fine_patch"),
-    "patches": ("random_patches", "compare_coarse_patch"),
-    "patches-fine": ("random_patches", "compare_fine_patch"),
-    "boundary-traces": ("boundary_traces", "compare_trace"),
     "wear": ("wear_scenes", "compare_bench"),
     "predicted-wear": ("predicted_pairs", "compare_pair"),
     "hybrid-rigs": ("hybrid_campaign", "compare_rig"),
     "made-fits": ("made_fits", "compare_fit"),
     "trace-pairs": ("surface_pairs", "compare_traces"),
     "scan-pairs": ("surface_pairs", "compare_scans"),
-    "backbone-bands": ("backbone_band", "compare_band"),
-    "backbone-forces": ("backbone_forces", "compare_force"),
-    "backbone-preload": ("backbone_forces", "compare_preload"),
-    "backbone-motions": ("backbone_forces", "compare_motions"),
+    "backbone-forces": ("backbone_motions", "compare_force"),
+    "backbone-motions": ("backbone_motions", "compare_motions"),
 }
 # Time limit of a scene with its reference; a longer one is recorded as failed.
 MAX_CPU_SECONDS = 60
@@ -125,33 +120,6 @@ def measure_rows(measures, truths: dict, doubts: dict, names=None) -> list:
     ]
 
 
-def select_known_rows(rows: list, tolerance: float) -> dict:
-    """Return the rows whose reference is known well enough, and what the others show, as keys of a line.
-
-    The rule does not depend on whether a row holds: the uncertainty of the reference is at most half of the stated error,
-    or of a tenth of the error that the tolerance allows.
-
-    Returns
-    -------
-    dict
-        - rows: the rows that count
-        - unknown: number of the other rows
-        - unknown_apart: number of the other rows that do not hold
-    """
-
-    def is_known(row: Row) -> bool:
-        """Return whether the reference of a row is known well enough."""
-        allowed = tolerance * max(abs(row.truth), row.floor)
-        return row.doubt <= max(row.error, allowed / 10, row.floor * FLOOR_FRACTION) / 2
-
-    others = [row for row in rows if not is_known(row)]
-    return {
-        "rows": [row for row in rows if is_known(row)],
-        "unknown": len(others),
-        "unknown_apart": sum(not row.holds for row in others),
-    }
-
-
 def strip_number(name: str) -> str:
     """Return the name of a measure without the number of its interface."""
     head, _, number = name.rpartition("_")
@@ -202,11 +170,6 @@ def print_score(lines: list) -> None:
     for engine in [*list_engines(lines), None]:
         selected = [line for line in lines if engine in (None, line.get("engine"))]
         print(f"{engine or 'all':12s}", describe_score(compute_score(selected)))
-    unknown, apart = (
-        sum(line.get(key, 0) for line in lines) for key in ("unknown", "unknown_apart")
-    )
-    if unknown:
-        print(f"left out: {unknown} errors of uncertain references; {apart} of them do not hold")
     for line in lines:
         if not line["rows"]:
             print(f"not compared: seed {line['seed']}, {line.get('refused', line.get('outcome'))}")

@@ -18,9 +18,10 @@ import numpy as np
 from campaigns import measure_rows
 from patch_of_order_four import Pressed, press_levels, read_scene
 from scipy.interpolate import PchipInterpolator
-from static_scenes import BodySection, PatchScene, read_contact
+from static_scenes import BodySection, PatchScene, make_contact
 
 import patchfem as pf
+from patchfem.scene import format_scene as format_tables
 
 MATERIALS = (("steel", 210e9, 0.3), ("titanium", 121e9, 0.32), ("aluminium", 70e9, 0.33))
 COATING = 250e9, 0.24  # Young's modulus [Pa] and Poisson's ratio.
@@ -82,27 +83,10 @@ class RandomBench:
 
     def text(self):
         """Return the text of the scene; the amplitude must have been set."""
-        out = [
-            f'[contact]\nlength = "{self.length!r} m"\nwidth = "{self.width!r} m"\nheight = "{self.height!r} m"',
-            f'load = "{self.load!r} N"',
-            f'substrate = {{young = "{self.young!r} Pa", poisson = {self.poisson!r}, density = "7000 kg/m^3"}}',
-        ]
-        if self.thick:
-            out += [
-                f'[contact.coating]\nthickness = "{self.thick!r} m"',
-                "material = {young = "
-                f'"{COATING[0]!r} Pa", poisson = {COATING[1]!r}, density = "14500 kg/m^3"}}',
-            ]
-        out += [f'[contact.crown]\nradius = "{self.radius!r} m"'] if self.crowned else []
-        out += [f'[contact.tilt]\nangle = "{self.angle!r} rad"'] if self.tilted else []
-        out += [
-            '[contact.shear]\n[friction]\nlaw = "coulomb"',
-            f"static = {self.static!r}",
-            '[slide]\nkind = "sine"',
-            f'amplitude = "{self.amplitude!r} m"',
-            f'frequency = "10 Hz"\ncycles = {self.cycles}\n',
-        ]
-        return "\n".join(out).replace("np.float64(", "").replace(")", "")
+        slide = {"kind": "sine", "amplitude": self.amplitude, "frequency": 10.0}
+        tables = {"friction": {"law": "coulomb", "static": self.static}}
+        tables["slide"] = slide | {"cycles": self.cycles}
+        return format_tables({"contact": make_contact(self.scene) | {"shear": {}}} | tables)
 
 
 class PartialSlipReference:
@@ -110,9 +94,9 @@ class PartialSlipReference:
 
     def __init__(self, bench, pressed: Pressed):
         self.bench = bench
-        index = np.flatnonzero(pressed.active[0])
+        index = np.flatnonzero(pressed.active)
         self.shear = pressed.tt[np.ix_(index, index)]
-        self.limit = bench.static * pressed.force[0, index]
+        self.limit = bench.static * pressed.force[index]
         self.stiffness = float(np.linalg.solve(self.shear, np.ones(index.size)).sum())
 
     def measures(self):
@@ -170,7 +154,7 @@ class PartialSlipReference:
 def solve_bench(seed: int) -> tuple:
     """Return a bench, its measures on the fine grid, and their differences from a coarser grid."""
     bench = RandomBench(seed)
-    levels = press_levels(read_scene(read_contact(bench.scene), None))
+    levels = press_levels(read_scene(make_contact(bench.scene)))
     coarse, fine = (PartialSlipReference(bench, pressed) for pressed in levels[1:])
     bench.amplitude = float(bench.share * bench.static * bench.load / fine.stiffness)
     values = fine.measures()

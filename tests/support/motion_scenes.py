@@ -1,10 +1,11 @@
 """Random scenes of rigs, with every law, drive and structure, for program and reference.
 
-`draw_spec(seed)` draws the numbers, `format_scene(spec)` writes the scene, and `format_record(spec)` is the table of a
-drive from a file.
+`draw_spec(seed)` draws the numbers, `write_scene(spec, folder)` writes the scene and the record of its drive.
 """
 
 import numpy as np
+
+from patchfem.scene import format_scene
 
 LAWS = (
     "coulomb",
@@ -234,27 +235,6 @@ def _draw_contact(r, out: dict) -> None:
         }
 
 
-def format_table(name: str, values: dict) -> str:
-    """Return a table of a scene as text."""
-    return f"[{name}]\n" + "".join(f"{key} = {value}\n" for key, value in values.items())
-
-
-def format_quantity(value: float, unit: str) -> str:
-    """Return a quantity as text of a scene."""
-    return f'"{float(value)!r} {unit}"'
-
-
-UNITS = {
-    "bond_length": "m",
-    "reference_speed": "m/s",
-    "stiffness": "N/m",
-    "stribeck_speed": "m/s",
-    "micro_damping": "N s/m",
-    "viscous": "N s/m",
-    "rest_growth": "m/s^2",
-    "slip_growth": "m",
-    "rest_speed": "m/s",
-}
 NAMES = {
     "weakening": "coulomb",
     "stretch": "nonlocal",
@@ -264,183 +244,90 @@ NAMES = {
 }
 
 
-def format_law_keys(s: dict) -> dict:
-    """Return the keys of the law as text values of a scene."""
-    name = NAMES.get(s["law"], s["law"])
-    out = {"law": f'"{name}"'} | ({"reading": '"report"'} if s["law"] == "report" else {})
-    return out | {
-        k: format_quantity(v, UNITS[k]) if k in UNITS else repr(float(v))
-        for k, v in s["keys"].items()
+def make_tables(s: dict, signal: str) -> dict:
+    """Return the tables of the scene of a spec; signal: name of the file of a recorded drive."""
+    law = {"law": NAMES.get(s["law"], s["law"])} | s["keys"]
+    if s["law"] == "report":
+        law["reading"] = "report"
+    structure = _make_masses(s, law) if s["several"] else _make_modes(s)
+    if s["drive"] == "free":
+        structure["start"] = {"displacement": s["start"]}
+    tables = {} if s["several"] else _make_contact(s) | {"friction": law}
+    method = {"method": s["method"]} if "method" in s else {}
+    return tables | {
+        "structure": structure,
+        "drive": _make_drive(s, signal),
+        "accuracy": {"tolerance": s["tolerance"]} | method,
     }
 
 
-def format_scene(s: dict, signal: str = "signal.csv") -> str:
-    """Return the scene of a spec as text; signal: name of the file of a recorded drive."""
-    if s["several"]:
-        return _format_masses(s) + _format_drive(s, signal) + _format_accuracy(s)
-    parts = []
+def _make_contact(s: dict) -> dict:
+    """Return the table of the patch, or of the load of a point."""
     if s["patch"] is not None:
-        p = s["patch"]
-        parts.append(
-            format_table(
-                "contact",
-                {
-                    "length": '"12.7 mm"',
-                    "width": '"12.7 mm"',
-                    "height": '"6.35 mm"',
-                    "load": format_quantity(s["load"], "N"),
-                    "substrate": '"Ti-8Al-1Mo-1V"',
-                    "element_size": format_quantity(12.7e-3 / p["elements"], "m"),
-                },
-            )
-        )
-        parts += ["[contact.shear]\n"] * p["shear"]
-        parts += [format_table("contact.tilt", {"angle": format_quantity(p["tilt"], "rad")})] * (
-            p["tilt"] > 0
-        )
-    else:
-        variation = (
-            {
-                "amplitude": format_quantity(s["load_amplitude"], "N"),
-                "frequency": format_quantity(s["load_frequency"], "Hz"),
-            }
-            if "load_amplitude" in s
-            else {}
-        )
-        parts.append(format_table("normal", {"load": format_quantity(s["load"], "N")} | variation))
-    parts += [
-        format_table("friction", format_law_keys(s)),
-        format_table("structure", {"moving_mass": format_quantity(s["mass"], "kg")}),
-    ]
+        contact = {
+            "length": "12.7 mm",
+            "width": "12.7 mm",
+            "height": "6.35 mm",
+            "load": s["load"],
+            "substrate": "Ti-8Al-1Mo-1V",
+            "element_size": 12.7e-3 / s["patch"]["elements"],
+        }
+        contact |= {"shear": {}} if s["patch"]["shear"] else {}
+        contact |= {"tilt": {"angle": s["patch"]["tilt"]}} if s["patch"]["tilt"] else {}
+        return {"contact": contact}
+    normal = {"load": s["load"]}
+    if "load_amplitude" in s:
+        normal |= {"amplitude": s["load_amplitude"], "frequency": s["load_frequency"]}
+    return {"normal": normal}
+
+
+def _make_modes(s: dict) -> dict:
+    """Return the structure of modes."""
+    out = {"moving_mass": s["mass"]}
     if "bonded" in s:
-        parts.append(
-            format_table(
-                "structure.bonded",
-                {
-                    "stiffness": format_quantity(s["bonded"]["stiffness"], "N/m"),
-                    "damping": format_quantity(s["bonded"]["damping"], "N s/m"),
-                },
-            )
-        )
+        out["bonded"] = s["bonded"]
     if "cubic" in s:
-        parts.append(
-            format_table("structure.stiffening", {"cubic": format_quantity(s["cubic"], "N/m^3")})
-        )
-    for k, mode in enumerate(s["modes"]):
-        parts.append(
-            "["
-            + format_table(
-                "structure.mode",
-                {"name": f'"m{k}"', "frequency": format_quantity(mode["frequency"], "Hz")}
-                | {key: repr(mode[key]) for key in ("damping", "slide", "base", "output")},
-            ).replace("]", "]]", 1)
-        )
-    return "".join(parts) + _format_drive(s, signal) + _format_accuracy(s)
-
-
-def _format_masses(s: dict) -> str:
-    """Return the structure of two masses as text."""
-    m = s["masses"]
-    parts = [
-        format_table(
-            "structure",
-            {"masses": "[" + ", ".join(format_quantity(mass, "kg") for mass in m["mass"]) + "]"},
-        )
+        out["stiffening"] = {"cubic": s["cubic"]}
+    names = ("frequency", "damping", "slide", "base", "output")
+    modes = [
+        {"name": f"m{k}"} | {key: mode[key] for key in names} for k, mode in enumerate(s["modes"])
     ]
-    for pair, k, c in zip(([1, 0], [2, 1], [2, 0]), m["stiffness"], m["damper"]):
-        parts.append(
-            "["
-            + format_table(
-                "structure.spring", {"between": pair, "stiffness": format_quantity(k, "N/m")}
-            ).replace("]", "]]", 1)
-        )
-        parts.append(
-            "["
-            + format_table(
-                "structure.damper", {"between": pair, "coefficient": format_quantity(c, "N s/m")}
-            ).replace("]", "]]", 1)
-        )
-    for pair, load in zip(m["pairs"], m["loads"]):
-        keys = {"between": pair, "load": format_quantity(load, "N")} | format_law_keys(s)
-        parts.append("[" + format_table("structure.interface", keys).replace("]", "]]", 1))
-    return "".join(parts)
+    return out | {"mode": modes}
 
 
-def _format_drive(s: dict, signal: str) -> str:
-    """Return the drive as text."""
+def _make_masses(s: dict, law: dict) -> dict:
+    """Return the structure of two masses."""
+    m = s["masses"]
+    links = list(zip(([1, 0], [2, 1], [2, 0]), m["stiffness"], m["damper"]))
+    return {
+        "masses": m["mass"],
+        "spring": [{"between": pair, "stiffness": k} for pair, k, _ in links],
+        "damper": [{"between": pair, "coefficient": c} for pair, _, c in links],
+        "interface": [
+            {"between": pair, "load": load} | law for pair, load in zip(m["pairs"], m["loads"])
+        ],
+    }
+
+
+def _make_drive(s: dict, signal: str) -> dict:
+    """Return the table of the drive."""
     kind = s["drive"]
-    size = s["size"]
-    out = ""
-    force = s["mass"] * size
-    driven_mass = {"mass": 1} if s["several"] else {}
+    size = {"acceleration": s["size"]}
     cycles = {"cycles": s["cycles"]}
     if kind == "free":
-        out = format_table(
-            "structure.start",
-            {"displacement": "[" + ", ".join(format_quantity(x, "m") for x in s["start"]) + "]"},
-        )
-        return out + format_table("drive", {"kind": '"free"'} | cycles)
+        return {"kind": "free"} | cycles
+    frequency = {"frequency": s["frequency"]}
     if kind == "force":
-        return format_table(
-            "drive",
-            {
-                "kind": '"force"',
-                "frequency": format_quantity(s["frequency"], "Hz"),
-                "force": format_quantity(force, "N"),
-            }
-            | driven_mass
-            | cycles,
-        )
-    if kind == "step":
-        return format_table(
-            "drive",
-            {"kind": '"base"', "waveform": '"step"', "acceleration": format_quantity(size, "m/s^2")}
-            | cycles,
-        )
-    if kind == "sweep":
-        w = s["sweep"]
-        return format_table(
-            "drive",
-            {
-                "kind": '"base"',
-                "waveform": '"sweep"',
-                "from": format_quantity(w["from"], "Hz"),
-                "to": format_quantity(w["to"], "Hz"),
-                "rate": format_quantity(w["rate"], "Hz/s"),
-                "acceleration": format_quantity(size, "m/s^2"),
-            },
-        )
-    if kind == "levels":
-        rows = "[" + ", ".join(format_quantity(level, "m/s^2") for level in s["levels"]) + "]"
-        return format_table(
-            "drive",
-            {
-                "kind": '"base"',
-                "waveform": '"levels"',
-                "frequency": format_quantity(s["frequency"], "Hz"),
-                "levels": rows,
-            }
-            | cycles,
-        )
-    if kind == "file":
-        return format_table(
-            "drive", {"kind": '"base"', "waveform": '"file"', "file": f'"{signal}"'}
-        )
-    return format_table(
-        "drive",
-        {
-            "kind": '"base"',
-            "frequency": format_quantity(s["frequency"], "Hz"),
-            "acceleration": format_quantity(size, "m/s^2"),
-        }
-        | cycles,
-    )
-
-
-def _format_accuracy(s: dict) -> str:
-    """Return [accuracy] as text."""
-    method = {"method": f'"{s["method"]}"'} if "method" in s else {}
-    return format_table("accuracy", {"tolerance": s["tolerance"]} | method)
+        driven_mass = {"mass": 1} if s["several"] else {}
+        force = {"kind": "force", "force": s["mass"] * s["size"]}
+        return force | frequency | driven_mass | cycles
+    return {"kind": "base"} | {
+        "step": lambda: {"waveform": "step"} | size | cycles,
+        "sweep": lambda: {"waveform": "sweep"} | s["sweep"] | size,
+        "levels": lambda: {"waveform": "levels", "levels": s["levels"]} | frequency | cycles,
+        "file": lambda: {"waveform": "file", "file": signal},
+        "sine": lambda: frequency | size | cycles,
+    }[kind]()
 
 
 def format_record(s: dict) -> str:
@@ -455,5 +342,5 @@ def write_scene(s: dict, folder):
     path = folder / f"scene{s['seed']}.toml"
     if "record" in s:
         (folder / f"signal{s['seed']}.csv").write_text(format_record(s), "utf-8")
-    path.write_text(format_scene(s, f"signal{s['seed']}.csv"), "utf-8")
+    path.write_text(format_scene(make_tables(s, f"signal{s['seed']}.csv")), "utf-8")
     return path

@@ -1,23 +1,21 @@
-"""Independent program for static patches of every family, which uses nothing of the package.
+"""Independent program for static patches of rectangular pieces, which uses nothing of the package.
 
-Elements of order 4 with Gauss-Lobatto nodes, mapped to the shape of the pieces, on columns
-that are graded towards the edges of the contact, its ends and steps. SuperLU eliminates the inside with the face last.
-Nodal forces meet the gap at the nodes of the face. Bare contact is solved by a primal-dual interior-point method, a rough
-layer by Newton's method for the separations. The changes between three levels of grading are the uncertainties. Measures
-have the names of the package.
+Rectangular elements of order 4 with Gauss-Lobatto nodes, on columns that are graded towards the edges of the contact,
+its ends and steps. SuperLU eliminates the inside with the face last. Nodal forces meet the gap at the nodes of the face,
+by a primal-dual interior-point method; a rough layer of constant stiffness adds to the compliance. The changes between
+three levels of grading are the uncertainties. Measures have the names of the package.
+
+The program of version 1.9 also knows rounded ends, strips, holders, other layers and measured traces.
 """
 
 from __future__ import annotations
 
 from itertools import pairwise
-from math import hypot, sqrt
 from typing import NamedTuple
 
 import numpy as np
 from numpy.polynomial import legendre
 from scipy import sparse
-from scipy.integrate import quad
-from scipy.interpolate import CubicSpline
 from scipy.linalg import cho_factor, cho_solve
 from scipy.sparse.linalg import splu
 
@@ -49,42 +47,22 @@ LEVELS = (
 )
 N_SEARCHES = 8
 MAX_COLUMNS = 400
-MAX_COLUMNS_OF_WAVES = 1 / 50  # longest column under a trace, over half the interface
 # Largest distance from the end of an interval, over its length, from which its edge is extrapolated
 EDGE_WINDOW = 0.06
-# Pressure over the peak at which a node of a rough layer counts as loaded
-MIN_LAYER_PRESSURE = 1e-13
 
 
 class Piece(NamedTuple):
-    """Piece with lengths [m], materials (Young's modulus [Pa], Poisson's ratio), and the shape of its ends."""
+    """Rectangular piece with lengths [m] and materials (Young's modulus [Pa], Poisson's ratio)."""
 
     length: float
     height: float
     thickness: float
     coating: tuple
     substrate: tuple
-    end: str
-    end_size: float
-
-    @property
-    def half_contact(self) -> float:
-        """Half the length [m] of the face that can touch: a rounding up to a slope of 0.097."""
-        flat = self.length / 2 - self.end_size
-        return flat + (self.end_size * 0.097 / hypot(1, 0.097) if self.end == "end_radius" else 0.0)
-
-    def drop(self, x) -> np.ndarray:
-        """Return the depth (k,) [m] of the face: 45 degrees, or a circle that goes on along its tangent of 60 degrees."""
-        beyond = np.maximum(np.abs(x) - (self.length / 2 - self.end_size), 0.0)
-        if self.end != "end_radius":
-            return beyond * (self.end == "chamfer")
-        last = self.end_size * sqrt(3) / 2
-        circle = self.end_size - np.sqrt(self.end_size**2 - np.minimum(beyond, last) ** 2)
-        return circle + sqrt(3) * np.maximum(beyond - last, 0.0)
 
 
 class Scene(NamedTuple):
-    """Patch in SI units: pieces, gap of unloaded faces (function of x), marks along x, holder and rough layer."""
+    """Patch in SI units: pieces, gap of unloaded faces (function of x), marks along x, stiffness of the layer [Pa/m]."""
 
     pieces: list
     plane: str
@@ -95,24 +73,20 @@ class Scene(NamedTuple):
     marks: list
     step: float | None
     tilt: float
-    moment: float | None
-    spring: float
-    layer: dict
-    strips: tuple
-    is_wavy: bool
+    layer: float
 
 
 class Pressed(NamedTuple):
-    """Pressed patch on one mesh: columns x, forces (s, m), compliances, motions and edges."""
+    """Pressed patch on one mesh: columns x, areas and forces (m,), compliances (m, m), softness (m,), contact."""
 
     x: np.ndarray
-    weight: np.ndarray
-    force: np.ndarray
+    area: np.ndarray
     nn: np.ndarray
     tt: np.ndarray
     nt: np.ndarray
-    slope: np.ndarray
-    motion: np.ndarray
+    soft: np.ndarray
+    force: np.ndarray
+    approach: float
     active: np.ndarray
     intervals: list
 
@@ -127,7 +101,7 @@ def read_material(table: dict) -> tuple[float, float]:
     return number(table["young"]), table["poisson"]
 
 
-def read_scene(contact: dict, trace_points) -> Scene:
+def read_scene(contact: dict) -> Scene:
     """Return the scene of a table [contact]."""
     pieces = []
     for side in ("lower", "upper"):
@@ -135,7 +109,6 @@ def read_scene(contact: dict, trace_points) -> Scene:
         coating = own.get("coating", contact.get("coating", "none"))
         has_coating = coating != "none"
         substrate = read_material(own.get("substrate", contact["substrate"]))
-        end = next((key for key in ("chamfer", "end_radius") if key in own), "")
         pieces.append(
             Piece(
                 number(own.get("length", contact["length"])),
@@ -143,53 +116,30 @@ def read_scene(contact: dict, trace_points) -> Scene:
                 number(coating["thickness"]) if has_coating else 0.0,
                 read_material(coating["material"]) if has_coating else substrate,
                 substrate,
-                end,
-                number(own[end]) if end else 0.0,
             )
         )
-    half = min(piece.half_contact for piece in pieces)
+    half = min(piece.length for piece in pieces) / 2
     tilt = number(contact.get("tilt", {}).get("angle", 0))
     curvature = 1 / number(contact["crown"]["radius"]) if "crown" in contact else 0.0
     step = contact.get("step")
-    curve = None
-    if trace_points is not None:
-        curve = CubicSpline(*trace_points, bc_type="natural")
-        lowest = curve(np.linspace(-half, half, 20001)).min()
+    at = number(step["at"]) if step else None
 
     def gap(x):
         """Return the gap (m,) [m] of the unloaded faces."""
-        out = tilt * x + x**2 / 2 * curvature + sum(piece.drop(x) for piece in pieces)
-        if step:
-            out = out + number(step["height"]) * np.heaviside(x - number(step["at"]), 0.5)
-        if curve is not None:
-            out = out + curve(x) - lowest
-        return out
+        out = tilt * x + x**2 / 2 * curvature
+        return out + number(step["height"]) * np.heaviside(x - at, 0.5) if step else out
 
-    load = number(contact["load"])
-    spring = number(contact.get("holder", {}).get("rotational_stiffness", 0))
-    line = contact.get("load_line")
-    moment = load * number(line["offset"]) if line else (0.0 if spring else None)
-    flats = [
-        p.length / 2 - p.end_size for p in pieces if p.end and p.length / 2 - p.end_size < half
-    ]
-    marks = [-half, half, *flats, *(-flat for flat in flats)]
-    at = number(step["at"]) if step else None
-    strips = contact.get("strips", {"count": 1})
     return Scene(
         pieces,
         contact.get("plane", "strain"),
         half,
         number(contact["width"]),
-        load,
+        number(contact["load"]),
         gap,
-        marks + ([at] if step else []),
+        [-half, half, *([at] if step else [])],
         at,
         tilt,
-        moment,
-        spring,
-        contact.get("asperities", {}),
-        (strips["count"], number(strips.get("roll", 0))),
-        curve is not None,
+        number(contact["asperities"]["normal_stiffness"]) if "asperities" in contact else np.inf,
     )
 
 
@@ -296,13 +246,13 @@ def face_nodes(xs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return np.append(x, xs[-1]), weight
 
 
-def cell_stiffness(corners, lame, shear) -> np.ndarray:
-    """Return the stiffness (cells, 50, 50) of cells of order 4; u_x first, then u_y.
+def cell_stiffness(widths, heights, lame, shear) -> np.ndarray:
+    """Return the stiffness (cells, 50, 50) of rectangular cells of order 4; u_x first, then u_y, each by rows.
 
     Parameters
     ----------
-    corners : (2, cells, 5, 5) ndarray
-        Places [m] of the nodes, by rows.
+    widths, heights : (cells,) ndarray
+        Lengths of the sides [m].
     lame, shear : (cells,) ndarray
         Lame's constants [Pa].
     """
@@ -311,22 +261,18 @@ def cell_stiffness(corners, lame, shear) -> np.ndarray:
     coefficients = np.linalg.inv(legendre.legvander(points, ORDER))
     value = legendre.legvander(gauss, ORDER) @ coefficients
     slope = np.stack([legendre.legval(gauss, legendre.legder(c)) for c in coefficients.T], axis=1)
-    rates = np.stack([np.kron(value, slope), np.kron(slope, value)])
-    places = corners.reshape(2, -1, 25)
 
-    # Derivatives of the shape functions along x and y by the inverse Jacobian of each Gauss point
-    jacobian = np.einsum("aqn,bcn->cqab", rates, places)
-    dx = np.einsum("cqab,bqn->acqn", np.linalg.inv(jacobian), rates)
-    area = np.linalg.det(jacobian) * np.outer(weight, weight).ravel()
-    x, y = dx
-    weighted_x, weighted_y = (d.transpose(0, 2, 1) * area[:, None, :] for d in (x, y))
-    xx, yy, xy = weighted_x @ x, weighted_y @ y, weighted_x @ y
-    yx = xy.transpose(0, 2, 1)
+    # Integrals of products of shape functions and of their slopes along a side of length 2
+    mass, mixed, stiff = (
+        one.T * weight @ other for one, other in ((value, value), (slope, value), (slope, slope))
+    )
+    ratio = (heights / widths)[:, None, None]
+    xx, yy, xy = np.kron(mass, stiff) * ratio, np.kron(stiff, mass) / ratio, np.kron(mixed.T, mixed)
     lame, shear = lame[:, None, None], shear[:, None, None]
-    cells = np.empty((xx.shape[0], 50, 50))
+    cells = np.empty((ratio.size, 50, 50))
     cells[:, :25, :25] = (lame + 2 * shear) * xx + shear * yy
     cells[:, 25:, 25:] = (lame + 2 * shear) * yy + shear * xx
-    cells[:, :25, 25:] = lame * xy + shear * yx
+    cells[:, :25, 25:] = lame * xy + shear * xy.T
     cells[:, 25:, :25] = cells[:, :25, 25:].transpose(0, 2, 1)
     return cells
 
@@ -345,28 +291,21 @@ def condense(x, piece: Piece, plane: str, row: float, level: Level, face: slice)
     y = grade(0.0, piece.height, marks, np.array(sizes), level.growth, largest)
     n_x, n_y = x.size - 1, y.size - 1
 
-    # The coating follows the drop of the face; the substrate fades out towards the far face.
-    nodes_x, _ = face_nodes(x)
-    nodes_y, _ = face_nodes(y)
-    fade = np.minimum(1.0, (piece.height - nodes_y) / (piece.height - piece.thickness))
-    places = np.stack(np.broadcast_arrays(nodes_x, nodes_y[:, None]))
-    places[1] += piece.drop(nodes_x) * fade[:, None]
-    rows = np.arange(n_y)[:, None] * ORDER + np.arange(ORDER + 1)
-    columns = np.arange(n_x)[:, None] * ORDER + np.arange(ORDER + 1)
-    of_cells = places[:, rows[:, None, :, None], columns[None, :, None, :]]
     is_coating = np.repeat((y[1:] + y[:-1]) / 2 < piece.thickness, n_x)
-    layers = np.where(
+    young, poisson = np.where(
         is_coating, np.array(piece.coating)[:, None], np.array(piece.substrate)[:, None]
     )
-    shear = layers[0] / 2 / (1 + layers[1])
-    lame = 2 * shear * layers[1] / (1 - 2 * layers[1])
+    shear = young / 2 / (1 + poisson)
+    lame = 2 * shear * poisson / (1 - 2 * poisson)
     if plane == "stress":
         lame = 2 * lame * shear / (lame + 2 * shear)
-    whole = cell_stiffness(of_cells.reshape(2, -1, 5, 5), lame, shear)
+    whole = cell_stiffness(np.tile(np.diff(x), n_y), np.repeat(np.diff(y), n_x), lame, shear)
     cells, local = condense_interior(whole)
 
     # Nodes of the face are last; all their tangential displacements precede the normal ones.
     numbers, count = numbering(n_x, n_y)
+    rows = np.arange(n_y)[:, None] * ORDER + np.arange(ORDER + 1)
+    columns = np.arange(n_x)[:, None] * ORDER + np.arange(ORDER + 1)
     numbers = numbers[rows[:, None, :, None], columns[None, :, None, :]].reshape(-1, 25)[:, local]
     m = n_x * ORDER + 1
     last = numbers >= count - m
@@ -385,52 +324,29 @@ def condense(x, piece: Piece, plane: str, row: float, level: Level, face: slice)
     return np.stack([c[m:, m:], c[:m, :m], c[m:, :m]])[:, part, part]
 
 
-def solve_blocks(blocks, rigid, spring, right, moments) -> tuple:
-    """Solve B_s u_s - R_s q = right_s for every strip s, and sum_s L_s u_s + S q = moments.
+def press_bare(C, gap, load: float) -> tuple:
+    """Minimise f C f / 2 + gap f for f >= 0 with sum f = load, by an interior-point method.
 
-    Parameters
-    ----------
-    blocks : (s, m, m) ndarray
-        Matrices B.
-    rigid : tuple of (s, m, r) and (s, r, m) ndarray
-        Matrices R and L.
-    spring : (r,) ndarray
-        Diagonal of S.
-    right : (s, m) ndarray
-    moments : (r,) ndarray
+    C: (m, m) compliance; gap (m,). Returns forces (m,), the approach beyond the smallest gap, and the nodes in contact.
     """
-    moved, sums = rigid
-    parts = np.linalg.solve(blocks, np.concatenate([right[:, :, None], moved], axis=2))
-    own, by_motion = parts[:, :, 0], parts[:, :, 1:]
-    matrix = np.einsum("srm,smt->rt", sums, by_motion) + np.diag(spring)
-    q = np.linalg.solve(matrix, moments - np.einsum("srm,sm->r", sums, own))
-    return own + by_motion @ q, q
-
-
-def press_bare(C, gap, rigid, target, spring) -> tuple:
-    """Minimise f C f / 2 + gap f for f >= 0 with rigid^T f + spring q = target, by an interior-point method.
-
-    C: (m, m) compliance of each strip; gap (s, m); rigid (s, m, r). Returns forces (s, m), motions (r,) and the set.
-    """
-    scale = target[0] * np.abs(C).max()
-    C, gap = C * target[0] / scale, (gap - gap.min()) / scale
-    spring = spring / target[0] * scale
-    goal = target / target[0]
+    scale = load * np.abs(C).max()
+    C, gap = C * load / scale, (gap - gap.min()) / scale
     n = gap.size
-    f, w, q = np.full(gap.shape, 1 / n), np.ones(gap.shape), np.zeros(target.size)
-    sums = rigid.transpose(0, 2, 1)
+    f, w, q = np.full(n, 1 / n), np.ones(n), 0.0
     for _ in range(150):
-        mu = (f * w).sum() / n
-        dual = f @ C + gap - rigid @ q - w
-        primal = np.einsum("srm,sm->r", sums, f) + spring * q - goal
-        if mu < 1e-15 and abs(dual).max() < 1e-12 and abs(primal).max() < 1e-12:
+        mu = f @ w / n
+        dual = C @ f + gap - q - w
+        primal = f.sum() - 1
+        if mu < 1e-15 and abs(dual).max() < 1e-12 and abs(primal) < 1e-12:
             break
-        blocks = C + np.apply_along_axis(np.diag, 1, w / f)
 
-        def step(centre, blocks=blocks, f=f, w=w, dual=dual, primal=primal):
+        def step(centre, f=f, w=w, dual=dual, primal=primal):
             """Return the Newton step towards complementarity products `centre`."""
             product = f * w - centre
-            df, dq = solve_blocks(blocks, (rigid, sums), spring, -dual - product / f, -primal)
+            right = np.stack([-dual - product / f, np.ones(n)], axis=1)
+            own, by_motion = np.linalg.solve(C + np.diag(w / f), right).T
+            dq = (-primal - own.sum()) / by_motion.sum()
+            df = own + by_motion * dq
             return df, -(product + w * df) / f, dq
 
         def largest(value, change):
@@ -439,90 +355,11 @@ def press_bare(C, gap, rigid, target, spring) -> tuple:
             return min(1.0, 0.9995 * ratio.min())
 
         df, dw, _ = step(0.0)
-        after = ((f + largest(f, df) * df) * (w + largest(w, dw) * dw)).sum() / n
+        after = (f + largest(f, df) * df) @ (w + largest(w, dw) * dw) / n
         df, dw, dq = step((after / mu) ** 3 * mu - df * dw)
         a = min(largest(f, df), largest(w, dw))
         f, w, q = f + a * df, w + a * dw, q + a * dq
-    return f * target[0], q * scale, f > w
-
-
-class RoughLaw:
-    """Pressure P(s) [Pa] of a rough layer as exp of a function of the separation s [m]."""
-
-    def __init__(self, layer: dict, scene: Scene):
-        if layer["law"] == "exponential":
-            decay = number(layer["decay_length"])
-            level = np.log(number(layer["normal_stiffness"]) * decay)
-            self.unit = decay
-            self.log = lambda s: (level - s / decay, np.full(s.shape, 1 / decay))
-            return
-        faces = [piece.coating for piece in scene.pieces]
-        modulus = 1 / sum((1 - nu**2) / young for young, nu in faces)
-        deviation = number(layer["height_deviation"])
-        factor = 4 / 3 * modulus * number(layer["density"])
-        factor *= number(layer["radius"]) ** 0.5 * deviation**1.5
-        h = np.linspace(-30, 36, 1321)
-
-        def integral(start):
-            """Return the integral of (z - h)^1.5 phi(z) over z > h, times exp(h^2/2) for positive h."""
-            shift = max(start, 0.0)
-
-            def integrand(t):
-                """Return the integrand at z = h + t."""
-                z = start + t
-                return t**1.5 * np.exp(-(z**2 - shift**2) / 2) / sqrt(2 * np.pi)
-
-            peak = max(-start, 0.0)
-            return quad(integrand, 0, peak + 12, points=[peak] if peak else None, limit=200)[0]
-
-        values = [np.log(integral(start)) - max(start, 0.0) ** 2 / 2 for start in h]
-        table = CubicSpline(h, np.array(values) + np.log(factor))
-        rate = table.derivative()
-        self.unit = deviation
-
-        def log(s):
-            """Return log P and its decay rate; beyond the table both go on along the tangent."""
-            place = np.clip(s / deviation, h[0], h[-1])
-            slope = rate(place)
-            return table(place) + slope * (s / deviation - place), -slope / deviation
-
-        self.log = log
-
-
-def press_layer(law: RoughLaw, area, C, gap, rigid, target, spring) -> tuple:
-    """Solve f = A P(s), s = gap - rigid q + C f, rigid^T f + spring q = target by damped Newton's method for s."""
-    bare, q, _ = press_bare(C, gap, rigid, target, spring)
-    q[0] += gap.min()
-    wanted = np.log(np.maximum(bare, 1e-3 * bare.mean()) / area)
-    s = np.zeros(gap.shape)
-    for _ in range(400):
-        log, rate = law.log(s)
-        s = s + np.clip((log - wanted) / rate, -5 * law.unit, 5 * law.unit)
-    s = np.maximum(s, gap - rigid @ q + bare @ C)
-    sums = rigid.transpose(0, 2, 1)
-    for _ in range(500):
-        log, rate = law.log(s)
-        f = area * np.exp(np.minimum(log, 300))
-        D = f * rate
-        mismatch = gap - rigid @ q + f @ C - s
-        missing = target - np.einsum("srm,sm->r", sums, f) - spring * q
-        # Newton step: ds + C D ds + rigid dq = mismatch, rigid^T D ds - spring dq = -missing
-        blocks = np.eye(s.shape[1]) + C * D[:, None, :]
-        ds, dq = solve_blocks(blocks, (-rigid, sums * D[:, None, :]), -spring, mismatch, -missing)
-        matters = np.exp(np.minimum(0.0, log - ds * rate - log.max())) > 1e-14
-        size = (np.abs(ds) * rate)[matters].max(initial=0.0)
-        # A pressure may grow by a factor of e in a step; it may fall freely.
-        risen = np.log(f.sum() / area.sum() / f.shape[0] * 0.01)
-        limit = np.maximum(np.log1p(np.maximum(-ds * rate, 0.0)), risen - log) / rate
-        s = s + np.maximum(ds, -limit)
-        q = q + dq
-        if size < 1e-11:
-            break
-    else:
-        raise ArithmeticError("the rough layer did not converge")
-    log, rate = law.log(s)
-    f = area * np.exp(log)
-    return f, q, log > log.max() + np.log(MIN_LAYER_PRESSURE), f * rate
+    return f * load, q * scale, f > w
 
 
 def condense_pieces(scene: Scene, parts: list, level: Level) -> tuple:
@@ -532,23 +369,16 @@ def condense_pieces(scene: Scene, parts: list, level: Level) -> tuple:
     """
     half = scene.half
     contact = min((high - low for low, high in parts), default=2 * half)
-    edges = []
-    for end in sorted({end for part in parts for end in part if abs(end) < half * (1 - 1e-9)}):
-        # Edges of strips that differ little share their columns.
-        if not edges or end - edges[-1] > level.edge * contact:
-            edges.append(end)
+    edges = sorted({end for part in parts for end in part if abs(end) < half * (1 - 1e-9)})
     bands = [(low, high, (high - low) / level.n_inside) for low, high in parts]
-    lengths = [piece.half_contact for piece in scene.pieces]
-    is_singular = max(lengths) > half * (1 + 1e-9) and not any(
-        piece.end == "end_radius" and piece.half_contact <= half * (1 + 1e-9)
-        for piece in scene.pieces
-    )
     size = max(level.edge * contact, 1e-8 * half)
     shorter = min([2 * half, *(piece.height for piece in scene.pieces)])
+    # The pressure is unbounded at an end that presses on a longer piece.
+    is_singular = max(piece.length for piece in scene.pieces) / 2 > half * (1 + 1e-9)
     corner = size if is_singular else min(level.corner * shorter, contact / 30)
     sizes = np.array([corner] * 2 + [size] * (len(scene.marks) - 2) + [size] * len(edges))
-    largest = half * (MAX_COLUMNS_OF_WAVES if scene.is_wavy else 1 / level.n_columns)
-    x = grade(-half, half, [*scene.marks, *edges], sizes, level.growth, largest, bands)
+    marks = [*scene.marks, *edges]
+    x = grade(-half, half, marks, sizes, level.growth, half / level.n_columns, bands)
     if x.size > MAX_COLUMNS:
         raise ArithmeticError(f"{x.size} columns are too many for this program")
 
@@ -561,98 +391,60 @@ def condense_pieces(scene: Scene, parts: list, level: Level) -> tuple:
     return nodes, weight, (compliances + mirror * of_upper) / scene.width
 
 
-def press(scene: Scene, parts: list, level: Level) -> Pressed:
-    """Press a scene on columns that are graded towards the edges of given intervals in contact."""
-    return press_nodes(scene, *condense_pieces(scene, parts, level))
-
-
 def condense_piece(piece: Piece, scene: Scene, x, level: Level) -> np.ndarray:
     """Return the compliances (3, m, m) [m2/N] of a piece per unit width at the nodes of the columns x of the interface."""
     h = np.diff(x)
     half, stop = scene.half, piece.length / 2
-    kinks = [stop - piece.end_size, stop - piece.end_size * (1 - sqrt(3) / 2)]
-    kinks = [kink for kink in kinks if piece.end and half * (1 + 1e-9) < kink < stop]
     sides = []
     for cell in (h[0], h[-1]):
         part = np.zeros(0)
         if stop > half * (1 + 1e-12):
-            places = [half, stop, *kinks]
-            sizes = np.array([cell, *[(stop - half) / 8] * (len(places) - 1)])
-            part = grade(half, stop, places, sizes, level.growth, (stop - half) / 2)[1:]
+            sizes = np.array([cell, (stop - half) / 8])
+            part = grade(half, stop, [half, stop], sizes, level.growth, (stop - half) / 2)[1:]
         sides.append(part)
     columns = np.concatenate([-sides[0][::-1], x, sides[1]])
     face = slice(sides[0].size, sides[0].size + x.size)
     return condense(columns, piece, scene.plane, h.min(), level, face)
 
 
-def press_nodes(scene: Scene, x, weight, compliance) -> Pressed:
-    """Press the nodes x of the face with the compliances (3, m, m) of both pieces."""
-    nn = compliance[0]
-    count, roll = scene.strips
-    y = ((np.arange(count) + 0.5) / count - 0.5) * scene.width
-    area = weight * scene.width / count
-
-    # Strips side by side do not interact; each is `count` times as compliant as the patch.
-    gap = scene.gap(x) + roll * y[:, None]
-    can_rotate = scene.moment is not None
-    rigid = np.stack([np.ones(x.size), x], axis=1)[:, : 1 + can_rotate]
-    rigid = np.repeat(rigid[None], count, axis=0)
-    target = np.array([scene.load, scene.moment or 0.0])[: 1 + can_rotate]
-    spring = np.array([0.0, scene.spring])[: 1 + can_rotate]
-    C = nn * count
-    slope = np.full(gap.shape, np.inf)
-    law = scene.layer.get("law", "")
-    if law in ("exponential", "hertz"):
-        rough = RoughLaw(scene.layer, scene)
-        force, motion, active, slope = press_layer(rough, area, C, gap, rigid, target, spring)
-    else:
-        if law:
-            slope = np.broadcast_to(number(scene.layer["normal_stiffness"]) * area, gap.shape)
-            C = C + np.diag(1 / slope[0])
-        force, motion, active = press_bare(C, gap, rigid, target, spring)
-        motion[0] += gap.min()
-    intervals = [
-        find_intervals(scene, x, strip / area, nodes)
-        for strip, nodes in zip(force, join_neighbours(active))
-    ]
-    return Pressed(x, area, force, *(compliance * count), slope, motion, active, intervals)
+def press(scene: Scene, parts: list, level: Level) -> Pressed:
+    """Press a scene on columns that are graded towards the edges of given intervals in contact."""
+    x, weight, compliances = condense_pieces(scene, parts, level)
+    area = weight * scene.width
+    soft = 1 / (scene.layer * area)
+    gap = scene.gap(x)
+    force, approach, active = press_bare(compliances[0] + np.diag(soft), gap, scene.load)
+    intervals = find_intervals(scene, x, force / area, join_neighbours(active))
+    return Pressed(x, area, *compliances, soft, force, approach + gap.min(), active, intervals)
 
 
 def join_neighbours(active) -> np.ndarray:
     """Close openings of up to two nodes, which are ripples of the pressure where it vanishes, and drop such islands."""
     out = active.copy()
     for value in (True, False):
-        for row in out:
-            change = np.flatnonzero(np.diff(np.concatenate([[True], row == value, [True]])))
-            for begin, end in change.reshape(-1, 2):
-                is_inside = 0 < begin and end < row.size
-                if is_inside and end - begin <= 2 and row.sum() > 6:
-                    row[begin:end] = value
+        change = np.flatnonzero(np.diff(np.concatenate([[True], out == value, [True]])))
+        for begin, end in change.reshape(-1, 2):
+            if 0 < begin and end < out.size and end - begin <= 2 and out.sum() > 6:
+                out[begin:end] = value
     return out
 
 
 def find_intervals(scene: Scene, x, pressure, active) -> list:
-    """Return the intervals (from, to) [m] of a strip in contact."""
-    law = scene.layer.get("law", "")
+    """Return the intervals (from, to) [m] in contact."""
     ends = []
     padded = np.concatenate([[False], active, [False]])
     for k in np.flatnonzero(padded[1:] != padded[:-1]):
-        is_start = bool(padded[k + 1])
-        node, side = (k, -1) if is_start else (k - 1, 1)
+        node, side = (k, -1) if padded[k + 1] else (k - 1, 1)
         outside = node + side
         if not 0 <= outside < x.size:
             ends.append(float(x[node]))
             continue
         cell = x[outside] - x[node]
-        near_step = scene.step is not None and min(abs(x[[node, outside]] - scene.step)) < abs(cell)
-        place = x[node] + cell / 2
-        if law in ("exponential", "hertz"):
-            logs = np.log(np.maximum(pressure[[node, outside]], 1e-300) / pressure.max())
-            place = x[node] + cell * (logs[0] - np.log(MIN_LAYER_PRESSURE)) / (logs[0] - logs[1])
-        elif near_step:
+        if scene.step is not None and min(abs(x[[node, outside]] - scene.step)) < abs(cell):
             place = scene.step
         else:
-            place = extrapolate_edge(scene, x, pressure * active, (node, side)) or place
+            middle = x[node] + cell / 2
+            place = extrapolate_edge(scene, x, pressure * active, (node, side)) or middle
         ends.append(float(place))
     return np.reshape(ends, (-1, 2)).tolist()
 
@@ -676,7 +468,7 @@ def extrapolate_edge(scene: Scene, x, pressure, end: tuple) -> float | None:
     near[np.clip(node - side * np.arange(ORDER), 0, x.size - 1)] = False
     if near.sum() < 6:
         return None
-    power = 1 if scene.layer else 2
+    power = 1 if np.isfinite(scene.layer) else 2
     curve = np.polyfit(depth[near] / window, (pressure[near] / pressure.max()) ** power, 3)
     roots = np.roots(curve)
     roots = roots[np.abs(roots.imag) < 1e-9].real
@@ -685,67 +477,52 @@ def extrapolate_edge(scene: Scene, x, pressure, end: tuple) -> float | None:
     return float(x[node] - side * window * roots[np.argmin(np.abs(roots))])
 
 
-def find_stiffnesses(scene: Scene, pressed: Pressed, strip: int, nodes) -> np.ndarray:
-    """Return the normal [N/m], tangential [N/m] and rotational stiffness [N m/rad] of a set of nodes of a strip."""
-    law = scene.layer.get("law", "")
-    ratio = scene.layer.get("tangential_ratio")
+def find_stiffnesses(pressed: Pressed, nodes) -> np.ndarray:
+    """Return the normal [N/m], tangential [N/m] and rotational stiffness [N m/rad] of a set of nodes."""
     index = np.flatnonzero(nodes)
     inside = np.ix_(index, index)
     x = pressed.x[index]
-    soft = 1 / pressed.slope[strip, index] if law else np.zeros(index.size)
-    nn = pressed.nn[inside] + np.diag(soft)
-    tt = pressed.tt[inside] + (np.diag(soft / ratio) if ratio else 0.0)
-    # Strips side by side slide without a motion across.
-    nt = pressed.nt[inside] if len(pressed.force) == 1 else 0.0 * pressed.nt[inside]
+    nn = pressed.nn[inside] + np.diag(pressed.soft[index])
+    nt = pressed.nt[inside]
     rates = np.linalg.solve(nn, np.stack([np.ones(index.size), x, *nt.T], axis=1))
-    shear = np.linalg.solve(tt - nt.T @ rates[:, 2:], np.ones(index.size))
+    shear = np.linalg.solve(pressed.tt[inside] - nt.T @ rates[:, 2:], np.ones(index.size))
     return np.array([rates[:, 0].sum(), shear.sum(), x @ rates[:, 1]])
 
 
-def interpolate_stiffnesses(scene: Scene, pressed: Pressed, strip: int) -> np.ndarray:
-    """Return the stiffnesses of a strip for edges between the nodes."""
+def interpolate_stiffnesses(pressed: Pressed) -> np.ndarray:
+    """Return the stiffnesses for edges between the nodes."""
     x = pressed.x
-    if scene.layer.get("law", "") in ("exponential", "hertz"):
-        return find_stiffnesses(scene, pressed, strip, pressed.active[strip])
 
     # The set of the nodes between the edges, and the set with one more node at each edge
     inner = np.zeros(x.size, bool)
     fractions = []
-    for low, high in pressed.intervals[strip]:
+    for low, high in pressed.intervals:
         first, last = np.searchsorted(x, [low - 1e-12, high + 1e-12]) - [0, 1]
         inner[first : last + 1] = True
         if first > 0:
             fractions.append((x[first] - low) / (x[first] - x[first - 1]))
         if last < x.size - 1:
             fractions.append((high - x[last]) / (x[last + 1] - x[last]))
-    if not inner.any():
-        return np.zeros(3)
     outer = inner.copy()
     outer[1:] |= inner[:-1]
     outer[:-1] |= inner[1:]
     fraction = np.mean(fractions) if fractions else 0.0
-    values = [find_stiffnesses(scene, pressed, strip, nodes) for nodes in (inner, outer)]
+    values = [find_stiffnesses(pressed, nodes) for nodes in (inner, outer)]
     return (1 - fraction) * values[0] + fraction * values[1]
 
 
 def find_measures(scene: Scene, pressed: Pressed) -> dict:
     """Return the measures of a pressed patch by name."""
-    x = pressed.x
-    count = len(pressed.force)
-    stiffnesses = [interpolate_stiffnesses(scene, pressed, strip) for strip in range(count)]
-    normal, shear, turn = np.sum(stiffnesses, axis=0)
-    length = sum(high - low for strip in pressed.intervals for low, high in strip)
-    places = np.concatenate([part for part in pressed.intervals if part])
-    force = pressed.force.sum(axis=0)
-    can_rotate = scene.moment is not None
+    normal, shear, turn = interpolate_stiffnesses(pressed)
+    moment = pressed.force @ pressed.x
     out = {
-        "contact_fraction": length / count / (2 * scene.half),
-        "contact_half_width": np.ptp(places) / 2,
+        "contact_fraction": sum(high - low for low, high in pressed.intervals) / 2 / scene.half,
+        "contact_half_width": np.ptp(pressed.intervals) / 2,
         "pressure_peak": interpolate_peak(scene, pressed),
-        "approach": pressed.motion[0],
-        "rotation": scene.tilt - (pressed.motion[1] if can_rotate else 0.0),
-        "moment": force @ x,
-        "pressure_centre": force @ x / scene.load,
+        "approach": pressed.approach,
+        "rotation": scene.tilt,
+        "moment": moment,
+        "pressure_centre": moment / scene.load,
         "normal_stiffness": normal,
         "tangential_stiffness": shear,
         "rotational_stiffness": turn,
@@ -755,13 +532,12 @@ def find_measures(scene: Scene, pressed: Pressed) -> dict:
 
 def interpolate_peak(scene: Scene, pressed: Pressed) -> float:
     """Return the maximum of the pressure, of the polynomial through five nodes where it is smooth."""
-    pressure = pressed.force / pressed.weight
-    strip, largest = np.unravel_index(np.argmax(pressure), pressure.shape)
-    nodes = slice(largest - 2, largest + 3)
-    near = pressure[strip, nodes]
+    pressure = pressed.force / pressed.area
+    largest = np.argmax(pressure)
+    near = pressure[largest - 2 : largest + 3]
     if scene.step or not 2 <= largest < pressed.x.size - 2 or (near <= 0).any():
         return pressure.max()
-    places = pressed.x[nodes] - pressed.x[largest]
+    places = pressed.x[largest - 2 : largest + 3] - pressed.x[largest]
     places = places / places[4]
     curve = np.polynomial.Polynomial.fit(places, near, 4)
     return curve(np.linspace(places[1], places[3], 201)).max()
@@ -772,7 +548,7 @@ def press_levels(scene: Scene, levels=LEVELS) -> list[Pressed]:
     parts = []
     for k in range(N_SEARCHES):
         before = parts
-        parts = find_parts(scene, press(scene, parts, SEARCHES[min(k // 2, 1)]))
+        parts = find_parts(press(scene, parts, SEARCHES[min(k // 2, 1)]))
         if k > 1 and len(parts) == len(before):
             change = np.abs(np.subtract(parts, before)).max()
             if change < min(high - low for low, high in parts) / 100:
@@ -780,11 +556,11 @@ def press_levels(scene: Scene, levels=LEVELS) -> list[Pressed]:
     found = []
     for level in levels:
         found.append(press(scene, parts, level))
-        parts = find_parts(scene, found[-1])
+        parts = find_parts(found[-1])
     return found
 
 
-def solve_patch(contact: dict, trace_points=None) -> tuple[dict, dict]:
+def solve_patch(contact: dict) -> tuple[dict, dict]:
     """Return the measures of a table [contact] and their uncertainties by name.
 
     The uncertainty is the larger of the change to the last level and half of the change before it.
@@ -793,10 +569,8 @@ def solve_patch(contact: dict, trace_points=None) -> tuple[dict, dict]:
     ----------
     contact : dict
         Quantities as text in SI units, such as "0.01 m".
-    trace_points : (2, k) ndarray, optional
-        Positions and heights [m] of a gap.
     """
-    scene = read_scene(contact, trace_points)
+    scene = read_scene(contact)
     first, second, last = (find_measures(scene, pressed) for pressed in press_levels(scene))
     doubt = {
         name: max(abs(value - second[name]), abs(second[name] - first[name]) / 2)
@@ -805,18 +579,12 @@ def solve_patch(contact: dict, trace_points=None) -> tuple[dict, dict]:
     return last, doubt
 
 
-def find_parts(scene: Scene, pressed: Pressed) -> list:
+def find_parts(pressed: Pressed) -> list:
     """Return the intervals (from, to) [m] towards whose ends the next columns are graded."""
     x = pressed.x
     cells = np.diff(x)
-    pressure = pressed.force / pressed.weight
-    parts = [part for strip in pressed.intervals for part in strip]
-    if scene.layer.get("law", "") in ("exponential", "hertz"):
-        loaded = pressure > 1e-2 * pressure.max()
-        strips = (find_intervals(scene, x, *strip) for strip in zip(pressure, loaded))
-        parts = [part for strip in strips for part in strip]
     out = []
-    for low, high in parts:
+    for low, high in pressed.intervals:
         k = np.clip(np.searchsorted(x, (low + high) / 2) - 1, 0, cells.size - 1)
         least = cells[k] / 2
         out.append((min(low, (low + high) / 2 - least), max(high, (low + high) / 2 + least)))

@@ -1,18 +1,4 @@
-"""Random cases of sweeps that are marched together, against single runs of each case.
-
-    python tests/support/point_cases.py SEED COUNT [LAW ...]
-    python tests/support/point_cases.py SEED COUNT [LAW ...] --singles N
-
-draws COUNT cases of each law with one seed, computes them together and one by one with the tolerance TRUTH, and prints
-the share of stated errors that hold, by measure, with the largest ratios. Scenes have the tolerance 1e-3; the single
-run's stated error is the uncertainty of the truth. Cases that a single run computed are left out.
-
-With `--singles N`, N of the cases are drawn and computed one by one with the tolerance of the sweep; the differences are
-compared with the sum of both stated errors.
-"""
-
-import argparse
-from collections import defaultdict
+"""Random cases of sweeps that are marched together, and their answers beside those of single runs."""
 
 import numpy as np
 from campaigns import Row, strip_number
@@ -22,10 +8,8 @@ import patchfem as pf
 from patchfem.api import get_base_scene
 from patchfem.response import TABLE as MOTION
 from patchfem.runs import TABLE as STATIC
-from patchfem.runs.batch import lumped, one_by_one
 from patchfem.scene import format_assignments
 
-TRUTH = 1e-6  # tolerance of the single runs that are the truth
 MANY = 64  # number of cases of a study of which points are marched together
 SCENE = (
     '[normal]\nload = "30 N"\n[friction]\n{law}\n'
@@ -127,60 +111,3 @@ def compare_answers(sweep_answers, singles) -> list[list]:
             case_rows.append(Row(name, value, error, FLOORS[strip_number(name)], truth, doubt))
         out.append(case_rows)
     return out
-
-
-def compare_with_truth(law: str, seed: int, count: int) -> dict:
-    """Return by measure the ratios of true to stated error of cases marched together.
-
-    The outcome, and with it the steady amplitude, depends on the tolerance; both are not compared.
-    """
-    results = lumped.solve(draw_points(law, seed, count))
-    marched = [case for case in range(count) if results.numerics[case]["engine"] == lumped.ENGINE]
-    truths = draw_points(law, seed, count, TRUTH)
-    truth = one_by_one.solve([truths[case] for case in marched])
-    return list_ratios(results.select(np.array(marched)), truth)
-
-
-def compare_with_single_runs(law: str, seed: int, count: int, n_singles: int) -> dict:
-    """Return by measure the ratios of differences to the sum of both errors of drawn cases of a sweep and of single runs."""
-    models = draw_points(law, seed, count)
-    drawn = np.sort(np.random.default_rng(seed).choice(count, n_singles, replace=False))
-    results = lumped.solve(models).select(drawn)
-    return list_ratios(results, one_by_one.solve([models[case] for case in drawn]))
-
-
-def list_ratios(results, singles) -> dict:
-    """Return by measure the ratios of differences to the sum of both errors."""
-    ratios = defaultdict(list)
-    for rows in compare_answers(results, singles):
-        for row in rows:
-            missing = np.isnan(row.value) or np.isnan(row.truth)
-            size = max(row.error + row.doubt, 1e-3 * row.floor, 1e-9 * abs(row.value), 1e-300)
-            ratios[row.name].append(np.inf if missing else row.true_error / size)
-    ratios.pop(lumped.STEADY_AMPLITUDE, None)
-    return ratios
-
-
-def main() -> None:
-    """Print the shares of errors that hold for each law."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("seed", type=int)
-    parser.add_argument("count", type=int)
-    parser.add_argument("laws", nargs="*", metavar="LAW")
-    parser.add_argument("--singles", type=int)
-    request = parser.parse_args()
-    for law in request.laws or LAWS:
-        if request.singles:
-            ratios = compare_with_single_runs(law, request.seed, request.count, request.singles)
-        else:
-            ratios = compare_with_truth(law, request.seed, request.count)
-        print(f"{law}: {len(ratios[lumped.AMPLITUDE])} of {request.count} cases compared")
-        columns = ratios | {"all": [ratio for column in ratios.values() for ratio in column]}
-        for name, column in columns.items():
-            share = np.mean(np.array(column) <= 1)
-            largest = ", ".join(f"{one:.3g}" for one in sorted(column)[-3:])
-            print(f"  {name:40} {100 * share:6.1f} %  largest {largest}", flush=True)
-
-
-if __name__ == "__main__":
-    main()

@@ -26,7 +26,7 @@ import wear_scenes
 from campaigns import Row
 from patch_of_order_four import read_scene
 from scipy.ndimage import gaussian_filter1d
-from static_scenes import MATERIALS, BodySection, PatchScene, format_scene, read_contact
+from static_scenes import MATERIALS, BodySection, PatchScene, make_contact
 from surface_pairs import draw_surface
 from wear_scenes import WearScene
 
@@ -87,7 +87,7 @@ def draw_scene(seed: int) -> WearScene:
 
 def compute_depth(scene: WearScene, x) -> np.ndarray:
     """Return the depth (n,) [m] of both bodies at positions x (n,) [m] along the patch, without the package."""
-    patch = read_scene(read_contact(scene.patch), None)
+    patch = read_scene(make_contact(scene.patch))
     model = wear_scenes.discretize(patch, (-patch.half, patch.half), CELLS)
     depth = wear_scenes.integrate_depth(patch, model, scene, STEPS).depth
     return np.where(np.abs(x) <= patch.half, np.interp(x, model.x, depth), 0.0)
@@ -156,12 +156,8 @@ def write_pair(pair: WearPair, folder: Path) -> None:
     for name, (x, z) in (("before", pair.before), ("after", pair.after)):
         rows = [f"{a * 1e6:.3f},{b * 1e6:.5f}" for a, b in zip(x, z)]
         (folder / f"{name}.csv").write_text("\n".join(["x [um],z [um]", *rows, ""]), "utf-8")
-    scene = pair.scene
-    text = format_scene(scene.patch) + (
-        '[friction]\nlaw = "coulomb"\nstatic = 0.3\n[slide]\nkind = "sine"\nfrequency = "10 Hz"\ncycles = 2\n'
-        f'amplitude = "{scene.amplitude!r} m"\n[wear]\ncoefficient = "{pair.run_coefficient!r} m^2/N"\n'
-        f"upper_share = {pair.share!r}\ncycles = {scene.cycles!r}\n"
-    )
+    wear = {"coefficient": pair.run_coefficient, "upper_share": pair.share}
+    text = wear_scenes.format_scene(pair.scene, **wear)
     (folder / "scene.toml").write_text(text, "utf-8")
 
 

@@ -6,7 +6,6 @@ of 1e-3.
 
 from __future__ import annotations
 
-import tomllib
 from functools import partial
 from pathlib import Path
 from time import process_time
@@ -17,6 +16,7 @@ from campaigns import measure_rows
 from patch_of_order_four import solve_patch
 
 import patchfem as pf
+from patchfem.scene import format_scene as format_tables
 
 KINDS = ("plain", "crown", "h1", "step", "ends", "skin")
 MATERIALS = ((121e9, 0.32), (210e9, 0.3), (70e9, 0.34), (250e9, 0.24))
@@ -116,55 +116,46 @@ def draw_scene(seed: int) -> PatchScene:
     )
 
 
-def format_scene(scene: PatchScene) -> str:
-    """Return the scene as text."""
+def make_contact(scene: PatchScene) -> dict:
+    """Return the table [contact] of a scene, in SI units."""
 
-    def format_material(young, nu):
+    def make_material(young, poisson):
         """Return a material as a table of a scene."""
-        return f'{{young = "{young:.9g} Pa", poisson = {nu:.9g}, density = "5000 kg/m^3"}}'
+        return {"young": young, "poisson": poisson, "density": 5000.0}
 
-    rows = [
-        "[contact]",
-        f'length = "{scene.length!r} m"',
-        f'width = "{scene.width!r} m"',
-        f'height = "{scene.lower.height!r} m"',
-        f'load = "{scene.load!r} N"',
-        f'plane = "{scene.plane}"',
-        f"substrate = {format_material(*scene.lower.layers[1])}",
-    ]
+    table = {
+        "length": scene.length,
+        "width": scene.width,
+        "height": scene.lower.height,
+        "load": scene.load,
+        "plane": scene.plane,
+        "substrate": make_material(*scene.lower.layers[1]),
+        "tilt": {"angle": scene.tilt},
+    }
     for name, body in (("lower", scene.lower), ("upper", scene.upper)):
-        rows += [
-            f"[contact.{name}]",
-            f'length = "{body.length!r} m"',
-            f"substrate = {format_material(*body.layers[1])}",
-        ]
-        rows.append(
-            f'coating = {{material = {format_material(*body.layers[0])}, thickness = "{body.thickness!r} m"}}'
-            if body.thickness
-            else 'coating = "none"'
-        )
-    rows += ["[contact.tilt]", f'angle = "{scene.tilt!r} rad"']
+        material, thickness = make_material(*body.layers[0]), body.thickness
+        table[name] = {
+            "length": body.length,
+            "substrate": make_material(*body.layers[1]),
+            "coating": {"material": material, "thickness": thickness} if thickness else "none",
+        }
     if scene.curvature:
-        rows += ["[contact.crown]", f'radius = "{1 / scene.curvature!r} m"']
+        table["crown"] = {"radius": 1 / scene.curvature}
     if scene.step:
-        rows += ["[contact.step]", f'height = "{scene.step[0]!r} m"', f'at = "{scene.step[1]!r} m"']
+        table["step"] = dict(zip(("height", "at"), scene.step))
     if scene.skin:
-        rows += [
-            "[contact.asperities]",
-            'law = "linear"',
-            f'normal_stiffness = "{scene.skin!r} Pa/m"',
-        ]
-    return "\n".join(rows) + "\n"
+        table["asperities"] = {"law": "linear", "normal_stiffness": scene.skin}
+    return table
 
 
-def read_contact(scene: PatchScene) -> dict:
-    """Return the table [contact] of the text of a scene."""
-    return tomllib.loads(format_scene(scene))["contact"]
+def format_scene(scene: PatchScene, **tables) -> str:
+    """Return the scene as text, with further tables."""
+    return format_tables({"contact": make_contact(scene)} | tables)
 
 
 def solve_reference(scene: PatchScene) -> tuple:
     """Return the measures of the reference, and their uncertainties, by name."""
-    true, doubt = solve_patch(read_contact(scene))
+    true, doubt = solve_patch(make_contact(scene))
     doubt = {name: float(doubt[name]) for name in JUDGED}
     # The value is zero by symmetry; its uncertainty is a fraction of the terms of its difference.
     doubt["pressure_centre"] = max(doubt["pressure_centre"], 1e-6 * true["contact_half_width"])

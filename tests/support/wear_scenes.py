@@ -25,7 +25,6 @@ from patch_of_order_four import (
     condense_pieces,
     find_intervals,
     find_measures,
-    number,
     read_scene,
 )
 from wear_forms import worn_volume
@@ -68,12 +67,13 @@ def draw_scene(seed: int) -> WearScene:
     return WearScene(patch, coefficient, amplitude, cycles)
 
 
-def format_scene(scene: WearScene) -> str:
-    """Return the scene as text."""
-    return static_scenes.format_scene(scene.patch) + (
-        '[friction]\nlaw = "coulomb"\nstatic = 0.3\n[slide]\nkind = "sine"\nfrequency = "10 Hz"\ncycles = 2\n'
-        f'amplitude = "{scene.amplitude!r} m"\n[wear]\ncoefficient = "{scene.coefficient!r} m^2/N"\n'
-        f"cycles = {scene.cycles!r}\n"
+def format_scene(scene: WearScene, **wear) -> str:
+    """Return the scene as text, with keys of [wear] that differ."""
+    return static_scenes.format_scene(
+        scene.patch,
+        friction={"law": "coulomb", "static": 0.3},
+        slide={"kind": "sine", "frequency": 10.0, "cycles": 2, "amplitude": scene.amplitude},
+        wear={"coefficient": scene.coefficient, "cycles": scene.cycles} | wear,
     )
 
 
@@ -82,9 +82,8 @@ def discretize(scene: Scene, span: tuple, cells: int) -> Pressed:
     level = Level(1 / (8 * cells), 1 / 60, 0.5, cells, 5)
     x, weight, compliances = condense_pieces(scene, [span], level)
     area = weight * scene.width
-    layer = number(scene.layer["normal_stiffness"]) if scene.layer else np.inf
-    empty = np.zeros((1, x.size))
-    return Pressed(x, area, empty, *compliances, layer * area[None], np.zeros(1), empty, [])
+    empty = np.zeros(x.size)
+    return Pressed(x, area, *compliances, 1 / (scene.layer * area), empty, 0.0, empty, [])
 
 
 def solve_contact(compliance, gap, load: float, active=None) -> tuple:
@@ -134,9 +133,9 @@ class WornPatch(NamedTuple):
     active: np.ndarray
 
 
-def get_compliance(patch: Scene, model: Pressed) -> np.ndarray:
+def get_compliance(model: Pressed) -> np.ndarray:
     """Return the normal compliance (m, m) [m/N] of both pieces and the linear layer."""
-    return model.nn + np.diag(1 / model.slope[0])
+    return model.nn + np.diag(model.soft)
 
 
 def integrate_depth(patch: Scene, model: Pressed, scene: WearScene, steps: int) -> WornPatch:
@@ -144,11 +143,11 @@ def integrate_depth(patch: Scene, model: Pressed, scene: WearScene, steps: int) 
     edges = (
         np.expm1(np.linspace(0, 1, steps + 1) * np.log1p(1 / FIRST_STEP)) * FIRST_STEP * scene.path
     )
-    compliance, gap = get_compliance(patch, model), patch.gap(model.x)
+    compliance, gap = get_compliance(model), patch.gap(model.x)
     active = None
     depth = np.zeros(gap.size)
     for begin, end in pairwise(edges):
-        rate = scene.coefficient * (end - begin) / model.weight
+        rate = scene.coefficient * (end - begin) / model.area
         force, approach, active = solve_contact(
             compliance + np.diag(rate), gap + depth, patch.load, active
         )
@@ -159,17 +158,15 @@ def integrate_depth(patch: Scene, model: Pressed, scene: WearScene, steps: int) 
 def compute_measures(patch: Scene, model: Pressed, scene: WearScene, steps: int) -> dict:
     """Return the measures after wear that is integrated in `steps` steps."""
     depth, force, approach, active = integrate_depth(patch, model, scene, steps)
-    intervals = [find_intervals(patch, model.x, force / model.weight, active)]
-    worn = model._replace(
-        force=force[None], motion=np.array([approach]), active=active[None], intervals=intervals
-    )
+    intervals = find_intervals(patch, model.x, force / model.area, active)
+    worn = model._replace(force=force, approach=approach, active=active, intervals=intervals)
     return find_measures(patch, worn) | {"worn_depth_max": float(depth.max())}
 
 
 def find_contact_span(patch: Scene, model: Pressed, scene: WearScene) -> tuple:
     """Return the smallest and largest position in contact before and after wear."""
-    compliance, gap = get_compliance(patch, model), patch.gap(model.x)
-    rate = scene.coefficient * scene.path / model.weight
+    compliance, gap = get_compliance(model), patch.gap(model.x)
+    rate = scene.coefficient * scene.path / model.area
     new = solve_contact(compliance, gap, patch.load)[2]
     worn = solve_contact(compliance + np.diag(rate), gap, patch.load)[2]
     positions = model.x[new | worn]
@@ -178,7 +175,7 @@ def find_contact_span(patch: Scene, model: Pressed, scene: WearScene) -> tuple:
 
 def solve_scene(scene: WearScene) -> dict:
     """Return the measures after wear: name -> (value, uncertainty)."""
-    patch = read_scene(static_scenes.read_contact(scene.patch), None)
+    patch = read_scene(static_scenes.make_contact(scene.patch))
     half = patch.half
     span = (-half, half)
     for _ in range(3):

@@ -263,7 +263,6 @@ def assert_resumes_to_same_files(whole_sweep: tuple, out: Path) -> None:
     ) == file_names(expected)
 
 
-@pytest.mark.slow
 def test_exact_killed_sweep_resumes_to_same_files(whole_sweep, tmp_path):
     """A sweep that is killed can be resumed to the same files."""
     path, over, _ = whole_sweep

@@ -1,15 +1,9 @@
-"""The folder of a sweep: it survives kills and damaged files, and computes only what is missing."""
+"""The folder of a sweep: it survives damaged files, and computes only what is missing."""
 
 import csv
 import json
-import os
 import shutil
-import signal
-import subprocess
-import sys
-import time
 
-import h5netcdf
 import numpy as np
 import pytest
 import xarray as xr
@@ -104,33 +98,6 @@ def test_exact_resumed_sweep_computes_what_is_missing(scene_file, tmp_path, monk
     assert [row["friction.static"] for row in read_rows(folder)] == ["0.2", "0.3", "0.4", "0.5"]
     assert run_sweep("0.2,0.3") == 2
     assert len(list((folder / "cases").iterdir())) == 2
-
-
-@pytest.mark.parametrize(
-    "executor", [("-j", "2"), pytest.param(("--executor", "dask"), marks=pytest.mark.slow)]
-)
-def test_exact_killed_sweep_resumes_to_same_bytes(scene_file, tmp_path, executor):
-    """A sweep that is killed twice resumes to the bytes of an undisturbed one; no chunk is ever incomplete."""
-    # all cases slip, so that they are computed together whatever their chunk is
-    over = ("--over", "friction.static=0.02..0.1:6000")
-    words = [sys.executable, "-m", "patchfem", "sweep", str(scene_file), *over, "--keep", "none"]
-    whole = tmp_path / "whole"
-    subprocess.run([*words, "-q", "-o", whole], check=True)
-    folder = tmp_path / "killed"
-    words += ["-q", "-o", folder, "--resume", *executor]
-    for _ in range(2):
-        n_before = len(list(folder.glob("chunks/*.nc")))
-        process = subprocess.Popen(words, stdout=subprocess.DEVNULL, start_new_session=True)
-        while process.poll() is None and len(list(folder.glob("chunks/*.nc"))) <= n_before:
-            time.sleep(0.02)
-        assert process.poll() is None
-        os.killpg(process.pid, signal.SIGKILL)
-        process.wait()
-        for path in folder.glob("chunks/[0-9a-f]*.nc"):
-            with h5netcdf.File(path, "r") as file:
-                assert file["name"].shape[0] > 0
-    subprocess.run(words, check=True, stdout=subprocess.DEVNULL)
-    assert (folder / "sweep.csv").read_bytes() == (whole / "sweep.csv").read_bytes()
 
 
 def test_exact_shards_give_same_files(swept, scene_file, tmp_path):
