@@ -26,6 +26,10 @@ PUBLIC = {
         "is_sinusoidal",
     ),
     "drives": ("make_release",),
+    "histories": (
+        "find_accelerations",
+        "make_response",
+    ),
     "places": (
         "DIRECTION_NAMES",
         "note_missing_mass",

@@ -19,7 +19,6 @@ from ...core import (
     Response,
     SineDrive,
 )
-from ...dynamics.integrated import find_accelerations
 from ...hybrid import cases, periodic
 from ...hybrid import runs as engine
 from ...hybrid.laws import is_rigid
@@ -43,6 +42,7 @@ from ...structure.drive_sizes import (
     is_periodic,
     is_sinusoidal,
 )
+from ...structure.histories import find_accelerations
 from . import strips
 from .evaluation import RunEvaluator, compute_sampled_work, compute_work_check, thin_samples
 from .hybrid_laws import Joints, make_joints
