@@ -123,12 +123,12 @@ def test_exact_backbone_accepts_amplitudes_in_any_form(amplitudes):
         (
             pf.new("bench"),
             {"starts": 3, "leave_out": "cycle"},
-            "leave_out applies only to fits to rows of a rig, and this is a fit to a loop",
+            "leave-out applies only to fits to rows of a rig; leave this option out",
         ),
         (
             pf.new("bench"),
             {"leave_out": "frequency"},
-            "leave_out applies only to fits to rows of a rig",
+            "leave-out applies only to fits to rows of a rig",
         ),
         (pf.new("wear"), {"hold": "frequency=1 Hz"}, "hold applies only to fits to a loop"),
         (BLOCK, {"starts": 0}, "at least one"),

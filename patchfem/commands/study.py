@@ -175,9 +175,7 @@ def fit(
     is_short = fit_requests.choose_kind(loaded_scene, to) in ("loop", "curve")
     with Progress(output.is_quiet or output.as_json or is_short) as progress:
         report = None if output.is_quiet else print_message
-        listener = fit_requests.Listener(
-            report, progress, lambda name: f"--{name.replace('_', '-')}"
-        )
+        listener = fit_requests.Listener(report, progress)
         answer = fits.fit_into(
             loaded_scene,
             to,

@@ -213,7 +213,7 @@ def _describe_search(fit: FittedLoop | FittedCurve | FittedRows) -> dict:
         "correlation": intervals.correlation,
         "evaluations": keys.fit.counts.evaluations,
         "failures": keys.fit.counts.failures,
-        "descents_agreed": keys.fit.n_agreed,
+        "descents_agreed": keys.fit.descents.n_best,
         "warnings": keys.warnings,
         "seconds": round(keys.seconds, 6),
     }

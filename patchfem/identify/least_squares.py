@@ -31,7 +31,6 @@ MAX_EVALUATIONS = 100  # largest number of evaluations in one descent, without J
 EXACT_FIT_RATIO = 1e-9
 # A descent has reached the best minimum if the ratio of its residual to the smallest one is at most this value.
 SAME_MINIMUM_RATIO = 1.01
-SAME_RESULT_RATIO = 1 + 5e-7  # largest ratio of the residuals of equal results
 # Largest distance from a bound at which a parameter is tried on the bound, relative to its range.
 NEAR_BOUND_FRACTION = 1e-3
 # Number of trial points per parameter for the choice of the starting points.
@@ -80,11 +79,7 @@ class Descents(NamedTuple):
     @property
     def n_best(self) -> int:
         """Number of descents that ended within 1 % of the smallest residual."""
-        return self.count_within(SAME_MINIMUM_RATIO)
-
-    def count_within(self, ratio: float) -> int:
-        """Return the number of descents whose residual is at most a ratio times the smallest one."""
-        return int((self.rms <= np.nanmin(self.rms) * ratio).sum())
+        return int((self.rms <= np.nanmin(self.rms) * SAME_MINIMUM_RATIO).sum())
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -108,11 +103,6 @@ class Fit:
     counts: SearchCounts
     outcome: Outcome
     descents: Descents
-
-    @property
-    def n_agreed(self) -> int:
-        """Number of descents that ended at the smallest residual, apart from round-off."""
-        return self.descents.count_within(SAME_RESULT_RATIO)
 
     def count_earlier_search(self, earlier: "Fit") -> "Fit":
         """Return this fit with evaluations and descents of an earlier search, which gave its only start."""

@@ -8,7 +8,6 @@ import numpy as np
 from scipy.optimize import brentq
 
 from ...core import NotConverged, PatchfemError
-from ...effects import law_has_trait
 from ...formatting import format_length
 from ...model.model import Model
 from ...model.source import locate_errors
@@ -276,9 +275,8 @@ def _fit_exponents(joint: JointMode, curve: Curve | None) -> LossExponents:
     two points. A loss counts if it exceeds MIN_LOSS_RATIO times its error and the round-off of the
     energy.
     """
-    theory = _theoretical_exponent(joint)
     if curve is None or curve.amplitude.size < 2 or not joint.friction_limit:
-        return LossExponents(micro_theory=theory)
+        return LossExponents()
     amplitude = curve.amplitude
     loss = curve.loss
     speed = 2 * np.pi * curve.frequency * amplitude / joint.reach
@@ -297,22 +295,7 @@ def _fit_exponents(joint: JointMode, curve: Curve | None) -> LossExponents:
             ends = points[[first, -1]]
             slope = float(np.diff(np.log(loss[ends]))[0] / np.diff(np.log(amplitude[ends]))[0])
         slopes.append(slope)
-    return LossExponents(*slopes, theory)
-
-
-def _theoretical_exponent(joint: JointMode) -> float | None:
-    """Return the theoretical loss exponent in micro-slip; None if no theory applies.
-
-    It is chi + 3 for sliders (Segalman 2005), and 3 for bonds and for pieces whose pressure falls
-    to 0 at the edges of the contact (Cattaneo, Mindlin).
-    """
-    friction = joint.model.friction
-    if friction is None or not joint.friction_limit:
-        return None
-    if law_has_trait(friction.law, "cells"):
-        return friction.chi + 3
-    is_elastic = joint.model.partial_slip or joint.model.rig.friction.has_partial_slip
-    return 3.0 if law_has_trait(friction.law, "bonds") or is_elastic else None
+    return LossExponents(*slopes)
 
 
 def _find_flutter_amplitude(joint: JointMode, curves: dict[str, Curve]) -> float | None:

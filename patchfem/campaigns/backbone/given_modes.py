@@ -49,7 +49,7 @@ def prepare_model(build: Callable, modes: str | Iterable = "") -> PreparedModel:
     """
     tables = BackboneTables(parse_modes(modes) if modes else (), stuck=False)
     model = build(tables, is_written=False)
-    notes = _note_ignored_tables(tables.ignored)
+    notes = tuple(IGNORED_TABLE_NOTE.format(table=name) for name in tables.ignored)
     if not tables.modes:
         return PreparedModel(model, notes)
     given_modes = tables.modes
@@ -108,11 +108,6 @@ def _assume_slides(modes: tuple, stiffness_per_mass: float) -> tuple:
 def _assumed_fraction(n_modes: int) -> float:
     """Return the fraction of the stiffness of each mode that is assumed to be due to the joint."""
     return min(ASSUMED_JOINT_FRACTION, MAX_JOINT_FRACTION / n_modes)
-
-
-def _note_ignored_tables(names: list[str]) -> tuple[str, ...]:
-    """Return a note on each table of the scene that is ignored."""
-    return tuple(IGNORED_TABLE_NOTE.format(table=f"[{name}]") for name in names)
 
 
 def _note_modes(modes: tuple, *, is_assumed: bool, is_stuck: bool) -> tuple:

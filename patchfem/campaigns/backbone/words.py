@@ -2,7 +2,6 @@
 
 import numpy as np
 
-from ...effects import law_has_trait
 from ...formatting import format_length, format_number, format_quantity
 from ...runs.patch import faces
 from .joint import JointMode
@@ -50,7 +49,7 @@ def write_notes(joint: JointMode, amplitudes, backbone: Backbone) -> tuple[str, 
         notes += _note_gaps(amplitudes, method, curve)
         notes += _note_missing_forces(joint, method, curve)
     if not joint.is_linear:
-        if backbone.exponents.micro_theory is not None and backbone.exponents.micro is None:
+        if (joint.has_cells or joint.has_partial_slip) and backbone.exponents.micro is None:
             edge = format_length(MAX_MICRO_SLIP_RATIO * joint.slip_amplitude, 2)
             notes.append(
                 f"the exponent of micro-slip cannot be determined: fewer than two amplitudes below {edge} have an energy "
@@ -150,10 +149,7 @@ def _describe_slip(joint: JointMode, curve: Curve) -> list[str]:
         f"At the stiffness of the sticking contact, friction would reach its limit at {edge}."
     ]
     # Micro-slip has no onset: the smallest slider of a mesh or of a density sets where its loss begins.
-    model = joint.model
-    has_partial_slip = model.partial_slip or model.rig.friction.has_partial_slip
-    laws = [interface.numbers.law for interface in model.rig.friction.interfaces]
-    if has_partial_slip or any(law_has_trait(law, "cells") for law in laws):
+    if joint.has_cells or joint.has_partial_slip:
         return sentences
     slips = curve.loss > ROUND_OFF_ERROR * joint.spring * (curve.amplitude / joint.reach) ** 2
     count = int(np.argmax(slips)) if slips.any() else curve.amplitude.size

@@ -53,12 +53,10 @@ class Listener:
 
     - say: takes a line of text.
     - progress: takes the completed fraction, from 0 to 1.
-    - format_option: takes the name of an option and returns its spelling for the caller.
     """
 
     say: Callable | None = None
     progress: Callable | None = None
-    format_option: Callable = str
 
 
 DEFAULT_OPTIONS = FitOptions()

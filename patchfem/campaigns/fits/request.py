@@ -1,8 +1,7 @@
 """Fit of keys of a scene to a measurement: the tables of the scene and the file choose the kind of fit."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from typing import NamedTuple
 
 from ...core import PatchfemError
 from ...inputs.measured import COLUMN_UNITS, TABLE_FORMAT
@@ -15,20 +14,18 @@ from .loop import FittedLoop, fit_hysteresis_loop
 from .problem import FitOptions, Listener, parse_ranges
 from .wear import FittedCoefficient, fit_wear
 
-
-class Kind(NamedTuple):
-    """Kind of fit: what is fitted, and the options that it has."""
-
-    target: str
-    options: tuple[str, ...] = ()
-
-
+# options of each kind of fit
 KINDS = {
-    "loop": Kind("a loop under a prescribed slide", ("hold",)),
-    "rows": Kind("rows of a rig", ("hold", "starts", "leave_out")),
-    "curve": Kind("frequency and damping of a rig against amplitude", ("starts",)),
-    "wear": Kind("a worn depth"),
+    "loop": ("hold",),
+    "rows": ("hold", "leave_out", "starts"),
+    "curve": ("starts",),
+    "wear": (),
 }
+TARGETS = {
+    "hold": "a loop under a prescribed slide or rows of a rig",
+    "leave_out": "rows of a rig",
+    "starts": "rows of a rig or frequency and damping of a rig against amplitude",
+}  # what is fitted with an option
 
 
 def fit_measurement(
@@ -58,11 +55,9 @@ def fit_measurement(
         If the model cannot be computed at any starting point.
     """
     kind = choose_kind(scene, to)
-    check_options(kind, options, listener.format_option)
+    check_options(kind, options)
     if not to:
-        raise PatchfemError(
-            f"{listener.format_option('to')} MEASURED and {listener.format_option('free')} KEYS are needed"
-        )
+        raise PatchfemError("--to MEASURED and --free KEYS are needed")
     ranges = parse_ranges(free)
     if kind == "wear":
         return fit_wear(build(scene), to, ranges, listener.progress)
@@ -98,18 +93,13 @@ def choose_kind(scene: Scene, to: str) -> str:
     )
 
 
-def check_options(kind: str, options: FitOptions, format_option: Callable) -> None:
-    """Raise PatchfemError if an option is invalid or belongs to another kind of fit than a key of KINDS.
-
-    format_option: function that turns the name of an option into the words of a message.
-    """
-    for name in ("hold", "leave_out", "starts"):
-        targets = [other.target for other in KINDS.values() if name in other.options]
-        if getattr(options, name) and KINDS[kind].target not in targets:
+def check_options(kind: str, options: FitOptions) -> None:
+    """Raise PatchfemError if an option is invalid or belongs to another kind of fit than a key of KINDS."""
+    for name, target in TARGETS.items():
+        if getattr(options, name) and name not in KINDS[kind]:
             raise PatchfemError(
-                f"{format_option(name)} applies only to fits to {' or '.join(targets)}, and this is a fit to "
-                f"{KINDS[kind].target}; leave this option out"
+                f"--{name.replace('_', '-')} applies only to fits to {target}; leave this option out"
             )
     starts = options.starts
     if starts is not None and (not isinstance(starts, int) or starts < 1):
-        raise PatchfemError(f"{format_option('starts')} {starts}: at least one is needed")
+        raise PatchfemError(f"--starts {starts}: at least one is needed")
