@@ -15,6 +15,7 @@ from ..model.source import locate_errors
 from ..runs.patch import trace_split
 from ..scene import scene, toml_text
 from ..scene.files import require_files
+from ..surface.roughness import form as forms
 from .shared import (
     Json,
     Output,
@@ -47,6 +48,9 @@ def profile(
     cutoff: text_option(
         'wavelength that separates roughness from waviness (L-filter), such as "0.25 mm"'
     ) = "",
+    form: text_option(
+        "form to subtract first, such as 1 (a line or a plane), or circle for a trace over a cylinder or a ball"
+    ) = "1",
     s_filter: text_option(
         'wavelength of the S-filter, such as "2.5 um"; shorter waves are removed first'
     ) = "",
@@ -77,12 +81,13 @@ def profile(
         if options[key] is not None and options[key] <= 0:
             raise UsageError(f"profile --{name} {text}: a length above zero is needed")
     if split is not None:
-        if more or s_filter or window or units or verbose:
+        if more or form != "1" or s_filter or window or units or verbose:
             raise UsageError(
-                "profile --split: takes one FILE, without --s-filter, --window, --units and --verbose"
+                "profile --split: takes one FILE, without --form, --s-filter, --window, --units and --verbose"
             )
         _print_split(file, split, options["cutoff"], out, json_=json_)
         return
+    options["form"] = forms.parse_form_option(form)
     paths = (file, *more)
     output = Output(out, json_, plot=plot, is_verbose=verbose)
     if out is not None:

@@ -27,6 +27,7 @@ PUBLIC = {
         "Quantity",
     ),
     "roughness.filter": ("mean_line",),
+    "roughness.form": ("parse_form_option",),
     "roughness.peaks": (
         "Moments",
         "PERSSON",

@@ -18,7 +18,6 @@ from . import sentences
 from .variables import make_variables, maps
 
 KINDS = {"profile": "traces", "areal": "scans"}
-FORMS = {"profile": "line", "areal": "plane"}  # what is subtracted first
 CONFIDENCE = 0.9  # probability of the interval of a parameter of a single trace, from 5 to 95 %
 MAX_SIZE_RATIO = (
     1.001  # of lengths or steps of several files, above which their means mix quantities
@@ -49,7 +48,7 @@ def answer_files(paths: list[Path], units: tuple[str, str] | None = None, **opti
     units : tuple of str, optional
         Units of x (and y) and of z, for files that state none.
     **options
-        `cutoff`, `window`, `short` of `surface.roughness.report.make_report`.
+        `cutoff`, `window`, `form`, `short` of `surface.roughness.report.make_report`.
 
     Returns
     -------
@@ -163,7 +162,7 @@ def describe_treatment(each: RoughnessReport) -> str:
     text = f"{shape} heights over {format_length(size.length)}, every {format_length(size.step)}"
     if size.measured not in (None, size.shape[-1]):
         text = f"{size.measured} heights, resampled to {text}"
-    text += f", about the least-squares {FORMS[each.kind]}"
+    text += f", about the least-squares {treatment.form}"
     if treatment.window is not None:
         text += f", window {', '.join(map(format_length, treatment.window))}"
     if treatment.short:
@@ -192,7 +191,7 @@ def report_to_dict(each: RoughnessReport) -> dict:
         "shape": list(size.shape),
         "cutoff": treatment.cutoff,
         "window": None if treatment.window is None else list(treatment.window),
-        "form": FORMS[each.kind],
+        "form": treatment.form,
         "s_filter": treatment.short,
         "confidence": CONFIDENCE if any(value.low is not None for value in each.values) else None,
         "measures": sentences.to_json({value.name: value for value in each.values}),

@@ -8,12 +8,13 @@ from scipy import special
 
 from ...core import PatchfemError, frozen_array
 from ...formatting import format_length
-from ..areal import Areal, find_scan_spikes, level_plane
-from ..profile import Profile, find_spikes, level, measure_step, resample_evenly
+from ..areal import Areal, find_scan_spikes
+from ..profile import Profile, find_spikes, measure_step, resample_evenly
 from ..quantity import Quantity
 from ..spectrum import BAND, WaveSpectrum, wave_spectrum
 from .areal import AREAL, compute_areal_parameters
 from .filter import filter_surface
+from .form import subtract_form
 from .parameters import (
     MIN_SAMPLES,
     MIN_SECTIONS,
@@ -42,20 +43,21 @@ class Sampling(NamedTuple):
 
 
 class Treatment(NamedTuple):
-    """Filters and window that were applied to a surface.
+    """Form removal, filters and window that were applied to a surface.
 
-    short: nesting index of the S-filter; cutoff: between
+    form: name of the least-squares form; short: nesting index of the S-filter; cutoff: between
     waviness and roughness, for a scan the nesting index of the L-filter; window: first and last
     position, for a scan in x and then in y; all in m.
     """
 
+    form: str
     short: float | None
     cutoff: float | None
     window: tuple[float, ...] | None
 
 
 class TraceParts(NamedTuple):
-    """Primary profile, waviness, roughness and spectrum of a trace about its line."""
+    """Primary profile, waviness, roughness and spectrum of a trace after form removal."""
 
     primary: Profile
     waviness: Profile | None
@@ -94,9 +96,10 @@ def make_report(
     surface: Profile | Areal,
     cutoff: float | None = None,
     window: tuple[float, ...] | None = None,
+    form: int | str = 1,
     short: float | None = None,
 ) -> RoughnessReport:
-    """Compute the roughness parameters of a trace about its least-squares line, or of a scan about its plane.
+    """Compute the roughness parameters of a trace or a scan.
 
     Parameters
     ----------
@@ -107,6 +110,8 @@ def make_report(
         alone.
     window : tuple of float, optional
         Positions [m] of the first and the last sample, of a scan in x, then in y.
+    form : int or str
+        1 (a line or a plane) or "circle".
     short : float, optional
         Nesting index [m] of the S-filter.
     """
@@ -117,11 +122,10 @@ def make_report(
             f"{part.source}: {part.x.size} samples; the parameters need at least {MIN_SAMPLES}"
         )
     whole = part if is_scan else resample_evenly(part)
-    subtract_form = level_plane if is_scan else level
-    primary = subtract_form(whole)
+    primary, form_name = subtract_form(whole, form)
     if short is not None:
-        # The filter changes the plane or line, so that it is subtracted again after it.
-        primary = subtract_form(filter_surface(primary, short)[0])
+        # The filter changes the plane or line, so the form is subtracted again after it.
+        primary = subtract_form(filter_surface(primary, short)[0], form)[0]
     # A straight line has heights of round-off, of which parameters would be made.
     if np.nanmax(np.abs(primary.z)) <= ROUND_OFF * np.nanmax(np.abs(whole.z)):
         primary = replace(primary, z=frozen_array(primary.z * 0.0))
@@ -144,7 +148,7 @@ def make_report(
             whole.z.shape,
             None if is_scan else part.x.size,
         ),
-        treatment=Treatment(short, cutoff, window),
+        treatment=Treatment(form_name, short, cutoff, window),
         values=tuple(quantities),
         notes=whole.notes + _describe_spikes(part) + notes,
         surface=parts,

@@ -6,6 +6,7 @@ from scipy.stats import norm
 
 from patchfem.core import PatchfemError
 from patchfem.surface import Profile, fitting_cutoff, make_report
+from patchfem.surface.roughness.form import parse_form_option, subtract_form
 from patchfem.surface.roughness.parameters import compute_core, compute_parameters
 
 UM = 1e-6
@@ -91,6 +92,16 @@ def test_always_intervals_hold_the_mean_of_a_rough_surface():
     assert 0.8 * 30 <= held
 
 
+@pytest.mark.parametrize("sign", [1, -1])
+def test_exact_circle_is_removed_from_trace(sign):
+    """A circle of 5 mm radius in a trace of 4 mm is removed to 0.1 nm, and its radius is stated."""
+    x = np.arange(4001) * UM
+    z = sign * np.sqrt((5 * MM) ** 2 - (x - 1.6 * MM) ** 2)
+    flat, name = subtract_form(make_trace(z), "circle")
+    assert np.abs(flat.z).max() < 1e-10
+    assert name == f"circle of radius 5 mm, a {'crest' if sign > 0 else 'trough'}"
+
+
 def test_exact_window_keeps_samples_between_cursors():
     """A window runs from the last sample at or before its beginning to the last at or before its end."""
     z = np.random.default_rng(1).normal(size=200) * UM
@@ -133,9 +144,11 @@ def test_exact_fitting_cutoff_is_longest_standard_one(length, expected):
             lambda: make_report(make_trace(np.zeros(99)), window=(0.0,)),
             "a window needs a first and a last position along x",
         ),
+        (lambda: parse_form_option("2"), "use 1"),
+        (lambda: subtract_form(make_trace([0.0, 1.0]), "circle"), "needs at least 10"),
     ],
 )
 def test_refuses_what_heights_do_not_determine(call, message):
-    """Too few samples and a window that is none are refused."""
+    """Too few samples, a window that is none, and forms that were removed are refused."""
     with pytest.raises(PatchfemError, match=message):
         call()

@@ -1,0 +1,74 @@
+"""Form of a surface, which is not roughness: a line, a plane, or a circle under a trace."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from ...core import PatchfemError, frozen_array
+from ...formatting import format_length
+from ..areal import Areal, level_plane
+from ..profile import Profile, level
+
+CIRCLE = "circle"
+MIN_HEIGHTS = 10  # smallest number of heights that determine a circle
+
+
+def parse_form_option(text: str) -> int | str:
+    """Parse the option that names the form to subtract: 1 (a line or a plane), or circle."""
+    text = text.strip()
+    if text == "1":
+        return 1
+    if text in (CIRCLE, "cylinder"):
+        return CIRCLE
+    raise PatchfemError(
+        f"the form '{text}' is not possible; use 1 (a line or a plane) or {CIRCLE} (of a trace); polynomials "
+        "were removed in 2.0"
+    )
+
+
+def subtract_form(surface: Profile | Areal, form: int | str = 1) -> tuple[Profile | Areal, str]:
+    """Subtract the least-squares form of a surface; return the remainder and the name of the form.
+
+    Raises PatchfemError if the heights do not determine it, and for a circle under a scan.
+    """
+    if isinstance(surface, Areal):
+        if form == CIRCLE:
+            raise PatchfemError(
+                f"{surface.source}: the form of a scan is its plane; cylinders were removed in 2.0, so "
+                "evaluate one line of the scan with --form circle"
+            )
+        return level_plane(surface), "plane"
+    if form != CIRCLE:
+        return level(surface), "line"
+
+    known = ~surface.missing
+    if known.sum() < MIN_HEIGHTS:
+        raise PatchfemError(
+            f"{surface.source}: {known.sum()} heights; a circle needs at least {MIN_HEIGHTS}"
+        )
+    from scipy.optimize import least_squares
+
+    # The sine of the slope of a circle is linear along x, so a large radius is well conditioned.
+    size = surface.length / 2
+    x = (surface.x - (surface.x[0] + surface.x[-1]) / 2) / size
+    start = np.polyfit(x[known], surface.z[known] / size, 2)[::-1] * [1, 1, 2]
+    fitted = least_squares(
+        lambda state: _evaluate_circle(state, x[known]) - surface.z[known] / size,
+        start,
+        x_scale="jac",
+        xtol=1e-14,
+        ftol=1e-14,
+        gtol=1e-14,
+    ).x
+    radius = format_length(size / max(abs(fitted[2]), 1e-12), 4)
+    name = f"circle of radius {radius}, a {'crest' if fitted[2] < 0 else 'trough'}"
+    remainder = surface.z - size * _evaluate_circle(fitted, x)
+    return replace(surface, z=frozen_array(remainder)), name
+
+
+def _evaluate_circle(state, x) -> np.ndarray:
+    """Return the heights of a circle: level, sine of the slope in the middle, curvature."""
+    height, sine, curvature = state
+    sine = np.clip(sine, -1, 1)
+    end = np.clip(sine + curvature * x, -1, 1)
+    return height + x * (sine + end) / (np.sqrt(1 - sine**2) + np.sqrt(1 - end**2))
