@@ -26,7 +26,7 @@ from typing import TYPE_CHECKING, Any
 from .campaigns import cost as cost_curves
 from .campaigns.backbone import request as backbone_requests
 from .campaigns.fits import request as fit_requests
-from .campaigns.fits.request import FitOptions
+from .campaigns.fits.options import FitOptions
 from .campaigns.sweeps import case_models as case_models
 from .campaigns.sweeps import executors, parse_request
 from .core import Measure, Missing, NotConverged, Outcome, PatchfemError

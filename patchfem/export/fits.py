@@ -13,7 +13,8 @@ import numpy as np
 from .. import __version__
 from ..campaigns.fits.curve import EXTENT, FittedCurve
 from ..campaigns.fits.loop import FittedLoop
-from ..campaigns.fits.problem import FitOptions, Listener
+from ..campaigns.fits.options import FitOptions
+from ..campaigns.fits.problem import Listener
 from ..campaigns.fits.request import fit_measurement
 from ..campaigns.fits.wear import COEFFICIENT_KEY, FittedCoefficient
 from ..campaigns.rows.fit import FittedRows

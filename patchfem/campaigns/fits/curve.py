@@ -26,7 +26,8 @@ from ...response.errors import convergence_error
 from ...scene.assignments import Range
 from ...scene.scene import Scene
 from ..backbone.curves import compute_backbone
-from .problem import DEFAULT_OPTIONS, FitOptions, FittedKeys, FreeKeys
+from .options import FitOptions
+from .problem import DEFAULT_OPTIONS, FittedKeys, FreeKeys
 
 UNITS = {
     "amplitude": {"m": 1.0, "mm": 1e-3, "um": 1e-6},

@@ -21,7 +21,8 @@ from ...runs.bench.bench import run_bench
 from ...runs.bench.engine import choose_smooth_bond_summation
 from ...scene.assignments import Range
 from ...scene.scene import Scene, SceneError
-from .problem import DEFAULT_OPTIONS, FitOptions, FittedKeys, FreeKeys, solve_contact
+from .options import FitOptions
+from .problem import DEFAULT_OPTIONS, FittedKeys, FreeKeys, solve_contact
 
 # Number of time steps between two rows at which the steps are not halved any more.
 MAX_STEPS_PER_ROW = 64

@@ -11,7 +11,8 @@ from ...scene.scene import Scene
 from ..rows.fit import FittedRows, fit_rows
 from .curve import HEADER, UNITS, FittedCurve, fit_curve
 from .loop import FittedLoop, fit_hysteresis_loop
-from .problem import FitOptions, Listener, parse_ranges
+from .options import FitOptions
+from .problem import Listener, parse_ranges
 from .wear import FittedCoefficient, fit_wear
 
 # options of each kind of fit

@@ -16,7 +16,8 @@ from ...identify.advice import advise_test
 from ...identify.least_squares import Descents, Fit, Search
 from ...scene.assignments import Range
 from ...scene.scene import Scene
-from ..fits.problem import SILENT, FitOptions, FittedKeys, Listener
+from ..fits.options import FitOptions
+from ..fits.problem import SILENT, FittedKeys, Listener
 from .cells import MAX_LOG_RATIO, Readings, compute_rms_scores, read_response_table
 from .condition_models import ConditionModels
 from .model_readings import ModelReadings
