@@ -26,7 +26,7 @@ from typing import TYPE_CHECKING, Any
 from .campaigns import cost as cost_curves
 from .campaigns.backbone import request as backbone_requests
 from .campaigns.fits import request as fit_requests
-from .campaigns.fits.request import FitOptions
+from .campaigns.fits.options import FitOptions
 from .campaigns.sweeps import case_models as case_models
 from .campaigns.sweeps import executors, parse_request
 from .core import Measure, Missing, NotConverged, Outcome, PatchfemError
@@ -428,7 +428,7 @@ def cost(
         `runs`. Each run has its `label`, `tolerance`, CPU `seconds`, `wall_seconds`, the `worst` measure with its error
         (relative to the allowed error at a tolerance of 1), `meets_tolerance`, the advice from its warnings as `remedies`,
         and for each measure its value in `values` and its error estimate in `errors`, in SI units. For a setting,
-        the entry has `cheapest` and `sentence`.
+        the entry has `sentence`.
 
     Raises
     ------
@@ -569,7 +569,6 @@ def sweep(
     draw: int = 0,
     seed: int = 0,
     sobol: bool = False,
-    of: str = "",
     jobs: int = 1,
     executor: str = "",
     resume: bool = False,
@@ -592,8 +591,6 @@ def sweep(
         Seed of the random numbers.
     sobol : bool
         Whether the random cases form a Sobol sequence instead of independent samples.
-    of : str
-        Measure of the attribute `answer`, such as "equivalent_damping".
     jobs : int
         Number of processes.
     executor : str
@@ -630,9 +627,9 @@ def sweep(
         raise SceneError(mistakes)
     if empty := [key for key, values in values_by_key.items() if _is_empty(values)]:
         raise SceneError([f"{key}: the sweep has no value for this key" for key in empty])
-    sweep_scene = _read_sweep_scene(scene, of)
+    sweep_scene = _read_sweep_scene(scene)
     ranges = [f"{key}={format_values(key, values)}" for key, values in values_by_key.items()]
-    request = parse_request.Request(ranges, None, draw, sobol, seed, of)
+    request = parse_request.Request(ranges, None, draw, sobol, seed)
     cases = parse_request.read_cases(sweep_scene, request)
     pool = executors.make_executor(executor, jobs)
     if out is None:
@@ -783,7 +780,7 @@ def fit(
         File of the measurements: a friction loop for a bench; a table of responses, or frequency and damping against
         amplitude, for a rig; a worn depth for a scene with [wear].
     options : FitOptions, optional
-        Validation rows, offsets of a loop, and settings of the search.
+        Validation rows, and the number of starting points of the search.
     free : dict
         Range of each free parameter by its key: (low, high), or a string such as "0.1..0.6".
     out : path, optional
@@ -847,11 +844,7 @@ def _check_fit_options(options: Any, changes: dict) -> FitOptions:
     if not isinstance(options, FitOptions):
         raise PatchfemError(f"fit: options: FitOptions are needed, not {options!r:.60}")
     options = replace(options, **changes)
-    return replace(
-        options,
-        hold=_require_strings(options.hold, "fit: hold"),
-        offset=_require_strings(options.offset, "fit: offset"),
-    )
+    return replace(options, hold=_require_strings(options.hold, "fit: hold"))
 
 
 def _format_bounds(key: str, ends: Any) -> str:
@@ -1066,8 +1059,7 @@ def import_(
     file : path
         Laboratory record.
     out : path
-        Output file, whose extension determines its contents: a table (.csv), modes for a scene (.toml) or a frequency
-        response (.uff).
+        Output file, whose extension determines its contents: a table (.csv) or modes for a scene (.toml).
     map : str or list of str
         Quantity of each channel, such as "force=Load cell [lbf]".
     zero : bool
@@ -1075,7 +1067,7 @@ def import_(
     decay : bool
         Whether the record is a free decay.
     **how
-        Options `segment`, `window`, `band` and `begin` as strings, such as segment="2 s".
+        Options `band` and `begin` as strings, such as begin="2 s".
 
     Returns
     -------
@@ -1190,10 +1182,10 @@ def compare(
         The contents of compare.json, in SI units. `verdict` and `sentences` summarise the comparison. Measures such as
         `shift`, `worn_depth_mean` and `amplitude_ratio` have `value`, `low`, `high`, `unit`, and a `reason` if the value is
         None. Scans also have `worn_volume`, `grown_volume`, `worn_share` and the `registration` in x, y and rotation. With
-        the option `pairs`, the entry `pairs` lists the comparisons, and `means` contains mean, interval and scatter; a
-        pair that fails has a `message`. For results folders, the dict contains the wear between the two runs over the
-        whole patch, and the measures of both runs in `runs`. With the option `predicted`, the entry `predicted` contains
-        the fitted wear `coefficient`, the `difference_rms` and a `sentence`.
+        the option `pairs`, the entry `pairs` lists the comparisons; a pair that fails has a `message`. For results
+        folders, the dict contains the wear between the two runs over the whole patch, and the measures of both runs in
+        `runs`. With the option `predicted`, the entry `predicted` contains the fitted wear `coefficient`, the
+        `difference_rms` and a `sentence`.
 
     Raises
     ------
@@ -1239,10 +1231,10 @@ def compare(
     return compared.answer_files(*files, options, folder, piece).details
 
 
-def _read_sweep_scene(scene: str | Path | Scene, measure: str) -> case_models.SweepScene:
+def _read_sweep_scene(scene: str | Path | Scene) -> case_models.SweepScene:
     """Return the scene text of a sweep without validating the scene.
 
-    `scene` is as for `load`; `measure` is the requested measure of the sweep.
+    `scene` is as for `load`.
     """
     sets: tuple = ()
     if isinstance(scene, Mapping):
@@ -1258,7 +1250,7 @@ def _read_sweep_scene(scene: str | Path | Scene, measure: str) -> case_models.Sw
     else:
         path = _require_path(scene, "a scene")
         text = read_text(scene)
-    return case_models.SweepScene(path, text, sets, measure, len(sets))
+    return case_models.SweepScene(path, text, sets, len(sets))
 
 
 def _count_written(scene) -> int:

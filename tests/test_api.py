@@ -170,7 +170,7 @@ def test_exact_python_value_sets_same_as_text(key, written, value, tmp_path):
         ("contact.load", -1.0, "must be >= 0"),
         ("contact.load", float("nan"), "not a finite"),
         ("contact.load", float("-inf"), "not a finite"),
-        ("contact.load", True, "true is not a quantity"),
+        ("contact.load", True, "not a quantity"),
         ("contact.load", "5", "bare number"),
         ("contact.pairs", 2.5, "a whole number is needed"),
         ("contact.load", None, "None cannot be a value of a scene"),

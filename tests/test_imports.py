@@ -43,7 +43,7 @@ PHYSICS = set(
     "runs.bench runs.batch runs.patch runs.rig runs.wear".split()
 )
 PIECES = "contact elasticity mesh runs.patch "  # folders needed to solve a static patch
-MOTION = "dynamics hybrid response runs.rig structure "  # folders needed to integrate the motion of a rig
+MOTION = "hybrid response runs.rig structure "  # folders needed to integrate the motion of a rig
 PAGE = "response "  # folder from which a page takes descriptions
 WEAR = '[wear]\ncoefficient = "1e-15 1/Pa"\ncycles = 100\n'
 FOLDERS = {  # kind of scene -> text, folders that `patchfem run` loads for the run and its page
@@ -92,7 +92,7 @@ MODULES_OF_SCENES = {  # run from Python -> text of the scene, modules that are 
     "point on a rig": (
         COULOMB_RIG,
         "hybrid.runs structure.modes",
-        "structure.matrices structure.masses structure.arrays structure.universal structure.modal_fit structure.drives "
+        "structure.matrices structure.masses structure.arrays structure.universal structure.drives "
         "dynamics.harmonic.equations dynamics.harmonic.continuation dynamics.harmonic.steady "
         "points.time_march runs.rig.steady " + " ".join(RIG_KEYS),
     ),

@@ -5,15 +5,18 @@ from functools import partial
 from importlib.util import find_spec
 from pathlib import Path
 
+import numpy as np
 import pytest
 import surfaces
 from command_line import run_cli
+from lab_files import SI, make_record, write_universal
 from scene_texts import COATED, COULOMB, DRIVE, MODE, NONLOCAL, POINT, TRIANGLE
 
 import patchfem as pf
 from patchfem.inputs import read_slide
 from patchfem.mesh import read_pieces
 from patchfem.scene.keys import removed
+from patchfem.structure import universal
 from patchfem.surface import read_surface
 
 RIG = POINT + COULOMB + MODE + DRIVE
@@ -66,6 +69,19 @@ def export_script(folder) -> None:
     pf.export(results, folder / "play.py")
 
 
+def read_responses(folder) -> None:
+    """Read the modes of a rig from a universal file of frequency responses."""
+    response = make_record([1.0, 2.0], [1j, 2j], 12, func_type=4, abscissa_spec_data_type=18)
+    universal.read_universal(write_universal(folder / "a.uff", [response]))
+
+
+def read_modes_as_arrays(folder) -> None:
+    """Read a rig from a file of natural frequencies and slides."""
+    np.savez(folder / "a.npz", frequency=[143.0], slide=[1.0])
+    (folder / "a.toml").write_text(f'[structure]\nfile = "a.npz"\n{DRIVE}', "utf-8")
+    pf.build(folder / "a.toml")
+
+
 def read_two_directions(folder) -> None:
     """Read a prescribed slide with a column of a second direction."""
     path = folder / "path.csv"
@@ -78,6 +94,16 @@ def write_rig(folder):
     path = folder / "rig.toml"
     path.write_text(RIG, "utf-8")
     return path
+
+
+def import_shapes(folder: Path) -> None:
+    """Import a universal file with a mode shape (data set 55) as modes."""
+    pytest.importorskip("pyuff")
+    shape = {"type": 55, "analysis_type": 2, "data_ch": 2, "spec_data_type": 8, "load_case": 1}
+    shape |= {"mode_n": 1, "node_nums": [11, 12], "freq": 100.0, "modal_m": 1.0}
+    shape |= {f"r{k}": np.zeros(2) for k in (1, 2, 3)}
+    shape |= {"modal_damp_vis": 0.01, "modal_damp_his": 0.0}
+    pf.import_(write_universal(folder / "shapes.uff", [SI, shape]), folder / "modes.toml")
 
 
 TRIED = {  # removed feature -> (function that uses it, replacement that the message names)
@@ -93,6 +119,10 @@ TRIED = {  # removed feature -> (function that uses it, replacement that the mes
         partial(load, RIG, {"friction.breakaway": 0.2}),
         "law 'iwan' or 'elastic-plastic' does not creep",
     ),
+    "value with a tolerance": (
+        lambda folder: pf.sweep(RIG, {"friction.static": "0.3 +- 5 %"}),
+        "write the range as low..high",
+    ),
     "fit --placebo": (
         partial(run_failing_command, ("fit", "a.toml", "--placebo", "friction.static=0.3")),
         "set another value of the key with --set",
@@ -105,6 +135,46 @@ TRIED = {  # removed feature -> (function that uses it, replacement that the mes
         partial(run_failing_command, ("fit", "a.toml", "--amplitudes", "1 um,2 um")),
         "leave it out",
     ),
+    "fit --offset": (
+        partial(run_failing_command, ("fit", "a.toml", "--offset", "force")),
+        "subtract the offset",
+    ),
+    "fit --warm-up": (
+        partial(run_failing_command, ("fit", "a.toml", "--warm-up")),
+        "hold them out",
+    ),
+    "fit --resume": (
+        partial(run_failing_command, ("fit", "a.toml", "--resume")),
+        "fewer --starts",
+    ),
+    "fit --seed": (
+        partial(run_failing_command, ("fit", "a.toml", "--seed", "1")),
+        "give more --starts",
+    ),
+    "fit --unstable": (
+        partial(run_failing_command, ("fit", "a.toml", "--unstable", "out")),
+        "--hold flag=U",
+    ),
+    "sweep --of": (
+        partial(run_failing_command, ("sweep", "a.toml", "--of", "loop_area")),
+        "choose the measure on the page",
+    ),
+    "plan --over": (
+        partial(run_failing_command, ("plan", "a.toml", "--over", "friction.static=0.2,0.3")),
+        "give the values of one case with --set",
+    ),
+    "import --segment": (
+        partial(run_failing_command, ("import", "a.uff", "-o", "b.toml", "--segment", "2 s")),
+        "fitted to the time record",
+    ),
+    "import --window": (
+        partial(run_failing_command, ("import", "a.uff", "-o", "b.toml", "--window", "hann")),
+        "fitted to the time record",
+    ),
+    "import -o .uff": (
+        partial(run_failing_command, ("import", "a.uff", "-o", "b.uff")),
+        "scipy.signal.csd",
+    ),
     "export --of": (
         partial(run_failing_command, ("export", "out", "-o", "a.vtu", "--of", "sigma_yy")),
         "choose the field in ParaView",
@@ -115,10 +185,17 @@ TRIED = {  # removed feature -> (function that uses it, replacement that the mes
     ),
     "export of a structure as .npz": (export_structure, "exported as .mat"),
     "export of a script for ParaView": (export_script, "write .pvd for older versions"),
-    "backbone by decay": (
+    "backbone --method decay": (
         lambda folder: pf.backbone(write_rig(folder), method="decay"),
         'drive.kind = "free"',
     ),
+    "fit of responses": (read_responses, "write the modes of your modal analysis as dataset 55"),
+    "modes as arrays": (read_modes_as_arrays, "write M = m I, K = m diag(omega^2)"),
+    "backbone --method all": (
+        lambda folder: pf.backbone(write_rig(folder), method="all"),
+        "leave it out: both methods are the default",
+    ),
+    "import of mode shapes": (import_shapes, "give the file as structure.file"),
     "matrix of Nastran": (
         lambda folder: pf.load(f"[structure.reduced]\n{FILES.format('k.op4')}{DRIVE}"),
         "use one of .mtx, .mat, .npz",
@@ -150,7 +227,7 @@ def test_refuses_removed_feature(tmp_path, name):
     with pytest.raises(pf.PatchfemError) as refused:
         attempt(tmp_path)
     sentence = str(refused.value)
-    assert re.search(r"removed in patchfem \d\.\d\b", sentence) and instead in sentence
+    assert re.search(r"removed in patchfem \d\.\d+\b", sentence) and instead in sentence
     assert len(sentence.strip().splitlines()) == 1
 
 

@@ -63,7 +63,6 @@ REFUSALS = {
     "missing_scene": ("run", "none.toml"),
     "missing_results": ("report", "none"),
     "sweep_without_key": ("sweep", "bench.toml"),
-    "sweep_of_unknown_measure": ("sweep", "bench.toml", *STATIC, "--of", "loop_are"),
     "folder_of_other_files": ("run", "bench.toml", "-o", "."),
     "unknown_export": ("export", "none", "-o", "a.xyz"),
     "unknown_verb": ("rnu", "bench.toml"),

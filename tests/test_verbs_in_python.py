@@ -47,20 +47,23 @@ def test_exact_fit_recovers_friction_of_computed_loop(tmp_path):
     loop = np.column_stack([run.response.time, run.response.slide * 1e6, run.response.force])
     path = tmp_path / "loop.csv"
     path.write_text(
-        "time [s],displacement [um],force [N]\n"
-        + "".join(",".join(map(repr, row)) + "\n" for row in loop.tolist()),
+        "time [s],displacement [um],force [N],cycle\n"
+        + "".join(
+            ",".join(map(repr, row)) + f",{1 + (k >= len(loop) - 5)}\n"
+            for k, row in enumerate(loop.tolist())
+        ),
         "utf-8",
     )
     static = pf.load(bench).friction.static
     free = {"friction.static": (static / 2, 2 * static)}
-    options = pf.FitOptions(offset=["force"])
+    options = pf.FitOptions(hold=["cycle=2"])
     fit = pf.fit(bench, path, options, free=free, out=tmp_path / "fit")
     assert fit["values"]["friction.static"]["value"] == pytest.approx(static, rel=1e-6)
-    assert (tmp_path / "fit" / "fit.json").is_file() and set(fit["offsets"]) == {"force"}
+    assert (tmp_path / "fit" / "fit.json").is_file() and fit["held"]["rows"] == 5
     for arguments, keywords in (
-        ((), {"to": path, "offset": "force"}),
-        ((path,), {"offset": ["force"]}),
-        ((path, pf.FitOptions(hold="cycle=1")), {"offset": ("force",), "hold": ()}),
+        ((), {"to": path, "hold": "cycle=2"}),
+        ((path,), {"hold": ["cycle=2"]}),
+        ((path, pf.FitOptions(hold="cycle=1")), {"hold": ("cycle=2",)}),
     ):
         again = pf.fit(bench, *arguments, free=free, **keywords)
         assert again | {"seconds": 0} == fit | {"seconds": 0}
@@ -118,20 +121,17 @@ def test_exact_backbone_accepts_amplitudes_in_any_form(amplitudes):
     "scene, given, said",
     [
         (
-            BLOCK,
-            {"offset": ["force"], "warm_up": True},
-            "offset applies only to fits to a loop under a prescribed slide; warm_up applies only",
+            pf.new("bench"),
+            {"starts": 3, "leave_out": "cycle"},
+            "leave-out applies only to fits to rows of a rig; leave this option out",
         ),
-        (pf.new("bench"), {"starts": 3}, "starts applies only to fits to rows of a rig"),
         (
             pf.new("bench"),
             {"leave_out": "frequency"},
-            "leave_out applies only to fits to rows of a rig",
+            "leave-out applies only to fits to rows of a rig",
         ),
         (pf.new("wear"), {"hold": "frequency=1 Hz"}, "hold applies only to fits to a loop"),
         (BLOCK, {"starts": 0}, "at least one"),
-        (BLOCK, {"seed": -1}, ">= 0"),
-        (BLOCK, {"unstable": "maybe"}, "bound, out, read"),
         (BLOCK, {"hold": "frequency=135 Hz"}, "--hold frequency=135 Hz: none of the rows"),
     ],
 )

@@ -13,7 +13,6 @@ PUBLIC = {
     "compare": (
         "SurfaceRuns",
         "run_both_surfaces",
-        "surface_runs_to_dict",
         "write_common_traces",
     ),
     "cost": (
@@ -22,7 +21,6 @@ PUBLIC = {
         "TOLERANCE",
         "describe_fastest_setting",
         "find_best_run",
-        "find_fastest_settings",
         "find_measures_with_error",
         "compute_setting_costs",
         "find_worst_error",
@@ -46,11 +44,7 @@ PUBLIC = {
         "find_applicable_settings",
     ),
     "rows.fit": ("FittedRows",),
-    "surface_pairs": (
-        "average_pairs",
-        "find_group",
-        "read_pairs",
-    ),
+    "surface_pairs": ("read_pairs",),
     "sweeps.case_models": ("SweepScene",),
     "sweeps.cases": ("Cases",),
     "sweeps.parse_request": (
@@ -58,7 +52,6 @@ PUBLIC = {
         "read_cases",
         "read_sweep",
     ),
-    "sweeps.plan": ("plan_sweep",),
     "sweeps.sweep": (
         "WorkerData",
         "iterate_chunks",

@@ -24,20 +24,17 @@ from ..runs.plan import plan
 from ..runs.results.result import Result
 from ..runs.run import run as run_plan
 from .numerical_settings import (
+    TOLERANCE,
     Setting,
     find_applicable_settings,
-    list_tolerances,
     make_setting_values,
 )
 
-# Name of the setting for a curve over tolerances, in addition to NUMERICAL_SETTINGS.
-TOLERANCE = "tolerance"
+MIN_RUNS = 3  # smallest number of runs of a curve over a setting
 # Number of timings of a short run; the shortest one is used, because disturbances only add time.
 N_TIMINGS = 3
 # Smallest CPU time [s] of a run that is timed only once; longer runs scatter by a few percent.
 MIN_SECONDS_TIMED_ONCE = 0.3
-# Smallest ratio of elapsed to CPU time at which both times are reported.
-MIN_ELAPSED_TO_CPU_RATIO = 1.5
 EQUAL_COST_RATIO = 1.1  # Largest ratio of the CPU times of equally expensive runs.
 TIMING_SCATTER = 2e-3  # Scatter of the CPU time of repeated short runs [s].
 
@@ -121,28 +118,22 @@ def compute_setting_costs(
     Raises
     ------
     PatchfemError
-        If the scene does not have this setting, or if fewer than three runs succeed.
+        If the scene does not have this setting.
     NotConverged
-        If no run succeeds at any tolerance.
+        If fewer than three runs succeed, or none at any tolerance.
     """
     with locate_errors(model.source):
-        if setting_name == TOLERANCE:
-            runs = _time_settings(list_tolerances(model), say)
-            if not runs:
-                raise NotConverged("cost: no run of this scene succeeded", "")
-            return runs
         possible = find_applicable_settings(model)
-        if setting_name not in possible:
+        if setting_name not in (TOLERANCE, *possible):
             raise PatchfemError(
                 f"cost --over {setting_name}: the cost of this setting cannot be measured for this scene; "
                 f"possible settings: {', '.join(possible) or 'none'}",
                 "",
             )
         runs = _time_settings(make_setting_values(model, setting_name), say)
-    if len(runs) < 3:
-        raise PatchfemError(
-            f"cost --over {setting_name}: runs with fewer than three values of this setting succeeded",
-            "",
+    if not runs or (len(runs) < MIN_RUNS and setting_name != TOLERANCE):
+        raise NotConverged(
+            f"cost --over {setting_name}: runs with only {len(runs)} values of it succeeded"
         )
     return runs
 
@@ -150,35 +141,28 @@ def compute_setting_costs(
 def _time_settings(settings: list[Setting], say: Callable | None) -> list[Cost]:
     """Run and time a model with each of some settings; settings that fail are left out."""
     # The first run includes imports and compilation, which the timings must not contain.
-    _run_setting(settings[0], "first run, not timed", None)
+    _run_setting(settings[0], None)
     runs = []
     for setting in settings:
         # a short run is timed several times, and one that compiles once more
         timings = []
+        result = None
         is_short = True
         while is_short and len(timings) < N_TIMINGS:
             compile_seconds = compiled.COMPILE_SECONDS[0]
             begin = (_measure_cpu_time(), perf_counter())
-            finished = _run_setting(setting, setting.label, say)
-            if finished is None:
+            result = _run_setting(setting, say)
+            if result is None:
                 break
             timings.append((_measure_cpu_time() - begin[0], perf_counter() - begin[1]))
             has_compiled = compiled.COMPILE_SECONDS[0] > compile_seconds
             is_short = has_compiled or timings[-1][0] < MIN_SECONDS_TIMED_ONCE
-        if finished is None:
+        if result is None:
             continue
-        runs.append(_make_cost(setting, timings, finished))
+        runs.append(_make_cost(setting, timings, result))
         if say is not None:
-            say(_describe_timing(runs[-1]))
+            say(f"{setting.words}: {runs[-1].seconds:.2f} CPU s")
     return runs
-
-
-def _describe_timing(cost: Cost) -> str:
-    """Describe the time of a run."""
-    text = f"{cost.words}: {cost.seconds:.2f} CPU s"
-    if cost.wall_seconds > MIN_ELAPSED_TO_CPU_RATIO * cost.seconds:
-        text += f" ({cost.wall_seconds:.2f} s elapsed)"
-    return text + ", timed once" * (cost.timings == 1)
 
 
 def _make_cost(setting: Setting, timings: list[tuple[float, float]], result: Result) -> Cost:
@@ -209,39 +193,20 @@ def _measure_cpu_time() -> float:
     return process_time() + children.children_user + children.children_system
 
 
-def _run_setting(setting: Setting, label: str, say: Callable | None) -> Result | None:
-    """Run a model with a numerical setting; return None if the run fails.
+def _run_setting(setting: Setting, say: Callable | None) -> Result | None:
+    """Run a model with a numerical setting; return None if it does not converge or runs out of memory.
 
-    A run fails if it does not converge or runs out of memory. The pieces are condensed again instead
-    of being loaded from the cache.
-
-    Parameters
-    ----------
-    setting : Setting
-        Setting with its model.
-    label : str
-        Name of the run in a message.
-    say : callable or None
-        Called with a line of text.
+    The pieces are condensed again instead of being loaded from the cache. say: called with the reason of a failure.
     """
     try:
         return run_plan(plan(setting.model), fresh=True)
     except (NotConverged, MemoryError) as error:
         if say is not None:
-            say(f"{label}: left out ({error or 'out of memory'})")
+            say(f"{setting.label}: left out ({error or 'out of memory'})")
         return None
 
 
-def find_fastest_settings(runs: list[Cost], tolerance: float) -> dict[str, str | None]:
-    """Return, for each measure, the label of the fastest run whose error is within the tolerance, or None."""
-    labels = {}
-    for name in find_measures_with_error(runs):
-        fastest = find_fastest_run(runs, tolerance, [name])
-        labels[name] = None if fastest is None else fastest.label
-    return labels
-
-
-def find_fastest_run(runs: list[Cost], tolerance: float, names: Sequence[str] = ()) -> Cost | None:
+def find_fastest_run(runs: list[Cost], tolerance: float) -> Cost | None:
     """Return the run with the shortest CPU time whose errors are within a tolerance; None if there is none.
 
     An error that is unknown is not within the tolerance. A coarse run that is accurate by chance is excluded: those of all
@@ -254,14 +219,12 @@ def find_fastest_run(runs: list[Cost], tolerance: float, names: Sequence[str] = 
         Runs from coarse to fine.
     tolerance : float
         Largest error, relative to the value.
-    names : sequence of str
-        Measures that count; by default those with an error estimate in any run.
     """
-    counted = names or find_measures_with_error(runs)
+    names = find_measures_with_error(runs)
     confirmed = []
     is_confirmed = True
     for run in reversed(runs):
-        is_accurate = judge_run(run, counted, tolerance) is Judgement.MEETS
+        is_accurate = judge_run(run, names, tolerance) is Judgement.MEETS
         if run.value is not None:
             is_confirmed = is_confirmed and is_accurate
         if is_accurate and (is_confirmed or run.value is None):
@@ -309,34 +272,21 @@ def judge_run(run: Cost, names: Sequence[str], tolerance: float) -> Judgement:
 
 
 def describe_fastest_setting(runs: list[Cost], tolerance: float) -> str:
-    """Describe the fastest setting that meets a tolerance, or the measure that misses it.
-
-    If no setting meets the tolerance, the description contains the worst measure of the best run.
-    """
+    """Describe the fastest setting that meets a tolerance, or the worst measure of the best run if none meets it."""
     names = find_measures_with_error(runs)
     best = find_best_run(runs, tolerance)
     seconds = format_number(best.seconds, 2)
-    if find_fastest_run(runs, tolerance) is not None:
-        measures = "every measure"
-        if any(name not in names for name in best.values):
-            measures += " that has an error estimate"
-        return (
-            f"{best.words}: {seconds} CPU s per run, with {measures} within the tolerance "
-            f"{tolerance:g}"
-        )
-
-    # A run without error estimates may be accurate enough: the sentence says then that none is known to meet it.
-    is_unknown = any(judge_run(run, names, tolerance) is Judgement.UNKNOWN for run in runs)
-    text = (
-        f"no setting {'is known to meet' if is_unknown else 'meets'} the tolerance {tolerance:g}: "
-    )
     worst = find_worst_error(best, names, tolerance)
+    if find_fastest_run(runs, tolerance) is not None:
+        estimated = " that has an error estimate" if best.values.keys() - set(names) else ""
+        return f"{best.words}: {seconds} CPU s per run, with every measure{estimated} within the tolerance {tolerance:g}"
+    # a run without error estimates may be accurate enough
+    is_unknown = any(judge_run(run, names, tolerance) is Judgement.UNKNOWN for run in runs)
+    text = f"no setting {'is known to meet' if is_unknown else 'meets'} the tolerance {tolerance:g}"
     if not all(name in best.errors for name in names):
-        return f"{text}no run has an error estimate of every measure"
-    return (
-        f"{text}the best run, with {best.words}, has an error of {format_number(worst.fraction, 2)} in "
-        f"{worst.name} and takes {seconds} CPU s"
-    )
+        return f"{text}: no run has an error estimate of every measure"
+    error = format_number(worst.fraction, 2)
+    return f"{text}: the best run, with {best.words}, has an error of {error} in {worst.name} and takes {seconds} CPU s"
 
 
 class WorstError(NamedTuple):

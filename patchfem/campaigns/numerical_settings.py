@@ -18,6 +18,8 @@ COUNT_FACTORS = (0.25, 0.5, 1.0, 2.0, 4.0)  # counts over that of the scene
 CELL_FACTORS = (0.125, 0.25, 0.5, 1.0, 2.0)  # cells of uniform meshes over those of the scene
 CELL_LIMITS = (8, 1600)  # numbers of cells of a uniform mesh along the interface
 DEFAULT_COUNT = 8  # middle value of a count that the scene does not set
+# Name of the accuracy of all settings together, which a curve may vary in place of a single one.
+TOLERANCE = "tolerance"
 # Tolerances for a series of runs; smaller ones take long and are rarely met.
 TOLERANCES = (1e-1, 1e-2, 1e-3, 1e-4)
 
@@ -57,13 +59,33 @@ def find_applicable_settings(model: Model) -> list[str]:
     return [name for name in NUMERICAL_SETTINGS if applies[name]]
 
 
-def list_tolerances(model: Model) -> list[Setting]:
-    """Return the model with several values of accuracy.tolerance, among them that of the scene, from large to small."""
+def make_setting_values(model: Model, name: str) -> list[Setting]:
+    """Return the values of a numerical setting, or of TOLERANCE, from coarse to fine.
+
+    The tolerances contain that of the scene. The last value of a setting is the automatic one. There are fewer coarse
+    values if the value of the scene is small.
+    """
+    words = name.replace("_", " ")
+    if name == TOLERANCE:
+        values = sorted({*TOLERANCES, model.accuracy.tolerance}, reverse=True)
+        texts = [(f"{value:g}", f"{words} {value:g}") for value in values]
+    elif name == "element_size":
+        length = model.patch.pieces.length
+        cells = round(length / model.patch.uniform_element_size)
+        values = [length / count for count in _scale_count(cells, CELL_FACTORS, CELL_LIMITS)]
+        labels = [f"{1e6 * size:.4g} um" for size in values]
+        texts = [(label, f"{words} {label}") for label in labels]
+    else:
+        values = _scale_count(_find_count(model, name), COUNT_FACTORS, COUNT_LIMITS[name])
+        texts = [(str(count), f"{count} {words}") for count in values]
+
     settings = []
-    for value in sorted({*TOLERANCES, model.accuracy.tolerance}, reverse=True):
-        changed = _change_setting(model, "tolerance", value)
-        settings.append(Setting(f"{value:g}", value, f"tolerance {value:g}", changed))
-    return settings
+    for value, (label, text) in zip(values, texts):
+        settings.append(Setting(label, float(value), text, _change_setting(model, name, value)))
+    if name == TOLERANCE:
+        return settings
+    automatic = _change_setting(model, name, None)
+    return [*settings, Setting("by tolerance", None, f"{words} set by the tolerance", automatic)]
 
 
 def _change_setting(model: Model, name: str, value: float | None) -> Model:
@@ -72,31 +94,10 @@ def _change_setting(model: Model, name: str, value: float | None) -> Model:
         return replace(model, patch=model.patch.with_element_size(value))
     if name == "jumps":
         return replace(model, wear=replace(model.wear, jumps=value))
-    return replace(model, accuracy=model.accuracy.model_copy(update={name: value}))
-
-
-def make_setting_values(model: Model, name: str) -> list[Setting]:
-    """Return the values of a numerical setting from coarse to fine; the automatic one is the last.
-
-    There are fewer coarse values if the value of the scene is small.
-    """
-    words = name.replace("_", " ")
-    settings = []
-    if name == "element_size":
-        length = model.patch.pieces.length
-        cells = round(length / model.patch.uniform_element_size)
-        for count in _scale_count(cells, CELL_FACTORS, CELL_LIMITS):
-            size = length / count
-            label = f"{1e6 * size:.4g} um"
-            settings.append(
-                Setting(label, size, f"{words} {label}", _change_setting(model, name, size))
-            )
-    else:
-        for count in _scale_count(_find_count(model, name), COUNT_FACTORS, COUNT_LIMITS[name]):
-            changed = _change_setting(model, name, count)
-            settings.append(Setting(str(count), float(count), f"{count} {words}", changed))
-    automatic = _change_setting(model, name, None)
-    return [*settings, Setting("by tolerance", None, f"{words} set by the tolerance", automatic)]
+    accuracy = model.accuracy.model_copy(update={name: value})
+    if value is None:
+        accuracy.model_fields_set.discard(name)  # a run may choose this setting
+    return replace(model, accuracy=accuracy)
 
 
 def _find_count(model: Model, name: str) -> int:

@@ -13,16 +13,8 @@ from .shared import Json, flag_option, note, repeated_option, text_option
 
 @dataclass(frozen=True)
 class EstimateOptions:
-    """Options of a frequency response and its modes."""
+    """Options of the identification of modes."""
 
-    segment: text_option(
-        'length of the averaged segments, such as "2 s"; default: the whole record if it begins and ends '
-        "at rest, otherwise an eighth of the record"
-    ) = ""
-    window: text_option(
-        "window function of the segments, such as hann; possible values: hann, none; default: hann if the "
-        "record is cut into several segments, otherwise none"
-    ) = ""
     band: text_option('frequency band in which to find modes, such as "20 Hz..400 Hz"') = ""
     decay: flag_option(
         "treat the record as a free decay; frequency and damping are then computed without a record of the "
@@ -42,14 +34,13 @@ def import_(
         Path,
         Parameter(
             name=["-o", "--out"],
-            help="file to write: table.csv (records in SI), modes.toml (modes for a scene) or "
-            "response.uff",
+            help="file to write: table.csv (records in SI) or modes.toml (modes for a scene)",
         ),
     ],
     map_: repeated_option(
         'quantity and name of a channel of the file, such as "force=Load cell [lbf]", '
-        '"displacement=12:+x", "time=t [s]", "force=run.load(:,2) [N]"; or, for mode shapes, '
-        "slide=12:+x; may be repeated; without this option the labels of the channels are used",
+        '"displacement=12:+x", "time=t [s]", "force=run.load(:,2) [N]"; may be repeated; without this option the labels of '
+        "the channels are used",
         "--map",
     ) = (),
     zero: flag_option(
@@ -60,9 +51,9 @@ def import_(
 ):
     """Convert a laboratory file into a table or into the modes of a scene. The table can be used as `drive.file`, as
     `slide.file` and with `fit --to`. The laboratory file may be .uff (datasets 58, with the units of dataset 164),
-    .mat, or .csv with units in its header. Modes are computed from an input and a response, from a free decay, from
-    mode shapes (dataset 55) or from frequency responses. With --decay the table gives frequency and damping ratio of
-    the decay against its amplitude, with 95 % intervals.
+    .mat, or .csv with units in its header. Modes are computed from an input and a response, or from a free decay; a
+    file of mode shapes is given as `structure.file`. With --decay the table gives
+    frequency and damping ratio of the decay against its amplitude, with 95 % intervals.
 
     Example: patchfem import bench.uff --map "force=Load cell [lbf]" --map displacement=12:+x -o loop.csv
     """

@@ -7,7 +7,6 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from ..campaigns.sweeps import parse_request
-from ..campaigns.sweeps import plan as sweep_plan
 from ..effects import law_has_trait, list_displayed_absent_effects
 from ..formatting import format_quantity, rewrite_powers_of_ten
 from ..mesh import files as mesh_files
@@ -76,7 +75,6 @@ def plan(
     /,
     *,
     set_: Sets = (),
-    what: CaseOptions | None = None,
     json_: Json = False,
     probe: flag_option(
         "run the scene once without error estimates: measured seconds, and the stiffness of the solved patch"
@@ -85,21 +83,12 @@ def plan(
         "list also the effects that the scene does not name", "-v", "--verbose"
     ) = False,
 ):
-    """Print what a run of SCENE would compute: sizes, the stiffnesses in series and dimensionless groups. With
-    --over, or if SCENE has a table [sweep], plan the whole sweep.
+    """Print what a run of SCENE would compute: sizes, the stiffnesses in series and dimensionless groups. Of a
+    scene with [sweep], give the values of one case with --set.
 
-    Example: patchfem plan rig.toml --over "contact.tilt.angle=1e-6 rad..1e-2 rad:9"
+    Example: patchfem plan rig.toml --set contact.tilt.angle="1 mrad"
     """
-    case_options = what if what is not None and what.selects_cases() else None
-    loaded_scene = load_scene(scene, set_) if case_options is None else None
-    if case_options is not None or loaded_scene.sweep:
-        if probe:
-            raise UsageError(
-                "--probe works for a single case, not for a sweep; give the values of this case with --set "
-                "and no --over"
-            )
-        _plan_sweep(scene, set_, case_options or CaseOptions(), json_, verbose)
-        return
+    loaded_scene = load_scene(scene, set_)
     run_plan = plans.plan(loaded_scene)
     plan_data = run_plan.as_json()
     if probe:
@@ -115,27 +104,6 @@ def plan(
         print(json.dumps(plan_data))
         return
     _print_plan(plan_data, probe or run_plan.model.has_bolted_patch, verbose)
-
-
-def _plan_sweep(scene: Path, sets, what: CaseOptions, json_: bool, verbose: bool) -> None:
-    """Print the plan of a sweep."""
-    sweep_scene, cases = _read_sweep(scene, sets, what)
-    plan_data = sweep_plan.plan_sweep(sweep_scene, cases)
-    if wrong := cases.warning:
-        note(wrong)
-    if json_:
-        print(json.dumps(plan_data))
-        return
-    print(
-        "case     "
-        + ", ".join(f"{key} {text}" for key, text in plan_data["case"].items())
-        + " (the first case), which the lines below describe"
-    )
-    _print_plan(plan_data, False, verbose)
-    print(
-        f"sweep    {plan_data['cases']} cases of "
-        + ", ".join(f"{n} {key}" for key, n in plan_data["values"].items())
-    )
 
 
 def _print_plan(plan_data: dict, is_solved: bool, verbose: bool) -> None:

@@ -63,10 +63,7 @@ Sets = repeated_option(
 Json = flag_option("print the answer as one JSON object", "--json")
 Out = out_option("folder of the results, such as out/mine")
 Quiet = flag_option("print only errors", "-q", "--quiet")
-Units = text_option(
-    'units of x and z if a file gives none or wrong ones, such as "mm,um"; for a matrix of heights: pixel '
-    'size and unit of z, such as "0.8 um,nm"'
-)
+Units = text_option('units of x and z if a file gives none or wrong ones, such as "mm,um"')
 NoPage = flag_option("leave out report.html", "--no-page")
 Plot = path_option("write also the first picture, such as loop.png (.png, .svg or .pdf)", "--plot")
 Verbose = flag_option("print all numbers", "-v", "--verbose")

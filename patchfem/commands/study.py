@@ -1,8 +1,7 @@
 """Commands that run a scene many times: error against time, backbone of a mode, fits."""
 
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated
 
 from cyclopts import Parameter
 
@@ -130,35 +129,6 @@ def backbone(
         raise CommandExit(NOT_CONVERGED)
 
 
-@dataclass(frozen=True)
-class RowFitOptions:
-    """Options of a fit of a rig to a table of measured responses."""
-
-    leave_out: text_option(
-        "column for cross-validation, such as frequency, input or run: each value of the column is left "
-        "out in turn, and the fit to the other rows is scored on the rows left out"
-    ) = ""
-    starts: Annotated[
-        int | None,
-        Parameter(
-            help="number of random starts inside the ranges, such as 20; the best result is used; default: 8, or 6 for a "
-            "curve of frequency and damping against amplitude"
-        ),
-    ] = None
-    seed: Annotated[int, Parameter(help="seed of the random starts, such as 1")] = 0
-    unstable: Annotated[
-        Literal["bound", "out", "read"],
-        Parameter(
-            help="how the fit uses rows with the flag U (unstable in the test), such as out; possible values: bound (the "
-            "readings are lower bounds), out (the rows are left out), read (the rows are used like all other "
-            "rows)"
-        ),
-    ] = "bound"
-    resume: flag_option("continue an interrupted fit; starts already finished are not repeated") = (
-        False
-    )
-
-
 def fit(
     scene: Path,
     /,
@@ -177,15 +147,17 @@ def fit(
         'rows to hold out: the fit predicts them but does not use them, such as "frequency=135 Hz,150 '
         'Hz"'
     ) = (),
-    offset: repeated_option(
-        "for a loop: offset to fit as well, such as force (a constant force over the whole record) or "
-        "displacement (distance of the first row from the stress-free position); may be repeated"
-    ) = (),
-    warm_up: flag_option(
-        "for a loop: compute the whole cycles of the record once, as a run-in, before the fitted "
-        "cycles"
-    ) = False,
-    rows: Annotated[RowFitOptions, Parameter(name="*")] = RowFitOptions(),
+    leave_out: text_option(
+        "column for cross-validation, such as frequency, input or run: each value of the column is left "
+        "out in turn, and the fit to the other rows is scored on the rows left out"
+    ) = "",
+    starts: Annotated[
+        int | None,
+        Parameter(
+            help="number of random starts inside the ranges, such as 20; the best result is used; default: 8, or 6 for a "
+            "curve of frequency and damping against amplitude"
+        ),
+    ] = None,
     set_: Sets = (),
     output_options: OutputGroup = DEFAULT_OUTPUT,
     verbose: Verbose = False,
@@ -198,14 +170,12 @@ def fit(
     """
     loaded_scene = remember_written(load_scene(scene, set_))
     output = output_options.make_output(f"{scene.stem}-fit", is_verbose=verbose)
-    options = fit_requests.FitOptions(hold, offset, warm_up, **vars(rows))
+    options = fit_requests.FitOptions(hold, leave_out, starts)
     # the fits to a loop and to a curve are too short for a progress line
     is_short = fit_requests.choose_kind(loaded_scene, to) in ("loop", "curve")
     with Progress(output.is_quiet or output.as_json or is_short) as progress:
         report = None if output.is_quiet else print_message
-        listener = fit_requests.Listener(
-            report, progress, lambda name: f"--{name.replace('_', '-')}"
-        )
+        listener = fit_requests.Listener(report, progress)
         answer = fits.fit_into(
             loaded_scene,
             to,

@@ -13,7 +13,6 @@ from cyclopts import Parameter
 from .. import core
 from ..campaigns.sweeps import executors, parse_request
 from ..export.sweeps import run
-from ..scene import assignments
 from .shared import (
     DEFAULT_OUTPUT,
     NOT_CONVERGED,
@@ -70,14 +69,6 @@ class CaseOptions:
         ),
     ] = 0
     seed: Annotated[int, Parameter(name="--seed", help="seed of the random cases, such as 1")] = 0
-    of: text_option(
-        "measure that the printed answer and the first picture of the page show, such as equivalent_damping",
-        "--of",
-    ) = ""
-
-    def selects_cases(self) -> bool:
-        """Return whether any option selects cases."""
-        return bool(self.over or self.cases or self.random or self.sobol)
 
     def request(self):
         """Return the request for cases; raise UsageError if the options are incompatible."""
@@ -90,7 +81,7 @@ class CaseOptions:
                 "--random and --sobol draw values from ranges; give each range by --over table.key=low..high"
             )
         return parse_request.Request(
-            self.over, self.cases, self.random or self.sobol, bool(self.sobol), self.seed, self.of
+            self.over, self.cases, self.random or self.sobol, bool(self.sobol), self.seed
         )
 
 
@@ -164,7 +155,7 @@ def sweep(
         answer = run.collect_shards(sweep_scene, cases, target, output.has_page)
     else:
         if not output.is_quiet:
-            _print_notes(sweep_scene, cases, what)
+            _print_notes(sweep_scene, cases)
         place = run.SweepTarget(target, resume, keep or "", part, output.has_page)
         answer = _run_cases(sweep_scene, cases, place, by, is_quiet=output.is_quiet)
     if answer is None:
@@ -173,14 +164,9 @@ def sweep(
         _print_sweep(answer, output, perf_counter() - start_time)
 
 
-def _print_notes(sweep_scene, cases, what: CaseOptions | None) -> None:
-    """Print notes on the ranges of the keys, on invalid cases and on a bolted joint."""
-    texts = [
-        *assignments.describe_ranges(what.over if what else ()),
-        cases.warning,
-        sweep_scene.note_bolted_joint(),
-    ]
-    for text in texts:
+def _print_notes(sweep_scene, cases) -> None:
+    """Print notes on invalid cases and on a bolted joint."""
+    for text in (cases.warning, sweep_scene.note_bolted_joint()):
         if text:
             note(text)
 

@@ -4,10 +4,9 @@ In: `core.ModalBasis`, a drive, a contact. Out: histories, events, energies. A m
 entry of this list and the entries before it:
 
 1. `exponentials`     exponentials of many small matrices
-2. `integrated`       accelerations and phases of slip of a run
-3. `curve_points`     adaptive points of a curve, denser where its curvature is larger
-4. `harmonic`         steady motions by harmonic balance, branches and stability
-5. `limit_cycles`     limit cycles of modes with negative damping and friction
+2. `curve_points`     adaptive points of a curve, denser where its curvature is larger
+3. `harmonic`         steady motions by harmonic balance, branches and stability
+4. `limit_cycles`     limit cycles of modes with negative damping and friction
 
 Motion in time is computed by `hybrid` and `points`.
 """
@@ -44,10 +43,6 @@ PUBLIC = {
     "harmonic.steady": (
         "find_steady_motion",
         "refine_steady_motion",
-    ),
-    "integrated": (
-        "EngineResult",
-        "mean_slip_phase",
     ),
     "limit_cycles": (
         "MAX_AMPLITUDE_RATIO",

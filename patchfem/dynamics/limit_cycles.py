@@ -16,16 +16,16 @@ from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
-from scipy.optimize import brentq
+from scipy.interpolate import CubicHermiteSpline
+from scipy.optimize import brentq, newton
 
 from ..core import ModalBasis, NotConverged
-from .exponentials import find_exponentials
 from .harmonic.backbone import FreeBalance, find_free_motions
 from .harmonic.equations import HarmonicBalance
 from .harmonic.forces import LawGroup
 from .harmonic.series import half_range
 
-# Number of samples of a cycle for its amplitude; with parabolas between
+# Number of samples of a cycle for its amplitude; with cubics between
 # samples the error is negligible.
 N_SAMPLES = 4096
 # Number of amplitudes at which the damping of a free motion is
@@ -127,30 +127,80 @@ def find_relay_cycles(modes: ModalBasis, row, slip_force: float, stick_force: fl
     return sorted(cycles)
 
 
+class _ForcedFlow(NamedTuple):
+    """Motion of n modes under a constant force, as a sum of exponentials exp(rate t) of its 2 n eigenvectors.
+
+    - modes: modes
+    - row: (n,) slide per coordinate
+    - rates: (2 n,) eigenvalues [1/s]
+    - vectors: (2 n, 2 n) eigenvectors of the states (z, z'), in columns
+    - rest: (2 n,) state of rest under the force
+    """
+
+    modes: ModalBasis
+    row: np.ndarray
+    rates: np.ndarray
+    vectors: np.ndarray
+    rest: np.ndarray
+
+    def find_reversals(self, half_periods) -> np.ndarray:
+        """Return the states (2 n, k) from which the motion goes to their opposites in half periods (k,) [s].
+
+        With E = exp(A T/2) and the state of rest e, E (y - e) + e = -y, so that y = tanh(A T/4) e.
+        """
+        parts = np.linalg.solve(self.vectors, self.rest)[:, None]
+        ratios = np.tanh(np.outer(self.rates, half_periods) / 2)
+        return (self.vectors @ (ratios * parts)).real
+
+    def find_reversal_speeds(self, half_periods) -> np.ndarray:
+        """Return the velocities (k,) of the slide at these states, times the half period and divided by the slide [1]."""
+        n = self.row.size
+        states = self.find_reversals(half_periods)
+        slides = np.abs(self.row) @ np.abs(states[:n])
+        return self.row @ states[n:] * half_periods / np.maximum(slides, 1e-300)
+
+    def make_steps(self, times) -> np.ndarray:
+        """Return the matrices (k, 2 n, 2 n) that advance a state without the force over times (k,) [s]."""
+        growth = np.exp(np.outer(times, self.rates))
+        return ((self.vectors * growth[:, None]) @ np.linalg.inv(self.vectors)).real
+
+    def find_rates(self, state) -> np.ndarray:
+        """Return the rates (2 n,) of a state (2 n,) without the force."""
+        modes = self.modes
+        n = self.row.size
+        accelerations = -(modes.omega**2) * state[:n] - modes.damping_matrix @ state[n:]
+        return np.concatenate([state[n:], accelerations])
+
+
+def _make_flow(modes: ModalBasis, row, force: float) -> _ForcedFlow:
+    """Return the motion of modes under a force [N] on a row (n,)."""
+    n = modes.omega.size
+    matrix = np.block(
+        [[np.zeros((n, n)), np.eye(n)], [-np.diag(modes.omega**2), -modes.damping_matrix]]
+    )
+    rest = np.concatenate([row * force / (modes.mass * modes.omega**2), np.zeros(n)])
+    return _ForcedFlow(modes, np.asarray(row, float), *np.linalg.eig(matrix), rest)
+
+
 def _find_mode_relay_cycles(modes: ModalBasis, row, forces: tuple, mode: int) -> list:
     """Find the limit cycles under rigid friction whose frequency is close to that of a given mode.
 
     forces: kinetic and static friction [N].
     """
-    cycles = []
+    flow = _make_flow(modes, row, forces[0])
     half_periods = np.pi / modes.omega[mode] * np.geomspace(0.6, 1.7, 400)
-    speed_ratios = _reversal_speed_ratios(modes, row, forces[0], half_periods)
-    for k in np.flatnonzero(speed_ratios[:-1] * speed_ratios[1:] <= 0):
-        half_period = brentq(
-            lambda half_period: _find_reversal(modes, row, forces[0], half_period)[1],
-            half_periods[k],
-            half_periods[k + 1],
-            xtol=1e-16,
-            rtol=1e-14,
-        )
+    speeds = flow.find_reversal_speeds(half_periods)
+
+    def find_speed(half_period: float) -> float:
+        return float(flow.find_reversal_speeds(np.array([half_period]))[0])
+
+    cycles = []
+    for k in np.flatnonzero(speeds[:-1] * speeds[1:] <= 0):
+        half_period = brentq(find_speed, *half_periods[k : k + 2], xtol=1e-16, rtol=1e-14)
         # Where an undamped mode is in resonance, the interface does not stop at the reversal.
-        is_reversal = abs(_find_reversal(modes, row, forces[0], half_period)[1]) < REST_TOL
-        if (
-            is_reversal
-            and (limit_cycle := _make_relay_cycle(modes, row, forces, half_period)) is not None
-        ):
-            cycles.append(limit_cycle)
-    return cycles
+        if abs(find_speed(half_period)) < REST_TOL:
+            cycles.append(_make_relay_cycle(flow, forces[1], half_period))
+    return [cycle for cycle in cycles if cycle is not None]
 
 
 def trace_relay_backbone(modes: ModalBasis, row, forces: tuple, amplitudes, mode: int) -> list:
@@ -174,161 +224,82 @@ def trace_relay_backbone(modes: ModalBasis, row, forces: tuple, amplitudes, mode
     list
         (LimitCycle, damping ratio) at each amplitude, or None if the interface would stick.
     """
-
-    def solve_cycle(log_rate: float):
-        undamped_modes = replace(
-            modes,
-            damping=modes.damping_matrix
-            - (modal_rate + np.exp(log_rate)) * np.eye(modes.omega.size),
-        )
-        cycles = _find_mode_relay_cycles(undamped_modes, row, forces, mode)
-        cycles = [candidate for candidate in cycles if candidate.amplitude > 0]
-        return min(
-            cycles, key=lambda candidate: abs(candidate.omega - modes.omega[mode]), default=None
-        )
-
     modal_rate = float(modes.damping_matrix[mode, mode])
-    rate_at_1_m = (
-        4
-        * forces[0]
-        * abs(row[mode] * modes.output[mode])
-        / (np.pi * modes.mass * modes.omega[mode])
-    )
-    rates = rate_at_1_m / np.asarray(amplitudes, float)
-    max_rate = 2 * MAX_FIRST_RATIO * modes.omega[mode]
-    dampings = [None] * len(rates)
-    for k in np.flatnonzero((rates > 0) & (rates <= max_rate)):
-        dampings[k] = _solve_damping(solve_cycle, float(amplitudes[k]), modal_rate, float(rates[k]))
-    return dampings
 
+    def solve_cycle(log_rate: float) -> LimitCycle:
+        """Return the cycle under a damping of all coordinates; NotConverged if the interface would stick."""
+        added = (modal_rate + np.exp(log_rate)) * np.eye(modes.omega.size)
+        sustained = replace(modes, damping=modes.damping_matrix - added)
+        cycles = _find_mode_relay_cycles(sustained, row, forces, mode)
+        cycles = [cycle for cycle in cycles if cycle.amplitude > 0]
+        if not cycles:
+            raise NotConverged("the interface sticks at its reversals")
+        return min(cycles, key=lambda cycle: abs(cycle.omega - modes.omega[mode]))
 
-def _solve_damping(
-    solve_cycle, amplitude: float, modal_rate: float, friction_rate: float
-) -> tuple | None:
-    """Solve for the limit cycle with an amplitude [m], and its damping ratio, by the secant method.
-
-    modal_rate: damping rate of the mode [1/s]; friction_rate: guess of the damping rate of friction [1/s].
-    """
-    log_rates = np.log([friction_rate, 1.01 * friction_rate])
-    cycles = [solve_cycle(log_rate) for log_rate in log_rates]
-    for _ in range(MAX_SECANT_STEPS):
-        if None in cycles:
+    def find_motion(amplitude: float) -> tuple | None:
+        """Return the cycle of an amplitude [m] and its damping ratio."""
+        # The first guess is den Hartog's balance.
+        lost = 4 * forces[0] * abs(row[mode] * modes.output[mode])
+        rate = lost / (np.pi * modes.mass * modes.omega[mode] * amplitude)
+        if not 0 < rate <= 2 * MAX_FIRST_RATIO * modes.omega[mode]:
             return None
-        log_errors = [np.log(limit_cycle.amplitude / amplitude) for limit_cycle in cycles]
-        if abs(log_errors[1]) < AMPLITUDE_TOL or log_errors[0] == log_errors[1]:
-            return cycles[1], float((modal_rate + np.exp(log_rates[1])) / (2 * cycles[1].omega))
-        log_rates = np.array(
-            [
-                log_rates[1],
-                log_rates[1]
-                - log_errors[1] * (log_rates[1] - log_rates[0]) / (log_errors[1] - log_errors[0]),
-            ]
-        )
-        cycles = [cycles[1], solve_cycle(log_rates[1])]
-    return None
+        first = float(np.log(rate))
+        try:
+            log_rate = newton(
+                lambda log_rate: np.log(solve_cycle(log_rate).amplitude / amplitude),
+                first,
+                x1=first + 0.01,
+                tol=AMPLITUDE_TOL,
+                maxiter=MAX_SECANT_STEPS,
+            )
+            cycle = solve_cycle(log_rate)
+        except (NotConverged, RuntimeError):
+            return None
+        return cycle, float((modal_rate + np.exp(log_rate)) / (2 * cycle.omega))
 
-
-def _free_motion_matrices(modes: ModalBasis, t) -> np.ndarray:
-    """Return the transition matrices (k, 2n, 2n) of the modal state (z, z') over time spans (k,)."""
-    times = np.asarray(t, float)
-    n = modes.omega.size
-    # Velocities are divided by `scale`, so that all entries of the matrix have a similar size.
-    scale = max(float(modes.omega.max()), 1 / float(times.max()))
-    stiffness = -np.diag(modes.omega**2) / scale
-    rates = np.block([[np.zeros((n, n)), scale * np.eye(n)], [stiffness, -modes.damping_matrix]])
-    size = np.repeat([1.0, scale], n)
-    return find_exponentials(rates * times[:, None, None]) * (size[:, None] / size)
-
-
-def _reversal_speed_ratios(modes: ModalBasis, row, force: float, half_periods) -> np.ndarray:
-    """Return dimensionless interface velocities (k,) at the reversal for assumed half periods.
-
-    It is the velocity times the half period, divided by the slide; see `_find_reversal`.
-    """
-    n = modes.omega.size
-    eye = np.eye(2 * modes.omega.size)
-    equilibrium = np.concatenate([row * force / (modes.mass * modes.omega**2), np.zeros(n)])
-    flow = _free_motion_matrices(modes, half_periods)
-    y = np.einsum("kab,kb->ka", np.linalg.pinv(flow + eye, rcond=1e-14), (flow - eye) @ equilibrium)
-    return y[:, n:] @ row * half_periods / np.maximum(np.abs(y[:, :n]) @ np.abs(row), 1e-300)
-
-
-def _find_reversal(modes: ModalBasis, row, force: float, half_period: float) -> tuple:
-    """Return the state at the reversal of a periodic motion with an assumed half period.
-
-    Also returns the slide velocity there, times the half period and divided by the slide, and the
-    equilibrium.
-    half_period: assumed half period [s].
-    """
-    n = modes.omega.size
-    eye = np.eye(2 * modes.omega.size)
-    equilibrium = np.concatenate([row * force / (modes.mass * modes.omega**2), np.zeros(n)])
-    flow = _free_motion_matrices(modes, [half_period])[0]
-    y = np.linalg.lstsq(flow + eye, (flow - eye) @ equilibrium, rcond=None)[0]
-    return (
-        y,
-        float(row @ y[n:]) * half_period / max(float(np.abs(row) @ np.abs(y[:n])), 1e-300),
-        equilibrium,
-    )
+    return [find_motion(float(amplitude)) for amplitude in amplitudes]
 
 
 def _make_relay_cycle(
-    modes: ModalBasis, row, forces: tuple, half_period: float
+    flow: _ForcedFlow, stick_force: float, half_period: float
 ) -> LimitCycle | None:
     """Return the limit cycle that has a given half period [s].
 
-    The result is None if the interface reverses or sticks within the half period.
-
+    The result is None if the interface reverses within the half period, or if the static friction [N] holds it.
     """
-    slip_force, stick_force = forces
-    n = modes.omega.size
-    y, _, equilibrium = _find_reversal(modes, row, slip_force, half_period)
+    modes, row = flow.modes, flow.row
+    n = row.size
+    state = flow.find_reversals([half_period])[:, 0]
     times = np.linspace(0, half_period, N_SAMPLES // 2 + 1)
-    path = equilibrium + _free_motion_matrices(modes, times) @ (y - equilibrium)
-    rate = path[:, n:] @ row
-    slide_scale = float(np.abs(row) @ np.abs(y[:n]))
-    static_force = (
-        -modes.mass * (modes.omega**2 * y[:n] + modes.damping_matrix @ y[n:]) @ row / (row @ row)
-    )
-    if rate[1:-1].max() > 1e-9 * slide_scale / half_period or -static_force <= stick_force:
+    steps = flow.make_steps(times)
+    path = flow.rest + steps @ (state - flow.rest)
+
+    # The slide is falling, and at its start the interface needs a force -m a to stay at rest.
+    speeds = path[:, n:] @ row
+    slide = float(np.abs(row) @ np.abs(state[:n]))
+    hold = -modes.mass * flow.find_rates(state)[n:] @ row / (row @ row)
+    if speeds[1:-1].max() > 1e-9 * slide / half_period or hold <= stick_force:
         return None
-    motion = path[:, :n] @ modes.output
-    cycle = np.concatenate([motion, -motion[1:]])
-    amplitude = _find_maximum(cycle)
-    coarse_amplitude = _find_maximum(cycle[::2])
-    # A time shift of the reversal absorbs part of a perturbation, so the
-    # map is from reversal to reversal.
-    speed = np.concatenate([path[-1, n:], _find_accelerations(modes, path[-1], row, slip_force)])
+    motion = path[:, :n] @ modes.output, path[:, n:] @ modes.output
+    amplitude, coarse = [
+        _find_largest(times[::stride], motion[0][::stride], motion[1][::stride])
+        for stride in (1, 2)
+    ]
+    error = abs(amplitude - coarse) + AMPLITUDE_TOL * amplitude
+
+    # A time shift of the reversal absorbs part of a perturbation, so the map is from reversal to reversal.
+    speed = flow.find_rates(path[-1] - flow.rest)
     face = np.concatenate([np.zeros(n), row])
-    reversal_map = (np.eye(2 * n) - np.outer(speed, face) / (face @ speed)) @ _free_motion_matrices(
-        modes, [half_period]
-    )[0]
+    reversal_map = (np.eye(2 * n) - np.outer(speed, face) / (face @ speed)) @ steps[-1]
     is_stable = bool(np.abs(np.linalg.eigvals(reversal_map)).max() < 1)
-    return LimitCycle(
-        amplitude,
-        abs(amplitude - coarse_amplitude) + AMPLITUDE_TOL * amplitude,
-        np.pi / half_period,
-        is_stable,
-    )
+    return LimitCycle(amplitude, error, np.pi / half_period, is_stable)
 
 
-def _find_accelerations(modes: ModalBasis, y, row, force: float) -> np.ndarray:
-    """Return the modal accelerations (n,) in a state (2 n,), with a force [N] applied along a row."""
-    n = modes.omega.size
-    return row * force / modes.mass - modes.omega**2 * y[:n] - modes.damping_matrix @ y[n:]
-
-
-def _find_maximum(samples) -> float:
-    """Return the maximum of a sampled motion (k,), interpolated by a parabola through three samples.
-
-    The motion changes sign after half a period.
-    """
-    k = int(np.argmax(samples))
-    if not 0 < k < samples.size - 1:
-        k = 1 if k == 0 else samples.size - 2
-    a, b, c = samples[k - 1 : k + 2]
-    bend = a - 2 * b + c
-    return float(b - (c - a) ** 2 / (8 * bend)) if bend < 0 else float(samples.max())
+def _find_largest(times, motion, speeds) -> float:
+    """Return the largest magnitude of the cubics through samples (k,) of a motion [m] and of its velocity [m/s]."""
+    curve = CubicHermiteSpline(times, motion, speeds)
+    turns = curve.derivative().roots(extrapolate=False)
+    return float(max(np.abs(motion).max(), np.nanmax(np.abs(curve(turns)), initial=0.0)))
 
 
 def find_balance_cycles(modes: ModalBasis, group: LawGroup, row, limit: float) -> tuple:

@@ -9,7 +9,6 @@ from ..campaigns.cost import (
     WorstError,
     describe_fastest_setting,
     find_best_run,
-    find_fastest_settings,
     find_measures_with_error,
     find_worst_error,
     judge_run,
@@ -92,9 +91,8 @@ def make_answer(curves: dict[str, list[Cost]], model: Model) -> Answer:
 def describe_runs(knob: str, runs: list[Cost], tolerance: float) -> dict:
     """Return the runs of a curve as an entry of cost.json, in SI units.
 
-    `runs`: the attributes of each `Cost`, with `worst` {`measure`, `error`} and `meets_tolerance`. `cheapest`: by measure
-    the label of the fastest run within the tolerance. `sentence`: the cost of all measures. The last two are None for
-    TOLERANCE, because its runs have different tolerances.
+    `runs`: the attributes of each `Cost`, with `worst` {`measure`, `error`} and `meets_tolerance`. `sentence`: the cost of
+    all measures; None for TOLERANCE, because its runs have different tolerances.
 
     Parameters
     ----------
@@ -117,7 +115,6 @@ def describe_runs(knob: str, runs: list[Cost], tolerance: float) -> dict:
     is_setting = knob != TOLERANCE
     return {
         "runs": entries,
-        "cheapest": find_fastest_settings(runs, tolerance) if is_setting else None,
         "sentence": describe_fastest_setting(runs, tolerance) if is_setting else None,
     }
 

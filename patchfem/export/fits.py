@@ -13,7 +13,9 @@ import numpy as np
 from .. import __version__
 from ..campaigns.fits.curve import EXTENT, FittedCurve
 from ..campaigns.fits.loop import FittedLoop
-from ..campaigns.fits.request import FitOptions, Listener, fit_measurement
+from ..campaigns.fits.options import FitOptions
+from ..campaigns.fits.problem import Listener
+from ..campaigns.fits.request import fit_measurement
 from ..campaigns.fits.wear import COEFFICIENT_KEY, FittedCoefficient
 from ..campaigns.rows.fit import FittedRows
 from ..disk.atomic_write import write_text
@@ -24,7 +26,7 @@ from ..scene.assignments import Range
 from ..scene.scene import Scene, add_sets, move_scene
 from . import page, store
 from .answer import Answer, Quantities, Quantity, Remarks, Variables, encode, make_columns
-from .folder import STARTS, Folder
+from .folder import Folder
 from .quantities import format_quantity
 from .runs import make_origin
 
@@ -75,10 +77,8 @@ def fit_into(
     SceneError, PatchfemError
         For input that cannot be used, before anything is computed.
     """
-    with Folder(target, options.resume) as folder:
-        if folder.dropped and listener.say is not None:
-            listener.say(folder.dropped)
-        fit = fit_measurement(scene, to, free, options, listener, folder.path / STARTS)
+    with Folder(target) as folder:
+        fit = fit_measurement(scene, to, free, options, listener)
         answer = make_answer(fit, scene)
         if command:
             answer = replace(answer, origin=answer.origin | {"command": command})
@@ -119,16 +119,12 @@ def make_answer(fit: AnyFit, scene: Scene) -> Answer:
         details |= _describe_search(fit)
     details |= parts.details
 
-    # fitted values, and offsets of the record, with their intervals
-    fitted = details["values"] | {
-        f"offset_{name}": entry for name, entry in details.get("offsets", {}).items()
-    }
     measures = {}
-    for name, entry in fitted.items():
+    for name, entry in details["values"].items():
         reason = "" if entry["interval"] else "the measurement does not determine an interval"
         ends = {end: entry[end] for end in ("low", "high")}
         measures[name] = Quantity(entry["value"], entry["unit"], **ends, reason=reason)
-    pairs = _collect_pairs(details.get("correlation", []), list(fitted))
+    pairs = _collect_pairs(details.get("correlation", []), list(measures))
     verdict = [_make_headline(details, measures), parts.residual]
     if pairs:
         correlation = pairs["correlation"].values[0]
@@ -211,7 +207,6 @@ def _describe_search(fit: FittedLoop | FittedCurve | FittedRows) -> dict:
     keys = fit.keys
     intervals = keys.fit.intervals
     names = [bound.key for bound in keys.ranges]
-    names += [offset.range.key for offset in getattr(fit, "offsets", ())]
     unknown = [dict(zip(names, row, strict=True)) for row in intervals.unknown.tolist()]
     return {
         "outcome": str(keys.outcome),
@@ -219,7 +214,7 @@ def _describe_search(fit: FittedLoop | FittedCurve | FittedRows) -> dict:
         "correlation": intervals.correlation,
         "evaluations": keys.fit.counts.evaluations,
         "failures": keys.fit.counts.failures,
-        "descents_agreed": keys.fit.n_agreed,
+        "descents_agreed": keys.fit.descents.n_best,
         "warnings": keys.warnings,
         "seconds": round(keys.seconds, 6),
     }
@@ -259,11 +254,9 @@ def describe_loop_fit(fit: FittedLoop) -> Parts:
         held = {"rows": fit.held_out.sum(), "rms": fit.held_out_rms}
         scores["held_out_rms"] = Quantity(fit.held_out_rms, unit)
         columns["held_out"] = (np.where(fit.held_out, loop.reading, np.nan), unit)
-    offsets = enumerate(fit.offsets, len(fit.keys.ranges))
     details = {
         "measured": loop.path.name,
         "quantity": loop.quantity,
-        "offsets": {one.name: _describe_value(one.range, fit.keys.fit, k) for k, one in offsets},
         "unit": unit,
         "rows": n_rows,
         "effective_rows": fit.keys.fit.intervals.rows,
@@ -336,7 +329,7 @@ def describe_rows_fit(fit: FittedRows) -> Parts:
         for first, last, rms in zip(search.starts, search.ends, search.rms, strict=True)
     ]
     instrument = {
-        name: getattr(fit.models.instrument, name, default) for name, default in INSTRUMENT.items()
+        name: getattr(fit.instrument, name, default) for name, default in INSTRUMENT.items()
     }
     for name, value in zip(names, fit.keys.fit.values, strict=True):
         table, _, key = name.partition(".")
@@ -348,12 +341,10 @@ def describe_rows_fit(fit: FittedRows) -> Parts:
         "quantity": "rows",
         "scores": scores,
         "scores_stable": fit.compute_scores(only_stable=True),
-        "unstable": fit.options.unstable,
         "reading": instrument,
         "readings": (~fit.held_out).sum(),
         "held": fit.held_out.sum(),
         "rms": fit.keys.fit.rms,
-        "seed": fit.options.seed,
         "starts": starts,
         "rows": rows,
         "motions": fit.n_motions,

@@ -37,10 +37,9 @@ FILES = frozenset(
     }
 )
 LOCK = ".writer"
-# files with the state from which an interrupted run or fit continues
+# files with the state from which an interrupted run continues
 STATE = "wear.npz"
-STARTS = "starts.json"
-STATES = re.compile(r"wear\.npz|starts\.json|march(_\d+)+\.npz")
+STATES = re.compile(r"wear\.npz|march(_\d+)+\.npz")
 
 
 class Folder:

@@ -37,7 +37,7 @@ KEY = tuple(
     track_depth wear_coefficient amplitude_ratio slope_ratio Ra Rq Rz RSm Rsk Rk Pa Pq Pt Sa Sq Sz Ssk Sdr Sal
     relative_displacement_amplitude relative_displacement_rms absolute_acceleration_peak absolute_acceleration_rms
     response_frequency response_damping slip_amplitude equivalent_stiffness equivalent_damping loop_area
-    friction_power friction_force_peak friction_ratio_peak flutter_amplitude onset_level jump_level
+    friction_power friction_force_peak friction_ratio_peak flutter_amplitude onset_level
     contact_fraction pressure_peak contact_half_width normal_load approach normal_stiffness tangential_stiffness
     """.split()
 )
@@ -106,10 +106,6 @@ QUANTITIES: dict[str, Definition] = {
         "1", "exponent of the energy loss per cycle over the amplitude in gross slip; 1 in theory"
     ),
     # fit; of keys of a scene, see FITTED_KEY
-    "offset_force": Definition("N", "constant force that is fitted to the whole record"),
-    "offset_displacement": Definition(
-        "m", "fitted distance of the first row from the position without stress"
-    ),
     "residual_rms": Definition("1", "root mean square of fitted minus measured values", 3),
     "residual_fraction": Definition(
         "1", "root mean square of fitted minus measured values, over the largest measured value"

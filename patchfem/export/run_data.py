@@ -527,10 +527,9 @@ def find_readings(result: Result) -> tuple[list, dict] | None:
 
 def _collect_accuracy(result: Result) -> Variables:
     """Return the error of the run and of its coarser runs over their CPU time, if the time steps limit the accuracy."""
-    curve = compute_accuracy_curve(result)
-    if curve is None:
+    runs = compute_accuracy_curve(result)
+    if not runs:
         return {}
-    runs = [*curve.coarser[::-1], curve.present]
     text = "largest error of the main measures, as the tolerance that it meets"
     columns = {
         "accuracy_steps": ([run.steps for run in runs], "1", "steps per cycle"),

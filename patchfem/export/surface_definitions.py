@@ -2,7 +2,7 @@
 
 from ..surface.compare.records import DEFINITIONS
 from ..surface.roughness.areal import AREAL
-from ..surface.roughness.parameters import PROFILE
+from ..surface.roughness.parameters import PROFILE, WAVES
 from .answer import Definition
 
 # names in a track -> names in compare.json and in the answer
@@ -31,14 +31,6 @@ _MEANINGS = {
         "coefficient of Archard's law with which the computed depth of a run fits the measured depth",
     ),
     "patch_centre": ("m", "middle of the patch, in x of the second trace"),
-    "dominant_wavelength": (
-        "m",
-        "wavelength of the octave with the largest mean square height, of the levelled trace",
-    ),
-    "band_amplitude": (
-        "m",
-        "amplitude of a sine with the mean square of the waves from 60 to 110 um, of the levelled trace",
-    ),
     "difference_rms": (
         "m",
         "root mean square of measured less computed depth over the patch, with the fitted coefficient",
@@ -55,12 +47,12 @@ def list_names() -> list[str]:
     """Return the names of all definitions; the parts of a track without the prefix track_."""
     heights = [f"P{name}" for name in PROFILE if name != "z"]
     roughness = [name if name.startswith("Mr") else f"R{name}" for name in PROFILE]
-    return list(dict.fromkeys([*_MEANINGS, *DEFINITIONS, *heights, *roughness, *AREAL]))
+    return list(dict.fromkeys([*_MEANINGS, *WAVES, *DEFINITIONS, *heights, *roughness, *AREAL]))
 
 
 def find(name: str) -> Definition | None:
     """Return the definition of a quantity of compare, pairs or profile; None if there is none."""
-    for table in (_MEANINGS, DEFINITIONS, AREAL):
+    for table in (_MEANINGS, WAVES, DEFINITIONS, AREAL):
         if name in table:
             return Definition(*table[name])
     for letter, profile in (("P", "levelled trace"), ("R", "roughness profile"), ("", "profile")):

@@ -3,7 +3,8 @@
 In: increments of relative displacement and pressure. Out: path-mean traction, dissipated energy, and the state after
 the step (`protocol`). `laws/` has one law per file, `bonds/` the sum over bonds of eq. 2.17 and its engines. Files named
 *kernels are compiled: those of `laws/` are for the harmonic balance. `grooves` has matched grooves, whose flanks the load
-climbs. `path_work` computes the friction work of samples. Read `protocol` first, then `laws/elastic_plastic`.
+climbs. `path_work` computes the friction work of samples and the phase of slip. Read `protocol` first, then
+`laws/elastic_plastic`.
 """
 
 # Names that other folders use, by module
@@ -56,7 +57,6 @@ PUBLIC = {
     ),
     "bonds.points_kernels": ("point_list",),
     "bonds.spread": ("carried_fraction",),
-    "bonds.temperature": ("surface_temperature_rise",),
     "grooves": ("Grooves",),
     "laws.coulomb": ("Coulomb",),
     "laws.elastic_plastic": (
@@ -67,7 +67,10 @@ PUBLIC = {
     "laws.lugre": ("LuGre",),
     "laws.stretch": ("points_element",),
     "laws.stretch_kernels": ("relax_stretch",),
-    "path_work": ("sampled_work",),
+    "path_work": (
+        "mean_slip_phase",
+        "sampled_work",
+    ),
     "protocol": (
         "Element",
         "Step",

@@ -6,6 +6,7 @@ NaN.
 
 import numpy as np
 
+from ..friction import path_work
 from .records import (
     N_FACE_INTEGRALS,
     N_INTEGRALS,
@@ -21,7 +22,6 @@ from .records import (
     Window,
 )
 
-MIN_ALIGNMENT = 0.95  # smallest mean resultant length of doubled phases that are one phase
 MIN_ENERGY = (
     1e-6  # imbalance that counts as round-off, relative to the energy of the smallest speed
 )
@@ -85,25 +85,15 @@ def compute_measures(
 
     # Measures of the first interface alone.
     row = records.faces[:, window, 0]
-    values["slip_start_phase"] = _mean_phase(row)
+    values["slip_start_phase"] = path_work.mean_slip_phase(
+        row[:, Window.STARTS], row[:, Window.COS_START], row[:, Window.SIN_START]
+    )
     if (rigs.faces[:, 0, Face.SWING] != 0).any() or (rigs.faces[:, 0, Face.STIFFNESS] != 0).any():
         values["normal_load_least"] = row[:, Window.MIN_LOAD]
         values["normal_load_peak"] = row[:, Window.MAX_LOAD]
         values["open_fraction"] = row[:, Window.OPEN] / span
     loop = _compute_loop(rigs, records, window, span, values, model["stiffness"])
     return values | {name: np.where(has_cycle, value, np.nan) for name, value in loop.items()}
-
-
-def _mean_phase(row) -> np.ndarray:
-    """Return the mean phase (c,) [rad], modulo pi, at which slip starts in each case; NaN without a common phase.
-
-    `row` (c, m) has the sums over the last cycles (`records.Window`) of one interface.
-    """
-    count = row[:, Window.STARTS]
-    cosine = row[:, Window.COS_START]
-    sine = row[:, Window.SIN_START]
-    is_common = (count > 0) & (np.hypot(cosine, sine) >= MIN_ALIGNMENT * count)
-    return np.where(is_common, np.arctan2(sine, cosine) / 2 % np.pi, np.nan)
 
 
 def _compute_energies(rigs, states, first, n_friction: int) -> dict:

@@ -11,6 +11,7 @@ import numpy as np
 
 from .. import compiled
 from ..core import ModalBasis, Response
+from ..structure.histories import make_response
 from .cases import Case, make_batch
 from .measures import compute_measures
 from .records import (
@@ -192,14 +193,6 @@ class Motion:
         )
         forces = rows[:, 1 + self.case.y.size :][:, :n_faces]
 
-        # Accelerations follow from eq. 3.4, relative to the base.
-        push = drive.values(time)
-        base = push if drive.moving else np.zeros_like(push)
-        acceleration = (
-            -np.outer(push, modes.base) - rate @ modes.damping_matrix.T - z * modes.omega**2
-        )
-        acceleration -= forces @ rig.rows[0] / modes.mass
-
         slides = z @ rig.rows[0, :m].T
         slide_rates = rate @ rig.rows[0, :m].T
         rests = (self._columns(rows, 2) == 0) & (rig.faces[:m, Face.RIGID] > 0)
@@ -223,12 +216,13 @@ class Motion:
             }
 
         still = np.zeros(time.size)
-        return Response(
-            time, z, rate,
-            slides[:, 0] if m else z @ modes.slide, slide_rates[:, 0] if m else rate @ modes.slide,
-            z @ modes.output, rate @ modes.output, acceleration @ modes.output + base, base,
-            forces[:, 0] if m else still, slips[:, 0] if m else still, extra,
-        )  # fmt: skip
+        interface = (z @ modes.slide, rate @ modes.slide, still, still)
+        if m:
+            interface = (slides[:, 0], slide_rates[:, 0], forces[:, 0], slips[:, 0])
+        pull = forces @ rig.rows[0]
+        return make_response(
+            modes, drive, drive.values(time), (time, z, rate), pull, interface, extra
+        )
 
 
 def run_batch(

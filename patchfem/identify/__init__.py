@@ -8,19 +8,15 @@ parameters that the data do not determine; frequencies, damping ratios and shape
 # Names that other folders use, by module.
 PUBLIC = {
     "least_squares": (
-        "Descent",
         "Descents",
         "Fit",
         "Problem",
         "Search",
     ),
     "measured_modes": (
-        "SHAPE_QUANTITIES",
         "compute_decay_curve",
-        "estimate_record",
         "identify_decay_modes",
         "identify_driven_modes",
-        "list_shape_modes",
     ),
     "fit_sentences": ("describe_fit",),
     "advice": ("advise_test",),

@@ -1,11 +1,9 @@
 """Natural frequencies and damping ratios of a free decay, from a fit of decaying sinusoids."""
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from ..core import PatchfemError
-from .sinusoids import Limits, SinusoidFit, SinusoidProblem
+from .sinusoids import FittedModes, Limits, SinusoidFit, SinusoidProblem
 
 MIN_SAMPLES = 32  # smallest number of samples of a record
 MAX_SINUSOIDS = 8  # largest number of sinusoids in one fit
@@ -20,29 +18,7 @@ DAMPING_ROUND_OFF = 1e-10  # error of a damping ratio of a record without noise
 START_DECAY_RATES = (0.3, 3.0, 30.0)
 
 
-@dataclass(frozen=True, eq=False, slots=True)
-class Decay:
-    """Frequencies, damping ratios and amplitudes of the sinusoids of a free decay.
-
-    - frequency: undamped natural frequencies (n,) [Hz], w/(2 pi) with w^2 = w_r^2 + s_r^2.
-    - damping: damping ratios (n,), s_r/w.
-    - amplitude: amplitudes (n,) at the first sample.
-    - damping_error: half-widths (n,) of the 95 % intervals of the damping ratios.
-    - misfit: root mean square of the residual relative to that of the record.
-    """
-
-    frequency: np.ndarray
-    damping: np.ndarray
-    amplitude: np.ndarray
-    damping_error: np.ndarray
-    misfit: float
-
-    def decrement(self) -> np.ndarray:
-        """Return the logarithmic decrements (n,), 2 pi zeta / sqrt(1 - zeta^2)."""
-        return 2 * np.pi * self.damping / np.sqrt(1 - self.damping**2)
-
-
-def fit_decay(time, value) -> Decay:
+def fit_decay(time, value) -> FittedModes:
     """Fit exponentially decaying sinusoids to a free decay.
 
     Parameters
@@ -51,10 +27,6 @@ def fit_decay(time, value) -> Decay:
         Times [s] after the end of the drive.
     value : (k,) ndarray
         Displacement, velocity or acceleration.
-
-    Returns
-    -------
-    Decay
 
     Raises
     ------
@@ -78,35 +50,16 @@ def fit_decay(time, value) -> Decay:
     energy = np.sum(motions**2, axis=1)
     is_kept = fit.damping > DAMPING_ROUND_OFF
     is_kept &= energy > MIN_AMPLITUDE_RATIO**2 * energy.max()
-    errors = problem.estimate_damping_errors(fit)
     if not is_kept.any():
-        raise PatchfemError(_describe_growth(fit.damping, errors, energy))
-    order = np.flatnonzero(is_kept)[np.argsort(fit.omega[is_kept])]
-    return Decay(
-        frequency=fit.omega[order] / (2 * np.pi),
-        damping=fit.damping[order],
-        amplitude=np.hypot(*fit.coefficients.T)[order],
-        damping_error=errors[order],
-        misfit=float(np.sqrt(fit.mean_square)) / problem.scale,
-    )
-
-
-def _describe_growth(damping, errors, energy) -> str:
-    """Describe why a record without a decaying sinusoid has no damping: it grows, or it does neither within its error.
-
-    damping, errors, energy: of each sinusoid (n,).
-    """
-    largest = int(np.argmax(energy))
-    error = max(float(errors[largest]), DAMPING_ROUND_OFF)
-    if damping[largest] < -error:
-        return (
-            "the oscillation in the record grows instead of decaying; begin the record after the drive "
-            "has ended"
+        largest = int(np.argmax(energy))
+        error = max(float(problem.estimate_damping_errors(fit)[largest]), DAMPING_ROUND_OFF)
+        behaviour = (
+            f"neither decays nor grows beyond its error of {error:.1g}; give a longer record"
         )
-    return (
-        f"the damping ratio of the oscillation in the record is zero within its error of {error:.1g}: it neither decays nor "
-        "grows; give a longer record"
-    )
+        if fit.damping[largest] < -error:
+            behaviour = "grows instead of decaying; begin the record after the drive has ended"
+        raise PatchfemError(f"the oscillation in the record {behaviour}")
+    return problem.select_modes(fit, is_kept)
 
 
 def _find_starts(time, fit: SinusoidFit) -> list[np.ndarray]:

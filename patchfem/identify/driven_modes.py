@@ -1,19 +1,17 @@
 """Natural modes fitted to the time record of one response, without windows that widen peaks.
 
 The model is that of `sinusoids` with the columns L f_-2 + U f + c, where L and U are the residuals of modes below
-and above the band as in `structure.modal_fit`. The input is assumed to be band-limited, and the response is computed by
+and above the band (Ewins, Modal testing, 2000). The input is assumed to be band-limited, and the response is computed by
 Fourier transform, which is periodic. Free decays of the same modes represent the initial state and the jump between
 the end and the start of the record. Modes are added at the spectral line where the residual depends most on the input.
 """
-
-from dataclasses import dataclass
 
 import numpy as np
 from scipy.fft import irfft, rfft, rfftfreq
 
 from ..core import PatchfemError
-from .frequency_response import MAX_NYQUIST_FRACTION, FrequencyResponse, estimate_response
-from .sinusoids import Limits, SinusoidFit, SinusoidProblem
+from ..response.welch import average_segments, transform_segments
+from .sinusoids import FittedModes, Limits, SinusoidFit, SinusoidProblem
 
 # order of the time derivative of the displacement, by the quantity of the response
 DERIVATIVE_ORDERS = {"displacement": 0, "velocity": 1, "acceleration": 2}
@@ -26,28 +24,17 @@ N_EDGE_SAMPLES = 32
 MAX_FITTED_SAMPLES = 2**16
 MIN_ZETA = 1e-6  # lower bound of the damping ratios in the search
 MAX_ZETA = 0.5  # upper bound of the damping ratios in the search
+# Ratio of the length of the record to that of the windowed segments in which a further mode is sought.
+N_SEGMENTS = 8
+MIN_SAMPLES = 64 * N_SEGMENTS  # smallest number of samples of a record
+# Half-width of the main lobe of a Hann window, which hides the lines near 0, in spectral lines.
+WINDOW_WIDTH_LINES = 1.5
+# Smallest input power of an excited spectral line, relative to the largest one.
+MIN_INPUT_POWER = 1e-6
+# Highest frequency that is used, relative to the Nyquist frequency, because of filters and aliasing.
+MAX_NYQUIST_FRACTION = 0.8
 # Initial peak widths zeta f of a further mode, in spectral lines of a segment.
 START_PEAK_WIDTHS = (0.1, 1.0, 5.0)
-
-
-@dataclass(frozen=True, eq=False, slots=True)
-class DrivenModes:
-    """Natural modes fitted to one response and its input, in order of increasing frequency.
-
-    - frequency: natural frequencies (n,) [Hz].
-    - damping: damping ratios (n,).
-    - residue: residues A (n,) of sum A / (w_r^2 - w^2 + 2i zeta w_r w).
-    - damping_error: half-widths (n,) of the 95 % intervals of the damping ratios.
-    - coherence: coherence (n,) at the peaks, or None.
-    - misfit: root mean square of the residual relative to that of the response.
-    """
-
-    frequency: np.ndarray
-    damping: np.ndarray
-    residue: np.ndarray
-    damping_error: np.ndarray
-    coherence: np.ndarray | None
-    misfit: float
 
 
 class _DrivenRecord:
@@ -85,22 +72,25 @@ class _DrivenRecord:
         by_rate = -2 * (rate + 1j * self.omega) * response * pole
         return self._transform(response, -2 * omega * response * pole, by_rate)
 
-    def find_starts(self, fit: SinusoidFit, estimate: FrequencyResponse) -> list[np.ndarray]:
-        """Return initial poles (2,) at the frequency where the input explains most of the residual."""
-        response = estimate_response(
-            self.step,
-            self.force[self.inner],
-            fit.residual,
-            min(estimate.segment, fit.residual.size),
-            estimate.window,
-        )
-        power = np.abs(response.value) ** 2 * response.input
-        if response.coherence is not None:
-            power = power * response.coherence
-        frequency = response.frequency[int(np.argmax(power))]
-        line_width = 1 / (estimate.segment * self.step)
-        zetas = np.clip(np.multiply(START_PEAK_WIDTHS, line_width / frequency), 1e-4, 0.2)
-        return [2 * np.pi * frequency * np.array([1.0, zeta]) for zeta in zetas]
+    def find_starts(self, fit: SinusoidFit) -> list[np.ndarray]:
+        """Return initial poles (2,) at the frequency where the input explains most of the residual.
+
+        This part of the power of a line is |G_xf|^2 / G_ff times the coherence, averaged over windowed segments (H1
+        estimator: Bendat and Piersol, Random Data, ch. 6).
+        """
+        size = 2 * (self.force.size // (2 * N_SEGMENTS))
+        records = (self.force[self.inner], fit.residual)
+        frequency, transforms = transform_segments(self.step, records, size)
+        densities = average_segments(*transforms)
+        power = np.abs(densities.cross) ** 2 / np.maximum(densities.input, 1e-300)
+        line_width = 1 / (size * self.step)
+        is_seen = frequency > WINDOW_WIDTH_LINES * line_width
+        is_seen &= frequency <= MAX_NYQUIST_FRACTION / (2 * self.step)
+        is_seen &= densities.input > MIN_INPUT_POWER * densities.input[is_seen].max()
+        explained = np.where(is_seen, power * densities.coherence(), 0.0)
+        peak = frequency[int(np.argmax(explained))]
+        zetas = np.clip(np.multiply(START_PEAK_WIDTHS, line_width / peak), 1e-4, 0.2)
+        return [2 * np.pi * peak * np.array([1.0, zeta]) for zeta in zetas]
 
 
 def fit_driven_modes(
@@ -108,9 +98,8 @@ def fit_driven_modes(
     force,
     response,
     quantity: str,
-    estimate: FrequencyResponse,
-    band: tuple = (0.0, np.inf),
-) -> DrivenModes:
+    band: tuple[float, float] = (0.0, np.inf),
+) -> FittedModes:
     """Fit natural modes to the time records of a response and its input.
 
     Parameters
@@ -121,25 +110,25 @@ def fit_driven_modes(
         Input and response.
     quantity : str
         Kind of the response, a key of `DERIVATIVE_ORDERS`.
-    estimate : FrequencyResponse
-        Frequency response of the same record, whose segments and coherence are used.
     band : (float, float)
         Frequency band [Hz] of the returned modes; modes outside are fitted, too.
-
-    Returns
-    -------
-    DrivenModes
 
     Raises
     ------
     PatchfemError
-        If no mode is visible in the band.
+        If the record is too short or has no input, or if no mode is visible in the band.
     """
+    if force.size < MIN_SAMPLES:
+        raise PatchfemError(
+            f"the record has {force.size} samples; at least {MIN_SAMPLES} are needed"
+        )
+    if not np.any(force):
+        raise PatchfemError("the input is zero, so there is no response to it")
     fitted = slice(MAX_FITTED_SAMPLES)
     record = _DrivenRecord(step, force[fitted], response[fitted], DERIVATIVE_ORDERS[quantity])
     problem = record.problem
 
-    fit = problem.fit(lambda fit: record.find_starts(fit, estimate), LIMITS)
+    fit = problem.fit(record.find_starts, LIMITS)
     if not fit.poles.size:
         raise PatchfemError(
             "no mode is visible in the response; a record over a resonance is needed"
@@ -147,7 +136,8 @@ def fit_driven_modes(
     w = fit.omega
     zeta = fit.damping
     min_frequency, max_frequency = band
-    min_w = 2 * np.pi * max(min_frequency, estimate.frequency[0])
+    lowest = WINDOW_WIDTH_LINES * N_SEGMENTS / (force.size * step)
+    min_w = 2 * np.pi * max(min_frequency, lowest)
     max_w = 2 * np.pi * min(max_frequency, MAX_NYQUIST_FRACTION / (2 * step))
     # a mode with a damping ratio at a bound represents noise or a trend, not a resonance
     is_resonance = (zeta > 2 * MIN_ZETA) & (zeta < 0.99 * MAX_ZETA)
@@ -156,16 +146,4 @@ def fit_driven_modes(
         raise PatchfemError(
             f"no mode is visible in the response between {min_frequency:g} and {max_frequency:g} Hz"
         )
-    order = np.flatnonzero(is_kept)[np.argsort(w[is_kept])]
-    frequency = w[order] / (2 * np.pi)
-    coherence = None
-    if estimate.coherence is not None:
-        coherence = np.interp(frequency, estimate.frequency, estimate.coherence)
-    return DrivenModes(
-        frequency=frequency,
-        damping=zeta[order],
-        residue=fit.coefficients[order, 2],
-        damping_error=problem.estimate_damping_errors(fit)[order],
-        coherence=coherence,
-        misfit=float(np.sqrt(fit.mean_square)) / problem.scale,
-    )
+    return problem.select_modes(fit, is_kept)

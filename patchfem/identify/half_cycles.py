@@ -28,7 +28,6 @@ N_NEIGHBOURS = 8  # half cycles on each side from which the noise of a half cycl
 # Lower and upper bounds of the frequency of the first cycle, relative to that of the highest spectral line, and of its
 # decay rate [1/s].
 FIRST_CYCLE_BOUNDS = ((0.75, -np.inf), (1.3, np.inf))
-MAX_STEP_RATIO = 10.0  # smallest length of a gap, relative to the 10 % quantile of the time steps
 PADDING_FACTOR = 8  # length of the zero-padded record relative to the record, for a finer spectrum
 
 
@@ -90,7 +89,13 @@ def find_half_cycles(time, value) -> HalfCycles:
         if len(sines) > 2:
             candidates.append(_FittedSines(*np.array(sines).T))
     if not candidates:
-        _raise_for_short_decay(time, middle, length)
+        reasons = [_describe_missing_samples(time, middle + k * length, length) for k in range(3)]
+        reason = next(
+            filter(None, reasons),
+            "the others do not rise above the noise; begin the record after the drive has ended (--begin), and take at "
+            "least 10 samples per cycle",
+        )
+        raise PatchfemError(f"fewer than three half cycles of a free decay are found: {reason}")
 
     best = min(candidates, key=lambda sines: sines.compute_noise().mean())
     noise = best.compute_noise()
@@ -103,38 +108,18 @@ def find_half_cycles(time, value) -> HalfCycles:
     )
 
 
-def _raise_for_short_decay(time, middle: float, length: float) -> None:
-    """Raise a PatchfemError with the reason why a decay has fewer than three half cycles."""
-    reasons = [_describe_missing_samples(time, middle + k * length, length) for k in range(3)]
-    usual_step, max_step = np.quantile(np.diff(time), (0.1, 1.0))
-    if max_step > MAX_STEP_RATIO * usual_step:
-        reasons.append(
-            f"the samples lie up to {max_step:.3g} s apart, elsewhere {usual_step:.3g} s"
-        )
-    reason = next(filter(None, reasons), "")
-    if reason:
-        raise PatchfemError(
-            f"fewer than three half cycles of a free decay have samples enough: {reason}"
-        )
-    raise PatchfemError(
-        "fewer than three half cycles of a free decay rise above the noise; begin the record after "
-        "the drive has ended (--begin), and take at least 10 samples per cycle"
-    )
-
-
-def describe_missing_samples_at_end(time, half_cycles: HalfCycles) -> str:
+def describe_missing_samples_at_end(time: np.ndarray, half_cycles: HalfCycles) -> str:
     """Return a sentence if samples are missing after the last half cycle; "" at the end of the record."""
     before, last = half_cycles.middle[-2:].tolist()
     return _describe_missing_samples(time, 2 * last - before, last - before)
 
 
-def _describe_missing_samples(time, middle: float, length: float) -> str:
-    """Return a sentence if a half cycle has too few samples, else "".
+def _describe_missing_samples(time: np.ndarray, middle: float, length: float) -> str:
+    """Return a sentence if a half cycle within the record has too few samples, else "".
 
-    The result is also "" if the half cycle ends after the record.
+    middle, length: midpoint and half period [s].
     """
-    low = middle - length / 2
-    high = middle + length / 2
+    low, high = middle - length / 2, middle + length / 2
     count = int(np.diff(np.searchsorted(time, (low, high)))[0])
     if count >= MIN_SAMPLES or high > time[-1]:
         return ""

@@ -11,7 +11,6 @@ import numpy as np
 from scipy.optimize import brentq
 from scipy.special import stdtrit
 
-from ..core import frozen_array
 from .correlation import estimate_effective_rows
 from .space import UnitCubeResidual
 
@@ -64,13 +63,13 @@ def make_unknown_intervals(n: int) -> FitIntervals:
     """Return intervals of NaN, for a fit without confidence intervals."""
     unknown = np.full((n, n + 3), np.nan)
     return FitIntervals(
-        ends=frozen_array(unknown[:, :2]),
+        ends=unknown[:, :2],
         methods=("none",) * n,
-        open_ends=frozen_array(np.zeros((n, 2)), bool),
-        correlation=frozen_array(unknown[:, 3:]),
-        effects=frozen_array(np.zeros((0, n))),
-        sensitivity=frozen_array(unknown[:, 2]),
-        unknown=frozen_array(np.zeros((0, n))),
+        open_ends=np.zeros((n, 2), bool),
+        correlation=unknown[:, 3:],
+        effects=np.zeros((0, n)),
+        sensitivity=unknown[:, 2],
+        unknown=np.zeros((0, n)),
         rows=np.nan,
     )
 
@@ -223,13 +222,13 @@ def compute_intervals(
     with np.errstate(invalid="ignore", divide="ignore"):
         correlation = covariance / np.outer(scale, scale)
     return FitIntervals(
-        ends=frozen_array(ends),
+        ends=ends,
         methods=tuple(methods),
-        open_ends=frozen_array(open_ends, bool),
-        correlation=frozen_array(correlation),
-        effects=frozen_array(jacobian * scale / np.sqrt(cost / dof)),
-        sensitivity=frozen_array(norms / np.sqrt(model.rows)),
-        unknown=frozen_array(_list_unknown_directions(model, u, free, null_vectors / norms[free])),
+        open_ends=open_ends,
+        correlation=correlation,
+        effects=jacobian * scale / np.sqrt(cost / dof),
+        sensitivity=norms / np.sqrt(model.rows),
+        unknown=_list_unknown_directions(model, u, free, null_vectors / norms[free]),
         rows=rows,
     )
 

@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.optimize import least_squares
 
-from ..core import NotConverged, Outcome, frozen_array
+from ..core import NotConverged, Outcome
 from .intervals import FitIntervals, compute_intervals, make_unknown_intervals
 from .space import (
     SearchCounts,
@@ -31,7 +31,6 @@ MAX_EVALUATIONS = 100  # largest number of evaluations in one descent, without J
 EXACT_FIT_RATIO = 1e-9
 # A descent has reached the best minimum if the ratio of its residual to the smallest one is at most this value.
 SAME_MINIMUM_RATIO = 1.01
-SAME_RESULT_RATIO = 1 + 5e-7  # largest ratio of the residuals of equal results
 # Largest distance from a bound at which a parameter is tried on the bound, relative to its range.
 NEAR_BOUND_FRACTION = 1e-3
 # Number of trial points per parameter for the choice of the starting points.
@@ -80,11 +79,7 @@ class Descents(NamedTuple):
     @property
     def n_best(self) -> int:
         """Number of descents that ended within 1 % of the smallest residual."""
-        return self.count_within(SAME_MINIMUM_RATIO)
-
-    def count_within(self, ratio: float) -> int:
-        """Return the number of descents whose residual is at most a ratio times the smallest one."""
-        return int((self.rms <= np.nanmin(self.rms) * ratio).sum())
+        return int((self.rms <= np.nanmin(self.rms) * SAME_MINIMUM_RATIO).sum())
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -109,11 +104,6 @@ class Fit:
     outcome: Outcome
     descents: Descents
 
-    @property
-    def n_agreed(self) -> int:
-        """Number of descents that ended at the smallest residual, apart from round-off."""
-        return self.descents.count_within(SAME_RESULT_RATIO)
-
     def count_earlier_search(self, earlier: "Fit") -> "Fit":
         """Return this fit with evaluations and descents of an earlier search, which gave its only start."""
         return replace(self, counts=earlier.counts.add(self.counts), descents=earlier.descents)
@@ -127,17 +117,13 @@ class Search:
     - seed: seed of random starting points, for a residual that is expensive to evaluate: derivatives are one-sided
       differences, and the best descent is continued with central ones. None: the start of the problem and the best of
       some trial points.
-    - before_descent: called before each descent.
-    - report: called with 1 after each descent.
-    - load, save: functions of the number of a start that return the stored descent or None, and store one.
+    - before_descent, report: called before and after each descent.
     """
 
     starts: int
     seed: int | None = None
     before_descent: Callable = lambda: None
-    report: Callable = lambda count: None
-    load: Callable = lambda start: None
-    save: Callable = lambda start, descent: None
+    report: Callable = lambda: None
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -147,7 +133,7 @@ class Problem:
     - residual: function of the parameters (n,) that returns the residual (r,), each row divided by its
       standard deviation. An evaluation fails if it raises a PatchfemError or is not finite.
     - low, high: bounds (n,).
-    - start: parameters (n,) from which the first descent starts, or None.
+    - start: parameters (n,) from which the first descent starts, NaN for the middle of a range; None without them.
     """
 
     residual: Callable
@@ -194,14 +180,11 @@ class Problem:
                 raise ValueError(f"{model.rows} rows of data cannot determine {n} values")
 
         ends = []
-        for number, start in enumerate(starts):
-            end = search.load(number)
-            if end is None:
-                search.before_descent()
-                end = descend(model, start, range(n))
-                search.save(number, end)
+        for start in starts:
+            search.before_descent()
+            end = descend(model, start, range(n))
             ends.append(end)
-            search.report(1)
+            search.report()
             # a fit that is exact to round-off is not repeated
             if not is_random and end.cost <= (EXACT_FIT_RATIO * model.largest) ** 2 * model.rows:
                 break
@@ -214,7 +197,7 @@ class Problem:
         if not is_random:
             return _assemble_fit(model, best, descents, interval_kind)
 
-        # the best descent is continued with central differences; all descents may be stored ones
+        # the best descent is continued with central differences
         search.before_descent()
         central = UnitCubeResidual(self.residual, model.space)
         best = descend(central, best.u, range(n))
@@ -267,7 +250,7 @@ def _assemble_fit(model: UnitCubeResidual, best: Descent, descents: Descents, ki
     n_near = np.count_nonzero(descents.rms <= SAME_MINIMUM_RATIO * np.sqrt(cost / model.rows))
     is_converged = best.is_converged or n_near > 1
     return Fit(
-        values=frozen_array(model.space.to_values(u)),
+        values=model.space.to_values(u),
         at_bound=tuple(np.where(u <= 0, "low", np.where(u >= 1, "high", "")).tolist()),
         intervals=intervals,
         rms=float(np.sqrt(cost / model.rows)),

@@ -1,4 +1,4 @@
-"""Modes of a scene from a driven record, a free decay or measured mode shapes."""
+"""Modes of a scene from a driven record or a free decay."""
 
 from dataclasses import dataclass, field
 from typing import NamedTuple
@@ -7,16 +7,14 @@ import numpy as np
 
 from ..core import PatchfemError
 from ..response.decay_curve import HalfCycles, fit_decay_curve, fit_slopes
-from ..structure import places as structure_places
-from ..structure.places import MeasuredModes
 from .decay import fit_decay
-from .driven_modes import DERIVATIVE_ORDERS, MAX_FITTED_SAMPLES, DrivenModes, fit_driven_modes
-from .frequency_response import FrequencyResponse, estimate_response, find_time_step
+from .driven_modes import DERIVATIVE_ORDERS, MAX_FITTED_SAMPLES, fit_driven_modes
 from .half_cycles import describe_missing_samples_at_end, find_half_cycles
+from .sinusoids import FittedModes
 
 INPUT_QUANTITIES = ("force", "base_acceleration")  # possible inputs of a record
-# Components of a mode whose node and direction in a file of mode shapes a user can give (--map).
-SHAPE_QUANTITIES = ("slide", "output", "base", "normal", "pitch")
+# Largest error of a sample time in time steps; times in text files may have only six digits.
+MAX_TIME_ERROR = 1e-3
 # Largest half-width of the interval of a damping ratio, relative to the damping ratio.
 MAX_ERROR_RATIO = 2.0
 # Largest misfit of a driven response for which no note is issued.
@@ -35,7 +33,6 @@ class ListedModes:
     - mass: modal mass [kg]; None if the record does not determine it.
     - descriptions: description of each mode.
     - notes: sentences for the user.
-    - estimate: frequency response of the record, or None.
     """
 
     frequency: np.ndarray
@@ -44,21 +41,6 @@ class ListedModes:
     mass: float | None
     descriptions: list
     notes: list = field(default_factory=list)
-    estimate: FrequencyResponse | None = None
-
-
-class RecordEstimate(NamedTuple):
-    """Frequency response estimated from a record, with the names of input and response.
-
-    - estimate: frequency response.
-    - step: time step [s].
-    - input, response: names of the two quantities.
-    """
-
-    estimate: FrequencyResponse
-    step: float
-    input: str
-    response: str
 
 
 class _ModeRows(NamedTuple):
@@ -88,46 +70,23 @@ def find_response_name(values: dict) -> str:
     return names[0]
 
 
-def estimate_record(
-    values: dict, segment: float | None = None, window: str | None = None
-) -> RecordEstimate:
-    """Estimate the frequency response of a record with one input and one response.
+def find_time_step(time: np.ndarray) -> float:
+    """Return the time step [s] of an equally sampled record.
 
-    Parameters
-    ----------
-    values : dict
-        Time, one input and one response by name.
-    segment : float, optional
-        Length of a segment [s].
-    window : str, optional
-        Window of the segments (`frequency_response.estimate_response`).
-
-    Returns
-    -------
-    RecordEstimate
-
-    Raises
-    ------
-    PatchfemError
-        If the record lacks time, input or response, or has several inputs or responses.
+    `time` (k,) are the sample times [s]. Raises PatchfemError if they are not equally spaced.
     """
-    response = find_response_name(values)
-    inputs = [name for name in INPUT_QUANTITIES if name in values]
-    if len(inputs) != 1 or "time" not in values:
+    step = (time[-1] - time[0]) / (time.size - 1)
+    deviation = np.abs(time - time[0] - step * np.arange(time.size)).max() / step
+    if deviation > max(MAX_TIME_ERROR, 1e-5 * time.size):
         raise PatchfemError(
-            "a frequency response needs time, a response and one input (force or base_acceleration), "
-            "but the record "
-            "has " + ", ".join(values) + ": choose channels with --map, or use --decay for a free "
-            "decay"
+            f"the times deviate from an even step of {step:.6g} s by up to {deviation:.2g} of this step; an "
+            "evenly sampled record is needed"
         )
-    step = find_time_step(values["time"])
-    samples = None if segment is None else round(segment / step)
-    estimate = estimate_response(step, values[inputs[0]], values[response], samples, window)
-    return RecordEstimate(estimate, step, inputs[0], response)
+    return float(step)
 
 
 def identify_driven_modes(
-    values: dict, segment: float | None, window: str | None, band: tuple
+    values: dict[str, np.ndarray], band: tuple[float, float] = (0.0, np.inf)
 ) -> ListedModes:
     """Identify modes from the response to a force at the same point or to a base acceleration.
 
@@ -136,24 +95,32 @@ def identify_driven_modes(
 
     Parameters
     ----------
-    values, segment, window
-        As in `estimate_record`.
+    values : dict
+        Time, one input and one response (k,) in SI by name.
     band : (float, float)
         Frequency band [Hz] of the modes.
 
-    Returns
-    -------
-    ListedModes
+    Raises
+    ------
+    PatchfemError
+        If the record lacks time, input or response, has several inputs or responses, or shows no mode.
     """
-    estimate, step, input_name, response_name = estimate_record(values, segment, window)
+    response_name = find_response_name(values)
+    inputs = [name for name in INPUT_QUANTITIES if name in values]
+    if len(inputs) != 1 or "time" not in values:
+        raise PatchfemError(
+            "modes need time, a response and one input (force or base_acceleration), "
+            "but the record "
+            "has " + ", ".join(values) + ": choose channels with --map, or use --decay for a free "
+            "decay"
+        )
+    input_name = inputs[0]
+    step = find_time_step(values["time"])
     excitation = values[input_name]
     response = values[response_name]
     if input_name == "base_acceleration" and response_name == "acceleration":
         response = response - excitation
-    relative_estimate = estimate_response(
-        step, excitation, response, estimate.segment, estimate.window
-    )
-    modes = fit_driven_modes(step, excitation, response, response_name, relative_estimate, band)
+    modes = fit_driven_modes(step, excitation, response, response_name, band)
     rows, mass, notes = (
         _convert_force_residues(modes) if input_name == "force" else _convert_base_residues(modes)
     )
@@ -172,13 +139,15 @@ def identify_driven_modes(
         damping=modes.damping,
         rows=rows,
         mass=mass,
-        descriptions=_describe_modes(modes),
+        descriptions=[
+            f"damping {zeta:.4g} +- {error:.1g} from the whole record"
+            for zeta, error in zip(modes.damping, modes.damping_error)
+        ],
         notes=notes,
-        estimate=estimate,
     )
 
 
-def _convert_force_residues(modes: DrivenModes) -> _ModeRows:
+def _convert_force_residues(modes: FittedModes) -> _ModeRows:
     """Return mode-shape components at the drive point and the modal mass, from residues.
 
     The components are relative to that of the first mode, whose residue is the reciprocal of the modal mass.
@@ -199,7 +168,7 @@ def _convert_force_residues(modes: DrivenModes) -> _ModeRows:
     return _ModeRows({"slide": motion, "output": motion}, 1 / float(first), notes)
 
 
-def _convert_base_residues(modes: DrivenModes) -> _ModeRows:
+def _convert_base_residues(modes: FittedModes) -> _ModeRows:
     """Split the residues of a base excitation into participation and mode-shape component.
 
     The residue is the negative product of both factors, which are assumed to have the same magnitude before
@@ -212,17 +181,6 @@ def _convert_base_residues(modes: DrivenModes) -> _ModeRows:
     motion = np.sign(product) * magnitude * scale
     rows = {"slide": motion, "output": motion, "base": magnitude / scale}
     return _ModeRows(rows, None, ["a response to base motion gives no modal mass: set moving_mass"])
-
-
-def _describe_modes(modes: DrivenModes) -> list:
-    """Return a sentence about the damping ratio of each mode."""
-    descriptions = []
-    for k, (zeta, error) in enumerate(zip(modes.damping, modes.damping_error)):
-        text = f"damping {zeta:.4g} +- {error:.1g} from the whole record"
-        if modes.coherence is not None:
-            text += f"; coherence {modes.coherence[k]:.3g}"
-        descriptions.append(text)
-    return descriptions
 
 
 def _select_decay(values: dict, begin: float | None) -> tuple:
@@ -326,7 +284,8 @@ def identify_decay_modes(values: dict, begin: float | None = None) -> ListedMode
     """
     decay = fit_decay(*_select_decay(values, begin))
     descriptions = []
-    for zeta, error, decrement in zip(decay.damping, decay.damping_error, decay.decrement()):
+    for zeta, error in zip(decay.damping, decay.damping_error):
+        decrement = 2 * np.pi * zeta / np.sqrt(1 - zeta**2)
         descriptions.append(
             f"damping {zeta:.4g} +- {error:.1g}, logarithmic decrement {decrement:.4g}"
         )
@@ -342,51 +301,3 @@ def identify_decay_modes(values: dict, begin: float | None = None) -> ListedMode
     motion[np.argmax(decay.amplitude)] = 1.0
     rows = {"slide": motion, "output": motion}
     return ListedModes(decay.frequency, decay.damping, rows, None, descriptions, notes)
-
-
-def list_shape_modes(shapes: MeasuredModes, places: dict) -> ListedModes:
-    """Convert measured mode shapes to the modes of a scene and their modal mass.
-
-    The modal mass is 1 / sum phi^2 at the sliding point, or at the point `base`. A larger mass would exceed
-    the mass that the modes represent there.
-
-    Parameters
-    ----------
-    shapes : MeasuredModes
-    places : dict
-        Node and direction such as ``"12:+x"`` for some of `SHAPE_QUANTITIES`; `slide` is required unless
-        the file has only one node and direction.
-
-    Returns
-    -------
-    ListedModes
-    """
-    if "slide" not in places:
-        node, axis = next(iter(shapes.motion))
-        slide = f"{node}:+{structure_places.DIRECTION_NAMES[axis]}"
-        if len(shapes.motion) != 1:
-            raise PatchfemError(
-                f"the file has {len(shapes.motion)} nodes and directions; give the node and direction "
-                f"that slide, such as --map slide={slide}"
-            )
-        places = {"slide": slide, **places}
-    motion = {key: shapes.motion_at(text, key) for key, text in places.items()}
-    inverse_mass = float(np.sum(motion.get("base", motion["slide"]) ** 2))
-    if not inverse_mass > 0:
-        raise PatchfemError("no mode moves the node that slides")
-    order = np.argsort(shapes.frequency, kind="stable")
-    rows = {key: row[order] / np.sqrt(inverse_mass) for key, row in motion.items()}
-    rows.setdefault("output", rows["slide"])
-    rows.setdefault("base", rows["slide"])
-    note = (
-        f"moving_mass is set to {1 / inverse_mass:.5g} kg, the mass that these modes contain at the node that slides; with "
-        "a larger value, part of the mass would belong to no mode"
-    )
-    return ListedModes(
-        frequency=shapes.frequency[order],
-        damping=shapes.zeta[order],
-        rows=rows,
-        mass=1 / inverse_mass,
-        descriptions=[""] * order.size,
-        notes=[*shapes.notes, note],
-    )

@@ -65,6 +65,33 @@ class SinusoidFit(NamedTuple):
         return self.poles[:, 1] / self.omega
 
 
+class FittedModes(NamedTuple):
+    """Modes of a record from its sinusoids, in order of increasing frequency.
+
+    - frequency: undamped natural frequencies (n,) [Hz], w_0/(2 pi) with w_0^2 = w^2 + s^2.
+    - damping: damping ratios (n,), s/w_0.
+    - coefficients: those of `SinusoidFit` (n, c).
+    - damping_error: half-widths (n,) of the 95 % intervals of the damping ratios.
+    - misfit: root mean square of the residual relative to that of the record.
+    """
+
+    frequency: np.ndarray
+    damping: np.ndarray
+    coefficients: np.ndarray
+    damping_error: np.ndarray
+    misfit: float
+
+    @property
+    def amplitude(self) -> np.ndarray:
+        """Amplitudes (n,) of free sinusoids at the first sample."""
+        return np.hypot(*self.coefficients.T[:2])
+
+    @property
+    def residue(self) -> np.ndarray:
+        """Residues A (n,) of the forced response sum A / (w_r^2 - w^2 + 2i zeta w_r w)."""
+        return self.coefficients[:, 2]
+
+
 class SinusoidProblem:
     """Separable least-squares problem for the sinusoids of a record.
 
@@ -192,6 +219,17 @@ class SinusoidProblem:
                 break
             best = further
         return best
+
+    def select_modes(self, fit: SinusoidFit, is_kept: np.ndarray) -> FittedModes:
+        """Return the modes of the sinusoids of a mask (n,), at least one of them."""
+        order = np.flatnonzero(is_kept)[np.argsort(fit.omega[is_kept])]
+        return FittedModes(
+            frequency=fit.omega[order] / (2 * np.pi),
+            damping=fit.damping[order],
+            coefficients=fit.coefficients[order],
+            damping_error=self.estimate_damping_errors(fit)[order],
+            misfit=float(np.sqrt(fit.mean_square)) / self.scale,
+        )
 
     def estimate_damping_errors(self, fit: SinusoidFit) -> np.ndarray:
         """Return the half-widths (n,) of the 95 % intervals of the damping ratios, for independent residuals."""

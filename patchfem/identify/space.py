@@ -45,9 +45,10 @@ class SearchSpace(NamedTuple):
         return np.where(u <= 0, self.low, np.where(u >= 1, self.high, inside))
 
     def to_unit_cube(self, values) -> np.ndarray:
-        """Return the point of the unit cube nearest to given parameters (n,)."""
+        """Return the point of the unit cube nearest to given parameters (n,), in the middle where they are NaN."""
         inside = np.clip(np.asarray(values, float), self.low, self.high)
-        return np.clip((self._scale(inside) - self._scale(self.low)) / self._span, 0.0, 1.0)
+        u = np.clip((self._scale(inside) - self._scale(self.low)) / self._span, 0.0, 1.0)
+        return np.where(np.isnan(u), 0.5, u)
 
     def derivatives(self, u) -> np.ndarray:
         """Return the derivatives (n,) of the parameters with respect to the coordinates u."""

@@ -26,8 +26,6 @@ PUBLIC = {
     "matrices": (
         "Matrix",
         "align_rows",
-        "compute_form_deviation",
-        "estimate_rounding",
         "read_matrix",
     ),
     "measured": (
@@ -50,14 +48,9 @@ PUBLIC = {
         "read_columns",
         "read_text",
     ),
-    "units": (
-        "CHANNEL_UNITS",
-        "SI_UNITS",
-    ),
+    "units": ("SI_UNITS",),
     "universal": (
-        "FunctionType",
-        "OrdinateType",
-        "find_axis_scale",
+        "Dataset",
         "find_unit_factors",
         "read_datasets",
     ),

@@ -1,8 +1,5 @@
 """Errors for damaged files."""
 
-import struct
-import zipfile
-import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager
 
@@ -10,35 +7,21 @@ from ..exceptions import PatchfemError
 
 MAX_REASON_LENGTH = 160  # largest number of characters of a quoted reason; longer reasons are cut
 
-# Exceptions that the readers and the libraries that they call raise for damaged files; a NameError,
-# an AttributeError or a TypeError is a mistake in the program and is not caught.
-DAMAGE_ERRORS = (
-    ValueError,  # includes UnicodeDecodeError
-    LookupError,  # KeyError and IndexError
-    OverflowError,
-    RuntimeError,  # raised by HDF5 and for encrypted archives; includes NotImplementedError of zipfile
-    OSError,
-    EOFError,
-    struct.error,
-    zipfile.BadZipFile,
-    zlib.error,
-)
+# Exceptions that are mistakes in the program; a damaged file leads to any other one in a library.
+MISTAKES = (NameError, AttributeError, TypeError, AssertionError)
 
 
 @contextmanager
 def refuse_damage(message: str, remedy: str = "") -> Iterator[None]:
     """Convert exceptions that are raised while a damaged file is read into a PatchfemError.
 
-    Its message is `message`, the reason in brackets and `remedy`. Damaged bytes raise `DAMAGE_ERRORS`,
-    or in pyuff a plain Exception.
+    Its message is `message`, the reason in brackets and `remedy`. `MISTAKES` of the program pass.
     """
     try:
         yield
-    except PatchfemError:
+    except (PatchfemError, *MISTAKES):
         raise
     except Exception as error:
-        if not isinstance(error, DAMAGE_ERRORS) and type(error) is not Exception:
-            raise
         reason = " ".join(str(error).split())[:MAX_REASON_LENGTH]
         if not reason.isprintable():
             reason = type(error).__name__

@@ -34,10 +34,11 @@ def read_records(path, requests: list, exported_names: Mapping = EXPORTED_NAMES)
     Parameters
     ----------
     path : path-like
+        File to read.
     requests : list of RequestedChannel
         Without any, the channels whose quantity the file states are read.
     exported_names : Mapping
-        Quantity -> names of `patchfem export` that stand for it, as in `loops.find_standard_name`.
+        Quantity -> names of `patchfem export` that stand for it, the preferred one first.
 
     Returns
     -------
@@ -74,7 +75,7 @@ def _read_universal(path: Path, requests: list, exported_names: Mapping) -> Reco
     if not channels:
         raise PatchfemError(
             f"{path}: contains no record over time (dataset 58, function type 1), only modes or "
-            "frequency responses; write these as the modes of a scene with -o modes.toml"
+            "frequency responses; name a file of mode shapes in the scene as structure.file"
         )
     return select_channels(path, channels, requests, notes)
 
@@ -121,11 +122,8 @@ def _read_matlab(path: Path, requests: list) -> Records:
             continue
         if 1 in values.shape:
             channels.append(Channel(name, "", "", "", values.ravel()))
-        if len(values) > 1:
-            columns = values.T[:MAX_COLUMNS]
-            channels += [
-                Channel(f"{name}(:,{number})", "", "", "", column)
-                for number, column in enumerate(columns, 1)
-            ]
+        else:
+            columns = enumerate(values.T[:MAX_COLUMNS], 1)
+            channels += [Channel(f"{name}(:,{k})", "", "", "", column) for k, column in columns]
     requests = [request._replace(source=request.source.replace(" ", "")) for request in requests]
     return select_channels(path, channels, requests, [])

@@ -45,6 +45,8 @@ class Loop:
             raise PatchfemError(
                 f"--hold {condition}: column=value,value is needed, such as cycle=1,2"
             )
+
+        # Only a column of labels can choose rows.
         if name not in self.labels:
             known = ", ".join(self.labels) or "none"
             raise PatchfemError(
@@ -60,6 +62,8 @@ class Loop:
                 f"--hold {name}={','.join(absent)}: no row of {self.path} has this value (it has: "
                 f"{known[:200]})"
             )
+
+        # Cells and texts are compared as numbers where both are numbers.
         selected = set(map(_parse_label, texts))
         return np.array([value in selected for value in values])
 
@@ -91,10 +95,14 @@ def read_loop(path) -> Loop:
         known |= dict.fromkeys(names, known[quantity])
     required = " ".join(("displacement", *EXPORTED_NAMES["displacement"]))
     table = TableFormat(known, (required,), LOOP_HEADER, "a measured loop")
+
+    # A column of `patchfem export` stands for the quantity that it contains.
     columns = read_columns(path, table)
     values = {
         find_standard_name(name, columns.values): column for name, column in columns.values.items()
     }
+
+    # The table has either a force or a ratio.
     quantities = [name for name in FORCE_UNITS if name in values]
     if not quantities:
         raise PatchfemError(
@@ -106,6 +114,8 @@ def read_loop(path) -> Loop:
             f"{path}:1: there are columns force and friction_ratio: keep only one of the two"
         )
     (quantity,) = quantities
+
+    # The slide is measured from the first row.
     displacement = values["displacement"]
     time = values.get("time")
     if time is not None:

@@ -27,18 +27,6 @@ MATRIX_NAMES = {
 MAX_NUMBERS = 5 * 10**7  # largest number of values in a matrix
 MAX_ROWS = 2 * 10**6  # largest number of rows in a matrix
 MAX_LISTED_ARRAYS = 12  # largest number of arrays that an error message lists
-# Number of entries from which the rounding of a matrix is estimated.
-N_SAMPLED_NUMBERS = 500
-MIN_DISTINCT_NUMBERS = 10  # smallest number of distinct entries that shows the rounding
-SINGLE_PRECISION_DIGITS = 7  # number of decimal digits of single precision
-DOUBLE_PRECISION_DIGITS = 15  # number of decimal digits that double precision always keeps
-# Smallest fraction of numbers with nearly all digits for which the whole
-# matrix was rounded to these digits.
-MIN_FULL_DIGITS_FRACTION = 0.6
-# Number of digits by which a number may be shorter, because a sign or an
-# exponent takes up part of its field.
-N_DROPPED_DIGITS = 2
-ROUNDING_DEVIATION = 12**-0.5  # standard deviation of the error of rounding to a multiple of 1
 
 
 class Matrix(NamedTuple):
@@ -67,69 +55,6 @@ def read_matrix(path, matrix_name: str) -> Matrix:
     return matrix._replace(values=values.tocsr())
 
 
-class MatrixRounding(NamedTuple):
-    """Rounding of the numbers in a matrix file, with the standard deviations of its errors."""
-
-    digits: str
-    deviation: np.ndarray
-
-
-def estimate_rounding(values) -> MatrixRounding | None:
-    """Estimate the rounding of the k stored numbers of a sparse array.
-
-    Returns None if they have all digits of double precision, or too few distinct values to tell.
-    """
-    data = values.data
-    size = np.abs(data)
-    samples = np.unique(size[size > 0])
-    samples = samples[:: max(1, samples.size // N_SAMPLED_NUMBERS)]
-    if samples.size < MIN_DISTINCT_NUMBERS:
-        return None
-    digits = np.array([_count_digits(sample) for sample in samples.tolist()])
-    max_digits = digits.max()
-    if max_digits > SINGLE_PRECISION_DIGITS and np.array_equal(samples.astype(np.float32), samples):
-        unit = np.where(size > 0, np.spacing(size.astype(np.float32)), 0.0).astype(float)
-        return MatrixRounding("single precision", ROUNDING_DEVIATION * unit)
-    if (
-        max_digits >= DOUBLE_PRECISION_DIGITS
-        or np.mean(digits >= max_digits - N_DROPPED_DIGITS) < MIN_FULL_DIGITS_FRACTION
-    ):
-        return None
-    count = int(np.median(digits))
-    with np.errstate(divide="ignore"):
-        power = np.floor(np.log10(size))
-    return MatrixRounding(f"{count} digits", ROUNDING_DEVIATION * 10.0 ** (power + 1 - count))
-
-
-def _count_digits(number: float) -> int:
-    """Return the number of significant decimal digits."""
-    return len(repr(number).split("e")[0].replace(".", "").strip("0"))
-
-
-def compute_form_deviation(values, deviation, shape) -> float:
-    """Return the standard deviation of shape^T A shape for a rounded sparse array A.
-
-    Parameters
-    ----------
-    values : sparse array
-        A (n, n).
-    deviation : array_like
-        Standard deviations of the distinct absolute values (k,) of A, which were rounded independently.
-    shape : (n,) array_like
-
-    Returns
-    -------
-    float
-    """
-    matrix = values.tocoo()
-    rows, columns = matrix.coords
-    _, index = np.unique(np.abs(matrix.data), return_inverse=True)
-    sensitivity = np.bincount(index, shape[rows] * shape[columns] * np.sign(matrix.data))
-    distinct = np.zeros(sensitivity.size)
-    distinct[index] = deviation
-    return float(np.sqrt(sensitivity**2 @ distinct**2))
-
-
 def align_rows(*matrices: Matrix) -> list[Matrix]:
     """Extend matrices so that all have the same rows and degrees of freedom.
 
@@ -141,6 +66,8 @@ def align_rows(*matrices: Matrix) -> list[Matrix]:
             "some of the files name nodes and directions and others do not; export all files in the "
             "same way"
         )
+
+    # The rows of all files are those of the sorted degrees of freedom.
     if with_places:
         places, index = _rank_dofs(np.vstack([matrix.places for matrix in matrices]))
         ends = np.cumsum([len(matrix.places) for matrix in matrices])
@@ -149,6 +76,8 @@ def align_rows(*matrices: Matrix) -> list[Matrix]:
             Matrix(_insert_empty_rows(matrix.values, rows, len(places)), places)
             for matrix, rows in zip(matrices, parts)
         ]
+
+    # A file without size may end before the last row, which then has no entry.
     n = max(matrix.values.shape[0] for matrix in matrices)
     sizes = {matrix.values.shape[0] if matrix.has_size else n: None for matrix in matrices}
     if len(sizes) > 1:
@@ -212,6 +141,8 @@ def _read_market(path: Path, matrix_name: str) -> Matrix:
             )
         if symmetry == "skew-symmetric":
             raise PatchfemError(f"{path}: the {matrix_name} is not symmetric; {SKEW_REFUSAL}")
+
+        # The size is checked before memory is reserved for it.
         lines = (line for line in file if line.strip() and line[0] != "%")
         n_rows, n_columns, *count = map(int, next(lines, "").split())
         n_numbers = count[0] if count else n_rows * n_columns
@@ -225,6 +156,8 @@ def _read_market(path: Path, matrix_name: str) -> Matrix:
         table = np.zeros((0, width))
         if n_numbers:
             table = np.loadtxt(lines, comments=None, ndmin=2)
+
+    # A full matrix is stored column by column.
     if count:
         rows, columns = _to_integers(path, table[:, :2]).T - 1
     elif symmetry == "general":
@@ -255,6 +188,8 @@ def _read_abaqus(path: Path) -> Matrix:
         if first:
             separator = "," if "," in first else None
             table = np.loadtxt(chain([first], lines), delimiter=separator, ndmin=2)
+
+    # The number of columns tells rows from degrees of freedom.
     if table.shape[1] not in (3, 5) or not table.size:
         raise PatchfemError(
             f"{path}: is not a matrix: write a Matrix Market file, or lines of row, column, number, or "
@@ -271,6 +206,8 @@ def _read_abaqus(path: Path) -> Matrix:
     else:
         rows, columns = labels.T - 1
         n = labels.max()
+
+    # A file that has one triangle only stands for both.
     values = sparse.coo_array((table[:, -1], (rows, columns)), (n, n)).tocsr()
     if (rows <= columns).all() or (rows >= columns).all():
         values = _complete_symmetric_matrix(values)

@@ -65,6 +65,7 @@ def check_file(path: Path, remedy: str) -> None:
     Parameters
     ----------
     path : Path
+        File to read.
     remedy : str
         What to do with a file that is too large.
     """
@@ -108,7 +109,9 @@ def select_channels(path: Path, channels: list, requests: list, notes: list) -> 
     path : Path
         File, for error messages.
     channels : list of Channel
+        Channels of the file.
     requests : list of RequestedChannel
+        Channels that the user asks for.
     notes : list of str
         Notes of the records.
 
@@ -127,6 +130,8 @@ def select_channels(path: Path, channels: list, requests: list, notes: list) -> 
         selected = [_make_requested_channel(path, channels, request) for request in requests]
     else:
         selected = [channel for channel in channels if channel.quantity]
+
+    # Each quantity comes from one channel.
     names = [channel.quantity for channel in selected]
     duplicates = sorted({name for name in names if names.count(name) > 1})
     if duplicates:
@@ -140,6 +145,8 @@ def select_channels(path: Path, channels: list, requests: list, notes: list) -> 
             f"{path}: no channel label names a quantity; choose channels with --map force=CHANNEL [N], "
             f"displacement=CHANNEL [mm] among {channel_list}"
         )
+
+    # All channels share the times of one.
     values = {channel.quantity: _convert_to_si(path, channel) for channel in selected}
     time = values.pop("time", None)
     if time is None:
@@ -163,7 +170,9 @@ def find_channel(path, channels: list, source: str) -> Channel:
     path : Path
         File, for error messages.
     channels : list of Channel
+        Channels of the file.
     source : str
+        Name, place or number, as the user writes it.
 
     Returns
     -------
@@ -208,9 +217,11 @@ def make_records(path, values: dict, notes: list, channel_list: str = "") -> Rec
     Parameters
     ----------
     path : Path
+        File to read.
     values : dict
         Quantity -> (k,) array.
     notes : list of str
+        Sentences for the user; may be extended.
     channel_list : str
         All channels of the file in words.
 
@@ -232,12 +243,15 @@ def make_records(path, values: dict, notes: list, channel_list: str = "") -> Rec
         )
     if min(sizes.values()) < 2:
         raise PatchfemError(f"{path}: at least two samples are needed")
+
+    # Values that no program can compute with.
     for name, column in values.items():
         wrong = np.flatnonzero(~np.isfinite(column))
         if wrong.size:
             raise PatchfemError(
                 f"{path}: {name} of sample {wrong[0] + 1} is {column[wrong[0]]}, not a finite number"
             )
+
     time = values.get("time")
     late = [] if time is None else np.flatnonzero(np.diff(time) <= 0)
     if len(late):

@@ -33,6 +33,7 @@ def read_signal(path, quantity: str) -> tuple:
         CSV file with a header like ``time [s],acceleration [g]``, or a universal file (.uff, .unv)
         with one time response of the quantity, in the unit of its label, of dataset 164 or in SI.
     quantity : {"acceleration", "force"}
+        What the record contains.
 
     Returns
     -------

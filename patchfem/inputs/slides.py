@@ -43,11 +43,14 @@ def read_slide(path) -> tuple:
         "a path",
         "; slide.file is relative to the scene",
     )
+
     columns = read_columns(path, table)
     if "lateral" in columns.values:
         raise PatchfemError(
             f"{path}:1: a slide in two directions was removed in patchfem 1.3; leave out the column lateral"
         )
+
+    # The pieces were pressed together where the slide starts.
     columns = {name: columns.values[name] for name in COLUMN_NAMES}
     for name, column in columns.items():
         if column[0] != 0:

@@ -19,6 +19,7 @@ def to_real(values, subject: str):
     Parameters
     ----------
     values : array_like or sparse array
+        Array to be checked.
     subject : str
         Name of the array, at the beginning of the message.
 
@@ -54,6 +55,7 @@ def read_numbers(values, subject: str, *shapes: tuple) -> np.ndarray:
     Parameters
     ----------
     values : array_like
+        Array to be checked.
     subject : str
         Name of the array, at the beginning of messages.
     *shapes : tuple of int or None
@@ -74,6 +76,8 @@ def read_numbers(values, subject: str, *shapes: tuple) -> np.ndarray:
     if values.dtype.kind not in "iufb":
         raise PatchfemError(f"{subject} contains no numbers; real numbers are needed")
     values = values.astype(float)
+
+    # Numbers with which the program can compute.
     if not np.isfinite(values).all():
         raise PatchfemError(
             f"{subject} contains values that are not finite; finite ones are needed"
@@ -86,6 +90,8 @@ def read_numbers(values, subject: str, *shapes: tuple) -> np.ndarray:
         raise PatchfemError(f"{subject} is empty; at least one number is needed")
     if not shapes:
         return values.ravel()
+
+    # The first shape that fits is accepted.
     for shape in shapes:
         lengths = zip(shape, values.shape)
         if len(shape) == values.ndim and all(length in (None, size) for length, size in lengths):
@@ -109,6 +115,7 @@ def symmetrize(values, subject: str):
     Parameters
     ----------
     values : (n, n) array_like or sparse array
+        Array to be checked.
     subject : str
         Name of the matrix, at the beginning of messages.
 

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
+from ..disk.open_with_timeout import open_for_reading
 from ..exceptions import Missing, PatchfemError
 from .units import normalize_unit
 
@@ -87,15 +88,19 @@ class TextTable(NamedTuple):
 def _read_lines(path: Path, contents: str, remedy: str) -> list[str]:
     """Read the lines of a text file; the last one is empty if the file ends with a line break."""
     try:
-        if path.stat().st_size > MAX_BYTES:
+        with open_for_reading(path) as file:
+            text = file.read(MAX_BYTES + 1)
+        if len(text) > MAX_BYTES:
             raise PatchfemError(
                 f"{path}: more than {MAX_BYTES >> 20} MiB of text; leave out some rows of {contents}"
             )
-        return path.read_text("utf-8-sig").split("\n")
+        lines = text.decode("utf-8-sig").replace("\r\n", "\n").replace("\r", "\n")
+        return lines.split("\n")
     except FileNotFoundError:
         raise Missing(f"{path}: there is no such file{remedy}") from None
     except (OSError, UnicodeDecodeError, ValueError) as error:
-        raise PatchfemError(f"{path}: {contents} cannot be read ({error})") from None
+        reason = getattr(error, "strerror", None) or error
+        raise PatchfemError(f"{path}: {contents} cannot be read ({reason})") from None
 
 
 def split_cells(location: str, line: str, separator: str) -> list[str]:
@@ -106,6 +111,7 @@ def split_cells(location: str, line: str, separator: str) -> list[str]:
     location : str
         Beginning of the error message, such as ``a.csv:3``.
     line : str
+        Line of the table, without its line break.
     separator : str
         Sign between the cells.
 
@@ -130,8 +136,9 @@ def read_text(path: Path, contents: str, remedy: str = "") -> TextTable:
     Parameters
     ----------
     path : Path
+        File to read.
     contents, remedy : str
-        Words of the error messages, as in `TableFormat`.
+        What the file is, such as "a drive", and the end of the message if there is no file.
 
     Raises
     ------
@@ -195,6 +202,7 @@ def parse_number(location: str, cell: str, factor: float) -> float:
     location : str
         Beginning of the error message, such as ``a.csv:3: force``.
     cell : str
+        Text of the cell.
     factor : float
         Factor to SI.
 

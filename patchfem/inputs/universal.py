@@ -7,7 +7,7 @@ precision.
 
 from enum import IntEnum
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -16,8 +16,11 @@ from .damage import refuse_damage
 from .records import Channel, check_file
 from .units import CHANNEL_UNITS, normalize_unit
 
+Dataset = dict[str, Any]  # dataset of a universal file as pyuff returns it
 DIRECTION_NAMES = ("x", "y", "z", "rx", "ry", "rz")  # directions 1 to 6 of a node
 TIME_ABSCISSA_TYPE = 17  # type code of the abscissa "time"
+GENERAL_TYPE = 0  # function type of a dataset 58 that may be anything
+TIME_RESPONSE_TYPE = 1  # function type of a time response in dataset 58
 
 
 class OrdinateType(IntEnum):
@@ -30,20 +33,13 @@ class OrdinateType(IntEnum):
     FORCE = 13
 
 
-class FunctionType(IntEnum):
-    """Function types of dataset 58."""
-
-    GENERAL = 0
-    TIME_RESPONSE = 1
-    FREQUENCY_RESPONSE = 4
-
-
-def read_datasets(path) -> list[dict]:
+def read_datasets(path) -> list[Dataset]:
     """Read the datasets 55, 58 and 164 of a universal file in order, as pyuff returns them.
 
     Parameters
     ----------
     path : path-like
+        File to read.
 
     Returns
     -------
@@ -77,7 +73,7 @@ def read_datasets(path) -> list[dict]:
     return datasets
 
 
-def make_channels(path, datasets: list, notes: list) -> list[Channel]:
+def make_channels(path, datasets: list[Dataset], notes: list[str]) -> list[Channel]:
     """Return the time records among the datasets as channels.
 
     A record along a negative axis is reversed, so that it points along the positive one.
@@ -102,14 +98,16 @@ def make_channels(path, datasets: list, notes: list) -> list[Channel]:
     """
     factors = find_unit_factors(path, datasets)
     functions = [dataset for dataset in datasets if dataset["type"] == 58]
-    return [
-        _make_channel(path, number, dataset, factors, notes)
-        for number, dataset in enumerate(functions, 1)
-        if _is_record(dataset)
-    ]
+    channels = []
+    for number, dataset in enumerate(functions, 1):
+        kind = int(dataset["func_type"])
+        is_over_time = int(dataset["abscissa_spec_data_type"]) == TIME_ABSCISSA_TYPE
+        if kind == TIME_RESPONSE_TYPE or (kind == GENERAL_TYPE and is_over_time):
+            channels.append(_make_channel(path, number, dataset, factors, notes))
+    return channels
 
 
-def find_unit_factors(path, datasets: list) -> dict | None:
+def find_unit_factors(path, datasets: list[Dataset]) -> Dataset | None:
     """Return dataset 164, whose `length` and `force` are units of the file per SI unit; None without it."""
     factors = next((dataset for dataset in datasets if dataset["type"] == 164), None)
     if factors is not None and not min(factors["length"], factors["force"]) > 0:
@@ -120,14 +118,13 @@ def find_unit_factors(path, datasets: list) -> dict | None:
     return factors
 
 
-def _is_record(dataset: dict) -> bool:
-    kind = int(dataset["func_type"])
-    is_over_time = int(dataset["abscissa_spec_data_type"]) == TIME_ABSCISSA_TYPE
-    return kind == FunctionType.TIME_RESPONSE or (kind == FunctionType.GENERAL and is_over_time)
+def _make_channel(
+    path, number: int, dataset: Dataset, factors: Dataset | None, notes: list[str]
+) -> Channel:
+    """Make a channel of a record from a dataset of a universal file.
 
-
-def _make_channel(path, number: int, dataset: dict, factors: dict | None, notes: list) -> Channel:
-    """Make a channel of a record from a dataset of a universal file."""
+    Its factor to SI is that of its unit label if this is a unit of its quantity, else that of dataset 164, else 1.
+    """
     location = f"{path}: record {number}"
     values = np.asarray(dataset["data"])
     time = np.asarray(dataset["x"], float)
@@ -139,69 +136,37 @@ def _make_channel(path, number: int, dataset: dict, factors: dict | None, notes:
         raise PatchfemError(
             f"{location}: {values.size} values, but {dataset['num_pts']} are announced; the file is damaged"
         )
-    scale = find_axis_scale(dataset, "ordinate", factors)
-    quantity = scale.quantity
-    if quantity and not scale.is_stated and (scale.unit or factors is None):
-        reason = f"its unit '{scale.unit[:20]}' is not known" if scale.unit else "it has no unit"
+
+    # Quantity and unit of the values; a channel whose label states a unit needs no factor.
+    kind = int(dataset["ordinate_spec_data_type"])
+    quantity = ""
+    if kind in list(OrdinateType):
+        quantity = OrdinateType(kind).name.lower().removeprefix("excitation_")
+    unit = normalize_unit(_clean_text(dataset["ordinate_axis_units_lab"]))
+    factor = None
+    if quantity and unit not in CHANNEL_UNITS[quantity]:
+        factor = 1.0
         remedy = "its values are read as SI; if they are in another unit, name this unit with --map"
         if factors is not None:
+            factor = 1 / factors["force" if quantity == "force" else "length"]
             remedy = "the unit of dataset 164 is used"
-        notes.append(f"record {number} ({quantity}): {reason}; {remedy}")
+        if unit or factors is None:
+            reason = f"its unit '{unit[:20]}' is not known" if unit else "it has no unit"
+            notes.append(f"record {number} ({quantity}): {reason}; {remedy}")
+
+    # Place of the record; along a negative axis it is reversed.
     direction = int(dataset["rsp_dir"])
-    axis = _format_direction(direction)
+    is_known = 1 <= abs(direction) <= len(DIRECTION_NAMES)
+    axis = DIRECTION_NAMES[abs(direction) - 1] if is_known else "?"
     if direction < 0:
         notes.append(f"record {number} points along -{axis}, so its sign is reversed here")
         values = -values
     name = _clean_text(dataset["id1"]) or f"record {number}"
     place = f"{int(dataset['rsp_node'])}:+{axis}" if direction else ""
-    factor = scale.factor if quantity and not scale.is_stated else None
-    return Channel(name, place, quantity, scale.unit, values, time, factor)
-
-
-class AxisScale(NamedTuple):
-    """Unit of the values along an axis of dataset 58.
-
-    quantity: what its data type says, or ""; unit: its label, or ""; factor: to SI, from the label if it is a unit of
-    the quantity (is_stated), else from dataset 164, else 1.
-    """
-
-    quantity: str
-    unit: str
-    factor: float
-    is_stated: bool
-
-
-def find_axis_scale(dataset: dict, axis: str, factors: dict | None) -> AxisScale:
-    """Find the unit of an axis.
-
-    Parameters
-    ----------
-    dataset : dict
-        Dataset 58.
-    axis : {"ordinate", "orddenom"}
-    factors : dict or None
-        Dataset 164 of the file.
-    """
-    kind = int(dataset[f"{axis}_spec_data_type"])
-    quantity = ""
-    if kind in list(OrdinateType):
-        quantity = OrdinateType(kind).name.lower().removeprefix("excitation_")
-    unit = normalize_unit(_clean_text(dataset[f"{axis}_axis_units_lab"]))
-    known = CHANNEL_UNITS.get(quantity, {})
-    if unit in known:
-        return AxisScale(quantity, unit, known[unit], True)
-    factor = 1.0
-    if quantity and factors is not None:
-        factor = 1 / factors["force" if quantity == "force" else "length"]
-    return AxisScale(quantity, unit, factor, False)
-
-
-def _format_direction(direction: int) -> str:
-    return (
-        DIRECTION_NAMES[abs(direction) - 1] if 1 <= abs(direction) <= len(DIRECTION_NAMES) else "?"
-    )
+    return Channel(name, place, quantity, unit, values, time, factor)
 
 
 def _clean_text(value) -> str:
+    """Return the text of a label, or "" for the word NONE, which stands for an empty one."""
     text = str(value or "").strip()
     return "" if text.upper() == "NONE" else text

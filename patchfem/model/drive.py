@@ -43,6 +43,7 @@ def read_drive_file(path: Path, kind: str) -> tuple:
     Parameters
     ----------
     path : Path
+        File to read.
     kind : str
         ``"base"`` for an acceleration of the base, else the file contains a force.
 

@@ -134,6 +134,8 @@ def read_end_state(path: Path) -> EarlierWear:
             f"{path}: not the result.nc of a run with [wear] and [contact]; give such a file",
             START_KEY,
         ) from None
+
+    # What the file has but this run cannot use.
     if has_strips:
         raise PatchfemError(
             f"{path}: that run has strips, and wear of strips cannot be continued yet; choose a run "

@@ -36,6 +36,7 @@ def find_file_faults(
     Parameters
     ----------
     tables : Tables
+        Tables of the scene, as far as they could be read.
     folder : Path
         Folder of the scene; files that do not exist are left out.
     is_valid : bool
@@ -152,7 +153,7 @@ def _check_drive(path: Path, tables, *, is_valid: bool) -> None:
 
 def _check_structure(path: Path, tables, *, is_valid: bool) -> None:
     """Check structure.file: compute modes from matrices, but do not fit modes to measured responses."""
-    if structure_files.is_universal_file(path) or not is_valid:
+    if structure_files.is_universal(path) or not is_valid:
         structure_files.read_content(path)
         return
     rubs = tables.friction is not None or bool(tables.structure.interface)

@@ -137,11 +137,15 @@ class Gap:
         gap = np.zeros(x.shape)
         notes = ()
         seconds = {}
+
+        # Shapes in closed form, each with its computing time.
         for name, shape_keys in self.shapes:
             begin = perf_counter()
             keys = {key: value for key, value in shape_keys if key != "on"}
             gap = gap + getattr(gaps, name)(x, **keys)
             seconds[name] = perf_counter() - begin
+
+        # The measured profile.
         if self.profile is not None:
             begin = perf_counter()
             heights, notes = profiles.compute_profile_gap(

@@ -71,6 +71,7 @@ def make_effective_law(law: Friction, width: float | None, load: float | None = 
     Parameters
     ----------
     law : Friction
+        Keys of the friction law.
     width : float or None
         Width [m] of the contact across the path.
     load : float, optional
@@ -130,6 +131,7 @@ def make_bond_parameters(law: Friction, peak_speed: float, min_rest_speed: float
     Parameters
     ----------
     law : Friction
+        Keys of the friction law.
     peak_speed : float
         Expected peak speed [m/s]; the default of the rest speed follows.
     min_rest_speed : float

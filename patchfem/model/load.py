@@ -51,6 +51,7 @@ class PointLoad:
         Parameters
         ----------
         slide : SlidePath
+            Prescribed slide; the samples that are added follow its motion.
         time : (k,) array_like
             Times [s] of the samples of the slide.
         rel_disp : (k,) array_like

@@ -16,7 +16,7 @@ from ..core import PatchfemError
 from ..effects import law_has_trait, list_absent_effects
 from ..formatting import format_quantity
 from ..scene.keys.memoize import memoize
-from ..scene.keys.tables import Accuracy, Friction, Temperature
+from ..scene.keys.tables import Accuracy, Friction
 from ..scene.rules.methods import MotionFeatures, find_motion_features
 from ..scene.scene import Scene
 from . import load, patch, rig, slide, structure, wear
@@ -55,7 +55,6 @@ class _SceneLaw(NamedTuple):
     """Friction law of the first interface of a scene, with the fields of `Model`."""
 
     friction: Friction | None = None
-    heat: Temperature | None = None
     spread: float | None = None
     pad: float | None = None
 
@@ -68,7 +67,6 @@ class Model:
     - patch: patch that carries the load, or None.
     - point: load on a point if no patch carries it, or None.
     - friction: effective keys of the law of the first interface, or None.
-    - heat: table of the surface temperature, or None.
     - spread: spread [m] of the friction over the pad (2.15), or None.
     - pad: width [m] of the pad across the path, or None.
     - slide: prescribed slide of a bench, or None.
@@ -85,7 +83,6 @@ class Model:
     patch: PatchModel | None
     point: PointLoad | None
     friction: Friction | None
-    heat: Temperature | None
     spread: float | None
     pad: float | None
     slide: SlidePath | None
@@ -238,6 +235,7 @@ def _build(scene: Scene) -> Model:
         grooves=grooves,
         motion=find_motion_features(scene, scene.kind),
     )
+
     source = Source(
         path=scene.path,
         title=scene.title,
@@ -308,7 +306,7 @@ def _build_law(scene: Scene, rig_model: Rig | None) -> _SceneLaw:
         friction = rig_model.friction.interfaces[0].numbers
     else:
         friction = make_effective_law(law, pad, find_normal_load(scene))
-    return _SceneLaw(friction, law.temperature, law.spread, pad)
+    return _SceneLaw(friction, law.spread, pad)
 
 
 def _build_measured(scene: Scene) -> MeasuredFile | None:

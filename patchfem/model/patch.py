@@ -309,6 +309,7 @@ def build_patch(contact: Contact, kind: str, resolve_path: Callable) -> PatchMod
     Parameters
     ----------
     contact : Contact
+        Table [contact], or that of an interface.
     kind : str
         Kind of the run. A patch of kind "patch" is static: its mesh is finer than that of the same patch
         in a rig or a bench, and may take more CPU time (`PatchModel.mesh.is_static`).
@@ -332,6 +333,8 @@ def build_patch(contact: Contact, kind: str, resolve_path: Callable) -> PatchMod
         material=trace is not None and trace.heights == "surface",
         file=trace.file if trace is not None else "",
     )
+
+    # Peaks that a trace or root mean squares determine.
     skin = contact.asperities
     if skin is not None and skin.law == "hertz":
         cutoff = find_shortest_wavelength(contact, pieces.length)
@@ -339,6 +342,7 @@ def build_patch(contact: Contact, kind: str, resolve_path: Callable) -> PatchMod
     strips = contact.strips
     if strips is not None:
         strips = PatchStrips(strips.count, strips.roll, strips.offset)
+
     return PatchModel(
         pieces=pieces,
         gap=gap,
@@ -378,6 +382,8 @@ def build_pieces(contact: Contact) -> PatchPieces:
             end = End("chamfer", own.chamfer)
         elif own.end_radius:
             end = End("radius", own.end_radius)
+
+        # Keys of the piece come before those of [contact].
         piece = PatchPiece(
             height=own.height or contact.height,
             substrate=own.substrate or contact.substrate,
@@ -386,6 +392,7 @@ def build_pieces(contact: Contact) -> PatchPieces:
             end=end,
         )
         pieces.append(piece)
+
     lower, upper = pieces
     return PatchPieces(
         lower=lower,

@@ -52,8 +52,11 @@ def extend_grid(patch: PatchModel, piece: PatchPiece, grid: TensorGrid, growth: 
     Parameters
     ----------
     patch : PatchModel
+        Patch of the piece.
     piece : PatchPiece
+        Piece whose grid is extended.
     grid : TensorGrid
+        Grid over the interface.
     growth : float
         Ratio of the lengths of successive columns beyond the interface.
 
@@ -115,6 +118,7 @@ def check_mesh_size(pieces: PatchPieces, lower, upper, unit: float) -> None:
     Parameters
     ----------
     pieces : PatchPieces
+        Pieces of the scene.
     lower, upper : TensorGrid or PieceMesh
         Bodies of the file, in m.
     unit : float

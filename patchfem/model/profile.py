@@ -10,10 +10,10 @@ from ..core import PatchfemError, frozen_array
 from ..exceptions import UnresolvedTrace
 from ..formatting import format_length
 from ..surface.files.read import read_profile
-from ..surface.fine import ELEMENTS_PER_WAVE, describe_lost_waves, fine_fraction
 from ..surface.nodes import MEANS_OVER_WAVES, average_at_nodes, place_over_patch
 from ..surface.profile import Profile, clean, level, resample_evenly
 from ..surface.roughness.filter import mean_line
+from ..surface.spectrum import ELEMENTS_PER_WAVE, describe_lost_waves, wave_spectrum
 from .file_cache import cache_by_file
 from .source import name_key
 
@@ -60,9 +60,11 @@ def compute_profile_gap(
     Parameters
     ----------
     path : Path
+        File to read.
     x : (m,) ndarray
         Coordinates of the nodes [m].
     lengths : gap.ProfileLengths
+        Lengths over which the profile is averaged.
     cell : float
         Cell length [m] of an even mesh; it limits how much of the trace may be missing.
     is_rough : bool
@@ -89,6 +91,8 @@ def compute_profile_gap(
     if is_rough:
         resolution = min(average, cell)
     trace, notes, is_straight = level_profile(path, x, resolution, is_material=is_material)
+
+    # Waves that the mesh cannot resolve are refused.
     if limit is not None and not is_straight:
         lost_waves = describe_lost_waves(trace, limit or float(np.diff(x).max()))
         if lost_waves is not None:
@@ -99,6 +103,8 @@ def compute_profile_gap(
         if not is_straight:
             notes = (*notes, *_describe_short_waves(trace, cutoff))
         return average_at_nodes(shape, x) - shape.z.min(), notes
+
+    # The spline through all samples, or through their means over the average length.
     if average is None:
         heights = average_at_nodes(trace, x, _fit_spline(trace).antiderivative())
         return heights - heights.min(), notes
@@ -143,7 +149,7 @@ def _filter_waviness(trace: Profile, cutoff: float) -> Profile:
 
 def _describe_short_waves(trace: Profile, cutoff: float) -> tuple:
     """Return sentences about the waves shorter than a cut-off [m], or () if there are none."""
-    fraction = fine_fraction(trace, cutoff)
+    fraction = wave_spectrum(trace).lost_fraction(cutoff)
     if not fraction > 0:
         return ()
     return (
@@ -161,6 +167,7 @@ def level_profile(path: Path, x, cell: float, *, is_material: bool) -> _Levelled
     Parameters
     ----------
     path : Path
+        File to read.
     x : (m,) ndarray
         Coordinates of the nodes [m].
     cell : float
@@ -178,6 +185,8 @@ def level_profile(path: Path, x, cell: float, *, is_material: bool) -> _Levelled
     if is_material:
         raw = replace(raw, z=frozen_array(-raw.z))
     trace = level(raw)
+
+    # A slope that was subtracted may have been a tilt that the user meant.
     slope = float(np.polyfit(raw.x, raw.z - trace.z, 1)[0])
     notes = trace.notes
     if abs(slope) * trace.length > MAX_UNREPORTED_SLOPE * np.ptp(trace.z):
@@ -187,6 +196,8 @@ def level_profile(path: Path, x, cell: float, *, is_material: bool) -> _Levelled
             "tilt, give [contact.tilt]",
         )
     is_straight = np.std(trace.z) <= max(MIN_HEIGHT_DEVIATION, STRAIGHT_TOL * np.ptp(raw.z))
+
+    # Beyond its ends the trace is continued at constant height.
     n_before = int(trace.x[0] > x[0])
     n_after = int(trace.x[-1] < x[-1])
     places = np.concatenate([x[:n_before], trace.x, x[x.size - n_after :]])

@@ -26,7 +26,6 @@ from .structure import (
     compute_joint_stiffnesses,
     compute_natural_frequencies,
     find_bolted_scene,
-    find_first_elastic_mode,
     has_pressed_joint,
     needs_strip_displacements,
     read_file_notes,
@@ -39,6 +38,8 @@ MIN_RUN_CYCLES = 0.25
 # Slide of the first mode per modal coordinate, relative to the largest one of all
 # modes, below which it is round-off.
 MIN_SLIDE_FRACTION = 1e-9
+# Fraction of the squared motion of the output below which a mode moves the output by round-off only.
+MIN_MODE_FRACTION = 1e-12
 
 # The scene whose joint is subtracted from bolted modes, by the value of structure.measured_joint.
 JOINT_SCENES = {
@@ -259,6 +260,7 @@ def build_rig(scene, joint: float | None = None) -> Rig:
     Parameters
     ----------
     scene : Scene
+        Checked scene with [structure] and [drive].
     joint : float, optional
         Stiffness [N/m] of a pressed patch, which is subtracted from modes measured with it.
 
@@ -311,6 +313,8 @@ def build_drive(scene, modes: ModalBasis) -> RigDrive:
     signal = build_signal(scene, modes)
     waveform = find_waveform(keys)
     levels = DriveLevels()
+
+    # Number of cycles of the whole run.
     if waveform.has_levels:
         amplitudes = tuple(segment.amplitude for segment in signal.segments)
         levels = DriveLevels(
@@ -322,6 +326,7 @@ def build_drive(scene, modes: ModalBasis) -> RigDrive:
     else:
         duration = signal.duration if keys.duration is None else keys.duration
         cycles = max(duration / signal.period, MIN_RUN_CYCLES)
+
     return RigDrive(
         signal=signal,
         kind=keys.kind,
@@ -353,10 +358,27 @@ def _build_first_mode(scene, own_modes: ModalBasis, modes: ModalBasis) -> FirstM
 
     `own_modes` are the modes without the bonded spring, `modes` the coordinates of the rig.
     """
-    frequency, mass = find_first_elastic_mode(scene, own_modes)
+    structure = scene.structure
     slide = own_modes.interfaces[0] if len(own_modes.interfaces) else own_modes.output
     elastic = np.flatnonzero(own_modes.omega > 0)
     first = int(elastic[0]) if elastic.size else 0
+
+    # A frequency that the scene states is free of the round-off of the modes.
+    frequency = float(own_modes.omega[first]) / (2 * np.pi)
+    if structure.mode and structure.measured == "free":
+        frequency = structure.mode[first].frequency
+
+    # The mass at the output is that of this mode, or of all coordinates if the mode does not move the output.
+    mass = structure.moving_mass
+    if mass is None or not (structure.mode or structure.file):
+        squared = np.square(own_modes.output)
+        total = max(float(squared.sum()), 1e-300)
+        moves_output = squared[first] > MIN_MODE_FRACTION * total
+        mass = float(own_modes.mass / (squared[first] if moves_output else total))
+    contact_mass = 0.0
+    if abs(slide[first]) > MIN_SLIDE_FRACTION * np.abs(slide).max(initial=0.0):
+        contact_mass = float(own_modes.mass / slide[first] ** 2)
+
     # Both bases describe the same masses, so a least-squares fit converts the coordinates.
     own_from_modes = np.eye(slide.size)
     if modes is not own_modes and modes.shapes is not None:
@@ -364,9 +386,6 @@ def _build_first_mode(scene, own_modes: ModalBasis, modes: ModalBasis) -> FirstM
         if own_modes.shapes is not None:
             own_from_modes = np.linalg.lstsq(own_modes.shapes, modes.shapes, rcond=None)[0]
     order = [first, *(k for k in range(slide.size) if k != first)]
-    contact_mass = 0.0
-    if abs(slide[first]) > MIN_SLIDE_FRACTION * np.abs(slide).max(initial=0.0):
-        contact_mass = float(own_modes.mass / slide[first] ** 2)
     return FirstMode(frequency, mass, contact_mass, (slide[:, None] * own_from_modes)[order])
 
 

@@ -109,6 +109,8 @@ def replace_numbers(
     tables = plain_numbers.changed_tables()
     rig = model.rig
     changes = {}
+
+    # Each table that changed gives its part of the model again.
     if "contact" in tables:
         changes["patch"] = patches.replace_loading_and_shapes(model.patch, scene.contact)
     if "structure" in tables and scene.structure.bonded is not None:
@@ -129,6 +131,7 @@ def replace_numbers(
             rig = replace(rig, drive=build_drive(scene, rig.modes))
         if "structure" in tables:
             rig = _replace_modes(rig, scene.structure)
+
     motion = find_motion_features(scene, model.kind)
     unwritten = replace(model, source=None, rig=rig, motion=motion, **changes)
     write = partial(write_resolved, scene, unwritten)
@@ -147,9 +150,13 @@ def _replace_modes(rig: Rig, structure: Structure) -> Rig:
     columns = [mode.frequency for mode in structure.mode]
     columns += [mode.damping for mode in structure.mode]
     frequency, damping = np.split(np.array(np.broadcast_arrays(*columns)), 2)
+
+    # Modes; numbers that differ are arrays with an entry for each case.
     omega = 2 * np.pi * frequency
     mass = structure.moving_mass
     modes = replace(rig.modes, omega=frozen_array(omega), zeta=frozen_array(damping), mass=mass)
+
+    # First elastic mode.
     elastic_modes = [k for k, values in enumerate(frequency) if np.any(values > 0)]
     first = elastic_modes[0] if elastic_modes else 0
     first_frequency = frequency[first]
@@ -160,6 +167,7 @@ def _replace_modes(rig: Rig, structure: Structure) -> Rig:
     contact_mass = rig.first_mode.contact_mass
     if contact_mass:
         contact_mass = mass / float(rig.modes.slide[first]) ** 2
+
     return replace(
         rig,
         modes=modes,

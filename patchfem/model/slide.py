@@ -138,6 +138,7 @@ class SlidePath:
         Parameters
         ----------
         tolerance : float
+            Relative error that is allowed.
         pinned_steps : int or None
             Number of steps that the scene gives instead.
         length : float or None

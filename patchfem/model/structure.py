@@ -20,9 +20,6 @@ from . import structure_files, structure_reduced
 from .law import InterfaceLaw, build_interface_laws, find_normal_load
 from .source import name_key
 
-# Fraction of the squared motion of the output below which a mode
-# moves the output by round-off only.
-MIN_MODE_FRACTION = 1e-12
 _build_listed_modes = memoize(listed_modes.build_basis)
 
 
@@ -37,6 +34,7 @@ def build_modes(scene, own_modes: ModalBasis | None = None) -> ModalBasis:
     Parameters
     ----------
     scene : Scene
+        Checked scene with [structure] and [drive].
     own_modes : ModalBasis, optional
         Result of `build_own_modes`, if it is known.
 
@@ -75,20 +73,26 @@ def build_own_modes(scene, joint: float | None = None) -> ModalBasis:
     Parameters
     ----------
     scene : Scene
+        Checked scene with [structure] and [drive].
     joint : float, optional
         Stiffness [N/m] of the joint; by default it follows from the friction laws. Modes that
         were measured with a pressed patch are not changed until its stiffness is given.
     """
     modes = _build_given_modes(scene)
+
+    # Modes without a joint are complete; a pressed patch must be solved first.
     bolted_scene = find_bolted_scene(scene)
     if scene.structure.measured == "free" or (joint is None and has_pressed_joint(bolted_scene)):
         return modes
+
+    # The bonded spring and its damper act beside the first interface.
     bonded = bolted_scene.structure.bonded
     stiffness = np.array(compute_joint_stiffnesses(bolted_scene) if joint is None else [joint])
     damping = 0.0
     if bonded is not None:
         damping = bonded.damping
         stiffness[:1] += bonded.stiffness
+
     try:
         return import_effect("structure.bonded").remove_springs(modes, stiffness, damping)
     except PatchfemError as error:
@@ -268,34 +272,6 @@ def compute_natural_frequencies(structure, modes: ModalBasis) -> np.ndarray:
     return modes.omega / (2 * pi)
 
 
-def find_first_elastic_mode(scene, own_modes: ModalBasis) -> tuple:
-    """Return the frequency [Hz] and the modal mass [kg] of the first mode that is not rigid.
-
-    The mass is structure.moving_mass, or else the modal mass at the output. If the mode does not move
-    the output, it is the mass of all coordinates at the output. The frequency is 0 if all modes are
-    rigid.
-
-    Parameters
-    ----------
-    scene : Scene
-    own_modes : ModalBasis
-        Modes without the bonded spring, from `build_own_modes`.
-    """
-    structure = scene.structure
-    frequencies = own_modes.omega / (2 * pi)
-    if structure.mode and structure.measured == "free":
-        frequencies = np.array([mode.frequency for mode in structure.mode])
-    elastic = np.flatnonzero(frequencies > 0)
-    first = int(elastic[0]) if elastic.size else 0
-    frequency = float(frequencies[first]) if elastic.size else 0.0
-    if structure.mode or (structure.file is not None and structure.moving_mass is not None):
-        return frequency, structure.moving_mass
-    squared = np.square(own_modes.output)
-    total = max(float(squared.sum()), 1e-300)
-    moves_output = squared[first] > MIN_MODE_FRACTION * total
-    return frequency, float(own_modes.mass / (squared[first] if moves_output else total))
-
-
 def needs_strip_displacements(scene) -> bool:
     """Return whether a mode yaws a patch with strips, so that the strips have different displacements."""
     has_strips = scene.contact is not None and scene.contact.strips is not None
@@ -311,6 +287,7 @@ def compute_strip_slides(modes: ModalBasis, offsets) -> np.ndarray:
     Parameters
     ----------
     modes : ModalBasis
+        Modes of the rig, with their yaw.
     offsets : (s,) array_like
         Distance y [m] of each strip from the middle of the patch.
 

@@ -15,7 +15,7 @@ class FileModes(NamedTuple):
     """Modes from a file, with sentences for the user on what was neglected or changed."""
 
     modes: ModalBasis
-    notes: list
+    notes: list[str]
 
 
 def read_scene_modes(scene) -> FileModes:
@@ -30,6 +30,7 @@ def read_modes(path: Path, structure, drive, *, needs_interface: bool) -> FileMo
     Parameters
     ----------
     path : Path
+        Universal file, or file of matrices.
     structure, drive
         Tables [structure] and [drive] of the scene.
     needs_interface : bool
@@ -49,68 +50,62 @@ def read_modes(path: Path, structure, drive, *, needs_interface: bool) -> FileMo
         return _build_modes(path, structure, drive.kind, mass, needs_interface)
 
 
+@cache_by_file
 def read_content(path: Path):
     """Read a file but build no modes: return arrays by name, or the shapes of a universal file."""
     with name_key("structure.file"):
-        return _read_file(path)
+        return universal.read_universal(path) if is_universal(path) else arrays.read_arrays(path)
 
 
-def is_universal_file(path: Path) -> bool:
+def is_universal(path: Path) -> bool:
     """Return whether a path has the extension of a universal file."""
     return path.suffix.lower() in UNIVERSAL_EXTENSIONS
-
-
-@cache_by_file
-def _read_file(path: Path):
-    """Read a universal file or a file of arrays."""
-    return universal.read_universal(path) if is_universal_file(path) else arrays.read_arrays(path)
 
 
 @cache_by_file
 def _build_modes(
     path: Path, structure, drive_kind: str, mass: int | None, needs_interface: bool
 ) -> FileModes:
-    """Build modes from the content of a file."""
-    content = _read_file(path)
+    """Build modes from the content of a file; `mass` is the number of the mass that a force drives."""
+    content = read_content(path)
     is_forced = drive_kind == "force"
-    if not is_universal_file(path):
-        try:
-            return _build_modes_from_arrays(content, structure, is_forced, mass, needs_interface)
-        except PatchfemError as error:
-            raise PatchfemError(f"{path}: {error}", error.key) from None
-    if mass is not None:
-        raise PatchfemError(
-            "a universal file has no numbered masses; use structure.force_at or output_at",
-            "drive.mass",
+    if is_universal(path):
+        if mass is not None:
+            raise PatchfemError(
+                "a universal file has no numbered masses; use structure.force_at or output_at",
+                "drive.mass",
+            )
+        place_texts = {key: getattr(structure, key) for key in LOCATION_KEYS}
+        modes = places.build_basis(content, structure.moving_mass, place_texts, is_forced=is_forced)
+        return FileModes(
+            modes, [*content.notes, *([] if is_forced else places.note_missing_mass(modes))]
         )
-    place_texts = {key: getattr(structure, key) for key in LOCATION_KEYS}
-    modes = places.build_basis(content, structure.moving_mass, place_texts, is_forced=is_forced)
-    notes = [] if is_forced else places.note_missing_mass(modes)
-    return FileModes(modes, [*content.notes, *notes])
 
-
-def _build_modes_from_arrays(
-    content: dict, structure, is_forced: bool, mass: int | None, needs_interface: bool
-) -> FileModes:
-    """Build modes from matrices or modal data."""
+    # Matrices of a file name no place; an error names the file.
     pairs = [interface.between for interface in structure.interface]
-    driven_mass = mass if is_forced else None
-    modes = arrays.build_basis(
-        content, pairs, driven_mass, is_forced=is_forced, mass=structure.moving_mass
-    )
-    if needs_interface and not len(modes.interfaces):
+    try:
+        modes = arrays.build_basis(content, pairs, mass if is_forced else None, is_forced=is_forced)
+        if needs_interface:
+            _require_slides(modes)
+    except PatchfemError as error:
+        raise PatchfemError(f"{path}: {error}", error.key) from None
+    return FileModes(modes, [])
+
+
+def _require_slides(modes: ModalBasis) -> None:
+    """Raise PatchfemError unless every interface slides, and the patch moves along x alone."""
+    if not len(modes.interfaces):
         raise PatchfemError(
             "lacks `slide`, the motion at the patch; add `slide` to the file, or write "
             "[[structure.interface]]"
         )
-    if needs_interface and not modes.interfaces.any(axis=1).all():
+    if not modes.interfaces.any(axis=1).all():
         raise PatchfemError(
             "`slide` of an interface is 0 in every mode, so nothing slides there; give the motion at the patch"
         )
-    for key in PATCH_MOTIONS if needs_interface else ():
+    for key in PATCH_MOTIONS:
         if getattr(modes, key) is not None:
             raise PatchfemError(
                 f"contains `{key}`, but the modes of such a file move the patch along x alone; list the modes in "
                 f"[[structure.mode]], which has the key {key}, or leave this array out"
             )
-    return FileModes(modes, [])

@@ -2,12 +2,11 @@
 
 import re
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from ..core import ModalBasis, PatchfemError
-from ..formatting import format_number
 from ..inputs import matrices
 from ..scene.rules.structure import MATRIX_KEYS
 from ..structure import reduced
@@ -15,8 +14,6 @@ from ..structure.places import DIRECTION_NAMES
 from .file_cache import cache_by_file
 from .source import name_key
 
-# Smallest relative uncertainty of a frequency that is reported.
-MIN_REPORTED_UNCERTAINTY = 1e-5
 NODE_PATTERN = re.compile(r"(\d+)(?::(r?[xyz]))?")  # pattern of "1201:x" or "1201"
 RANGE_PATTERN = re.compile(r"(\d+)\.\.(\d+)(?::(\d+))?")  # pattern of "a..b" or "a..b:n"
 
@@ -33,16 +30,17 @@ class ReducedModes(NamedTuple):
 
     modes: ModalBasis
     other_modes: tuple[ModalBasis, ...]
-    notes: list
+    notes: list[str]
     max_modes: int
 
 
-class _Coordinates(NamedTuple):
-    """Boundary rows (b,), motion (n,) for a unit motion of the base or None, and notes."""
+class _ReducedFiles(NamedTuple):
+    """Matrices of the files by key, boundary rows (b,), motion (n,) for a unit motion of the base or None, and notes."""
 
+    values: dict[str, Any]
     boundary: np.ndarray
     moved: np.ndarray | None
-    notes: list
+    notes: list[str]
 
 
 def build_reduced_modes(scene) -> ReducedModes:
@@ -52,37 +50,27 @@ def build_reduced_modes(scene) -> ReducedModes:
     is_base_driven = scene.drive.kind == "base"
     output = structure.output_mass or 1
     with name_key("structure.reduced"):
-        files = _find_files(table, scene.resolve_path)
-        reduction, notes = _reduce(
-            tuple(files.values()),
-            tuple(files),
-            table.boundary,
-            table.modes,
-            table.method,
-            table.moved,
-            table.unit,
-            is_base_driven,
-        )
+        paths = _find_files(table, scene.resolve_path)
+        # A damping ratio and the places that slide do not change the matrices.
+        settings = table.model_copy(update={"damping": None, "slide": None})
+        reduction, notes = _reduce(tuple(paths.values()), tuple(paths), settings, is_base_driven)
         pairs = list_slide_pairs(structure)
         driven_mass = None if is_base_driven else scene.drive.mass or output
-        ratio = 0.0
-        if table.damping is not None and not isinstance(table.damping, str):
-            ratio = table.damping
+        ratio = 0.0 if "damping" in paths else table.damping or 0.0
         names = [str(coordinate) for coordinate in table.boundary]
 
-        def build(count: int) -> ModalBasis:
-            return reduced.build_basis(reduction, count, pairs, output, driven_mass, ratio, names)
-
-        modes = build(table.modes)
+        # The modes that are left out show in runs with all computed modes and with half of those kept.
         n_computed = reduction.modes.omega.size
-        keeps_all = reduction.modes.is_complete and table.modes >= n_computed
-        counts = [] if keeps_all else [n_computed, table.modes // 2][: 1 + (table.modes > 1)]
-        other_modes = tuple(build(count) for count in counts)
-    notes = [*notes, _describe_reduction(reduction, modes, table)]
+        counts = [table.modes]
+        if not reduction.modes.is_complete or table.modes < n_computed:
+            counts += [n_computed, table.modes // 2][: 1 + (table.modes > 1)]
+        arguments = (pairs, output, driven_mass, ratio, names)
+        modes, *other_modes = [reduced.build_basis(reduction, n, *arguments) for n in counts]
     max_modes = n_computed
     if not reduction.modes.is_complete:
         max_modes = reduction.lowest.size - len(reduction.boundary)
-    return ReducedModes(modes, other_modes, notes, max_modes)
+    notes = [*notes, _describe_reduction(reduction, modes, table)]
+    return ReducedModes(modes, tuple(other_modes), notes, max_modes)
 
 
 def list_slide_pairs(structure) -> list[tuple[int, int]]:
@@ -126,56 +114,20 @@ def read_matrix(path: Path, key: str) -> matrices.Matrix:
 
 
 @cache_by_file
-def _reduce(
-    paths: tuple,
-    keys: tuple,
-    boundary: tuple,
-    modes: int,
-    method: str,
-    moved: tuple | None,
-    unit: float,
-    is_base_driven: bool,
-) -> tuple:
-    """Reduce the matrices in files; return the Reduction and notes."""
-    matrix_list = list(map(read_matrix, paths, keys))
-    coordinates = _locate_coordinates(matrix_list, boundary, moved, is_base_driven)
-    aligned = matrices.align_rows(*matrix_list)
-    values = {key: matrix.values / unit for key, matrix in zip(keys, aligned)}
+def _reduce(paths: tuple[Path, ...], keys: tuple[str, ...], table, is_base_driven: bool):
+    """Reduce the matrices in files; return the `structure.reduced.Reduction` and notes."""
+    files = _read_files(dict(zip(keys, paths)), table, is_base_driven)
+    values = {key: matrix / table.unit for key, matrix in files.values.items()}
     reduction = reduced.reduce_matrices(
         values["stiffness"],
         values["mass"],
         values.get("damping"),
-        coordinates.boundary,
-        modes,
-        method,
-        coordinates.moved,
+        files.boundary,
+        table.modes,
+        table.method,
+        files.moved,
     )
-    names = [path.name for path in paths]
-    rounding_notes = _note_rounding(names, aligned, values["stiffness"], unit, reduction.lowest)
-    return reduction, [*coordinates.notes, *rounding_notes]
-
-
-def _note_rounding(names: list, aligned: list, stiffness, unit: float, shape) -> list:
-    """Return a note about each matrix whose rounded numbers make the lowest frequency uncertain.
-
-    The uncertainty of the square of the frequency is two standard deviations of shape^T A shape, with
-    the shape (n,) of the lowest mode of unit modal mass; that of the frequency is half as large.
-    """
-    notes = []
-    square = shape @ (stiffness @ shape)
-    for name, key, matrix, scale in zip(names, MATRIX_KEYS, aligned, (square, 1.0)):
-        rounding = matrices.estimate_rounding(matrix.values)
-        if rounding is None or not square:
-            continue
-        deviation = matrices.compute_form_deviation(matrix.values, rounding.deviation, shape)
-        uncertainty = deviation / unit / scale
-        if uncertainty > MIN_REPORTED_UNCERTAINTY:
-            notes.append(
-                f"{name} stores the {key} in {rounding.digits}, which leaves the lowest "
-                f"frequency of the structure uncertain by {format_number(100 * uncertainty, 2)} %; write the "
-                "file in double precision"
-            )
-    return notes
+    return reduction, files.notes
 
 
 def check_reduction(folder: Path, table, *, is_base_driven: bool) -> None:
@@ -195,54 +147,79 @@ def check_reduction(folder: Path, table, *, is_base_driven: bool) -> None:
     PatchfemError
         If they cannot be used.
     """
-    files = _find_files(table, folder.__truediv__)
-    matrix_list = [read_matrix(path, key) for key, path in files.items()]
-    _locate_coordinates(matrix_list, table.boundary, table.moved, is_base_driven)
+    _read_files(_find_files(table, folder.__truediv__), table, is_base_driven)
 
 
-def _locate_coordinates(
-    matrix_list: list, boundary: tuple, moved: tuple | None, is_base_driven: bool
-) -> _Coordinates:
-    """Find the rows of the boundary coordinates, and of those that move with the base."""
+def _read_files(paths: dict[str, Path], table, is_base_driven: bool) -> _ReducedFiles:
+    """Read the matrices, and find the rows of the boundary coordinates and of those that move with the base."""
+    read = [read_matrix(path, key) for key, path in paths.items()]
     with name_key("structure.reduced.mass"):
-        stiffness = matrices.align_rows(*matrix_list)[0]
-    if len(matrix_list) > 1 and not abs(matrix_list[0].values - matrix_list[1].values).nnz:
-        raise PatchfemError(
-            "contains the same numbers as the stiffness; give the file of the mass",
-            "structure.reduced.mass",
-        )
-    n = stiffness.values.shape[0]
-    rows = np.concatenate([_find_rows(name, stiffness, "boundary") for name in boundary])
-    if np.unique(rows).size < rows.size:
-        raise PatchfemError("names a coordinate twice", "structure.reduced.boundary")
+        aligned = matrices.align_rows(*read)
+        if len(read) > 1 and not abs(read[0].values - read[1].values).nnz:
+            raise PatchfemError(
+                "contains the same numbers as the stiffness; give the file of the mass"
+            )
+    values = {key: matrix.values for key, matrix in zip(paths, aligned)}
+    places = aligned[0].places
+    n = values["stiffness"].shape[0]
+
+    # Rows of the boundary.
+    with name_key("structure.reduced.boundary"):
+        rows = np.concatenate([_find_rows(name, n, places) for name in table.boundary])
+        if np.unique(rows).size < rows.size:
+            raise PatchfemError("names a coordinate twice")
     if not is_base_driven:
-        return _Coordinates(rows, None, [])
-    motion = np.zeros(n)
+        return _ReducedFiles(values, rows, None, [])
+
+    # Rows that a base moves along x.
     notes = []
-    if moved is None and stiffness.places is not None:
+    moved = table.moved
+    if moved is None and places is not None:
         moved = ("x",)
     if moved is None:
-        motion[:] = 1.0
+        moved = (f"1..{n}",)
         if n > rows.size:
             notes.append(
                 f"all {n} coordinates of structure.reduced are taken to move with the base, because the files name no "
                 "directions; give the coordinates along x in structure.reduced.moved"
             )
-    for name in moved or ():
-        motion[_find_rows(name, stiffness, "moved")] = 1.0
-    return _Coordinates(rows, motion, notes)
+    motion = np.zeros(n)
+    with name_key("structure.reduced.moved"):
+        for name in moved:
+            motion[_find_moved_rows(name, n, places)] = 1.0
+    return _ReducedFiles(values, rows, motion, notes)
 
 
-def _find_rows(name, matrix: matrices.Matrix, key: str) -> np.ndarray:
-    """Find the row indices, counted from 0, of the coordinates that a scene names.
+def _find_moved_rows(name, n: int, places) -> np.ndarray:
+    """Find the row indices (k,) that `moved` names: as for the boundary, or a range of rows, or a direction."""
+    text = str(name)
+    row_range = RANGE_PATTERN.fullmatch(text)
+    if row_range is None:
+        if places is not None and text in DIRECTION_NAMES:
+            return np.flatnonzero(places[:, 1] == DIRECTION_NAMES.index(text) + 1)
+        return _find_rows(name, n, places)
+
+    # "a..b:n" stands for n evenly spaced rows, "a..b" for all of them.
+    first, last, count = (int(number or 0) for number in row_range.groups())
+    step, remainder = divmod(last - first, max((count or last - first + 1) - 1, 1))
+    if not 1 <= first <= last <= n or remainder or (step == 0 and count > 1):
+        raise PatchfemError(
+            f"'{text}' is not a range of rows from 1 to {n}; write 'a..b:n' for n rows from a to b"
+        )
+    return np.arange(first - 1, last, max(step, 1))
+
+
+def _find_rows(name, n: int, places) -> np.ndarray:
+    """Find the row indices, counted from 0, of a coordinate that a scene names.
 
     Parameters
     ----------
     name : int or str
-        A number from 1, a node with a direction or, for `moved`, a range of numbers or a direction.
-    matrix : Matrix
-    key : str
-        Key of [structure.reduced], ``"boundary"`` or ``"moved"``.
+        A number from 1, or a node with a direction.
+    n : int
+        Number of rows.
+    places : (n, 2) ndarray or None
+        Node and direction of each row, if the files name them.
 
     Returns
     -------
@@ -251,62 +228,33 @@ def _find_rows(name, matrix: matrices.Matrix, key: str) -> np.ndarray:
     Raises
     ------
     PatchfemError
-        If the matrix has no such coordinate; its `key` is the key at fault.
+        If the matrix has no such coordinate.
     """
-    full_key = f"structure.reduced.{key}"
-    n = matrix.values.shape[0]
     if not isinstance(name, str):
         if name > n:
             raise PatchfemError(
-                f"there is no coordinate {name}: the matrices have {n}, numbered from 1", full_key
+                f"there is no coordinate {name}: the matrices have {n}, numbered from 1"
             )
         return np.array([name - 1])
-    row_range = RANGE_PATTERN.fullmatch(name)
-    if key == "moved" and row_range:
-        return _list_rows_in_range(row_range, n, full_key)
-    if matrix.places is None:
+    if places is None:
         raise PatchfemError(
             f"'{name}' names a node, but the files name no nodes; give row numbers of the matrices, "
-            "which start at 1",
-            full_key,
+            "which start at 1"
         )
-    if key == "moved" and name in DIRECTION_NAMES:
-        return np.flatnonzero(matrix.places[:, 1] == DIRECTION_NAMES.index(name) + 1)
     match = NODE_PATTERN.fullmatch(name)
     if match is None:
         raise PatchfemError(
-            f"'{name}' is not a node with a direction; write node:direction, such as \"1201:x\"",
-            full_key,
+            f"'{name}' is not a node with a direction; write node:direction, such as \"1201:x\""
         )
-    node = int(match[1])
-    direction = DIRECTION_NAMES.index(match[2]) + 1 if match[2] else 0
-    rows = np.flatnonzero((matrix.places == (node, direction)).all(axis=1))
-    if not rows.size:
-        raise PatchfemError(f"the files have no {name}; {_list_directions(matrix, node)}", full_key)
-    return rows
+    place = (int(match[1]), DIRECTION_NAMES.index(match[2]) + 1 if match[2] else 0)
+    rows = np.flatnonzero((places == place).all(axis=1))
+    if rows.size:
+        return rows
 
-
-def _list_rows_in_range(row_range: re.Match, n: int, full_key: str) -> np.ndarray:
-    """Return the row indices, counted from 0, for a range "a..b" or "a..b:n" of row numbers."""
-    first = int(row_range[1])
-    last = int(row_range[2])
-    count = int(row_range[3] or 0) or last - first + 1
-    step = (last - first) / max(count - 1, 1)
-    if not 1 <= first <= last <= n or step != int(step) or (step == 0 and count > 1):
-        raise PatchfemError(
-            f"'{row_range[0]}' is not a range of rows from 1 to {n}; write 'a..b:n' for n rows from "
-            "a to b",
-            full_key,
-        )
-    return np.arange(first - 1, last, max(int(step), 1))
-
-
-def _list_directions(matrix: matrices.Matrix, node: int) -> str:
-    """List the directions of a node, or the nodes in the files if the node does not exist."""
-    directions = matrix.places[matrix.places[:, 0] == node, 1]
-    if not directions.size:
-        return f"their nodes are {matrix.places[0, 0]} to {matrix.places[-1, 0]}"
-    names = [
-        DIRECTION_NAMES[direction - 1] if direction else "no direction" for direction in directions
-    ]
-    return f"node {node} has {', '.join(names)}"
+    # The message lists what the files have instead.
+    directions = places[places[:, 0] == place[0], 1]
+    advice = f"their nodes are {places[0, 0]} to {places[-1, 0]}"
+    if directions.size:
+        known = ", ".join(("no direction", *DIRECTION_NAMES)[direction] for direction in directions)
+        advice = f"node {place[0]} has {known}"
+    raise PatchfemError(f"the files have no {name}; {advice}")

@@ -6,11 +6,11 @@ import numpy as np
 
 from .. import compiled
 from ..core import ModalBasis, SineDrive
+from ..friction import path_work
 from .case_kernels import LEVELS, TICKS
 from .case_rows import Cases, Now, Number, Seen
 
 FULL_STICK = 1e-12  # fraction of the time below which slip is round-off
-MIN_ALIGNMENT = 0.95  # resultant of the phases of slip starts below which they have no common phase
 MIN_ACCELERATION = 1e-9  # first harmonic [m s-2] below which it has no distortion
 MIN_SLIDE_RANGE = 1e-15  # range of the slide [m] below which the contact is at rest
 
@@ -137,7 +137,9 @@ def compute_measures(cases: Cases, now, seen, history) -> dict:
         "friction_force_peak": seen[:, Seen.MAX_FORCE],
         "slip_amplitude": (seen[:, Seen.MAX_SLIP] - seen[:, Seen.MIN_SLIP]) / 2,
         "stick_fraction": np.where(stuck > 1 - FULL_STICK, 1.0, stuck),
-        "slip_start_phase": _mean_phase(seen),
+        "slip_start_phase": path_work.mean_slip_phase(
+            seen[:, Seen.STARTS], seen[:, Seen.START_COS], seen[:, Seen.START_SIN]
+        ),
         "normal_load": columns[Number.LOAD],
         "loop_area": work / count,
         "drift_per_cycle": (seen[:, Seen.LAST_MEAN] - seen[:, Seen.FIRST_MEAN])
@@ -163,15 +165,6 @@ def _compute_energies(cases: Cases, now, mass) -> dict:
         "energy_dissipated": work - now[:, Now.ELASTIC],
         "energy_created": np.zeros_like(work),
     }
-
-
-def _mean_phase(seen) -> np.ndarray:
-    """Return the mean phase (c,) [rad], modulo pi, at which slip starts; NaN without a common phase."""
-    count = seen[:, Seen.STARTS]
-    cosine = seen[:, Seen.START_COS]
-    sine = seen[:, Seen.START_SIN]
-    is_common = (count > 0) & (np.hypot(cosine, sine) >= MIN_ALIGNMENT * count)
-    return np.where(is_common, np.arctan2(sine, cosine) / 2 % np.pi, np.nan)
 
 
 def _compute_harmonics(cases: Cases, now, seen, area, slide_range) -> dict:

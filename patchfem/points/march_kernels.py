@@ -59,10 +59,6 @@ from .return_maps_kernels import (
 )
 
 MAX_ITERATIONS = 200  # Newton iterations of a step
-STEADY_BONDS = (
-    1e-13  # relative distance of bonds from those of an endless slide that counts as none
-)
-LAST_STEP = 4e-6  # change of a slide in bond lengths, half the square of which is within RESIDUAL
 MAX_CUTS = 40  # trials of a line search
 MAX_OVERSHOOT = 0.5  # slope beyond the minimum of a line search, relative to that at its start
 MAX_STALLS = 4  # iterations that do not halve the smallest residual, after which a step ends
@@ -329,37 +325,12 @@ def write_forces(system, level, h):
         moves[Port.FORCE, 0] = moves[Port.SUM, 0]
 
 
-@njit(**NJIT_CALL)
-def keep_sliding(values, count, direction):
-    """Return whether no point moves against a direction.
-
-    Parameters
-    ----------
-    values : (13, m) array
-        Values of the points, in the rows of `march_rows.Point`.
-    count : int
-        Number of points.
-    direction : float
-        Sign of the slide.
-    """
-    least = 0.0
-    for j in range(count):
-        least = min(least, direction * values[Point.SLIDE, j])
-    return least == 0.0
-
-
 @njit(**NJIT_INLINE)
 def write_bond_forces(system):
-    """Write the mean forces of bonds that slide steadily or a short way, in loops that vectorise; else return False."""
+    """Write the mean forces of bonds that slide a short way, in loops that vectorise; else return False."""
     points = system.points
     values = points.values
     count = points.port.size
-    direction = system.totals[Total.SLIDES]
-    if direction != 0.0 and keep_sliding(values, count, direction):
-        for j in range(count):
-            values[Point.FORCE, j] = direction * points.numbers[1, j] * values[Point.LOAD, j]
-            values[Point.BY_SLIDE, j] = 0.0
-        return True
     return write_bond_means(
         points.numbers,
         points.trial,
@@ -372,15 +343,11 @@ def write_bond_forces(system):
 
 @njit(**NJIT_CALL)
 def advance_plain_bonds(system):
-    """Advance bonds of constant length whose slides are short, or that slide steadily; return whether they were."""
+    """Advance bonds of constant length whose slides are short; return whether they were."""
     points = system.points
     values = points.values
     trial = points.trial
     count = points.port.size
-    direction = system.totals[Total.SLIDES]
-    if direction != 0.0 and keep_sliding(values, count, direction):
-        return True
-    system.totals[Total.SLIDES] = 0.0
     longest = 0.0
     for j in range(count):
         longest = max(longest, abs(values[Point.SLIDE, j]) - MAX_SHORT_PATH * trial[4, j])
@@ -388,22 +355,6 @@ def advance_plain_bonds(system):
         return False
     advance_bonds(trial, values[Point.LOAD, :count], values[Point.SLIDE, :count])
     return True
-
-
-@njit(**NJIT_CALL)
-def find_steady_slide(system):
-    """Return the direction in which all bonds of constant length slide steadily, or 0."""
-    points = system.points
-    values = points.values
-    direction = 1.0 if points.trial[2, 0] > 0 else -1.0
-    for j in range(points.port.size):
-        load = values[Point.LOAD, j]
-        length = points.trial[4, j]
-        gap = abs(points.trial[1, j] - load) + abs(direction * points.trial[2, j] / length - load)
-        gap += 0.01 * abs(points.trial[3, j] / (length * length) - 2 * load)
-        if gap > STEADY_BONDS * load:
-            return 0.0
-    return direction
 
 
 @njit(**NJIT_INLINE)
@@ -614,53 +565,6 @@ def find_step(system, level):
 
 
 @njit(**NJIT_INLINE)
-def is_last_step(system, level):
-    """Return whether the present step changes the slide of every bond by less than LAST_STEP bond lengths."""
-    ports = system.ports
-    points = system.points
-    n_ports = ports.values.shape[1]
-    change = 0.0
-    for k in range(n_ports):
-        change += ports.compliance[level, 0, 0, k] * ports.step[k]
-    change = abs(change)
-    for k in range(points.stiffness.size):
-        change += points.shear[Shear.LARGEST, k] * abs(ports.step[n_ports + k])
-    return change <= LAST_STEP * points.trial[4, 0]
-
-
-@njit(**NJIT_INLINE)
-def finish_step(system, level):
-    """Take a step whose residual is known to be small; the forces of the points follow from their slopes."""
-    ports = system.ports
-    points = system.points
-    values = points.values
-    n_ports = ports.values.shape[1]
-    change = 0.0
-    for k in range(n_ports):
-        change += ports.compliance[level, 0, 0, k] * ports.step[k]
-    for p in range(n_ports):
-        for k in range(n_ports):
-            dq = ports.compliance[level, 0, p, k] * ports.step[k]
-            ports.values[Port.INCREMENT, p] += dq
-            v = ports.compliance[level, 1, p, k] * ports.step[k]
-            ports.values[Port.END_VELOCITY, p] += v
-        ports.values[Port.FORCE, p] -= ports.step[p]
-    count = points.port.size
-    for j in range(count):
-        values[Point.BY_VELOCITY, j] = change
-    for k in range(points.stiffness.size):
-        part = ports.step[n_ports + k]
-        points.shear[Shear.TRIAL, k] -= part
-        for j in range(count):
-            values[Point.BY_VELOCITY, j] += points.shapes[k, j] * part
-    for j in range(count):
-        dq = values[Point.BY_VELOCITY, j]
-        values[Point.SLIDE, j] += dq
-        values[Point.FORCE, j] += values[Point.BY_SLIDE, j] * dq
-        values[Point.BY_VELOCITY, j] = 0.0
-
-
-@njit(**NJIT_INLINE)
 def take_step(system, level, h, fraction):
     """Subtract a fraction of the step from the unknowns at its start; return the relative residual.
 
@@ -722,9 +626,6 @@ def solve_forces(system, level, h):
             descent = -find_step(system, level)
         else:
             ports.step[:] = 0.0
-        if count > 0 and system.options.is_plain and is_last_step(system, level):
-            finish_step(system, level)
-            return True
 
         # The line search ends where the potential no longer falls, or rises little.
         low = 0.0
@@ -986,8 +887,7 @@ def commit(system, h):
     options = system.options
     flank = system.flank
     count = points.port.size
-    is_constant = options.is_plain and not options.has_growth
-    is_advanced = is_constant and advance_plain_bonds(system)
+    is_advanced = options.is_plain and not options.has_growth and advance_plain_bonds(system)
     for j in range(count):
         values[Point.TOTAL, j] += values[Point.SLIDE, j]
     for j in range(count if options.has_loads or not is_advanced else 0):
@@ -1022,12 +922,9 @@ def commit(system, h):
                 was_held = points.memory[0, j] == 0 and points.trial[0, j] == 0
                 ports.values[Port.FREE, p] = ports.values[Port.INCREMENT, p] if was_held else 0.0
                 values[Point.TOTAL, j] -= ports.values[Port.FREE, p]
-    if system.totals[Total.SLIDES] == 0.0:
-        for k in range(points.memory.shape[0]):
-            for j in range(count):
-                points.memory[k, j] = points.trial[k, j]
-        if is_constant and not options.has_loads:
-            system.totals[Total.SLIDES] = find_steady_slide(system)
+    for k in range(points.memory.shape[0]):
+        for j in range(count):
+            points.memory[k, j] = points.trial[k, j]
     system.totals[Total.IS_DIRTY] = 0.0
     shear = points.shear
     for k in range(points.stiffness.size):
@@ -1352,41 +1249,6 @@ def add_energies(system, level, drive):
     totals[Total.STORED] = max(totals[Total.STORED], 0.5 * mass * stored)
 
 
-@njit(**NJIT_CALL)
-def write_bond_sample(system, sample, first):
-    """Write force and slip of bonds on one port, and the sum of the weights of the points; return their energy.
-
-    Parameters
-    ----------
-    system : march_rows.System
-        Arrays of the march, changed in place.
-    sample : (k,) array
-        Sample, in the rows of `march_rows.Sample`; output.
-    first : int
-        Column of the force of the port.
-    """
-    points = system.points
-    values = points.values
-    force = 0.0
-    energy = 0.0
-    slip = 0.0
-    total = 0.0
-    for j in range(points.port.size):
-        m = points.memory[1, j]
-        z = points.memory[2, j]
-        stiffness = points.numbers[1, j] / points.numbers[2, j]
-        weight = values[Point.END_LOAD, j] * points.numbers[1, j]
-        stretch = z / m if m > 0.0 else 0.0
-        force += stiffness * z
-        energy += 0.5 * stiffness * points.memory[3, j]
-        slip += weight * (values[Point.TOTAL, j] - stretch)
-        total += weight
-    sample[first] = force
-    sample[first + 1] = slip
-    system.ports.vector[0] = total
-    return energy
-
-
 @njit(**NJIT_INLINE)
 def write_sample(system, row, sample):
     """Write a sample of forces and energies at the present state.
@@ -1423,9 +1285,7 @@ def write_sample(system, row, sample):
         ports.vector[p] = 0.0
     for k in range(points.stiffness.size):
         energy += 0.5 * points.stiffness[k] * points.shear[Shear.VALUE, k] ** 2
-    if system.options.is_plain:
-        energy += write_bond_sample(system, sample, first)
-    for j in range(0 if system.options.is_plain else points.port.size):
+    for j in range(points.port.size):
         p = points.port[j]
         load = points.values[Point.END_LOAD, j]
         state = read_point(system, j)

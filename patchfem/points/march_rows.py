@@ -83,7 +83,6 @@ class Shear(IntEnum):
     - LAST, EARLIER, FIRST: their mean rates in the last three steps [m/s], the last one first
     - TRIAL, BASE: increments of a trial step, and those from which a line search starts [m]
     - SCALE: factor that makes the residuals of the coordinates comparable with forces
-    - LARGEST: largest slide of a point per coordinate
     """
 
     VALUE = 0
@@ -93,7 +92,6 @@ class Shear(IntEnum):
     TRIAL = 4
     BASE = 5
     SCALE = 6
-    LARGEST = 7
 
 
 class Flank(IntEnum):
@@ -134,7 +132,6 @@ class Total(IntEnum):
     - SLOT: slot of the contact set, -1 if none is found
     - IS_FULL: 1 if a list of bonds is full
     - IS_DIRTY: 1 if the trial memory differs from the memory
-    - SLIDES: direction in which all bonds slide steadily, so that their force does not change; 0 if they do not
     - REST: energy that the modes gained as ports at rest were brought back in the last step [J]
     """
 
@@ -149,8 +146,7 @@ class Total(IntEnum):
     SLOT = 8
     IS_FULL = 9
     IS_DIRTY = 10
-    SLIDES = 11
-    REST = 12
+    REST = 11
 
 
 class Sample(IntEnum):

@@ -16,6 +16,7 @@ from ..friction.bonds import list_numbers
 from ..friction.bonds.list_rows_kernels import N_ROWS, STATUS, BondLists
 from ..friction.bonds.parameters import growth_numbers
 from ..friction.path_work import sampled_work
+from ..structure.histories import find_accelerations, make_response
 from . import checkpoint
 from .contacts import Contact
 from .law_rows import Law
@@ -360,7 +361,6 @@ def _make_points(contact: Contact, n_nodes: int) -> Points:
     shear = np.zeros((len(Shear), stiffness.size))
     if stiffness.size:
         shear[Shear.SCALE] = 1 / np.sqrt((shapes**2).mean(axis=1))
-        shear[Shear.LARGEST] = np.abs(shapes).max(axis=1)
     n_moving = 0 if contact.sets is None else 2  # ports of heave and pitch have no points
     return Points(
         np.repeat(np.arange(len(counts)), counts),
@@ -1026,7 +1026,7 @@ class Record:
             numbers = numbers[is_kept]
             energies = energies[:, is_kept]
         in_window = numbers >= run.done - self.n_window
-        response = make_response(run, rows, numbers, energies)
+        response = make_histories(run, rows, numbers, energies)
         n = 2 * run.modes.omega.size
         window_rows = rows[in_window][:-1]
         steps = run.steps
@@ -1083,7 +1083,7 @@ def find_extremes(q, v, step: float) -> list[tuple[float, float]]:
     return list(zip(low.tolist(), high.tolist()))
 
 
-def make_response(run: March, rows, numbers, energies) -> Response:
+def make_histories(run: March, rows, numbers, energies) -> Response:
     """Return samples (k, w) with their step numbers (k,) and energies (3, k) as histories.
 
     `extra` has the energies: friction work, stored, dissipated and created energy [J]; slides, slide rates, forces and
@@ -1113,10 +1113,8 @@ def make_response(run: March, rows, numbers, energies) -> Response:
     columns = columns.reshape(len(rows), len(sets), N_PORT_COLUMNS)
     port_rows = np.array([one.row for one in sets], float).reshape(len(sets), n)
     push = run.drive.values(time)
-    base = push if run.drive.moving else np.zeros_like(push)
     forces = columns[..., 0]
-    acceleration = -np.outer(push, modes.base) - rate @ modes.damping_matrix.T - z * modes.omega**2
-    acceleration -= forces @ port_rows / modes.mass
+    pull = forces @ port_rows
     work, dissipated, created = energies
     extra = {"ledger": np.stack([work, rows[:, 2 * n + Sample.ENERGY], dissipated, created])}
     press = rows[:, 2 * n + Sample.LOAD : 2 * n + Sample.PITCH + 1]
@@ -1125,7 +1123,7 @@ def make_response(run: March, rows, numbers, energies) -> Response:
     if contact.sets is not None:
         # Less load accelerates the holder towards the contact.
         change = press[:, :2] - [contact.sets.load, contact.sets.moment]
-        acceleration += change @ np.array([contact.heave, contact.pitch]) / modes.mass
+        pull = pull - change @ np.array([contact.heave, contact.pitch])
     slides = z @ port_rows.T
     rates = rate @ port_rows.T
     is_interface = np.array([not one.is_spring for one in sets], bool)
@@ -1136,7 +1134,7 @@ def make_response(run: March, rows, numbers, energies) -> Response:
             extra |= {name: part[:, is_interface] for name, part in parts.items()}
     grooves = contact.grooves
     if grooves is not None and grooves.lifted_mass:
-        sliding = acceleration @ modes.slide
+        sliding = find_accelerations(modes, push, z, rate, pull) @ modes.slide
         lift = grooves.slope(slides[:, 0]) * sliding
         lift = lift + grooves.slope_derivative(slides[:, 0]) * rates[:, 0] ** 2
         extra["normal_load"] = contact.preload + grooves.lifted_mass * lift
@@ -1146,8 +1144,4 @@ def make_response(run: March, rows, numbers, energies) -> Response:
     else:
         still = np.zeros(len(rows))
         interface = z @ modes.slide, rate @ modes.slide, still, z @ modes.slide
-    slide, speed, force, slip = interface
-    return Response(
-        time, z, rate, slide, speed, z @ modes.output, rate @ modes.output,
-        acceleration @ modes.output + base, base, force, slip, extra,
-    )  # fmt: skip
+    return make_response(modes, run.drive, push, (time, z, rate), pull, interface, extra)

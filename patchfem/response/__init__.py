@@ -1,8 +1,7 @@
 """Computation of the measures of a run: values with names, units and errors.
 
-In: histories of a run, and measures that its engine integrated over the last cycles
-(`dynamics.integrated`). Out: measures by name with errors from coarse runs, the outcome, the
-stick-slip events, and the ringing. Read `rows` first: each row of its table evaluates a
+In: histories of a run, and measures that its engine integrated over the last cycles. Out: measures by name with errors
+from coarse runs, the outcome, and the stick-slip events. Read `rows` first: each row of its table evaluates a
 `LastCycles`. A value that the engine integrated replaces the value from samples. `measures` has the
 functions that evaluate samples.
 """
@@ -41,19 +40,17 @@ PUBLIC = {
     ),
     "events": (
         "EVENT_KIND_NAMES",
-        "EXACT_SOURCE",
         "Events",
         "SEGMENT_BORDER",
         "classify_changes",
+        "find_segment_borders",
+        "is_all_stuck",
         "join_events",
         "sort_events",
     ),
     "levels": (
         "Level",
-        "MIN_JUMP_FACTOR",
         "bracket_onset",
-        "largest_hysteresis",
-        "largest_jump",
         "make_no_onset_reason",
         "make_onset_test",
     ),
@@ -106,10 +103,7 @@ PUBLIC = {
         "find_missing_unbounded",
     ),
     "ringing": (
-        "MIN_PERIODS",
         "compute_stuck_vibration",
-        "make_ringing_measures",
-        "measure_ringing",
         "select_strongest",
     ),
     "rows": (
@@ -127,13 +121,6 @@ PUBLIC = {
         "select_names",
         "set_final_floors",
         "stick_fraction",
-    ),
-    "run_events": (
-        "find_segment_borders",
-        "find_stick_intervals",
-        "is_all_stuck",
-        "list_events",
-        "measure_ringing_in_sticks",
     ),
     "settling": (
         "CLASSES",
@@ -153,7 +140,6 @@ PUBLIC = {
         "warn_if_short",
     ),
     "welch": (
-        "CrossDensities",
         "average_segments",
         "transform_segments",
     ),

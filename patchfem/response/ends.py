@@ -8,7 +8,7 @@ end between two steps. Coarse runs do not show this error, because they end at t
 import numpy as np
 
 from ..core import Response
-from .run_events import slips_and_displacements
+from .events import slips_and_displacements
 
 
 def estimate_window_error(window: Response, period: float, offset: float) -> dict:

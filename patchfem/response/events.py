@@ -1,14 +1,13 @@
-"""Stick-slip events of a run, detected in samples, and the stick intervals between them.
+"""Stick-slip events of a run that an engine computes from event to event, and whether interfaces stick.
 
-In: samples of slip and relative displacement, or event rows of an engine. Out: `Events`, and stick
-intervals.
+In: event rows of an engine, or the window of a run. Out: `Events`.
 """
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
-from ..core import STICK_SPEED_RATIO
+from .measures import slip_round_off
 
 # Kinds of events, as indices of EVENT_KIND_NAMES.
 STOP = 0
@@ -19,11 +18,9 @@ REVERSAL_DOWN = 4
 SEGMENT_BORDER = 5
 EVENT_KIND_NAMES = ("stop", "release_up", "release_down", "reversal_up", "reversal_down", "border")
 MAX_EVENTS = 100_000
-EXACT_SOURCE = "the times of stick and slip are those of the exact solution"
 
 
-@dataclass(frozen=True, eq=False, slots=True)
-class Events:
+class Events(NamedTuple):
     """Last events of a run in chronological order, at most MAX_EVENTS.
 
     - time (k,): time [s].
@@ -31,42 +28,20 @@ class Events:
       drive.
     - kind (k,): index of EVENT_KIND_NAMES; "up" means towards positive slip.
     - slide (k,): relative displacement [m].
-    - count: number of all events of the run.
-    - source: sentence about the detection of the events.
     """
 
     time: np.ndarray
     interface: np.ndarray
     kind: np.ndarray
     slide: np.ndarray
-    count: int
-    source: str = ""
 
 
-def sort_events(rows, count: int | None = None, source: str = "") -> Events:
-    """Return event rows (time [s], interface, kind, displacement [m]) as Events, sorted by time.
-
-    Parameters
-    ----------
-    rows : sequence
-        Event rows; only the last MAX_EVENTS are used.
-    count : int, optional
-        Number of all events of the run; None: number of rows.
-    source : str
-        Sentence about the detection of the events.
-    """
+def sort_events(rows) -> Events:
+    """Return event rows (time [s], interface, kind, displacement [m]) as Events, sorted by time."""
     rows = np.array(rows, float).reshape(-1, 4)
-    rows = rows[np.lexsort((rows[:, 1], rows[:, 0]))]
-    count = len(rows) if count is None else count
-    rows = rows[-MAX_EVENTS:]
-    return Events(
-        rows[:, 0].copy(),
-        rows[:, 1].astype(np.int32),
-        rows[:, 2].astype(np.int8),
-        rows[:, 3].copy(),
-        count,
-        source,
-    )
+    rows = rows[np.lexsort((rows[:, 1], rows[:, 0]))][-MAX_EVENTS:]
+    time, interface, kind, slide = rows.T.copy()
+    return Events(time, interface.astype(np.int32), kind.astype(np.int8), slide)
 
 
 def classify_changes(before, after) -> np.ndarray:
@@ -83,8 +58,8 @@ def classify_changes(before, after) -> np.ndarray:
     return np.where(after == 0, STOP, np.where(after > 0, upwards, downwards))
 
 
-def join_events(parts: list, shifts: list) -> Events:
-    """Join the exact events of successive runs, with a border between segments of the drive at each start.
+def join_events(parts: list[Events], shifts: list) -> Events:
+    """Join the events of successive runs, with a border between segments of the drive at each start.
 
     Parameters
     ----------
@@ -94,143 +69,28 @@ def join_events(parts: list, shifts: list) -> Events:
     """
     rows = [(shift, 0, SEGMENT_BORDER, np.nan) for shift in shifts[1:]]
     for events, shift in zip(parts, shifts):
-        rows += zip(events.time + shift, events.interface, events.kind, events.slide)
-    count = sum(events.count for events in parts) + len(shifts) - 1
-    return sort_events(rows, count, EXACT_SOURCE)
+        rows += zip(events.time + shift, *events[1:])
+    return sort_events(rows)
 
 
-def detect_events(
-    time, slips, slides, period: float, max_stick_slip: float = 0.0, borders=()
-) -> Events:
-    """Detect stops, releases, reversals and segment borders in the samples of a run.
+def slips_and_displacements(response) -> tuple:
+    """Return the slip and the relative displacement (k, i) [m] of each interface."""
+    extra = response.extra
+    if "slides" in extra:
+        return extra.get("slips", extra["slides"]), extra["slides"]
+    return response.slip[:, None], response.slide[:, None]
 
-    At a stop or a release, the slip speed passes 1e-2 times its peak in the cycle. At a reversal, it changes
-    sign between two samples without a stop.
 
-    Parameters
-    ----------
-    time : (k,)
-        Times [s].
-    slips, slides : (k, i)
-        Slip and relative displacement of each interface [m].
-    period : float
-        Period of the drive [s].
-    max_stick_slip : float
-        Largest range of the slip of a sticking interface in a cycle [m].
-    borders : sequence of float
-        Times of the borders between segments of the drive [s].
+def find_segment_borders(drive) -> list:
+    """Return the times [s] at which a drive changes from one segment to the next."""
+    return [segment.start for segment in drive.segments[1:]]
+
+
+def is_all_stuck(window, max_stick_slip: float) -> bool:
+    """Return whether no interface or strip slips by more than a given distance [m] in a window.
+
+    The limit applies to half the range of the slip, and is at least its round-off.
     """
-    rows = [(t, 0, SEGMENT_BORDER, np.nan) for t in borders if time[0] < t < time[-1]]
-    for number in range(slips.shape[1]):
-        rows += _detect_interface_events(
-            time, slips[:, number], slides[:, number], period, max_stick_slip, number + 1
-        )
-    return sort_events(
-        rows,
-        source="stick and slip are detected in the samples of the last cycles: the interface sticks "
-        "while the slip speed is below 1e-2 of the peak slip speed of the cycle",
-    )
-
-
-def compute_slip_states(time, slip, period: float, max_stick_slip: float = 0.0) -> tuple:
-    """Return the relative slip speed [1] and the stick-slip state between samples.
-
-    Parameters
-    ----------
-    time : (k,)
-        Times [s].
-    slip : (k,)
-        Slip [m].
-    period : float
-        Period of the drive [s].
-    max_stick_slip : float
-        Largest range of the slip of a sticking interface in a cycle [m].
-
-    Returns
-    -------
-    tuple
-        Slip speed relative to its peak in the cycle, and the state, (k - 1,) each: +1 or -1 for
-        slip in this direction, 0 for stick.
-    """
-    step = np.diff(time)
-    rate = np.divide(np.diff(slip), step, out=np.zeros(step.size), where=step > 0)
-    # the offset of 1e-6 cycles allows for round-off of the times
-    cycle = np.floor((time[:-1] - time[0]) / period + 1e-6).astype(int)
-    peak, low, high = (np.full(cycle.max(initial=0) + 1, start) for start in (0.0, np.inf, -np.inf))
-    np.maximum.at(peak, cycle, np.abs(rate))
-    for samples in (slip[:-1], slip[1:]):
-        np.minimum.at(low, cycle, samples)
-        np.maximum.at(high, cycle, samples)
-    peak[high - low <= max_stick_slip] = np.inf
-    relative_speed = rate / np.where(peak > 0, peak, np.inf)[cycle]
-    return relative_speed, np.where(
-        np.abs(relative_speed) >= STICK_SPEED_RATIO, np.sign(relative_speed), 0
-    ).astype(int)
-
-
-def _detect_interface_events(
-    time, slip, slide, period: float, max_stick_slip: float, number: int
-) -> list:
-    """Return the event rows of a single interface, detected in its samples."""
-    relative_speed, state = compute_slip_states(time, slip, period, max_stick_slip)
-    k = np.flatnonzero(state[1:] != state[:-1])
-    midpoints = (time[1:] + time[:-1]) / 2
-    before = state[k]
-    after = state[k + 1]
-    speed_before = relative_speed[k]
-    rise = relative_speed[k + 1] - relative_speed[k]
-    is_reversal = (before != 0) & (after != 0)
-    direction = np.where(before != 0, before, after)
-    kind = classify_changes(before, after)
-    fraction = np.clip(
-        (np.where(is_reversal, 0.0, direction * STICK_SPEED_RATIO) - speed_before)
-        / np.where(rise != 0, rise, 1.0),
-        0,
-        1,
-    )
-    times = midpoints[k] + np.where(rise != 0, fraction, 0.5) * (midpoints[k + 1] - midpoints[k])
-    return [*zip(times, [number] * k.size, kind, np.interp(times, time, slide))]
-
-
-def find_stick_spans(events: Events, begin: float, end: float, always_slips) -> list:
-    """Return the start and end times [s] of the intervals in which the first interface sticks.
-
-    With several interfaces, only the intervals with the same states of all other interfaces are returned,
-    for the states that last longest in total.
-
-    Parameters
-    ----------
-    events : Events
-    begin, end : float
-        Start and end of the window [s].
-    always_slips : (i,) of bool
-        Whether each interface slips during the whole window if it has no events.
-    """
-    count = len(always_slips)
-    sliding = [bool(slips) for slips in always_slips]
-    for number in range(count):
-        kinds = events.kind[events.interface == number + 1]
-        if kinds.size:
-            sliding[number] = kinds[0] not in (RELEASE_UP, RELEASE_DOWN)
-    # the last event of each interface before `begin` determines its initial state
-    first = int(np.searchsorted(events.time, begin))
-    for number in range(count):
-        kinds = events.kind[:first][events.interface[:first] == number + 1]
-        if kinds.size:
-            sliding[number] = bool(kinds[-1] != STOP)
-    intervals = {}
-    last_time = -np.inf
-    rows = zip(
-        *(column[first:].tolist() for column in (events.time, events.interface, events.kind))
-    )
-    for time, number, kind in [*rows, (np.inf, 0, SEGMENT_BORDER)]:
-        start = max(last_time, begin)
-        stop = min(time, end)
-        if stop > start and not sliding[0]:
-            intervals.setdefault(tuple(sliding), []).append((float(start), float(stop)))
-        if number:
-            sliding[number - 1] = kind != STOP
-        last_time = time
-    return max(
-        intervals.values(), key=lambda spans: sum(stop - start for start, stop in spans), default=[]
-    )
+    slips = slips_and_displacements(window)[0]
+    slips = np.column_stack([window.slip, slips])
+    return bool(np.ptp(slips, axis=0).max() / 2 <= max(max_stick_slip, slip_round_off(window)))

@@ -1,15 +1,11 @@
-"""Measures of a run whose drive level changes in steps: onset of slip, jump, hysteresis.
+"""Onset of slip of a run whose drive level changes in steps.
 
 In: a `Level` record for each drive level, in chronological order. Out: the two levels that bracket the
-onset of slip, the largest jump of the amplitude, and the hysteresis between increasing and decreasing
-levels.
+onset of slip.
 """
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from itertools import pairwise
-
-import numpy as np
 
 from ..core import Outcome
 from ..formatting import format_length
@@ -18,9 +14,6 @@ from .rows import AMPLITUDE, select_names
 LEVEL_MEASURES = select_names("level")
 # Smallest ratio of the third to the first harmonic of the acceleration that indicates slip.
 MIN_DISTORTION = 0.03
-# Smallest ratio of a measure at neighbouring levels, divided by the ratio of the drive levels, that
-# counts as a jump.
-MIN_JUMP_FACTOR = 1.5
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -98,57 +91,3 @@ def bracket_onset(levels, is_above_onset: Callable[[Level], bool]) -> tuple | No
         if k + 1 < len(levels) and levels[k + 1].drive < level.drive:
             return None
     return None
-
-
-def largest_jump(levels) -> tuple | None:
-    """Return the largest relative jump of the amplitude between successive drive levels.
-
-    The jump is the ratio of the measures divided by the ratio of the drive levels.
-
-    Parameters
-    ----------
-    levels : sequence of Level
-
-    Returns
-    -------
-    tuple or None
-        Drive of the level after the jump, factor [1], and distance between the two levels in the
-        unit of the drive; None if no factor, upwards or downwards,
-        reaches MIN_JUMP_FACTOR.
-    """
-    jumps = []
-    for level, next_level in pairwise(levels):
-        sizes = level.values[AMPLITUDE], next_level.values[AMPLITUDE]
-        amounts = level.drive, next_level.drive, *sizes
-        if all(0 < size < np.inf for size in amounts) and not (level.stuck or next_level.stuck):
-            factor = sizes[1] / sizes[0] / (next_level.drive / level.drive)
-            jumps.append(
-                (abs(np.log(factor)), next_level.drive, factor, abs(next_level.drive - level.drive))
-            )
-    return max(jumps)[1:] if jumps and max(jumps)[0] >= np.log(MIN_JUMP_FACTOR) else None
-
-
-def largest_hysteresis(levels) -> tuple | None:
-    """Return the largest difference of the amplitude between increasing and decreasing levels.
-
-    Parameters
-    ----------
-    levels : sequence of Level
-
-    Returns
-    -------
-    tuple or None
-        Difference at equal drive, and its error; None if no drive level occurs in both directions.
-    """
-    drives = np.array([level.drive for level in levels])
-    highest = int(np.argmax(drives))
-    decreasing_levels = {round(level.drive, 9): level for level in levels[highest + 1 :]}
-    differences = []
-    for rising in levels[:highest]:
-        falling = decreasing_levels.get(round(rising.drive, 9))
-        if falling is not None:
-            difference = abs(rising.values[AMPLITUDE] - falling.values[AMPLITUDE])
-            if np.isfinite(difference):
-                error = sum(level.errors.get(AMPLITUDE, 0.0) for level in (rising, falling))
-                differences.append((difference, error))
-    return max(differences, default=None)

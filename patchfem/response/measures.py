@@ -9,7 +9,6 @@ from typing import NamedTuple
 import numpy as np
 
 from ..core import Response
-from ..dynamics import integrated
 from ..friction import path_work
 
 # Largest irreversible fraction of a change of displacement at which an interface counts as stuck.
@@ -196,7 +195,7 @@ def slip_start_measure(phases) -> dict:
 
     The dict is empty if the onsets have different phases.
     """
-    phase = integrated.mean_slip_phase(
+    phase = path_work.mean_slip_phase(
         len(phases), np.cos(2 * phases).sum(), np.sin(2 * phases).sum()
     )
     return {} if np.isnan(phase) else {"slip_start_phase": float(phase)}

@@ -576,32 +576,12 @@ ROWS = (
         "energy",
     ),
     MeasureDefinition(
-        "ring_frequency", "Hz", 1e-3, "frequency of the free vibration (ringing) during stick"
-    ),
-    MeasureDefinition(
-        "ring_damping", "1", 1e-6, "damping ratio of the free vibration (ringing) during stick"
-    ),
-    MeasureDefinition(
         "onset_level",
         "m s-2",
         0.0,
         "drive level at the onset of slip, found by bisection between two levels; the key `drive.onset` defines what "
         "counts as the onset; for a force drive the level is in N",
         group="friction",
-    ),
-    MeasureDefinition(
-        "jump_level",
-        "m s-2",
-        0.0,
-        "drive level just after the largest jump of the amplitude; a step from one level to the next counts as a jump "
-        "if the amplitude changes by at least 1.5 times the factor of the level; for a force drive the level is in N",
-    ),
-    MeasureDefinition(
-        "level_hysteresis",
-        "m",
-        0.0,
-        "hysteresis: largest difference between the amplitudes reached at the same level while the levels "
-        "increase and while they decrease",
     ),
     *SINGLE_RUN_ROWS,
 )

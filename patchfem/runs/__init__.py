@@ -44,7 +44,6 @@ PUBLIC = {
         "steps_per_cycle",
     ),
     "bench.errors": ("estimate_bench_errors",),
-    "bench.ledger": ("BenchOptions",),
     "joint": ("find_stuck_patch_stiffness",),
     "patch.faces": ("has_error_meshes",),
     "patch.jenkins_elements": ("elements",),

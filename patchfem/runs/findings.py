@@ -43,8 +43,6 @@ SAMPLED_MEASURES = (
     "stick_fraction",
     "slip_start_phase",
 )
-# Prefix of the measures of ringing, which engines without steps may not compute.
-RINGING_PREFIX = "ring_"
 USE_ERROR_ADVICE = "use the value with its stated error"
 NO_ADVICE = Advice(f"no known setting makes this value more accurate; {USE_ERROR_ADVICE}")
 ELEMENT_SIZE = "contact.element_size"
@@ -88,8 +86,7 @@ class Missed(NamedTuple):
         known = [
             name for name in main if self.measures[name].error < abs(self.measures[name].value)
         ]
-        others = [name for name in self.excess if not name.startswith(RINGING_PREFIX)]
-        return known or [max(others or self.excess, key=self.excess.get)]
+        return known or [max(self.excess, key=self.excess.get)]
 
     @property
     def worst(self) -> str:
@@ -306,7 +303,7 @@ def _advise_steps(missed: Missed) -> Advice | None:
     allowed = total / missed.excess[name]
     target = max(allowed - (total - parts["steps"]), MIN_STEP_ERROR_FRACTION * allowed)
     halvings = max(1, ceil(log2(parts["steps"] / target) / order))
-    if exact and halvings > MAX_HALVINGS and not name.startswith(RINGING_PREFIX):
+    if exact and halvings > MAX_HALVINGS:
         return exact
     proposed = steps * 2 ** min(halvings, notes.MAX_PROPOSED_HALVINGS)
     return Advice.set_key(STEPS_KEY, proposed)

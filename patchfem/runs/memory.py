@@ -13,8 +13,6 @@ from ..points import checkpoint, time_march
 from .plan import Plan
 from .rig import engines, numerics
 
-# Address space [bytes] that packages and the compiler map in addition to the memory in use.
-MAPPED_BYTES = 210e6
 FIXED_BYTES = 160e6  # packages and compiled code [bytes]
 # Per node of the pieces [bytes]: to condense them in a static run, and with the frames of a motion.
 NODE_BYTES = {True: 4.6e3, False: 8.1e3}
@@ -165,24 +163,19 @@ def _advise_fewer_samples(model, length: str) -> str:
 def free_bytes() -> float:
     """Return the total memory [bytes] that this process may use; inf if none is known.
 
-    The system, its control group and the limits of the process are considered.
+    The system and the control group of the process are considered.
     """
-    used, mapped = read_process_bytes()
-    return min(
-        _read_available_bytes() + used,
-        free_in_control_group(used),
-        _read_process_limit() - MAPPED_BYTES + used - mapped,
-    )
+    used = _read_used_bytes()
+    return min(_read_available_bytes() + used, free_in_control_group(used))
 
 
-def read_process_bytes(status: Path = Path("/proc/self/statm")) -> tuple:
-    """Return the memory in use and the address space of this process [bytes]."""
+def _read_used_bytes() -> float:
+    """Return the memory in use by this process [bytes]; 0 if unknown."""
     try:
-        size, resident = map(int, status.read_text("ascii").split()[:2])
+        resident = int(Path("/proc/self/statm").read_text("ascii").split()[1])
     except (OSError, ValueError):
-        return 0.0, 0.0
-    page = os.sysconf("SC_PAGE_SIZE")
-    return float(resident * page), float(size * page)
+        return 0.0
+    return float(resident * os.sysconf("SC_PAGE_SIZE"))
 
 
 def _read_available_bytes() -> float:
@@ -193,16 +186,6 @@ def _read_available_bytes() -> float:
         return 1024.0 * int(known["MemAvailable"].split()[0])
     except (OSError, KeyError, ValueError):
         return float("inf")
-
-
-def _read_process_limit() -> float:
-    """Return the limit on the address space of this process [bytes]; inf if it has none."""
-    try:
-        import resource
-    except ImportError:
-        return float("inf")
-    limit = resource.getrlimit(resource.RLIMIT_AS)[0]
-    return float("inf") if limit == resource.RLIM_INFINITY else float(limit)
 
 
 def free_in_control_group(

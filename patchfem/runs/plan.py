@@ -202,9 +202,7 @@ def _make_plan(model: Model) -> Plan:
         unknowns |= of_rig.count_unknowns(model)
         law_sentences += of_rig.describe_method(model)
     if model.kind == "bench":
-        engine, counts, samples = of_bench.count_bench_sizes(
-            model, unknowns.get("interface_points", 1)
-        )
+        engine, counts, samples = of_bench.count_bench_sizes(model)
         unknowns |= counts
         groups = of_bench.compute_dimensionless_groups(model) | groups
     if model.wear is not None and model.patch is not None:

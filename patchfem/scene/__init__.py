@@ -13,7 +13,6 @@ PUBLIC = {
         "LISTS",
         "RANDOM",
         "Range",
-        "describe_ranges",
         "make_axis",
         "read_assignments",
         "POSITIVE_KEYS",

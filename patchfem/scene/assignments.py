@@ -1,8 +1,8 @@
 """Values that are given to keys beside the tables of a scene: the only parser of ``table.key=values``.
 
 --over, --free, the table [sweep] and the arguments of Python give a key a list of values, ``26 lbf, 100 N``, or a range.
-A range with a number of values, ``1 mm..9 mm:5``, stands for these values. A range without it, ``1 mm..9 mm`` or
-``5 mm +- 4 mm``, is one from which random values are drawn, or in which a fit varies the key.
+A range with a number of values, ``1 mm..9 mm:5``, stands for these values. A range without it, ``1 mm..9 mm``, is one
+from which random values are drawn, or in which a fit varies the key.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from __future__ import annotations
 import re
 from array import array
 from collections import Counter
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from itertools import chain
 from typing import Any, NamedTuple, get_origin
@@ -18,6 +18,7 @@ from typing import Any, NamedTuple, get_origin
 from ..core import PatchfemError
 from .keys import quantities
 from .keys.lookup import LIMITS_BY_ERROR_TYPE, validate_value
+from .keys.removed import describe_removed
 from .keys.types import Key, list_keys, list_required_keys
 from .lines import split_assignment, split_key
 from .reader import is_toml, read_set_value
@@ -36,9 +37,7 @@ SIGNIFICANT_DIGITS = 15
 _NUMBER_PATTERN = r"[-+]?[0-9.]+(?:[eE][-+]?[0-9]+)?"
 _RANGE_PATTERN = re.compile(r"(.*?)\s*\.\.\s*(.*?)\s*(?::\s*([0-9]*)\s*(log|lin)?)?")
 _QUANTITY_PATTERN = re.compile(rf"{_NUMBER_PATTERN}\s*(.*)")
-_TOLERANCE_PATTERN = re.compile(
-    rf"({_NUMBER_PATTERN})\s*(.*?)\s*(?:\+/?-|±)\s*([0-9.]+(?:[eE][-+]?[0-9]+)?)\s*(.*)"
-)
+_TOLERANCE_PATTERN = re.compile(r"\+/?-|±")
 _CLOSING_SIGNS = {"[": "]", "{": "}", '"': '"', "'": "'"}
 
 
@@ -197,32 +196,17 @@ def read_positive_values(text: str, name: str, kind: str = "length") -> list[flo
 
     Raises PatchfemError, whose message begins with `name`, for any other text.
     """
-    axes: list[Axis] = []
-    mistakes: list[str] = []
     key, example = POSITIVE_KEYS[kind]
-    _append_values(axes, mistakes, name, (key, text), LISTS)
-    if mistakes:
-        raise PatchfemError("; ".join(mistakes))
-    values = sorted(axes[0].values)
+    try:
+        axis = read_values(key, text)
+    except ValueError as error:
+        raise PatchfemError(f"{name}: {error}") from None
+    values = sorted(axis.values)
     if values[0] <= 0:
         raise PatchfemError(
-            f"{name}: {values[0]:g} {axes[0].unit}; {kind}s above 0 are needed, such as {example}"
+            f"{name}: {values[0]:g} {axis.unit}; {kind}s above 0 are needed, such as {example}"
         )
     return values
-
-
-def describe_ranges(texts: Iterable[str]) -> list[str]:
-    """Return a sentence on the range given by each string ``table.key=value +- tolerance``."""
-    sentences = []
-    for text in texts:
-        key, values = split_assignment(text)
-        try:
-            ends = _range_about(values)
-        except ValueError:  # `read_assignments` reports this mistake
-            continue
-        if ends:
-            sentences.append(f"{key}: {values} is drawn evenly from {ends}")
-    return sentences
 
 
 def make_axis(key: str, texts: Iterable[str], *, distinct: bool = True) -> Axis:
@@ -240,11 +224,11 @@ def make_axis(key: str, texts: Iterable[str], *, distinct: bool = True) -> Axis:
     Raises
     ------
     ValueError
-        With one line for each value that the key does not accept.
+        If the key does not accept a value.
     """
     texts = tuple(texts)
     reader = _ValueReader(key, texts)
-    values = _collect(reader.read, texts)
+    values = [reader.read(text) for text in texts]
     if distinct and len(set(values)) < len(values):
         twice = next(k for k, value in enumerate(values) if values.index(value) < k)
         raise ValueError(f"{texts[twice]} is given twice")
@@ -269,7 +253,7 @@ def read_values(key: str, text: str, form: Form = LISTS) -> Axis | Range:
     Raises
     ------
     ValueError
-        With one line for each mistake.
+        If the text is no value, list or range of the key.
     """
     pieces = _split_at_commas(text)
     reader = _ValueReader(key, pieces)
@@ -279,6 +263,8 @@ def read_values(key: str, text: str, form: Form = LISTS) -> Axis | Range:
         raise ValueError(
             "is not a number that can vary; only quantities and plain numbers can be free"
         )
+    if reader.is_number and _TOLERANCE_PATTERN.search(text):
+        raise ValueError(describe_removed("value with a tolerance", f"{text}: a tolerance"))
     if form.has_ranges and len(pieces) == 1:
         spread = reader.parse_range(text.strip())
         if spread is not None:
@@ -286,31 +272,17 @@ def read_values(key: str, text: str, form: Form = LISTS) -> Axis | Range:
             return spread
     if not form.has_lists:
         raise ValueError(f"{text}: a range is needed, {form.usage}")
-    return make_axis(key, chain.from_iterable(_collect(reader.list_values, pieces)))
+    return make_axis(key, chain.from_iterable(map(reader.list_values, pieces)))
 
 
 def _append_values(
     given: list, mistakes: list[str], name: str, assignment: tuple[str, str], form: Form
 ) -> None:
-    """Read the values of a key, and append them to `given`, or their mistakes after `name` to `mistakes`."""
+    """Read the values of a key, and append them to `given`, or the mistake in them after `name` to `mistakes`."""
     try:
         given.append(read_values(*assignment, form))
     except ValueError as error:
-        mistakes += [f"{name}: {line}" if name else line for line in str(error).split("\n")]
-
-
-def _collect(read: Callable, texts: Iterable[str]) -> list:
-    """Apply a function to texts and return its results; raise one ValueError with the sentences of all that it raises."""
-    values = []
-    mistakes = []
-    for text in texts:
-        try:
-            values.append(read(text))
-        except ValueError as error:
-            mistakes.append(str(error))
-    if mistakes:
-        raise ValueError("\n".join(mistakes))
-    return values
+        mistakes.append(f"{name}: {error}" if name else str(error))
 
 
 class _ValueReader:
@@ -354,10 +326,6 @@ class _ValueReader:
         """Return the values that one part of a list stands for, as a scene writes them: those of a range, or one value."""
         if not piece:
             raise ValueError("there is no value between two commas")
-        if about := _range_about(piece) if self.is_number else "":
-            raise ValueError(
-                f"{piece}: write this range as {about}:9 for 9 values in it, or as {about} with --random"
-            )
         spread = self.parse_range(piece)
         if spread is None:
             return [piece]
@@ -368,12 +336,8 @@ class _ValueReader:
         return spread.format_values(k / (spread.count - 1) for k in range(spread.count))
 
     def parse_range(self, piece: str) -> Range | None:
-        """Parse a range such as ``1..9 mm:5`` or ``5 mm +- 1 mm``; return None for any other text."""
-        if not self.is_number:
-            return None
-        if about := _range_about(piece):
-            piece = f"{about}:lin"
-        match = _RANGE_PATTERN.fullmatch(piece)
+        """Parse a range such as ``1..9 mm:5``; return None for any other text."""
+        match = _RANGE_PATTERN.fullmatch(piece) if self.is_number else None
         if match is None:
             return None
         first, last, count, spacing = match.groups()
@@ -444,30 +408,6 @@ def _is_log(low: float, high: float, spacing: str | None) -> bool:
     if spacing == "log" and not is_positive:
         raise ValueError("a logarithmic range needs both ends > 0")
     return spacing == "log"
-
-
-def _range_about(text: str) -> str:
-    """Convert a value with tolerance such as "5 mm +- 1 mm" to a range, or return "" if there is no tolerance.
-
-    Raises ValueError if the tolerance has another unit than the value.
-    """
-    match = _TOLERANCE_PATTERN.fullmatch(text)
-    if match is None:
-        return ""
-    number, unit, width, width_unit = match.groups()
-    try:
-        middle = float(number)
-        half = float(width)
-    except ValueError:  # the string is not a number, such as 1.2.3
-        return ""
-    if width_unit not in ("%", "", unit):
-        unit_of_value = f" ({unit})" if unit else ""
-        raise ValueError(
-            f"{text}: write the width in % or in the unit of the value{unit_of_value}, or the range as low..high"
-        )
-    if width_unit == "%":
-        half = abs(middle) * half / 100
-    return "..".join(_format_with_unit(end, unit) for end in (middle - half, middle + half))
 
 
 def _flatten_table(table: dict, table_key: str = "") -> list[tuple[str, Any]]:

@@ -127,14 +127,9 @@ def format_question(question: str, meanings: dict[str, str]) -> str:
 
 
 def describe_choice(choice: Choice) -> list[str]:
-    """Return sentences on the chosen law, its accuracy and limits, and the user's answers that it ignores."""
+    """Return sentences on the chosen law, its accuracy and limits, and the wishes that it does not answer."""
     row = choice.row
     missing = [word for word in row.known if word not in choice.known]
-    # Every law has a coefficient (key `static`); another word may be a key of the law.
-    used = {*row.known, *row.keys, "coefficient", NOTHING}
-    if "bond_length" in row.keys:
-        used.add("stiffness")
-    unused = [word for word in choice.known if word not in used]
     unanswered = [word for word in choice.wanted if word not in row.wanted]
     sentences = [
         f"you know {', '.join(choice.known)} and want {', '.join(choice.wanted)}",
@@ -145,8 +140,6 @@ def describe_choice(choice: Choice) -> list[str]:
     if missing:
         assumed = "; ".join(f"{word} ({KNOWLEDGE[word]})" for word in missing)
         sentences.append(f"assumed in the scene, because you do not know it: {assumed}")
-    if unused:
-        sentences.append(f"not used: {', '.join(unused)}")
     if unanswered:
         sentences.append(
             f"not answered by this law: {', '.join(unanswered)}; ask again with --want {unanswered[0]}"

@@ -8,9 +8,6 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
-# Largest number of parts in a dotted key; no key of a scene has more than five, and the run
-# time is quadratic in their number.
-MAX_KEY_PARTS = 50
 _ITEM_PATTERN = re.compile(r"(.+)\[([1-9][0-9]{0,8})\]")
 _ITEM_IN_MESSAGE_PATTERN = re.compile(
     r"\b((?:structure|drive|wear)(?:\.[a-z_]+(?:\[[0-9]+\])?)+)\.([0-9]{1,9})(?![0-9a-zA-Z_])"
@@ -113,21 +110,12 @@ def find_line(lines: dict[str, int], key: str) -> int:
     return lines.get(key, 0)
 
 
-class TooManyKeyParts(ValueError):
-    """Error for a key on `line`, counted from 1, that has more than MAX_KEY_PARTS parts."""
-
-    def __init__(self, line: int) -> None:
-        super().__init__(f"a key has more than {MAX_KEY_PARTS} parts; write table.key")
-        self.line = line
-
-
 @lru_cache(16)
 def find_key_lines(text: str) -> dict[str, int]:
     """Return the line number of every key of a TOML text.
 
     A table has the line of its header; a table without a header that of the first key in it. Items of an array of
     tables count from 0, as in ``structure.mode.0.name``. A string that is not TOML gives the keys before the first error.
-    Raises TooManyKeyParts for a key of more than MAX_KEY_PARTS parts.
     """
     lines: dict[str, int] = {}
     last_item: dict[str, int] = {}  # index of the last item of each array of tables
@@ -149,7 +137,7 @@ def find_key_lines(text: str) -> dict[str, int]:
             continue
         if not opened and (match := _HEADER_PATTERN.match(text, position)):
             table = _record_header(
-                lines, last_item, _split_written_key(match[2], line), line, is_array=bool(match[1])
+                lines, last_item, _split_written_key(match[2]), line, is_array=bool(match[1])
             )
             position = match.end()
             continue
@@ -159,7 +147,7 @@ def find_key_lines(text: str) -> dict[str, int]:
             path = f"{path}.{index}"
             lines.setdefault(path, line)
         elif match := _PAIR_PATTERN.match(text, position):
-            for part in _split_written_key(match[1], line):
+            for part in _split_written_key(match[1]):
                 path = _join_path(path, part)
                 lines.setdefault(path, line)
             position = _BLANK_PATTERN.match(text, match.end()).end()
@@ -197,12 +185,9 @@ def _record_header(
     return path
 
 
-def _split_written_key(key: str, line: int) -> list[str]:
+def _split_written_key(key: str) -> list[str]:
     """Return the parts of a key of a TOML text, without their quotes."""
-    parts = [part.strip("\"'") for part in _KEY_PART_PATTERN.findall(key)]
-    if len(parts) > MAX_KEY_PARTS:
-        raise TooManyKeyParts(line)
-    return parts
+    return [part.strip("\"'") for part in _KEY_PART_PATTERN.findall(key)]
 
 
 def _join_path(path: str, name: str) -> str:

@@ -112,6 +112,7 @@ class BaseScene:
         scene : Scene
             What `override` returned for these keys.
         keys : sequence of str
+            Dotted keys whose numbers differ.
 
         Returns
         -------
@@ -121,8 +122,7 @@ class BaseScene:
         has_own_kinetic = "friction.static" in keys and "kinetic" in self._draft.raw.get(
             "friction", {}
         )
-        is_reduced = scene.structure is not None and scene.structure.reduced is not None
-        if has_own_kinetic or is_reduced or not _is_plain(self._draft, scene):
+        if has_own_kinetic or not _is_plain(self._draft, scene):
             return None
         limits = dict(_find_plain_key(scene, key) for key in keys)
         # Two keys may name the same number, one of them by the name of its mode.

@@ -141,7 +141,7 @@ def apply_set(draft: SceneDraft, assignment: str) -> None:
     for depth, piece in enumerate(pieces):
         path = ".".join(pieces[: depth + 1])
         if isinstance(holder, list):
-            piece = _find_item(draft, holder, path, key)
+            piece = _find_item(draft, holder, path)
             if piece is None:
                 return
             pieces[depth] = str(piece)
@@ -152,6 +152,8 @@ def apply_set(draft: SceneDraft, assignment: str) -> None:
             return
         if depth == len(pieces) - 1:
             break
+
+        # A table may be made, an item of an array may not.
         inner = holder[piece] if isinstance(holder, list) else holder.get(piece)
         if inner is None and _is_array_of_tables(path):
             draft.add_set_mistake(f"{key}: the scene has no [[{path}]]")
@@ -163,6 +165,8 @@ def apply_set(draft: SceneDraft, assignment: str) -> None:
             draft.add_set_mistake(f"{key}: {path} is a value, not a table")
             return
         holder = inner
+
+    # The value is read as TOML, and as text otherwise.
     path = ".".join(pieces)
     holder[piece] = read_set_value(path, text)
     draft.record_set(path)
@@ -174,35 +178,29 @@ def _is_array_of_tables(key: str) -> bool:
     return known is not None and known.is_array and known.inner is not None
 
 
-def _find_item(draft: SceneDraft, items: list[Any], path: str, written_key: str) -> int | None:
+def _find_item(draft: SceneDraft, items: list[Any], path: str) -> int | None:
     """Return the index of the item that a key of --set names; report a missing item and return None.
 
     Parameters
     ----------
     draft : SceneDraft
+        Scene that is being read.
     items : list
         The array.
     path : str
         Dotted key that ends in the name or the number of the item.
-    written_key : str
-        The whole key as it was written: a number in brackets counts from 1, a number behind a dot from 0.
     """
     above, _, item_name = path.rpartition(".")
     index = find_item(items, item_name)
     if index is not None:
         return index
-    is_number = item_name.isdecimal()
     table = number_items_from_one(above)
-    displayed_key = number_items_from_one(path)
-    description = "such item" if is_number else f"'{item_name}'"
+    description = "such item" if item_name.isdecimal() else f"'{item_name}'"
     known = [name for name in list_item_names(items) if isinstance(name, str)]
     advice = f"{table} has {len(items)}, numbered from 1 as in {table}[1]"
     if known:
         advice = advise_on_name(item_name, known)
-    if is_number and f"[{int(item_name) + 1}]" not in written_key:
-        displayed_key = f"{table}.{item_name}"
-        advice += f"; {table}.0, with a dot, means {table}[1]"
-    draft.add_set_mistake(f"{displayed_key}: no {description} here; {advice}")
+    draft.add_set_mistake(f"{number_items_from_one(path)}: no {description} here; {advice}")
     return None
 
 

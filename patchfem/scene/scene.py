@@ -37,7 +37,7 @@ __all__ = [
     "remember_written",
 ]
 
-# Largest number of characters of the effects, and of the --set values, in the repr of a Scene.
+# Largest number of characters of the effects and the --set values in the repr of a Scene.
 MAX_LISTED_CHARACTERS = 160
 
 
@@ -78,11 +78,8 @@ class Scene:
     written: Scene | None = None
 
     def __repr__(self) -> str:
-        effects = shorten(", ".join(self.effect_names()), MAX_LISTED_CHARACTERS)
-        sets = (
-            f"\n  with {shorten(', '.join(self.sets), MAX_LISTED_CHARACTERS)}" if self.sets else ""
-        )
-        return f"Scene of {self.path.name}: {self.kind}; {effects}{sets}"
+        words = ", ".join((*self.effect_names(), *self.sets))
+        return f"Scene of {self.path.name}: {self.kind}; {shorten(words, MAX_LISTED_CHARACTERS)}"
 
     def with_(self, **sets: Any) -> Scene:
         """Return a copy of the scene with the values of the given keys replaced.
@@ -126,13 +123,14 @@ def load(
     Parameters
     ----------
     path : str or Path
+        File to read.
     sets : iterable of str
         ``table.key=value`` as of --set, applied in their order.
     faults : Callable, optional
         faults(tables, folder, is_valid) returns (key, message) of further mistakes, such as those inside the files that
         the scene names. `tables` are as far as they could be read; `is_valid` is True if they have no mistake.
     prepare : Callable, optional
-        As in `loads`.
+        prepare(raw) changes the plain values before they are read.
 
     Raises
     ------
@@ -162,12 +160,13 @@ def loads(
     Parameters
     ----------
     text : str
+        Content of a scene file.
     path : str or Path
         File that messages name, and to whose folder the paths in the scene are relative.
     sets : iterable of str
         ``table.key=value`` as of --set. A key among them is no longer an axis of [sweep].
     faults : Callable, optional
-        faults(tables, is_valid) returns (key, message) of further mistakes, as in `load`.
+        faults(tables, is_valid) returns (key, message) of further mistakes.
     prepare : Callable, optional
         prepare(raw) changes the plain values of the text and of the sets before they are read.
 
@@ -211,7 +210,7 @@ def finish_scene(
     draft : SceneDraft
         Its tables are not read yet.
     path, text, sets, faults
-        As in `loads`.
+        File, its content, assignments of --set, and function of the tables that returns further mistakes.
 
     Raises
     ------
@@ -252,10 +251,11 @@ def remember_written(scene: Scene, n_written: int = 0, prepare: Callable | None 
     Parameters
     ----------
     scene : Scene
+        Checked scene with [structure] and [drive].
     n_written : int
         Number of the first assignments in `scene.sets` that belong to the scene as written.
     prepare : Callable, optional
-        As in `loads`.
+        prepare(raw) changes the plain values before they are read.
 
     Raises
     ------

@@ -60,6 +60,7 @@ def require_units(scene: Any, values: dict[str, Any]) -> Any:
     Parameters
     ----------
     scene : Scene
+        Checked scene with [structure] and [drive].
     values : dict
         Values by key, or tables of values, as they were given in Python.
     """

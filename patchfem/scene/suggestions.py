@@ -22,6 +22,7 @@ from .lines import split_key
 
 # Rating of a table of a similar name, of which 1 is that of a table that knows all keys inside.
 SIMILAR_NAME_RATING = 0.75
+SAME_NAME_RATING = 2.0  # rating of a table of the same name, above that of all others
 MIN_RATING = 0.5  # rating above which a table is suggested
 
 
@@ -145,14 +146,12 @@ def _suggest_name(
     free = [name for name in list_keys(model) if name not in written]
     fitting = [name for name in free if _accepts_value(model, name, raw[key])]
     lacking = [name for name in _list_needed_keys(model, raw) if name in fitting]
-    words = set(key.lower().split("_"))
-    related = [name for name in fitting if words & set(name.split("_"))]
-    begun = [name for name in fitting if name.startswith(key.lower())]
+    word = key.lower()
+    words = set(word.split("_"))
     return next(
         chain(
             _list_similar(key, fitting),
-            related,
-            begun,
+            (name for name in fitting if words & set(name.split("_")) or name.startswith(word)),
             lacking if len(lacking) == 1 or not is_set else (),
             _list_similar(key, free),
             _list_similar(key, written & list_keys(model).keys()),
@@ -169,13 +168,13 @@ def _suggest_table(model: type[Table], key: str, value: Any) -> str:
     similar = _list_similar(key, tables)
 
     def rate(name: str) -> float:
-        """Return the fraction of the keys inside that a table knows, and more for a similar name."""
+        """Return the fraction of the keys inside that a table knows, and more for a similar or the same name."""
         known = len(inside & list_keys(tables[name]).keys()) / max(len(inside), 1)
-        return known + SIMILAR_NAME_RATING * (name in similar)
+        is_same = name.rpartition(".")[2] == key
+        return known + SIMILAR_NAME_RATING * (name in similar) + SAME_NAME_RATING * is_same
 
-    same_name = [name for name in tables if name.rpartition(".")[2] == key]
-    likely = [name for name in (*similar, *tables) if rate(name) > MIN_RATING]
-    return max(same_name or likely, key=rate, default="")
+    best = max((*similar, *tables), key=rate, default="")
+    return best if best and rate(best) > MIN_RATING else ""
 
 
 def _list_similar(key: str, names: Collection[str]) -> list[str]:

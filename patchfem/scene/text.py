@@ -85,6 +85,8 @@ def _format_lines(table: Table, table_key: str) -> Iterator[str]:
             if isinstance(value, Material):
                 value = _list_values(value)
             yield f"{name} = {write_value(path, value, 'force' if is_force else None)}"
+
+    # In TOML, keys of a table stand before the tables inside it.
     for header, path, item in inner:
         yield ""
         yield header

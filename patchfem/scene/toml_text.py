@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from ..disk.open_with_timeout import open_for_reading
-from .lines import MAX_KEY_PARTS, TooManyKeyParts, find_key_lines
+from .lines import find_key_lines
 from .rules.scene_draft import SceneError
 
 # Largest size of a scene file in bytes; larger data belong in files that the scene names.
@@ -64,13 +64,8 @@ def read_text(path: str | Path) -> str:
 def parse_text(text: str, path: str | Path) -> ParsedText:
     """Return the values of a TOML text and the lines of its keys; raise SceneError if the text is not TOML."""
     try:
-        if any(line.count(".") > MAX_KEY_PARTS for line in text.split("\n")):
-            # Refuses a key with very many parts, which tomllib would take minutes to read.
-            find_key_lines(text)
         values = tomllib.loads(text)
         return ParsedText(values, find_key_lines(text))
-    except TooManyKeyParts as error:
-        raise SceneError([f"{path}:{error.line}: {error}"]) from None
     except (ValueError, RecursionError) as error:
         raise SceneError([_describe_syntax(error, text, path)]) from None
 
@@ -105,8 +100,6 @@ def _advise_spelling(text: str, line: int) -> str:
         return f"; put a digit on both sides of the point: {key} = {number}"
     if _DECIMAL_COMMA_PATTERN.fullmatch(value):
         return f"; write the decimal comma as a point: {key} = {value.replace(',', '.')}"
-    if value.lower() in ("true", "false"):
-        return f"; {key} = {value.lower()}"
     if _QUANTITY_OR_WORD_PATTERN.fullmatch(value) and len(value) < MAX_QUOTED_CHARACTERS:
         return f'; put a quantity or a word in quotes: {key} = "{value}"'
     return ""

@@ -1,6 +1,6 @@
 """Modes of a rig, the drives that excite them, and their initial conditions.
 
-In: frequencies, masses and springs, matrices, or files of a modal test. Out: a `core.ModalBasis`, starts, and
+In: frequencies, masses and springs, matrices, or the mode shapes of a modal test. Out: a `core.ModalBasis`, starts, and
 drives with their signals. The modal coordinates follow
 z_i'' + 2 zeta_i w_i z_i' + w_i^2 z_i = G_i + g_i (3.4). Read `matrices` first for modes, and `drives` for
 signals.
@@ -26,9 +26,12 @@ PUBLIC = {
         "is_sinusoidal",
     ),
     "drives": ("make_release",),
+    "histories": (
+        "find_accelerations",
+        "make_response",
+    ),
     "places": (
         "DIRECTION_NAMES",
-        "MeasuredModes",
         "note_missing_mass",
     ),
     "reduced": (

@@ -31,6 +31,7 @@ def add_spring(basis: ModalBasis, stiffness: float, damping: float = 0.0) -> Mod
     Parameters
     ----------
     basis : ModalBasis
+        Modes of the rig.
     stiffness : float
         Stiffness k >= 0 [N/m] of the spring.
     damping : float
@@ -54,6 +55,7 @@ def remove_springs(basis: ModalBasis, stiffness, damping: float = 0.0) -> ModalB
     Parameters
     ----------
     basis : ModalBasis
+        Modes of the rig.
     stiffness : (i,) array_like
         Stiffness [N/m] of the spring along the slide of each interface.
     damping : float
@@ -72,6 +74,8 @@ def remove_springs(basis: ModalBasis, stiffness, damping: float = 0.0) -> ModalB
     mass = basis.mass
     joint = slides.T * np.asarray(stiffness, float) @ slides / mass
     squares, shapes = np.linalg.eigh(np.diag(basis.omega**2) - joint)
+
+    # A joint that is stiffer than the modes would leave a negative stiffness.
     min_square = MIN_ELASTIC_FRACTION * float(np.max(basis.omega**2 + np.diag(joint), initial=0.0))
     if squares[0] < -min_square:
         measured_square = float(shapes[:, 0] ** 2 @ basis.omega**2)
@@ -82,6 +86,8 @@ def remove_springs(basis: ModalBasis, stiffness, damping: float = 0.0) -> ModalB
             f"would have a negative stiffness{_advise_on_slides(basis.omega, joint)}"
         )
     squares[squares <= min_square] = 0.0
+
+    # The damper of the joint must be a part of the damping of the modes.
     damper = -damping / mass * np.outer(slides[0], slides[0])
     if damping:
         decay_rates = np.linalg.eigvalsh(basis.damping_matrix + damper)
@@ -118,6 +124,7 @@ def _change_coordinates(basis: ModalBasis, omega, shapes, damper) -> ModalBasis:
     Parameters
     ----------
     basis : ModalBasis
+        Modes of the rig.
     omega : (n,) array_like
         Circular frequencies [rad/s] of the new modes.
     shapes : (n, n) array_like

@@ -163,6 +163,7 @@ def choose_samples_per_cycle(drive, cycles: float) -> int:
     Parameters
     ----------
     drive
+        Drive signal of the rig.
     cycles : float
         Drive cycles of the run.
     """

@@ -90,6 +90,8 @@ def build_basis(
         rows_per_root = _divide_by_root(root, np.asarray(spring_rows, float).T).T
         omega, normalized = decouple_modes(_require_finite(rows_per_root))
     phi = _divide_by_root(root, normalized, transpose=True)
+
+    # Damping in the coordinates of the modes.
     D = np.zeros((n, n))
     if damper_rows is not None:
         D = _project_damper_rows(phi, np.asarray(damper_rows, float))
@@ -97,6 +99,7 @@ def build_basis(
         D = _project_damping_matrix(phi, _check_matrix(C, "C", M.shape))
     phi, D = _decouple_equal_frequencies(phi, omega, D)
 
+    # Rows of the interfaces and of the output; the sign of each mode follows from them.
     faces = np.zeros((0, n)) if faces is None else np.atleast_2d(_check_row(faces, n, "slide"))
     if output is None:
         output = faces[0] if len(faces) else np.eye(n)[0]
@@ -104,6 +107,8 @@ def build_basis(
     sign = _find_shape_signs(phi, output)
     phi = phi * sign
     zeta, damping = split_damping(D * np.outer(sign, sign), omega)
+
+    # Participation of the drive.
     if force is not None:
         participation = -phi.T @ _check_row(force, n, "force")
     else:
@@ -112,6 +117,7 @@ def build_basis(
     patch_motions = {
         key: _check_row(row, n, key) @ phi for key, row in rows.items() if row is not None
     }
+
     slides = faces @ phi
     return make_basis(
         tuple(names) if names is not None else tuple(str(k + 1) for k in range(n)),
@@ -171,6 +177,7 @@ def trim_round_off(matrix, scale, round_off: float = ENTRY_TOL) -> np.ndarray:
     Parameters
     ----------
     matrix : (n, n) array_like
+        Matrix that may hold round-off.
     scale : (n, n) array_like
         Size of each entry.
     round_off : float

@@ -74,6 +74,8 @@ def draw_random_record(
             "needed",
             "drive.duration",
         )
+
+    # Amplitudes A_k and B_k of variance G(f_k)/T; the sinc compensates the interpolation between rows.
     f = np.clip(lines / duration, low, high)
     line_density = np.exp(np.interp(np.log(f), np.log(frequency), np.log(density)))
     normal = np.random.default_rng(seed).standard_normal((2, lines.size))

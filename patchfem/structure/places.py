@@ -96,6 +96,7 @@ def build_basis(shapes: MeasuredModes, mass: float, places: dict, *, is_forced: 
     Parameters
     ----------
     shapes : MeasuredModes
+        Modes with their motions at the nodes of the file.
     mass : float
         Modal mass [kg] to which the modes are scaled; their coordinates are motions like those of a
         block of this mass.
@@ -120,6 +121,8 @@ def build_basis(shapes: MeasuredModes, mass: float, places: dict, *, is_forced: 
             rows[key] = np.sqrt(mass) * shapes.motion_at(text, key)
             if key in ("slide_at", "output_at") and not rows[key].any():
                 raise PatchfemError(f"no mode of the file moves '{text}'", f"structure.{key}")
+
+    # Places that are not given are those of the slide and the output.
     slide = rows["slide_at"]
     output = rows.get("output_at", slide)
     base = -rows.get("force_at", output) if is_forced else rows.get("base_at", slide)
@@ -130,6 +133,8 @@ def build_basis(shapes: MeasuredModes, mass: float, places: dict, *, is_forced: 
             "most 1 is possible; lower structure.moving_mass, or give the place of the moving mass",
             "structure.base_at",
         )
+
+    # Modes are sorted by frequency, and move the output in the positive direction.
     order = np.argsort(shapes.frequency, kind="stable")
     sign = np.where(output[order] < 0, -1.0, 1.0)
     motions = {"slide": slide, "base": base, "output": output}

@@ -150,6 +150,8 @@ def reduce_matrices(K, M, C, boundary, modes: int, method: str, moved=None) -> R
     compute_shapes = (
         _compute_craig_bampton_shapes if method == CRAIG_BAMPTON else _compute_free_interface_shapes
     )
+
+    # More modes are computed than are kept, for the error estimate.
     count = 2 * modes + N_EXTRA_MODES
     with use_one_blas_thread():
         shapes, computed = compute_shapes(K.tocsc(), M.tocsc(), np.asarray(boundary), count, load)
@@ -227,6 +229,8 @@ def _compute_lowest_modes(K, M, count: int, factor: SparseFactor, shift: float =
     count = min(count, n)
     if count < 1:
         return np.zeros(0), np.zeros((n, 0))
+
+    # Shift-invert Lanczos iteration with a fixed start, so that a run can be repeated.
     if n > MAX_DENSE_COORDINATES and count <= n // 4:
         operator = LinearOperator(K.shape, matvec=factor.solve, dtype=float)
         start = np.random.default_rng(1).standard_normal(n)
@@ -238,6 +242,7 @@ def _compute_lowest_modes(K, M, count: int, factor: SparseFactor, shift: float =
             f"{count} of {n} modes were asked for, which is too many for the solver; keep fewer modes",
             "structure.reduced.modes",
         )
+
     shifted = (K + shift * M).toarray()
     # The second matrix of eigh must be positive definite; M may be singular, so M v = mu K v is
     # solved.
@@ -261,6 +266,8 @@ def _compute_craig_bampton_shapes(K, M, boundary, count: int, load) -> tuple:
     if not inner.size:
         no_modes = ComputedModes(np.zeros(0), np.zeros((0, n_boundary)), True)
         return constraint_modes, no_modes
+
+    # Modes of the inner coordinates with the boundary held.
     K_inner = K[inner][:, inner].tocsc()
     M_inner = M[inner][:, inner].tocsc()
     factor = _factorize(K_inner)
@@ -273,9 +280,13 @@ def _compute_craig_bampton_shapes(K, M, boundary, count: int, load) -> tuple:
         )
     omega, fixed_modes = _compute_lowest_modes(K_inner, M_inner, count, factor)
     is_complete = omega.size < count or count == inner.size
+
+    # Static shapes for a unit motion of each boundary coordinate: -K_ii^-1 K_ib.
     constraint_modes[inner] = -factor.solve(K[inner][:, boundary].toarray())
     shapes = [_expand_rows(fixed_modes, inner, n), constraint_modes]
     participation = np.zeros((omega.size, n_boundary))
+
+    # What the modes leave of the static shape of the load.
     if load is not None and not is_complete:
         static = factor.solve(load[inner])[:, None]
         residual, of_load = _subtract_modes(static, fixed_modes, M_inner)
@@ -291,6 +302,8 @@ def _compute_free_interface_shapes(K, M, boundary, count: int, load) -> tuple:
     """
     n = K.shape[0]
     shift = 0.0
+
+    # A free structure is held by a small shift of its stiffness.
     factor = _factorize(K)
     if factor is None:
         mass = M.diagonal()
@@ -302,6 +315,8 @@ def _compute_free_interface_shapes(K, M, boundary, count: int, load) -> tuple:
         raise PatchfemError(
             "a part of the structure has neither stiffness nor mass", "structure.reduced.stiffness"
         )
+
+    # The attachment modes take the place of as many modes.
     max_modes = n - boundary.size
     count = min(count, max_modes)
     omega, free_modes = _compute_lowest_modes(K, M, count, factor, shift)
@@ -352,6 +367,7 @@ def build_basis(
     Parameters
     ----------
     reduction : Reduction
+        Matrices projected on modes and static shapes.
     modes : int
         Number of modes to keep; all if fewer were computed.
     pairs : sequence of (i, j)
@@ -383,10 +399,13 @@ def build_basis(
     damping = None
     if reduction.damping is not None:
         damping = selection.T @ reduction.damping @ selection
+
+    # Boundary and drive in the coordinates of the reduction.
     motion = reduction.boundary @ selection
     force = -selection.T @ reduction.base_load if driven_mass is None else motion[driven_mass - 1]
     boundary_names = names or [str(k + 1) for k in range(n_boundary)]
     mode_names = [f"mode {k + 1}" for k in range(len(mass) - n_boundary)]
+
     basis = matrices.build_basis(
         mass,
         None,
@@ -397,6 +416,8 @@ def build_basis(
         names=[*boundary_names, *mode_names],
         spring_rows=_factor_stiffness(stiffness, mass),
     )
+
+    # The named coordinates are the boundary and the modes, without the shapes of the boundary.
     modal_shapes = np.delete(basis.shapes, np.s_[n_modes : n_modes + n_boundary], axis=0)
     shapes = np.vstack([motion @ basis.shapes, modal_shapes])
     basis = replace(basis, shapes=frozen_array(shapes))

@@ -13,6 +13,7 @@ def compute_receptance(basis: ModalBasis, omega, rows_out, rows_in) -> np.ndarra
     Parameters
     ----------
     basis : ModalBasis
+        Modes of the rig.
     omega : (k,) array_like
         Circular frequencies [rad/s].
     rows_out, rows_in : (o, n) and (i, n) array_like

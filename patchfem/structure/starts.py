@@ -17,6 +17,7 @@ def start_from_values(basis: ModalBasis, displacement=None, velocity=None) -> In
     Parameters
     ----------
     basis : ModalBasis
+        Modes of the rig.
     displacement, velocity : (p,) array_like, optional
         Displacements [m] and velocities [m/s]; default: zeros.
 

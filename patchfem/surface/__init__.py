@@ -7,24 +7,13 @@ interface nodes (`nodes`), roughness (`roughness`), and what changed between two
 
 # Names that other folders use, by module.
 PUBLIC = {
-    "compare.compare": ("Options", "compare_files"),
-    "compare.records": (
-        "Comparison",
-        "Finding",
-        "Track",
-    ),
+    "compare.compare": ("Options",),
     "files.read": (
         "read_profile",
         "read_surface",
     ),
-    "fine": (
-        "ELEMENTS_PER_WAVE",
-        "describe_lost_waves",
-        "fine_fraction",
-    ),
     "nodes": (
         "average_at_nodes",
-        "is_note",
         "place_over_patch",
     ),
     "profile": (
@@ -36,27 +25,22 @@ PUBLIC = {
     "quantity": (
         "LEVEL",
         "Quantity",
-        "average_quantities",
     ),
     "roughness.filter": ("mean_line",),
     "roughness.form": ("parse_form_option",),
-    "roughness.parameters": ("abbott_curve",),
     "roughness.peaks": (
         "Moments",
         "PERSSON",
-        "Peaks",
-        "TraceMoments",
         "gaussian_peaks",
-        "persson_stiffness",
         "trace_moments",
     ),
     "roughness.report": (
-        "RoughnessReport",
         "fitting_cutoff",
         "make_report",
     ),
-    "roughness.spectrum": (
+    "spectrum": (
         "BAND",
-        "Spectrum",
+        "ELEMENTS_PER_WAVE",
+        "describe_lost_waves",
     ),
 }

@@ -10,8 +10,9 @@ from .profile import robust_deviation
 SPIKE_THRESHOLDS = (10.0, 40.0, 160.0)  # |height - median of 5 x 5| in standard deviations
 MAX_SPIKE_POINTS = 12  # number of points of a spike; a larger group is a feature of the surface
 SPIKE_WINDOW = 5  # side of the square of the median
-# Singular value of the normal equations per height, at or below which it counts as round-off.
-RANK_TOL = 1e-12
+RANK_TOL = (
+    1e-6  # singular value of the places relative to the largest one, below which it is round-off
+)
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -26,7 +27,7 @@ class Areal:
     y: np.ndarray
     z: np.ndarray
     source: str
-    notes: tuple = ()
+    notes: tuple[str, ...] = ()
 
     @property
     def missing(self) -> np.ndarray:
@@ -71,16 +72,13 @@ def level_plane(scan: Areal) -> Areal:
     Raises PatchfemError if the measured heights do not determine it, such as all of them in one line.
     """
     known = ~scan.missing
-    # Positions from -1 to 1 give well-conditioned normal equations.
-    x, y = (2 * (axis - axis[0]) / (axis[-1] - axis[0]) - 1 for axis in (scan.x, scan.y))
+    # Positions from -1 to 1 make the rank independent of units.
+    x, y = (2 * (axis - axis[0]) / np.ptp(axis) - 1 for axis in (scan.x, scan.y))
     plane = np.array([np.broadcast_to(part, known.shape) for part in (1.0, x, y[:, None])])
-    base = plane[:, known]
-    normal = base @ base.T
-    if np.linalg.matrix_rank(normal / max(known.sum(), 1), tol=RANK_TOL, hermitian=True) < 3:
+    factors, _, rank, _ = np.linalg.lstsq(plane[:, known].T, scan.z[known], rcond=RANK_TOL)
+    if rank < 3:
         raise PatchfemError(
             f"{scan.source}: {known.sum()} heights, which all lie on one straight line; a plane needs "
             "three points that do not"
         )
-    z = scan.z - scan.z[known].mean()
-    factors = np.linalg.solve(normal, base @ z[known])
-    return replace(scan, z=frozen_array(z - np.tensordot(factors, plane, 1)))
+    return replace(scan, z=frozen_array(scan.z - np.tensordot(factors, plane, 1)))

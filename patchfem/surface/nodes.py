@@ -11,7 +11,7 @@ from .profile import Profile
 MEANS_OVER_WAVES = "means over the waves of the trace"
 # Parts of the notes that cast no doubt on a result.
 NOTES = ("the trace is centred on the patch", MEANS_OVER_WAVES, "is rounded to")
-ROUND_OFF = 1e-3  # digit to which notes state x, relative to its step; smaller digits are round-off
+N_DIGITS = 11  # number of digits of x [m] in notes, which state no round-off
 # Largest number of elements that a trace may lack at either end, with round-off.
 MAX_MISSING_ELEMENTS = 0.5000001
 MAX_STEP_ELEMENTS = 1.5  # largest sample spacing in elements without a note
@@ -39,16 +39,16 @@ def place_over_patch(profile: Profile, x: np.ndarray) -> Profile:
     -------
     Profile
     """
-    x = _check_nodes(x)
     known = profile.x[~profile.missing]
     if known.size < 2:
         raise PatchfemError(f"{profile.source}: {known.size} heights; a trace needs at least two")
+
+    # A trace that does not cover the patch is centred on it.
     shift = 0.0
     notes = profile.notes
     if not _covers(known, x):
         shift = float(x[0] + x[-1] - known[0] - known[-1]) / 2
-        digit = 10.0 ** np.floor(np.log10(ROUND_OFF * np.median(np.diff(known))))
-        rounded = digit * np.rint(np.array([known[0], known[-1], shift]) / digit)
+        rounded = np.round([known[0], known[-1], shift], N_DIGITS)
         first, last, added = map(format_length, rounded.tolist())
         notes += (
             f"{profile.source}: x runs from {first} to {last} in the file and does not cover the patch, from "
@@ -56,10 +56,13 @@ def place_over_patch(profile: Profile, x: np.ndarray) -> Profile:
         )
     known = known + shift
     _require_cover(profile.source, known, x)
+
+    # One sample beyond each end of the patch stays, if there is one.
     first = max(int(np.searchsorted(known, x[0], "right")) - 1, 0)
     last = min(int(np.searchsorted(known, x[-1], "left")), known.size - 1)
     places = profile.x + shift
     kept = (places >= known[first]) & (places <= known[last])
+
     step = float(np.median(np.diff(places[kept])))
     element = float(np.diff(x).max())
     if step > MAX_STEP_ELEMENTS * element:
@@ -95,7 +98,6 @@ def average_at_nodes(profile: Profile, x: np.ndarray, integral=None) -> np.ndarr
     -------
     (m,) array [m]
     """
-    x = _check_nodes(x)
     if profile.missing.any():
         raise PatchfemError(
             f"{profile.source}: {profile.missing.sum()} heights are missing; clean the trace first"
@@ -115,13 +117,6 @@ def average_at_nodes(profile: Profile, x: np.ndarray, integral=None) -> np.ndarr
     high = np.minimum(np.arange(x.size) + 1, x.size - 1)
     slope = (mean[high] - mean[low]) / (middle[high] - middle[low])
     return frozen_array(mean + slope * (x - middle))
-
-
-def _check_nodes(x) -> np.ndarray:
-    x = np.asarray(x, dtype=np.float64)
-    if x.ndim != 1 or x.size < 2 or not (np.diff(x) > 0).all():
-        raise PatchfemError("a profile needs two or more nodes with rising x")
-    return x
 
 
 def _covers(places, x) -> bool:

@@ -1,7 +1,6 @@
 """Measured or simulated trace of heights, and its levelling, resampling and cleaning."""
 
 from dataclasses import dataclass, replace
-from typing import NamedTuple
 
 import numpy as np
 
@@ -33,7 +32,7 @@ class Profile:
     x: np.ndarray
     z: np.ndarray
     source: str
-    notes: tuple = ()
+    notes: tuple[str, ...] = ()
 
     @property
     def missing(self) -> np.ndarray:
@@ -48,20 +47,21 @@ class Profile:
     @property
     def step(self) -> float:
         """Mean distance of neighbouring samples [m]."""
-        return self.length / (self.x.size - 1)
+        return measure_step(self.x)
+
+
+def measure_step(axis: np.ndarray) -> float:
+    """Return the mean distance [m] of neighbouring positions (n,) [m]."""
+    return float(axis[-1] - axis[0]) / (axis.size - 1)
 
 
 def level(profile: Profile) -> Profile:
     """Subtract the least-squares line from a trace."""
     known = ~profile.missing
-    x = profile.x
-    z = profile.z
-    if known.sum() < 2:
-        return replace(profile, z=frozen_array(z - z[known].mean() if known.any() else z))
-    s = (x - x[known].mean()) / profile.length
-    z = z - z[known].mean()
-    slope = s[known] @ z[known] / (s[known] @ s[known])
-    return replace(profile, z=frozen_array(z - s * slope))
+    x = (profile.x - profile.x[known].mean()) / profile.length
+    z = profile.z - profile.z[known].mean()
+    slope = x[known] @ z[known] / (x[known] @ x[known])
+    return replace(profile, z=frozen_array(z - x * slope))
 
 
 def resample_evenly(profile: Profile) -> Profile:
@@ -70,7 +70,7 @@ def resample_evenly(profile: Profile) -> Profile:
     Missing heights are bridged by straight lines. An uneven trace is resampled at the 10th
     percentile of its steps, so that nothing between its samples is lost. The notes state both.
     """
-    profile, _ = _bridge(profile, ~profile.missing)
+    profile = _bridge(profile, ~profile.missing)
     steps = np.diff(profile.x)
     if np.ptp(steps) <= EVEN_TOL * steps.mean():
         return profile
@@ -86,34 +86,39 @@ def resample_evenly(profile: Profile) -> Profile:
     return replace(profile, x=frozen_array(x), z=frozen_array(z), notes=(*profile.notes, note))
 
 
-def _bridge(profile: Profile, usable) -> tuple[Profile, tuple[float, float]]:
+def _bridge(profile: Profile, usable, max_gap: float = np.inf) -> Profile:
     """Replace all but the usable heights by straight lines, and cut off such ends; a note counts missing heights.
 
-    Returns
-    -------
-    Profile
-    (float, float)
-        First and last place [m] of the longest line.
+    Raises PatchfemError for fewer than two usable heights, and if a line is longer than `max_gap` [m].
     """
     places = profile.x[usable]
     if places.size < 2:
         raise PatchfemError(
             f"{profile.source}: {places.size} usable heights; a trace needs at least two"
         )
-    gaps = np.where(np.diff(np.flatnonzero(usable)) > 1, np.diff(places), 0.0)
-    longest = int(np.argmax(gaps))
-    ends = (float(places[longest]), float(places[longest]) + float(gaps[longest]))
     if usable.all():
-        return profile, ends
+        return profile
+
+    # A gap reaches from one usable height to the next.
+    gaps = np.where(np.diff(np.flatnonzero(usable)) > 1, np.diff(places), 0.0)
+    first = int(np.argmax(gaps))
+    longest = float(gaps[first])
+    if longest > max_gap * (1 + 1e-9):
+        raise PatchfemError(
+            f"{profile.source}: no usable height between x = {format_length(places[first])} and "
+            f"{format_length(places[first + 1])}, and a straight line may bridge at most {format_length(max_gap)}; "
+            "measure this part of the trace anew or use a larger contact.element_size"
+        )
+
     notes = profile.notes
     if profile.missing.any():
         notes += (
             f"{profile.source}: {profile.missing.sum()} of {profile.z.size} heights are missing; the gaps are bridged "
-            f"by straight lines, of which the longest spans {format_length(float(gaps[longest]))}",
+            f"by straight lines, of which the longest spans {format_length(longest)}",
         )
     x = profile.x[(profile.x >= places[0]) & (profile.x <= places[-1])]
     z = np.interp(x, places, profile.z[usable])
-    return replace(profile, x=frozen_array(x), z=frozen_array(z), notes=notes), ends
+    return replace(profile, x=frozen_array(x), z=frozen_array(z), notes=notes)
 
 
 def clean(profile: Profile, max_gap: float) -> Profile:
@@ -123,50 +128,44 @@ def clean(profile: Profile, max_gap: float) -> Profile:
     counts. Raises PatchfemError for a longer gap, and for fewer than two good heights.
     """
     is_spike = find_spikes(profile)
-    notes = profile.notes
     if is_spike.any():
-        notes += (
+        note = (
             f"{profile.source}: {is_spike.sum()} of {profile.x.size} heights are spikes (the first "
             f"at x = {format_length(profile.x[np.argmax(is_spike)])}), which lie more than "
             f"{SPIKE_DEVIATIONS:g} robust standard deviations from the median of {WINDOW} samples; "
-            "straight lines replace these heights",
+            "straight lines replace these heights"
         )
-        profile = replace(profile, notes=notes)
-    bridged, (first, last) = _bridge(profile, ~(profile.missing | is_spike))
-    if last - first > max_gap * (1 + 1e-9):
-        raise PatchfemError(
-            f"{profile.source}: no usable height between x = {format_length(first)} and "
-            f"{format_length(last)}, and a straight line may bridge at most {format_length(max_gap)}; "
-            "measure this part of the trace anew or use a larger contact.element_size"
-        )
-    return bridged
+        profile = replace(profile, notes=(*profile.notes, note))
+    return _bridge(profile, ~(profile.missing | is_spike), max_gap)
 
 
-class RunningMedian(NamedTuple):
-    """Deviation of heights from their running median [m], and median absolute deviation (n,).
+def _compare_with_neighbours(z, window: int, floor: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
+    """Compare heights (n,) with their running median.
 
-    typical_spread: median of the deviations of all windows.
+    Parameters
+    ----------
+    z : (n,) array [m]
+    window : int
+        Number of samples of the median; those at an end have the first or the last window.
+    floor : float
+        Smallest median absolute deviation [m].
+
+    Returns
+    -------
+    distance, deviation : (n,) array [m]
+        Distance from the median, and the standard deviation that follows from the median absolute deviation in the
+        window, at least that of a typical window.
     """
-
-    distance: np.ndarray
-    spread: np.ndarray
-    typical_spread: float
-
-
-def _running_median(z, window: int) -> RunningMedian:
-    """Compute the running median of a trace."""
     windows = np.lib.stride_tricks.sliding_window_view(z, window)
-    half = window // 2
     median = np.empty(len(windows))
     spread = np.empty(len(windows))
     for start in range(0, len(windows), CHUNK):
         part = slice(start, start + CHUNK)
-        median[part] = np.partition(windows[part], half, axis=1)[:, half]
-        spread[part] = np.partition(np.abs(windows[part] - median[part, None]), half, axis=1)[
-            :, half
-        ]
-    place = np.clip(np.arange(z.size) - half, 0, z.size - window)
-    return RunningMedian(z - median[place], spread[place], float(np.median(spread)))
+        median[part] = np.median(windows[part], axis=1)
+        spread[part] = np.median(np.abs(windows[part] - median[part, None]), axis=1)
+    place = np.clip(np.arange(z.size) - window // 2, 0, z.size - window)
+    deviation = MAD_TO_DEVIATION * np.maximum(spread, max(float(np.median(spread)), floor))
+    return z - median[place], deviation[place]
 
 
 def find_spikes(profile: Profile) -> np.ndarray:
@@ -181,16 +180,14 @@ def find_spikes(profile: Profile) -> np.ndarray:
     if known.size < WINDOW:
         return is_spike
     z = profile.z[known]
-    running = _running_median(z, WINDOW)
-    digit = np.diff(np.unique(z)).min(initial=np.inf)
-    floor = max(running.typical_spread, digit if np.isfinite(digit) else 0.0)
-    deviation = MAD_TO_DEVIATION * np.maximum(running.spread, floor)
-    is_spike[known] = np.abs(running.distance) > SPIKE_DEVIATIONS * deviation
+    digit = np.diff(np.unique(z)).min(initial=np.ptp(z))
+    distance, deviation = _compare_with_neighbours(z, WINDOW, digit)
+    is_spike[known] = np.abs(distance) > SPIKE_DEVIATIONS * deviation
     return is_spike
 
 
 def remove_spikes(profile: Profile) -> Profile:
-    """Mark spikes, dropouts and specks of dust as not measured, and count them in a note.
+    """Mark spikes, dropouts and specks of dust as not measured.
 
     Spikes and dropouts are those of `find_spikes`. A speck stands as far above the median of 15 or 31
     samples, and both of its walls are as many deviations steeper than the steps of the trace. A
@@ -202,29 +199,25 @@ def remove_spikes(profile: Profile) -> Profile:
     z = profile.z[known]
     is_spike = find_spikes(profile)[known]
     min_wall = SPIKE_DEVIATIONS * robust_deviation(z[2:] - z[:-2]) / 2
+
+    # A group goes with one sample on each side, which its flank may touch.
     removed = is_spike.copy()
     for window in (WINDOW, *SPECK_WINDOWS):
-        running = _running_median(z, window)
-        deviation = MAD_TO_DEVIATION * np.maximum(running.spread, running.typical_spread)
-        for first, last in find_runs(np.abs(running.distance) > FOOT_DEVIATIONS * deviation):
+        distance, deviation = _compare_with_neighbours(z, window)
+        for first, last in find_runs(np.abs(distance) > FOOT_DEVIATIONS * deviation):
             group = slice(first, last + 1)
             walls = np.diff(z[max(first - 2, 0) : last + 3])
             has_walls = min(walls.max(initial=0.0), -walls.min(initial=0.0)) > min_wall
-            is_high = running.distance[group].max() > SPIKE_DEVIATIONS * deviation[group].max()
+            is_high = distance[group].max() > SPIKE_DEVIATIONS * deviation[group].max()
             is_speck = is_high and has_walls and last - first < window // 2
             if is_speck or is_spike[group].any():
                 removed[max(first - 1, 0) : last + 2] = True
+
     if not removed.any():
         return profile
     heights = np.array(profile.z)
     heights[known[removed]] = np.nan
-    count = len(find_runs(removed))
-    note = (
-        f"{profile.source}: spikes, dropouts or dust at {count} place{'s' * (count > 1)} (the "
-        f"first at x = {format_length(profile.x[known[np.argmax(removed)]])}) are left out, {removed.sum()} "
-        f"of {z.size} heights with their neighbours; use --keep-spikes to keep them"
-    )
-    return replace(profile, z=frozen_array(heights), notes=(*profile.notes, note))
+    return replace(profile, z=frozen_array(heights))
 
 
 def robust_deviation(values) -> float:
@@ -234,5 +227,5 @@ def robust_deviation(values) -> float:
 
 def find_runs(flags) -> list[tuple[int, int]]:
     """Return the first and the last index of each run of true values."""
-    change = np.flatnonzero(np.diff(np.concatenate([[0], flags.astype(np.int8), [0]])))
-    return list(zip(change[::2].tolist(), (change[1::2] - 1).tolist()))
+    changes = np.flatnonzero(np.diff(np.concatenate([[0], flags.astype(np.int8), [0]])))
+    return [(first, stop - 1) for first, stop in changes.reshape(-1, 2).tolist()]

@@ -35,7 +35,7 @@ class Mean(NamedTuple):
     count: int
 
 
-def average_quantities(quantities: list, text: str) -> Mean | None:
+def average_quantities(quantities: list[Quantity], text: str) -> Mean | None:
     """Average a quantity over the measurements that have a value, or return None if fewer than two have one.
 
     The 95 % interval s t / sqrt(n) comes from their scatter by Student's t, or from their own

@@ -25,7 +25,7 @@ from scipy.linalg import expm
 
 from patchfem import compiled
 from patchfem.core import InitialState, ModalBasis
-from patchfem.dynamics.integrated import find_accelerations
+from patchfem.structure.histories import find_accelerations
 
 KERNELS = Path(__file__).with_name("report_methods_kernels.py")
 CRITERIA = ("displacement", "velocity", "force")

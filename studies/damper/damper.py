@@ -15,6 +15,8 @@ Run: python studies/damper/damper.py FILE.csv [PICTURE.svg]
 """
 
 import sys
+import tempfile
+from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
@@ -22,9 +24,12 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
 
+from steady_loops import HOLD, write_with_run_in
+
 from patchfem.campaigns.fits.loop import fit_hysteresis_loop
-from patchfem.campaigns.fits.loop_path import LoopOptions
+from patchfem.campaigns.fits.problem import FitOptions, FittedKeys, parse_ranges
 from patchfem.inputs import read_loop
+from patchfem.inputs.loops import Loop
 from patchfem.scene import loads
 
 SOURCE = "ARTS-Laboratory, Dataset-Friction-Damper-with-Backlash, dataset-1, 1 Hz, 20 lb tension; CC BY-SA 4.0"
@@ -71,7 +76,8 @@ class Row(NamedTuple):
     """Law fitted to the record.
 
     Contains rms difference [N] over all rows and over the rows beyond half a stroke after a
-    reversal, work per cycle [J] of law and record, fitted force (k,) and the fit.
+    reversal, work per cycle [J] of law and record, the record without its offset, the fitted force (k,) [N], and the
+    fitted keys.
     """
 
     law: str
@@ -80,7 +86,9 @@ class Row(NamedTuple):
     plateau: float
     work: float
     measured: float
-    fitted: object
+    loop: Loop
+    model: np.ndarray
+    keys: FittedKeys
 
 
 def plateau(slide) -> np.ndarray:
@@ -109,7 +117,10 @@ def repeat(loop) -> tuple:
 
 
 def main(file, names=tuple(LAWS)) -> list:
-    """Return a Row for each law, fitted to a record in steady motion with a force offset."""
+    """Return a Row for each law, fitted to a record in steady motion.
+
+    The offset of the load cell is the mean difference from a first fit, which is subtracted for a second one.
+    """
     loop = read_loop(file)
     period, _ = repeat(loop)
     flat = plateau(loop.displacement)
@@ -121,19 +132,29 @@ def main(file, names=tuple(LAWS)) -> list:
 
     for name in names:
         text, free = LAWS[name]
-        found = fit_hysteresis_loop(
-            loads(SCENE.format(text)), Path(file), free, options=LoopOptions(("force",), True)
-        )
-        miss = found.model - loop.reading
+        offset = 0.0
+        for _ in range(2):
+            record = replace(loop, reading=loop.reading - offset)
+            with tempfile.TemporaryDirectory() as folder:
+                path = Path(folder) / "loop.csv"
+                count = write_with_run_in(path, loop.time, loop.displacement, record.reading)
+                found = fit_hysteresis_loop(
+                    loads(SCENE.format(text)), path, parse_ranges(free), FitOptions(hold=(HOLD,))
+                )
+            model = found.model[count:]
+            miss = model - record.reading
+            offset -= miss.mean()
         rows.append(
             Row(
                 name,
                 len(free),
                 found.rms,
                 float(np.sqrt(np.mean(miss[flat] ** 2))),
-                work(found.model),
+                work(model),
                 work(loop.reading),
-                found,
+                record,
+                model,
+                found.keys,
             )
         )
     return rows
@@ -143,14 +164,14 @@ def draw(rows: list, path: Path) -> None:
     """Plot the record and the laws against the slide, and their differences against time."""
     from drawing import drawing
 
-    loop = rows[0].fitted.loop
+    loop = rows[0].loop
     with drawing(path, (9.6, 4.2), 1, 2) as (_, (left, right)):
         left.plot(
             loop.displacement * 1e3, loop.reading / 1e3, ".", ms=3, color="0.6", label="measured"
         )
         for row in rows:
-            left.plot(loop.displacement * 1e3, row.fitted.model / 1e3, lw=1, label=row.law)
-            right.plot(loop.time, (row.fitted.model - loop.reading) / 1e3, lw=0.8)
+            left.plot(loop.displacement * 1e3, row.model / 1e3, lw=1, label=row.law)
+            right.plot(loop.time, (row.model - loop.reading) / 1e3, lw=0.8)
         left.set(xlabel="slide [mm]", ylabel="force [kN]", title="Measured and fitted")
         right.set(xlabel="time [s]", ylabel="fitted - measured [kN]", title="Residual")
         left.legend(frameon=False)
@@ -168,13 +189,13 @@ if __name__ == "__main__":
             "[PICTURE.svg]"
         )
     table = main(sys.argv[1])
-    print(f"cycles repeat to {repeat(table[0].fitted.loop)[1]:.0f} N")
+    print(f"cycles repeat to {repeat(table[0].loop)[1]:.0f} N")
     for row in table:
         values = ", ".join(
             f"{one.key.partition('.')[2]} {value:.4g} {one.unit}"
-            for one, value in zip(row.fitted.keys.ranges, row.fitted.keys.fit.values)
+            for one, value in zip(row.keys.ranges, row.keys.fit.values)
         )
-        keys = row.fitted.keys
+        keys = row.keys
         print(
             f"{row.law:20s} rms {row.rms:6.0f} N, plateau {row.plateau:5.0f} N, work {row.work:5.1f} J of "
             f"{row.measured:5.1f} J, counted rows {keys.fit.intervals.rows:.0f}, {keys.seconds:.0f} s: {values}"

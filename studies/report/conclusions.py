@@ -125,16 +125,15 @@ def jump() -> float:
 
 
 def third() -> Conclusion:
-    scene = figure_27.scene("second path").replace("cycles = 800", "cycles = 300")
-    value = pf.run(scene, **{"drive.acceleration": 5 * G}).measures
+    plan = pf.plan(figure_27.scene("second path"))
+    stuck = max(mode["stuck_frequency"] for mode in plan.modes(plan.chain))
     return Conclusion(
         3,
         "the impacts of sticking and slipping make the mass ring at higher frequencies",
         HOLDS,
         f"At a level of 5 g the acceleration of the block jumps by {5 * jump():.1f} g when the block "
         "stops. If the contact deforms by 0.243 um before it slips, as in the best model of Table 1, the "
-        f"block rings at {value['ring_frequency'].value / 1e3:.1f} kHz with a damping ratio of "
-        f"{value['ring_damping'].value:.2f}.",
+        f"block rings at {stuck / 1e3:.1f} kHz.",
     )
 
 

@@ -30,11 +30,12 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
 from drawing import BLUE, GREY, ORANGE, drawing
+from steady_loops import HOLD, write_with_run_in
 from study_text import read_answer
 
 import patchfem as pf
 from patchfem.campaigns.fits.loop import fit_hysteresis_loop
-from patchfem.campaigns.fits.loop_path import LoopOptions
+from patchfem.campaigns.fits.problem import FitOptions, parse_ranges
 from patchfem.scene import loads
 
 FOLDER = Path(__file__).parent
@@ -149,14 +150,9 @@ def read_as_rigid(one: Loop) -> tuple:
         # one cycle and a quarter, so that the loop is closed
         step = one.time[1]
         again = np.arange(0, 5001, 4)
-        rows = np.column_stack(
-            [again * step, one.slider[again % 4000] * 1e6, one.cell[again % 4000]]
-        )
-        np.savetxt(
-            path, rows, "%.9g", ",", header="time [s],displacement [um],force [N]", comments=""
-        )
-        free = ["friction.static=0.2..0.5,friction.bond_length=0.2 um..20 um"]
-        found = fit_hysteresis_loop(loads(BENCH), path, free, options=LoopOptions((), True))
+        write_with_run_in(path, again * step, one.slider[again % 4000], one.cell[again % 4000])
+        free = parse_ranges(["friction.static=0.2..0.5,friction.bond_length=0.2 um..20 um"])
+        found = fit_hysteresis_loop(loads(BENCH), path, free, FitOptions(hold=(HOLD,)))
     return tuple(float(value) for value in found.keys.fit.values[:2])
 
 

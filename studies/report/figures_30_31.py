@@ -41,10 +41,10 @@ from drawing import drawing
 from study_text import read_answer
 
 from patchfem.core import frozen_array
-from patchfem.surface import BAND, Profile, level, make_report
+from patchfem.surface import Profile, level, make_report
 from patchfem.surface.compare.compare import Options, compare_surfaces
 from patchfem.surface.compare.waves import compare_waves
-from patchfem.surface.roughness.spectrum import estimate_spectrum
+from patchfem.surface.spectrum import wave_spectrum
 
 FOLDER = Path(__file__).parent
 ANSWER = read_answer(__doc__)
@@ -132,7 +132,7 @@ def count_held(sets: list, row) -> int:
 
 def amplitude(trace: Profile) -> float:
     """Return the amplitude [m] of the waves in the band."""
-    return estimate_spectrum(level(trace).z, bands.STEP).band_amplitude(*BAND)
+    return wave_spectrum(trace, is_tapered=True).measure_band()
 
 
 def heights(sets: list, when: int) -> np.ndarray:

@@ -32,8 +32,8 @@ from figure_27 import POINT
 from modal_test import march_samples
 from study_text import read_answer
 
-from patchfem.campaigns.rows.condition_models import FitRequest
-from patchfem.campaigns.rows.fit import RowsOptions, fit_rows
+from patchfem.campaigns.fits.problem import FitOptions
+from patchfem.campaigns.rows.fit import fit_rows
 from patchfem.inputs import read_table
 from patchfem.scene import BOUNDS, loads, read_assignments
 
@@ -139,10 +139,7 @@ def fit_gauge(gauge: bool):
     scene = loads(text(), SCENE, READING)
     wanted, wrong = read_assignments((*FREE, *((GAUGE,) if gauge else ())), BOUNDS)
     assert not wrong
-    return fit_rows(
-        FitRequest(scene, wanted, TABLE),
-        RowsOptions((HOLD,), starts=STARTS, seed=SEED),
-    )
+    return fit_rows(scene, TABLE, wanted, FitOptions((HOLD,), starts=STARTS), seed=SEED)
 
 
 def _picture(series: dict, found: dict, path: Path) -> Path:

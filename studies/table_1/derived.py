@@ -9,10 +9,11 @@ from math import pi
 
 import numpy as np
 
-from patchfem.campaigns.rows.condition_models import ConditionModels, FitRequest
+from patchfem.campaigns.rows.condition_models import ConditionModels
 from patchfem.campaigns.rows.model_readings import ModelReadings
 from patchfem.core import frozen_array
 from patchfem.model import build
+from patchfem.scene.scene import add_sets
 
 MASS = 1.19396625  # [kg] mass of the block in all scenes
 AXIAL = 143.0  # [Hz] axial mode in all scenes
@@ -32,6 +33,19 @@ class Number:
     high: float
     kind: None = None
     unit: str = "1"
+
+
+class FitRequest:
+    """Question to a fit of a rig: scene, ranges of its free keys, and file of the measured responses."""
+
+    def __init__(self, scene, ranges, measured):
+        self.scene = scene
+        self.ranges = ranges
+        self.measured = measured
+
+    def make_condition_models(self, conditions, *sets: str) -> ConditionModels:
+        """Return the rig models at conditions (c, 2), with additional --set strings."""
+        return ConditionModels(add_sets(self.scene, sets), conditions, self.ranges, self.measured)
 
 
 class Derived(FitRequest):

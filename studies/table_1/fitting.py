@@ -210,7 +210,7 @@ def search_starts(cells, computed, seen, starts: int, most: int, begins=()) -> t
         the valleys tied with it.
     """
     wanted = computed.models.ranges
-    residual = make_residual(cells, computed, seen, "bound")
+    residual = make_residual(cells, computed, seen)
     box = make_search_space([one.low for one in wanted], [one.high for one in wanted])
     quick = UnitCubeResidual(residual, box, is_expensive=True)
     rng = np.random.default_rng(SEED)
@@ -271,7 +271,7 @@ def group_valleys(cells, computed, seen, last, ends) -> tuple:
         (values, rms) at the ends of the starts.
     """
     wanted = computed.models.ranges
-    residual = make_residual(cells, computed, seen, "bound")
+    residual = make_residual(cells, computed, seen)
     box = make_search_space([one.low for one in wanted], [one.high for one in wanted])
 
     def at(values) -> np.ndarray:

@@ -25,9 +25,8 @@ from dataclasses import dataclass, replace
 from math import pi
 from pathlib import Path
 
-from derived import Derived, Number, rods
+from derived import Derived, FitRequest, Number, rods
 
-from patchfem.campaigns.rows.condition_models import FitRequest
 from patchfem.scene import BOUNDS, Scene, load, loads, read_assignments
 
 FOLDER = Path(__file__).parent

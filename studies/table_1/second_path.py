@@ -17,11 +17,12 @@ from pathlib import Path
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parent))
+from derived import FitRequest
 from null_models import fit_null_model
 
+from patchfem.campaigns.fits.problem import FitOptions
 from patchfem.campaigns.rows.cells import compute_rms_scores, read_response_table
-from patchfem.campaigns.rows.condition_models import FitRequest
-from patchfem.campaigns.rows.fit import RowsOptions, fit_rows
+from patchfem.campaigns.rows.fit import fit_rows
 from patchfem.campaigns.rows.model_readings import ModelReadings
 from patchfem.scene import BOUNDS, load, loads, read_assignments
 
@@ -78,7 +79,9 @@ def as_it_stands(point: bool = False) -> dict:
 
 def fit_path(point: bool = False, starts: int = 8):
     """Return the numbers fitted to 143 Hz from random starts, as FittedRows."""
-    return fit_rows(question(point), RowsOptions(hold=(PREDICTED_ROWS,), starts=starts))
+    asked = question(point)
+    options = FitOptions(hold=(PREDICTED_ROWS,), starts=starts)
+    return fit_rows(asked.scene, asked.measured, asked.ranges, options)
 
 
 def main(starts: int = 8) -> dict:

@@ -27,6 +27,7 @@ from drawing import BLUE, GREY, ORANGE, drawing
 
 from patchfem.core import G_N
 from patchfem.model import build
+from patchfem.response import make_onset_test
 from patchfem.runs import choose_numerics
 from patchfem.runs import run as runner
 from patchfem.runs.patch.press import solve_patch_contact
@@ -81,7 +82,8 @@ def onset(worn, cycles: int, pair=None) -> float:
     model = build(scene.loads(text, SCENE))
     patch = solve_patch_contact(model.patch, pair, worn)
     found = solve.solve_rig(model, choose_numerics(model), patch)
-    return levels.find_onset(found.levels, found.run_level, 3e-3)[0] / G_N
+    is_slipping = make_onset_test("slip")
+    return levels.find_onset(found.levels, found.run_level, 3e-3, is_slipping)[0] / G_N
 
 
 def _worn_rig(coefficient: float, cycles: int, motion: int, tolerance: str) -> Row:

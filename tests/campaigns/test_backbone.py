@@ -390,10 +390,9 @@ def test_always_errors_of_micro_slip_include_the_mesh():
         viscous == pytest.approx(0.002, rel=1e-9)
         and coarse_curve.damping_error[0] > 1e-6 * coarse_curve.damping[0]
     )
-    assert fine.exponents.micro == pytest.approx(3, abs=0.3) and fine.exponents.micro_theory == 3
+    assert fine.exponents.micro == pytest.approx(3, abs=0.3)
     assert coarse.exponents.micro is None
     assert any("the exponent of micro-slip cannot be determined" in note for note in coarse.notes)
-    assert any("higher than the frequencies by balance" in note for note in fine.notes)
 
 
 def test_stuck_frequency_follows_from_tangential_stiffness():

@@ -171,6 +171,6 @@ def test_exact_curves_without_common_amplitude_are_not_compared():
     curves["quasi-static"] = curves["quasi-static"]._replace(amplitude=np.array([2e-6, 4e-6]))
     near = apart._replace(curves=curves, band=make_band(curves))
     assert words.describe_static_curve(curves) == [
-        "The quasi-static curve holds within 2 % and both errors at all amplitudes of both curves."
+        "The quasi-static curve holds up to 2 um within 2 % and both errors."
     ]
     assert "and the difference of the two methods" in words.describe_band_width(near)

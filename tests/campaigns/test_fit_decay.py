@@ -20,6 +20,7 @@ from scene_texts import (
 import patchfem as pf
 from patchfem.campaigns.fits import curve as curves
 from patchfem.campaigns.fits.curve import read_damping_curve
+from patchfem.campaigns.fits.problem import FitOptions, parse_ranges
 from patchfem.core import PatchfemError
 
 IWAN = (
@@ -142,10 +143,8 @@ def test_exact_method_with_gaps_is_not_used(gaps, tmp_path, monkeypatch):
     monkeypatch.setattr(curves, "compute_points", compute_with_gaps)
     path = tmp_path / "curve.csv"
     path.write_text("amplitude [um],frequency [Hz],damping\n1,100,0.01\n20,60,0.006\n")
-    free = ["friction.chi=-0.9..-0.05"]
-    reason = (
-        ".*the mode of the model does not oscillate at the amplitudes 20 um; leave out these rows"
-    )
+    free = parse_ranges(["friction.chi=-0.9..-0.05"])
+    reason = ".*the mode of the model does not oscillate at 1 of 2 amplitudes, from 20 um to 20 um"
     if len(gaps) == 2:
         with pytest.raises(PatchfemError, match=f"quasi-static: {reason}.*balance: {reason}"):
             curves.fit_curve(pf.load(IWAN), path, free)
@@ -223,7 +222,7 @@ def test_scatter_replaces_errors_that_a_table_does_not_give(tmp_path):
     path = tmp_path / "points.csv"
     head = "amplitude [m],frequency [Hz],damping [1]"
     np.savetxt(path, np.transpose(rows), delimiter=",", header=head, comments="")
-    free = ["friction.static=0.05..0.6", "friction.stiffness=5e4 N/m..1e6 N/m"]
+    free = parse_ranges(["friction.static=0.05..0.6,friction.stiffness=5e4 N/m..1e6 N/m"])
     drive = '[drive]\nkind = "force"\nforce = "1 N"\nfrequency = "200 Hz"\ncycles = 100\n'
     fit = curves.fit_curve(pf.load(joint + drive), path, free).keys.fit
     for value, (low, high) in zip((0.27, 2.5e5), fit.intervals.ends, strict=True):
@@ -246,7 +245,8 @@ def test_assumed_errors_and_computed_curves_are_printed(tmp_path, monkeypatch):
     assert answer.code == 0 and assumed in answer.out + answer.err
     assert "The errors of the measured values are their scatter around the fit." in answer.out
     fitted = pf.load(tmp_path / "out/scene.fitted.toml")
-    fit = curves.fit_curve(fitted, tmp_path / "curve.csv", free, starts=1)
+    options = FitOptions(starts=1)
+    fit = curves.fit_curve(fitted, tmp_path / "curve.csv", parse_ranges(free), options)
     # repeated evaluations at a new start are computed once
     assert abs(fit.n_computed - fit.keys.fit.counts.evaluations) < 10
     details = json.loads((tmp_path / "out/fit.json").read_text("utf-8"))
@@ -271,5 +271,7 @@ def test_refuses_fewer_values_than_parameters(tmp_path):
         PatchfemError, match=r"only 4 values are used .* too few to determine 4 values"
     ):
         curves.fit_curve(
-            pf.load(IWAN), path, [f"{key}={low}..{high}" for key, (low, high) in free.items()]
+            pf.load(IWAN),
+            path,
+            parse_ranges([f"{key}={low}..{high}" for key, (low, high) in free.items()]),
         )

@@ -41,8 +41,7 @@ REFUSED = {  # command -> [(arguments, texts of the lines of the message)]; exit
         (("--random", "4"), ("give each range by --over",)),
         (("--random", "4", "--sobol", "4", "--over", "friction.static=0.1..0.2"), ("one of them",)),
         ((*STATIC, "--shard", "5/4"), ("--shard 5/4",)),
-        ((*STATIC, "--of", "damping"), ("'equivalent_damping'?",)),
-        ((*STATIC, "--of", "zzz"), ("--of zzz: unknown measure; use a name that",)),
+        ((*STATIC, "--of", "damping"), ("sweep --of was removed",)),
         ((*STATIC, "-o", "."), ("bare.csv",)),
         ((*STATIC, "--keep", "pages", "--no-page"), ("--no-page",)),
         (
@@ -64,11 +63,11 @@ REFUSED = {  # command -> [(arguments, texts of the lines of the message)]; exit
     ],
     "sweep own.toml": [(("--set", "friction.static=0.3"), ("sets friction.static in every",))],
     "plan rig.toml": [
-        ((*STATIC, "--probe"), ("--probe works for a single case",)),
+        (STATIC, ("plan --over was removed",)),
     ],
     **{
         f"{verb} refused.toml": [((), ("must be >= 0", "must be >= 0"))]
-        for verb in ("check", "plan", "sweep")
+        for verb in ("check", "sweep")
     },
     "check shipped.toml": [
         (
@@ -79,11 +78,11 @@ REFUSED = {  # command -> [(arguments, texts of the lines of the message)]; exit
     "compare": [
         (
             ("trace.csv", "trace.csv", "--direction", "z"),
-            ("direction 'z': x or y is needed",),
+            ("direction 'z': the datum is straight, and the direction x or y",),
         ),
         (
             ("trace.csv", "trace.csv", "--datum", "bent"),
-            ("datum 'bent': straight is needed, or nothing",),
+            ("datum 'bent', direction '': the datum is straight",),
         ),
         (("trace.csv", "trace.csv", "bare.csv"), ("give two files BEFORE and AFTER",)),
         (
@@ -117,7 +116,7 @@ REFUSED = {  # command -> [(arguments, texts of the lines of the message)]; exit
             ("trace.csv", "--window", "1 mm,9 mm"),
             ("from 1 mm to 9 mm, but the surface along x from 0 um to 2 mm",),
         ),
-        (("trace.csv", "--units", "mm"), ("give two units, of x and of z",)),
+        (("trace.csv", "--units", "mm"), ("the units ('mm',) are not those of x and of z",)),
         (("bare.csv",), ("units are never guessed",)),
     ],
     "new": [

@@ -165,7 +165,7 @@ def test_exact_printed_command_repeats_random_cases(tmp_path, monkeypatch, words
     )
     scene.write_text(BENCH, encoding="utf-8")
     sweep_into(
-        first, scene, "--over", "friction.static=0.3 +- 20 %", *words, "--set", "normal.load=90 N"
+        first, scene, "--over", "friction.static=0.24..0.36", *words, "--set", "normal.load=90 N"
     )
     monkeypatch.chdir(tmp_path)
 
@@ -188,21 +188,3 @@ def test_refuses_sweep_without_valid_case(rig_scene, tmp_path):
     """A sweep without a valid case ends with exit code 2."""
     answer = sweep_into(tmp_path / "a", rig_scene, "--over", "drive.cycles=1e15,2e15")
     assert answer.code == 2 and "no case could be run" in answer.out + answer.err
-
-
-def test_exact_sweep_plan_counts_cases(rig_scene):
-    """The plan of a sweep gives the number of cases, but no time and no memory."""
-    sweep_plan = json.loads(run_cli("plan", rig_scene, *OVER, "--json").out)
-    single_plan = json.loads(run_cli("plan", rig_scene, "--json").out)
-    assert sweep_plan["cases"] == 6 and sweep_plan["values"] == {
-        "normal.load": 3,
-        "drive.acceleration": 2,
-    }
-    assert sweep_plan["seconds"] is None and "disk_bytes" not in sweep_plan
-    assert (sweep_plan["kind"], sweep_plan["engine"], sweep_plan["effects"]) == (
-        single_plan["kind"],
-        single_plan["engine"],
-        single_plan["effects"],
-    )
-    screen = run_cli("plan", rig_scene, *OVER).out
-    assert "6 cases of 3 normal.load, 2 drive.acceleration\n" in screen and "cost" not in screen

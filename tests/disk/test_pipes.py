@@ -47,5 +47,5 @@ def test_refuses_pipe_without_writer(named_pipe, monkeypatch):
     ):
         toml_text.read_text(named_pipe)
     assert read_case_table(named_pipe)[1] == [
-        f"{named_pipe}: cannot be read: this is a pipe, and no data came through it within 0 s"
+        f"{named_pipe}: the table of cases cannot be read (this is a pipe, and no data came through it within 0 s)"
     ]

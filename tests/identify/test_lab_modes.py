@@ -8,7 +8,7 @@ from patchfem.core import PatchfemError
 from patchfem.identify import identify_decay_modes, identify_driven_modes
 from patchfem.identify.decay import fit_decay
 from patchfem.identify.driven_modes import fit_driven_modes
-from patchfem.identify.frequency_response import estimate_response, find_time_step
+from patchfem.identify.measured_modes import find_time_step
 
 HERTZ = OMEGA / (2 * np.pi)
 
@@ -18,56 +18,30 @@ HERTZ = OMEGA / (2 * np.pi)
 def test_exact_modes_from_record_without_window_bias(quantity):
     """The modes fitted to a record are exact, although segments of 0.26 s would widen the peak at 143 Hz, 1.1 Hz wide."""
     force, response = driven_response(quantity)
-    estimate = estimate_response(STEP, force, response)
-    modes = fit_driven_modes(STEP, force, response, quantity, estimate)
+    modes = fit_driven_modes(STEP, force, response, quantity)
     np.testing.assert_allclose(modes.frequency, HERTZ, rtol=1e-9)
     np.testing.assert_allclose(modes.damping, ZETA, rtol=1e-7)
     np.testing.assert_allclose(modes.residue, RESIDUE, rtol=1e-7)
-    assert estimate.segments == 15 and estimate.window == "hann" and modes.misfit < 1e-8
-    assert 0.2 < modes.coherence[0] < modes.coherence[1] < 1
+    assert modes.misfit < 1e-8
 
 
 def test_exact_modes_from_impact_without_window():
-    """An impact whose response decays within the record is analysed in one segment without window, exactly."""
+    """The modes fitted to an impact whose response decays within the record are exact."""
     s = 2j * np.pi * np.fft.rfftfreq(SAMPLES, STEP)
     force = 50 * np.exp(-(((TIME - 0.4) / 1e-3) ** 2))
     H = sum(a / (w * w + s**2 + 0.04 * w * s) for w, a in zip(OMEGA, RESIDUE))
     response = np.fft.irfft(s**2 * H * np.fft.rfft(force), SAMPLES)
-    impact_estimate = estimate_response(STEP, force, response)
-    assert (
-        impact_estimate.window == "none"
-        and impact_estimate.segments == 1
-        and impact_estimate.coherence is None
-    )
-    expected = (s**2 * H)[np.searchsorted(s.imag / (2 * np.pi), impact_estimate.frequency - 1e-6)]
-    np.testing.assert_allclose(impact_estimate.value, expected, rtol=1e-8)
-    modes = fit_driven_modes(STEP, force, response, "acceleration", impact_estimate)
+    modes = fit_driven_modes(STEP, force, response, "acceleration")
     np.testing.assert_allclose(modes.damping, 0.02, rtol=1e-7)
-    identified = identify_driven_modes(
-        {"time": TIME, "force": force, "acceleration": response}, None, None, (0, np.inf)
-    )
+    identified = identify_driven_modes({"time": TIME, "force": force, "acceleration": response})
     assert not identified.notes and identified.mass == pytest.approx(1 / 1.2, rel=1e-7)
-
-
-def test_order_coherence_with_white_noise():
-    """The coherence with white noise of variance r on a unit response is 1/(1 + r) within the scatter."""
-    rng = np.random.default_rng(2)
-    force = rng.normal(size=2**15)
-    for r in (0.25, 1.0):
-        modes = estimate_response(
-            STEP, force, force + np.sqrt(r) * rng.normal(size=force.size), 512, "hann"
-        )
-        assert np.mean(modes.coherence) == pytest.approx(1 / (1 + r), abs=0.02)
-        assert abs(np.mean(modes.value) - 1) < 0.02
 
 
 def test_always_noisy_damping_is_within_stated_error():
     """The damping from a record with 10 % noise is within 1.5 times its stated error."""
     force, response = driven_response("acceleration")
     noisy = response + 0.1 * np.std(response) * np.random.default_rng(3).normal(size=SAMPLES)
-    modes = fit_driven_modes(
-        STEP, force, noisy, "acceleration", estimate_response(STEP, force, noisy)
-    )
+    modes = fit_driven_modes(STEP, force, noisy, "acceleration")
     assert modes.frequency.size == 2 and modes.misfit == pytest.approx(0.1, rel=0.05)
     assert (
         np.abs(modes.damping - ZETA) < 1.5 * modes.damping_error
@@ -76,16 +50,13 @@ def test_always_noisy_damping_is_within_stated_error():
 
 
 @pytest.mark.parametrize("amplitudes", [(0.3, 0.2), (0.3, 0.0)])
-def test_exact_free_decay_frequency_damping_and_decrement(amplitudes):
-    """Frequency, damping, amplitude and decrement of a free decay of one or two modes are exact."""
+def test_exact_free_decay_frequency_damping_and_amplitude(amplitudes):
+    """Frequency, damping and amplitude of a free decay of one or two modes are exact."""
     modes = fit_decay(*free_decay(amplitudes))
     n = int(np.count_nonzero(amplitudes))
     np.testing.assert_allclose(modes.frequency, HERTZ[:n], rtol=1e-10)
     np.testing.assert_allclose(modes.damping, ZETA[:n], rtol=1e-8)
     np.testing.assert_allclose(modes.amplitude, amplitudes[:n], rtol=1e-8)
-    np.testing.assert_allclose(
-        modes.decrement(), 2 * np.pi * ZETA[:n] / np.sqrt(1 - ZETA[:n] ** 2), rtol=1e-8
-    )
 
 
 def test_always_noisy_decay_is_within_stated_error():
@@ -112,9 +83,7 @@ def test_always_friction_decay_is_reported_as_not_exponential():
 def test_exact_modal_mass_from_driven_point_response():
     """A response at the driven point gives the modal mass and the output rows."""
     force, response = driven_response("acceleration")
-    modes = identify_driven_modes(
-        {"time": TIME, "force": force, "acceleration": response}, None, None, (0, np.inf)
-    )
+    modes = identify_driven_modes({"time": TIME, "force": force, "acceleration": response})
     assert modes.mass == pytest.approx(1 / 1.2, rel=1e-6)
     np.testing.assert_allclose(modes.rows["output"], [1, np.sqrt(0.5)], rtol=1e-6)
     assert modes.descriptions[0].startswith("damping 0.004 +-") and not modes.notes
@@ -124,19 +93,13 @@ def test_exact_participation_from_base_motion():
     """A record of base motion gives the participation factors of the modes but no modal mass."""
     base, relative = driven_response("acceleration")
     modes = identify_driven_modes(
-        {"time": TIME, "base_acceleration": base, "acceleration": base - relative / 2},
-        None,
-        None,
-        (0, np.inf),
+        {"time": TIME, "base_acceleration": base, "acceleration": base - relative / 2}
     )
     np.testing.assert_allclose(modes.rows["base"] ** 2, RESIDUE / 2, rtol=1e-6)
     np.testing.assert_allclose(modes.rows["output"] * modes.rows["base"], RESIDUE / 2, rtol=1e-6)
     assert modes.mass is None and "gives no modal mass" in modes.notes[-1]
     modes = identify_driven_modes(
-        {"time": TIME, "base_acceleration": base, "acceleration": base - relative},
-        None,
-        None,
-        (0, np.inf),
+        {"time": TIME, "base_acceleration": base, "acceleration": base - relative}
     )
     # the participation cannot exceed one, so the output row is larger
     assert np.sum(modes.rows["base"] ** 2) == pytest.approx(1, rel=1e-9)
@@ -147,24 +110,20 @@ def test_refuses_invalid_records_with_reason():
     """Records with a wrong sign, without input, without modes in the band or unsuitable sampling are refused."""
     force, response = driven_response("acceleration")
     with pytest.raises(PatchfemError, match="moves against the force"):
-        identify_driven_modes(
-            {"time": TIME, "force": -force, "acceleration": response}, None, None, (0, np.inf)
-        )
+        identify_driven_modes({"time": TIME, "force": -force, "acceleration": response})
     with pytest.raises(
         PatchfemError,
         match=r"one input \(force or base_acceleration\), but the record has time, acc",
     ):
-        identify_driven_modes({"time": TIME, "acceleration": response}, None, None, (0, np.inf))
+        identify_driven_modes({"time": TIME, "acceleration": response})
     with pytest.raises(PatchfemError, match="between 300 and 400 Hz"):
-        identify_driven_modes(
-            {"time": TIME, "force": force, "acceleration": response}, None, None, (300, 400)
-        )
+        identify_driven_modes({"time": TIME, "force": force, "acceleration": response}, (300, 400))
     with pytest.raises(PatchfemError, match="one response is needed"):
         identify_decay_modes({"time": TIME, "force": force})
     with pytest.raises(PatchfemError, match="the input is zero"):
-        estimate_response(STEP, 0 * force, response)
-    with pytest.raises(PatchfemError, match="a segment has 10 samples"):
-        estimate_response(STEP, force, response, 10)
+        fit_driven_modes(STEP, 0 * force, response, "acceleration")
+    with pytest.raises(PatchfemError, match="the record has 500 samples; at least 512"):
+        fit_driven_modes(STEP, force[:500], response[:500], "acceleration")
     with pytest.raises(PatchfemError, match="evenly sampled"):
         find_time_step(TIME**1.01)
     with pytest.raises(PatchfemError, match="grows instead of decaying"):
@@ -182,7 +141,9 @@ def test_refuses_undamped_decay_without_calling_it_growing(rate, noise):
     rng = np.random.default_rng(1)
     time = TIME[:500]
     record = np.exp(rate * time) * np.cos(OMEGA[0] * time) + noise * rng.normal(size=500)
-    with pytest.raises(PatchfemError, match=r"is zero within its error of [\de.-]+: it neither"):
+    with pytest.raises(
+        PatchfemError, match=r"neither decays nor grows beyond its error of [\de.-]+;"
+    ):
         fit_decay(time, record)
     growing = np.exp(60 * rate * time) * record
     if rate:

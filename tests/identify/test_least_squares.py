@@ -51,7 +51,9 @@ def test_exact_linear_fit_has_closed_form_intervals():
     assert fit.intervals.methods == ("linear",) * 3
     assert fit.at_bound == ("",) * 3
     assert fit.intervals.unknown.shape == (0, 3)
-    assert fit.outcome is Outcome.DONE and fit.n_agreed == 3 and describe_fit(fit, "abc") == []
+    assert (
+        fit.outcome is Outcome.DONE and fit.descents.n_best == 3 and describe_fit(fit, "abc") == []
+    )
 
 
 @given(st.integers(0, 10_000), st.floats(-3, 3), st.integers(-8, 8))
@@ -201,18 +203,14 @@ def test_always_isolated_start_is_not_converged():
     assert Problem(residual, [0.0], [1.0], start=[0.0]).solve().outcome is Outcome.NOT_CONVERGED
 
 
-def test_always_lower_end_that_no_start_reached_is_not_converged():
+def test_always_lower_end_that_no_start_reached_is_not_converged(monkeypatch):
     """Two starts with the same end do not confirm the lower end of an unfinished last descent."""
-
-    def residual(v):
-        if v[0] > 0.0:
-            raise PatchfemError("no value")
-        return v[0] - np.array([1.0, 1.1])
-
-    problem = Problem(residual, [0.0], [1.0])
+    problem = Problem(lambda v: v[0] - np.array([1.0, 1.1]), [0.0], [1.0])
     for cost, outcome in ((9.0, Outcome.NOT_CONVERGED), (2.21, Outcome.DONE)):
-        end = least_squares.Descent(np.array([0.0]), cost, False, 2)
-        assert problem.search(Search(2, seed=1, load=lambda _, end=end: end), "").outcome is outcome
+        ends = [least_squares.Descent(np.array([0.0]), one, False, 2) for one in (cost, cost, 2.21)]
+        following = iter(ends)
+        monkeypatch.setattr(least_squares, "descend", lambda *_, ends=following: next(ends))
+        assert problem.search(Search(2, seed=1), "").outcome is outcome
 
 
 def test_refuses_unsolvable_fits():
@@ -285,7 +283,7 @@ def test_exact_counts_contain_every_evaluation():
     first = problem.solve(4, "")
     second = replace(problem, start=first.values).solve(1).count_earlier_search(first)
     assert fit.counts.evaluations + second.counts.evaluations == len(calls)
-    assert second.n_agreed == first.n_agreed == 4
+    assert second.descents.n_best == first.descents.n_best == 4
     failures = fit.counts.failures + second.counts.failures
     assert failures == sum(values[0] > 4 for values in calls) > 0
     assert second.counts.reason == "too large"

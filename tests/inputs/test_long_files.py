@@ -80,7 +80,7 @@ def test_refuses_invalid_cell_with_line_number(write_table, n_rows, cell, messag
 def test_refuses_empty_matrices():
     """Matrices without coordinates are refused."""
     empty = np.zeros((0, 0))
-    with pytest.raises(PatchfemError, match="M has no coordinate"):
+    with pytest.raises(PatchfemError, match="M must be square with at least one row"):
         arrays.build_basis({"M": empty, "K": empty, "slide": np.zeros(0), "output": np.zeros(0)})
 
 

@@ -1,4 +1,4 @@
-"""MATLAB files: arrays, texts and fields of structures, from files that MATLAB, SciPy or h5py wrote."""
+"""MATLAB files: arrays and fields of structures, from files that MATLAB, SciPy or h5py wrote."""
 
 import io
 from pathlib import Path
@@ -69,17 +69,15 @@ ARRAYS = {
 
 
 @pytest.mark.parametrize("packed", [False, True])
-def test_exact_arrays_and_texts(packed):
-    """Arrays of numbers, of any type and form, and texts are read with their values."""
+def test_exact_arrays(packed):
+    """Arrays of numbers, of any type and form, are read with their values, and texts are left out."""
     texts = {"cells": np.array(["axial", "yaw", "é"], dtype=object), "letters": ["ab", "cde"]}
     variables = read_variables("a.mat", matlab5_bytes(ARRAYS | texts, packed))
-    assert variables.keys() == ARRAYS.keys() | texts.keys()
+    assert variables.keys() == ARRAYS.keys()
     for name, expected in ARRAYS.items():
         assert (
             abs(variables[name] - expected).sum() == 0 and variables[name].shape == expected.shape
         )
-    assert variables["cells"].tolist() == ["axial", "yaw", "é"]
-    assert variables["letters"].tolist() == ["ab", "cde"]
     assert "waves" not in read_real_arrays("a.mat", matlab5_bytes(ARRAYS, packed))
 
 
@@ -93,11 +91,7 @@ def test_exact_files_written_by_matlab():
     for version in ("6.1_SOL2", "6.5.1_GLNX86", "7.1_GLNX86", "7.4_GLNX86"):
         variables = read(f"teststruct_{version}.mat")
         assert np.allclose(variables["teststruct.doublefield"], [[2**0.5, np.e, np.pi]], rtol=1e-15)
-        assert variables["teststruct.stringfield"].tolist() == ["Rats live on no evil star."]
-        assert list(read(f"teststructnest_{version}.mat")) == [
-            "teststructnest.one",
-            "teststructnest.two.three",
-        ]
+        assert list(read(f"teststructnest_{version}.mat")) == ["teststructnest.one"]
         assert read(f"teststructarr_{version}.mat") == {}  # arrays of structures are not read
 
 
@@ -117,13 +111,11 @@ def test_exact_structure_fields_are_named_and_mapped(data, tmp_path):
         "run.load.F": (51, 1),
         "run.load.all": (51, 3),
         "run.t": (1, 51),
-        "run.by": (1,),
         "g": (1, 1),
     }
     assert np.array_equal(variables["run.load.all"], RUN["load"]["all"]) and variables["g"] == [
         [9.81]
     ]
-    assert variables["run.by"].tolist() == ["bench 3"]
     (tmp_path / "a.mat").write_bytes(data)
     for force in ("run.load.F", "run.load.all(:,2)"):
         records = read_records(
@@ -132,15 +124,15 @@ def test_exact_structure_fields_are_named_and_mapped(data, tmp_path):
         assert np.array_equal(records["time"], TIME) and np.array_equal(
             records["force"], 1e3 * FORCE
         )
-    with pytest.raises(PatchfemError, match=r"no channel 'run.F'; the file has .*run\.load\.F"):
+    listed = r"no channel 'run.F'; the file has [^:]*'run.load.F', \d 'run.load.all\(:,1\)', "
+    with pytest.raises(PatchfemError, match=listed):
         read_records(tmp_path / "a.mat", parse_requests(["time=run.t [s]", "force=run.F [N]"]))
 
 
 def test_exact_matlab_73_structure_equals_version_7(tmp_path):
-    """A structure from a file of version 7.3 with texts and a sparse matrix equals that from version 7."""
+    """A structure from a file of version 7.3 with a sparse matrix, beside texts, equals that from version 7."""
     matrices_of_rig = {"M": np.diag([1.0, 2.0]), "C": np.zeros((2, 2)), "slide": [[1.0, 0.0]]}
     stiffness = np.array([[3e6, -1e6], [-1e6, 1e6]])
-    names = ("tip", "base é")
 
     def add_items(file):
         group = file.create_group("K")
@@ -151,22 +143,19 @@ def test_exact_matlab_73_structure_equals_version_7(tmp_path):
             ("jc", np.array([0, 2, 4], "u8")),
         ):
             group[name] = values
-        add_matlab_value(file, "#refs#/a", names[0])
-        add_matlab_value(file, "#refs#/b", names[1])
-        cells = file.create_dataset("names", (2, 1), h5py.ref_dtype)
+        add_matlab_value(file, "#refs#/a", "tip")
+        cells = file.create_dataset("names", (1, 1), h5py.ref_dtype)
         cells[0, 0] = file["#refs#/a"].ref
-        cells[1, 0] = file["#refs#/b"].ref
         cells.attrs["MATLAB_class"] = np.bytes_("cell")
 
     (tmp_path / "new.mat").write_bytes(matlab73_bytes(matrices_of_rig, add_items))
     savemat(
         tmp_path / "old.mat",
-        matrices_of_rig | {"K": stiffness, "names": np.array(names, dtype=object)},
+        matrices_of_rig | {"K": stiffness, "names": np.array(["tip"], dtype=object)},
     )
     basis_73, basis_7 = (
         arrays.build_basis(arrays.read_arrays(tmp_path / f"{name}.mat")) for name in ("new", "old")
     )
-    assert basis_73.names == basis_7.names
     assert np.array_equal(basis_73.omega, basis_7.omega)
     assert np.array_equal(basis_73.slide, basis_7.slide)
 

@@ -75,47 +75,6 @@ def test_exact_abaqus_matrix_lines(tmp_path):
     ]
 
 
-def slender_beam(seed: int, n: int = 60):
-    """Return the stiffness (n, n) of a clamped beam of rigid links and its shape (n,) of lowest stiffness.
-
-    Each coordinate has a random unit.
-    """
-    D = np.eye(n) - 2 * np.eye(n, k=-1) + np.eye(n, k=-2)
-    unit = np.random.default_rng(seed).uniform(1, 2, n)
-    stiffness = D.T @ D * np.outer(unit, unit) * 1e7
-    return sparse.csr_array(stiffness), np.linalg.eigh(stiffness)[1][:, 0]
-
-
-@pytest.mark.parametrize(
-    "expected, round_values",
-    [
-        ("10 digits", lambda values: [float(f"{one:.9e}") for one in values]),
-        ("4 digits", lambda values: [float(f"{one:.3e}") for one in values]),
-        ("single precision", lambda values: values.astype(np.float32).astype(float)),
-    ],
-)
-def test_exact_rounding_uncertainty_of_stiffness(expected, round_values):
-    """The estimated uncertainty of a rounded stiffness agrees with the scatter over 60 rounded matrices.
-
-    The rounding is recognised as a number of digits or as single precision.
-    """
-    ratios = []
-    for seed in range(60):
-        full, shape = slender_beam(seed)
-        assert matrices.estimate_rounding(full) is None
-        rounded_matrix = full.copy()
-        rounded_matrix.data = np.array(round_values(full.data))
-        digits, rounding = matrices.estimate_rounding(rounded_matrix)
-        assert digits == expected
-        ratios.append(
-            shape
-            @ (rounded_matrix - full)
-            @ shape
-            / matrices.compute_form_deviation(rounded_matrix, rounding, shape)
-        )
-    assert 0.85 < np.sqrt(np.mean(np.square(ratios))) < 1.15
-
-
 def test_exact_rows_are_aligned_by_node():
     """Matrices whose files order the nodes differently are aligned by node and direction."""
     first_matrix = matrices.Matrix(

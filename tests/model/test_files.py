@@ -7,7 +7,6 @@ import json
 import meshio
 import numpy as np
 import pytest
-import surfaces as write
 from command_line import run_cli
 from scene_texts import BENCH, COATED, COULOMB, POINT, STRUCTURE, find_line
 
@@ -43,16 +42,11 @@ def mesh_text(name="{}") -> str:
     return f'{head}mesh = "{name}"\n{table}{remainder}'
 
 
-def make_modes(**changes) -> bytes:
-    """Return a .npz file of two modes with changed arrays."""
+def make_matrices(**changes) -> bytes:
+    """Return a .npz file with the matrices of two masses and changed arrays."""
     content = io.BytesIO()
-    modes = {
-        "omega": [300.0, 600.0],
-        "damping": [0.01, 0.01],
-        "slide": [1.0, 0.5],
-        "base": [0.5, 0.5],
-    }
-    np.savez(content, **({"moving_mass": 2.0} | modes | changes))
+    matrices = {"M": np.eye(2), "K": [[3e5, -1e5], [-1e5, 1e5]], "slide": [1.0, 0.5]}
+    np.savez(content, **(matrices | changes))
     return content.getvalue()
 
 
@@ -60,16 +54,16 @@ FAULTS = {
     "profile": (PROFILE, "a.csv", "0,1\n1,2\n", "contact.profile.file", "a.csv:1: the unit of x is not given"),
     "profile, short": (PROFILE, "a.csv", "x [mm],z [um]\n0,1\n2,2\n4,1\n", "contact.profile.file",
                        "the profile is 4 mm long, but the patch is 12.7 mm"),
-    "profile, areal": (PROFILE, "a.x3p", write.heights_to_x3p(write.draw_scan()), "contact.profile.file",
-                       "an areal scan of 4 x 6 heights, but a single trace is needed"),
+    "profile, areal": (PROFILE, "a.csv", "x [um],y [um],z [um]\n0,0,1\n9,0,2\n0,9,3\n9,9,4\n", "contact.profile.file",
+                       "an areal scan of 2 x 2 heights, but a single trace is needed"),
     "slide": (SLIDE, "p.csv", "time [s],displacement [um]\n0,0\n1,x\n", "slide.file",
               "p.csv:3: displacement: 'x' is not a finite number"),
     "drive": (DRIVE, "d.csv", "time [s],acceleration [g]\n0,0\n0,1\n", "drive.file",
               "d.csv:3: time 0 s is not later than"),
     "structure": (ARRAYS, "a.npz", b"PK\x03\x04 no archive", "structure.file", "a.npz cannot be read"),
-    "structure, no modes": (ARRAYS, "a.npz", make_modes(omega=[]), "structure.file",
-                            "a.npz: omega is empty; at least one number is needed"),
-    "structure, no slide": (POINT + COULOMB + ARRAYS, "a.npz", make_modes(slide=[0.0, 0.0]), "structure.file",
+    "structure, no stiffness": (ARRAYS, "a.npz", make_matrices(K=[]), "structure.file",
+                                "a.npz: K must be square, not of shape (0,)"),
+    "structure, no slide": (POINT + COULOMB + ARRAYS, "a.npz", make_matrices(slide=[0.0, 0.0]), "structure.file",
                             "a.npz: `slide` of an interface is 0 in every mode"),
     "measured": (MEASURED, "m.csv", "frequency [Hz],output [g]\n1,1\n", "measured.file",
                  "not 'frequency [Hz],output [g]' (no column input)"),

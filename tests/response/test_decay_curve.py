@@ -170,7 +170,6 @@ def test_exact_decay_that_ends_stuck_has_stuck_eigenvalue():
     frequency = values.imag / (2 * np.pi)
     damping = -values.real / np.abs(values)
     decay = done.extra["decay"]
-    ring = done.measures
     k = np.argmin(np.abs(frequency - decay.frequency[-1]))
     rings = decay.frequency == decay.frequency[-1]
     assert str(done.outcome) == "stuck" and rings.sum() > 40 and 3 < np.sum(~rings)
@@ -179,9 +178,6 @@ def test_exact_decay_that_ends_stuck_has_stuck_eigenvalue():
     assert np.all(decay.frequency_error < decay.frequency / 2) and np.all(
         decay.damping_error < decay.damping / 2
     )
-    k = np.argmin(np.abs(frequency - ring["ring_frequency"].value))
-    assert ring["ring_frequency"].value == pytest.approx(frequency[k], rel=1e-9)
-    assert ring["ring_damping"].value == pytest.approx(damping[k], rel=1e-7)
     amplitude = np.ptp(done.window.output) / 2
     assert decay.amplitude[-1] < 1.2 * amplitude
 
@@ -230,20 +226,14 @@ def mindlin_damping(amplitude, stuck: float, slide: float):
     return np.array(out)
 
 
-def test_always_release_and_ringing_errors_cover_mindlin_damping():
-    """The errors of the decay curve and of the ringing cover Mindlin's damping."""
-    result = pf.run(CROWNED)
-    decay = result.extra["decay"]
-    ring = result.measures["ring_damping"]
-    stuck = result.measures["ring_frequency"].value
+def test_always_release_errors_cover_mindlin_damping():
+    """The errors of the decay curve cover Mindlin's damping."""
+    decay = pf.run(CROWNED).extra["decay"]
+    stuck = decay.frequency[-1]
     known = np.flatnonzero(np.isfinite(decay.damping_error))[::20]
     law = mindlin_damping(decay.amplitude[known], stuck, 1.0)
     assert known.size > 20 and law.max() > 2e-4
     assert (np.abs(decay.damping[known] - law) <= decay.damping_error[known]).all()
-    beside = mindlin_damping(result.measures["relative_displacement_amplitude"].value, stuck, 1.0)[
-        0
-    ]
-    assert abs(ring.value - beside) <= ring.error and beside > 1.5 * ring.value
 
 
 @pytest.mark.parametrize(

@@ -1,4 +1,4 @@
-"""Drive levels: onset of slip, jumps and hysteresis of a table, and onsets found by bisection."""
+"""Drive levels: onset of slip of a table, and onsets found by bisection."""
 
 import numpy as np
 import pytest
@@ -6,11 +6,8 @@ from scene_texts import MODE, POINT
 
 from patchfem.core import G_N
 from patchfem.response import (
-    MIN_JUMP_FACTOR,
     Level,
     bracket_onset,
-    largest_hysteresis,
-    largest_jump,
     make_onset_test,
 )
 from patchfem.runs.run import run
@@ -46,8 +43,8 @@ def make_level(drive, amplitude, stuck=False, error=0.0):
     return Level(drive, stuck, {NAME: amplitude}, {NAME: error})
 
 
-def test_exact_onset_jump_and_hysteresis_of_table():
-    """Onset bracket, largest jump and largest hysteresis of a table of levels are those computed by hand."""
+def test_exact_onset_of_table():
+    """The onset brackets of a table of levels are those computed by hand."""
     table = [
         make_level(3, 0.0, True),
         make_level(4, 0.0, True),
@@ -65,11 +62,6 @@ def test_exact_onset_jump_and_hysteresis_of_table():
         is None
     )
     assert bracket_onset(table, make_onset_test("gauge", 2.0)) == (2, 3)
-    assert largest_jump(table) == (6, pytest.approx(6 * 5 / 6), 1)
-    # not the widest of the table
-    assert largest_jump([make_level(1, 1.0), make_level(4, 4.1), make_level(4.5, 9.0)])[2] == 0.5
-    assert largest_hysteresis(table) == (pytest.approx(0.5), pytest.approx(0.2))
-    assert largest_hysteresis(table[:4]) is None and largest_jump(table[:2]) is None
 
 
 def run_levels(law, levels, method="", cycles=30):
@@ -94,12 +86,10 @@ def test_exact_onset_of_rigid_block_is_mu_n_over_m(levels):
 
 
 def test_exact_no_onset_below_friction_limit():
-    """Without slip at any level, onset and jump are absent and have a reason."""
+    """Without slip at any level, the onset is absent and has a reason."""
     _, found = run_levels('law = "coulomb"', '["1 g", "3 g"]')
     assert found["onset_level"].value is None
     assert found["onset_level"].reason == "no level of the increasing sequence slips"
-    assert found["jump_level"].value is None
-    assert f"below {MIN_JUMP_FACTOR:g} times" in found["jump_level"].reason
 
 
 def run_single_level(level: str, cycles: int = 30):

@@ -5,8 +5,8 @@ import pytest
 
 from patchfem.core import Response
 from patchfem.response import estimate_window_error
+from patchfem.response.events import slips_and_displacements
 from patchfem.response.loops import mean_drift
-from patchfem.response.run_events import slips_and_displacements
 
 PERIOD, STEPS = 1.0, 4000
 

@@ -104,7 +104,7 @@ def test_always_95_of_100_measures_lie_within_both_errors(law):
     assert np.mean([row.holds for row in rows]) >= 0.95
 
 
-def test_always_ringing_and_secant_of_sticking_contact_agree_with_single_run():
+def test_always_secant_of_sticking_contact_agrees_with_single_run():
     """Sliders of a sticking contact slip a little, and the extremes of its ringing may lie at the ends of cycles."""
     sets = {
         "normal.load": "6.52443 N", "friction.stiffness": "60926 N/m", "friction.chi": "-0.653",
@@ -115,9 +115,8 @@ def test_always_ringing_and_secant_of_sticking_contact_agree_with_single_run():
     marched = lumped.solve([model])
     single = one_by_one.solve([model])
     assert marched.numerics[0]["engine"] == lumped.ENGINE
-    for name in ("ring_frequency", "ring_damping", "secant_stiffness"):
-        errors = marched.errors[name][0] + single.errors[name][0]
-        assert abs(marched.values[name][0] - single.values[name][0]) <= errors, name
+    change = marched.values["secant_stiffness"][0] - single.values["secant_stiffness"][0]
+    assert abs(change) <= sum(one.errors["secant_stiffness"][0] for one in (marched, single))
 
 
 # Changes after which a rig is not one mode with one point under a sine, or has no motion.

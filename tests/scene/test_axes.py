@@ -13,7 +13,6 @@ from patchfem.scene import (
     LISTS,
     RANDOM,
     Range,
-    describe_ranges,
     loads,
     read_assignments,
 )
@@ -145,22 +144,3 @@ def test_always_values_of_all_axes_select_one_case():
     with pytest.raises(PatchfemError) as second_error:
         build(loads(SWEPT, "a.toml", sets[:1]))
     assert sets[0] not in str(second_error.value) and sets[1] in str(second_error.value)
-
-
-@pytest.mark.parametrize(
-    "text, low, high, unit",
-    [
-        ("friction.static=0.3+-15%", 0.255, 0.345, ""),
-        ("friction.static=0.3 +/- 0.03", 0.27, 0.33, ""),
-        ("normal.load=115 N +- 10 N", 105, 125, "N"),
-    ],
-)
-def test_exact_value_with_tolerance_is_uniform_range(text, low, high, unit):
-    """A value with a tolerance, such as 0.3 +- 15 %, is a uniform range, which is described in a note."""
-    (axis,), wrong = read_assignments([text], RANDOM)
-    assert not wrong and (axis.low, axis.high, axis.written_unit) == (low, high, unit)
-    assert not axis.is_log
-    (note,) = describe_ranges([text])
-    ends = note.partition(" is drawn evenly from ")[2].split("..")
-    assert [float(end.removesuffix(unit)) for end in ends] == [low, high]
-    assert describe_ranges(["friction.static=0.2..0.3"]) == []

@@ -160,7 +160,6 @@ def test_refuses_a_duration_below_a_quarter_of_a_cycle():
 
 ALLOWED = [
     (PATCH_BENCH, [LOWER], "bench"),
-    (PATCH_BENCH, [LOWER, PLASTIC, "friction.bond_length=1 um"], "bench"),
     (PATCH_BENCH, [LOWER, *REPORT, "friction.order=-0.5"], "bench"),
     (PATCH_BENCH, [LOWER, SHEAR, *REPORT], "bench"),
     (RIG, ["friction.reading=report", "structure.mode.second.pitch=1 rad/m", SHEAR], "rig"),

@@ -97,7 +97,7 @@ def test_always_parser_returns_finite_or_raises_value_error(text, kind):
             "a bare number without a unit; a force with its unit is needed, such as '26 lbf'",
         ),
         ("26", "force", "'26' is a bare number without a unit"),
-        (True, "force", "true is not a quantity"),
+        (True, "force", "not a quantity"),
         (None, "force", "not a quantity"),
         ("26 lb", "force", "did you mean 'lbf'"),
         ("0,5 mm", "length", "has a comma: use a point as the decimal separator"),

@@ -102,7 +102,7 @@ BAD_SETS = [
     ("accuracy.steps_per_cycle=3", "accuracy.steps_per_cycle", "must be >= 4"),
     ("contact.load.x=1", "contact.load.x", "contact.load is a value, not a table"),
     ("contact.load", "contact.load", "table.key=value is needed"),
-    ("contact.load=['1 N']", "contact.load", "an array is not a quantity; a force with its unit is needed"),
+    ("contact.load=['1 N']", "contact.load", "not a quantity; a force with its unit is needed"),
     ("structure.mode.axial=3", "structure.mode[1]", "a table is needed, not 3"),
     ("structure.mode[0].slide=1", "structure.mode[0].slide", "mode[0] names no item; items are numbered from 1"),
     ("structure.mode.second.name=", "structure.mode[2].name", "must not be an empty text"),
@@ -291,7 +291,6 @@ def test_refuses_invalid_toml(text, start):
         ("static = -.5e3\n", "put a digit on both sides of the point: static = -0.5e3"),
         ("static = 5.\n", "put a digit on both sides of the point: static = 5.0"),
         ("static = 0,3\n", "write the decimal comma as a point: static = 0.3"),
-        ("a = True\n", "; a = true"),
         (
             "damping = 0.3 %  # of the mode\n",
             'put a quantity or a word in quotes: damping = "0.3 %"',

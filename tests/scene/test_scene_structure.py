@@ -164,7 +164,7 @@ def test_exact_initial_conditions_of_scene():
     (["structure.start.displacement=['1 mm']"], "structure.start.displacement", "the number of values is 1, but one "
                                                                                 "value for each mass"),
     (["structure.start={}"], "structure.start.displacement", "this key or velocity is needed"),
-    (["structure.slide_at=12:+x"], "structure.slide_at", "names a place in a file"),
+    (["structure.slide_at=12:+x"], "structure.slide_at", "names a place in a universal file"),
     (["drive={kind = 'force', mass = 3, force = '1 N', frequency = '1 Hz', cycles = 9}"], "drive.mass", "no mass 3"),
     (["drive={kind = 'free', displacement = '1 mm', cycles = 9}", "structure.start.velocity=['1 m/s', '0 m/s']"],
      "structure.start", "[structure.start] and drive.displacement exclude each other"),

@@ -41,6 +41,7 @@ SETS = {
     "law of an averaged pressure": "{law}.law=convolution {law}.bond_length=1_um",
     "law that sticks rigidly": "{law}.law=coulomb",
     "law with memory for a constant pressure": IWAN,
+    "law with memory but without bonds": "{law}.law=elastic-plastic",
     "law without bonds": "{law}.law=coulomb",
     "law without elements": TANH,
     "levels or sweep in time": "drive.waveform=levels drive.levels=['1_g','2_g']",

@@ -1,4 +1,4 @@
-"""Universal files written by pyuff and read back: mode shapes with their scale, and modes from responses."""
+"""Universal files written by pyuff and read back: mode shapes with their scale."""
 
 import numpy as np
 import pytest
@@ -98,36 +98,6 @@ UNITS_MM = {
 }
 
 
-def make_responses(response_type=12, noise=0.0, signs=(1, 1, 1), spacing=0.5, **change):
-    """Return datasets 58 of the responses of the rig to a force at node 13."""
-    frequency = np.arange(20.0, 250.0, spacing)
-    omega = 2 * np.pi * frequency
-    H = (
-        compute_receptance(damped_basis(), omega, RIG.shapes, RIG.shapes[2])[:, :, 0]
-        * ((1j * omega) ** {8: 0, 11: 1, 12: 2}[response_type])[:, None]
-    )
-    rng = np.random.default_rng(5)
-    H = H * (1 + noise * (rng.normal(size=H.shape) + 1j * rng.normal(size=H.shape)) / np.sqrt(2))
-    return [
-        {
-            "type": 58,
-            "func_type": 4,
-            "rsp_node": NODES[k],
-            "rsp_dir": 2 * signs[k],
-            "ref_node": 13,
-            "ref_dir": 2,
-            "abscissa_spacing": 1,
-            "abscissa_spec_data_type": 18,
-            "ordinate_spec_data_type": response_type,
-            "orddenom_spec_data_type": 13,
-            "x": frequency,
-            "data": H[:, k] * signs[k],
-            **change,
-        }
-        for k in range(3)
-    ]
-
-
 def check_modes(modes, rtol, shape_tol):
     """Check frequencies and shapes of the modes that were read."""
     np.testing.assert_allclose(2 * np.pi * modes.frequency, RIG.omega, rtol=rtol)
@@ -158,7 +128,7 @@ def test_exact_complex_modes_are_made_real_with_note(tmp_path):
 
 
 def test_exact_units_of_dataset_164_are_applied(tmp_path):
-    """The units of dataset 164 scale shapes and responses, for mm and mN and for inches."""
+    """The units of dataset 164 scale shapes, for mm and mN and for inches."""
     units = UNITS_MM
     check_modes(
         universal.read_universal(write_universal(tmp_path / "a.uff", [units, *normal_modes()])),
@@ -174,33 +144,6 @@ def test_exact_units_of_dataset_164_are_applied(tmp_path):
     np.testing.assert_allclose(
         np.abs(modes.motion[11, 1]), np.abs(RIG.shapes[0]) / np.sqrt(175.126835), rtol=FILE_RTOL
     )
-    modes = universal.read_universal(
-        write_universal(tmp_path / "c.uff", [inches, *make_responses(8)])
-    )
-    np.testing.assert_allclose(
-        np.abs(modes.motion[11, 1]), np.abs(RIG.shapes[0]) / np.sqrt(175.126835), rtol=1e-5
-    )
-
-
-def test_exact_label_of_a_response_counts_before_dataset_164(tmp_path):
-    """Responses in mm/N, whose labels and dataset 164 both say so, are converted once."""
-    units = UNITS_MM | {"force": 1.0}
-    responses = make_responses(8, ordinate_axis_units_lab="mm", orddenom_axis_units_lab="N")
-    responses = [response | {"data": 1000 * response["data"]} for response in responses]
-    modes = universal.read_universal(write_universal(tmp_path / "a.uff", [units, *responses]))
-    check_modes(modes, 1e-6, 1e-6)
-    assert not modes.notes
-
-
-@pytest.mark.parametrize("response_type", [8, 12])
-def test_exact_modes_are_identified_from_responses(tmp_path, response_type):
-    """Receptance, mobility and accelerance with a reversed accelerometer give the modes within 1e-6."""
-    modes = universal.read_universal(
-        write_universal(tmp_path / "a.uff", make_responses(response_type, signs=(1, -1, 1)))
-    )
-    check_modes(modes, 1e-6, 1e-6)
-    np.testing.assert_allclose(modes.zeta, ZETA, rtol=1e-6)
-    assert not modes.notes
 
 
 def test_exact_basis_from_node_directions(tmp_path):
@@ -310,10 +253,10 @@ def test_refuses_heave_in_array_file_beside_friction(tmp_path):
     """An array `normal`, which no engine reads, is refused beside friction and ignored without it."""
     np.savez(
         tmp_path / "a.npz",
-        frequency=[143.0],
-        damping=[0.01],
+        M=[[0.5]],
+        K=[[4e5]],
+        C=[[9.0]],
         slide=[1.0],
-        base=[1.0],
         normal=[0.1],
     )
     text = HEAVING_RIG.replace("a.uff", "a.npz")

@@ -33,13 +33,13 @@ def test_bond_law_fits_the_plateaus_but_not_the_backlash():
     """
     rows = {row.law: row for row in damper.main(FILE, ("coulomb", "elastic-plastic", "stretch"))}
     stretch = rows["stretch"]
-    loop = rows["stretch"].fitted.loop
+    loop = rows["stretch"].loop
     scatter = damper.repeat(loop)[1]
-    assert stretch.fitted.keys.fit.values[1] == pytest.approx(2.04e-3, rel=0.01)
+    assert stretch.keys.fit.values[1] == pytest.approx(2.04e-3, rel=0.01)
     assert stretch.work == pytest.approx(stretch.measured, rel=0.005)
     assert stretch.plateau < 0.07 * 4.2e3
     assert stretch.rms > 8 * scatter and rows["elastic-plastic"].rms > stretch.rms
     assert rows["coulomb"].work < 0.9 * stretch.measured
-    limit = stretch.fitted.keys.fit.values[0] * damper.LOAD
+    limit = stretch.keys.fit.values[0] * damper.LOAD
     assert np.abs(loop.reading).max() > 2 * limit
-    assert 40 < stretch.fitted.keys.fit.intervals.rows < 90
+    assert 40 < stretch.keys.fit.intervals.rows < 90

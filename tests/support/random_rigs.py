@@ -31,7 +31,7 @@ PATCH_MEASURES = {  # Measures of the static patch, whose reference would be the
     "normal_stiffness", "tangential_stiffness",
 }  # fmt: skip
 LEFT_OUT = PATCH_MEASURES | {
-    "energy_balance", "work_check", "normal_load", "energy_created", "jump_level", "level_hysteresis",
+    "energy_balance", "work_check", "normal_load", "energy_created",
     "relative_displacement_amplitude_steady",
 }  # fmt: skip
 

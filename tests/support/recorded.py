@@ -159,7 +159,13 @@ def write_surfaces(folder: Path) -> None:
     groove = 0.8 * np.clip(1 - ((np.arange(120) - 60) / 20) ** 2, 0, None)
     for name, heights in {"scan": scan, "worn_scan": scan - groove}.items():
         noise = 0.003 * draw.normal(size=scan.shape)
-        np.savetxt(folder / f"{name}.csv", heights + noise, fmt="%.5f", delimiter=",")
+        np.savetxt(
+            folder / f"{name}.csv",
+            heights + noise,
+            fmt="%.5f",
+            delimiter=",",
+            header="Width: 240 um\nHeight: 180 um\nValue units: um",
+        )
 
 
 def describe_file(path: Path, name: str) -> dict:

@@ -91,30 +91,22 @@ def write_input_files(folder: Path) -> None:
         slide=[1.0, 0.0],
         output=[0.0, 1.0],
     )
-    f = np.arange(100.0, 200.0, 0.5)
-    wave = 2 * np.pi * f
-    own = 2 * np.pi * 143
-    pyuff.UFF(str(folder / "rig.uff")).write_sets(
-        [
-            {
-                "type": 58,
-                "func_type": 4,
-                "rsp_node": 7,
-                "rsp_dir": 1,
-                "ref_node": 7,
-                "ref_dir": 1,
-                "abscissa_spacing": 1,
-                "abscissa_spec_data_type": 18,
-                "ordinate_spec_data_type": 12,
-                "orddenom_spec_data_type": 13,
-                "x": f,
-                "data": -(wave**2) / 0.884 / (own**2 - wave**2 + 0.006j * own * wave),
-                "ordinate_axis_units_lab": "m/s^2",
-                "orddenom_axis_units_lab": "N",
-            }
-        ],
-        mode="overwrite",
-    )
+    zero = np.zeros(1)
+    shape = {
+        "type": 55,
+        "analysis_type": 2,
+        "data_ch": 2,
+        "spec_data_type": 8,
+        "load_case": 1,
+        "mode_n": 1,
+        "node_nums": [7],
+        **{"r1": np.ones(1), "r2": zero, "r3": zero},
+        "modal_m": 0.884,
+        "freq": 143.0,
+        "modal_damp_vis": 0.003,
+        "modal_damp_his": 0.0,
+    }
+    pyuff.UFF(str(folder / "rig.uff")).write_sets([shape], mode="overwrite")
 
 
 def run_command(*words: str) -> dict:

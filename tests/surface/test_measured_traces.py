@@ -12,7 +12,7 @@ from scipy.io import loadmat
 
 from patchfem.surface import Profile, describe_lost_waves, read_surface
 from patchfem.surface.areal import level_plane
-from patchfem.surface.fine import wave_spectrum
+from patchfem.surface.spectrum import wave_spectrum
 
 pytestmark = pytest.mark.skipif(
     "PATCHFEM_DATA" not in os.environ, reason="PATCHFEM_DATA names no folder of scans"

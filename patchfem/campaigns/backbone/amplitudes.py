@@ -22,7 +22,7 @@ SOFTENING_END = 0.7
 HARDENING_END = 3.0
 # Ratio of the travel to the largest default amplitude, so that a release can start above it.
 TRAVEL_FACTOR = 1.15
-LINEAR_AMPLITUDES = (1e-6, 1e-3)  # first and last amplitude of a linear rig [m]
+MAX_LINEAR_AMPLITUDE = 1e-3  # largest amplitude of a linear rig [m]
 N_LINEAR = 4  # number of amplitudes of a linear rig, whose values are constant
 # Change between neighbours, as a fraction of the range of the curve, above which a point is added between them.
 MAX_CHANGE = 0.08
@@ -50,9 +50,8 @@ def _default_range(joint: JointMode) -> tuple[float, float]:
     """Return the smallest and largest default amplitude [m] of a mode."""
     travel = joint.model.rig.springs.travel
     if joint.is_linear:
-        low, high = LINEAR_AMPLITUDES
-        factor = min(1.0, travel / high)
-        return low * factor, high * factor
+        high = min(MAX_LINEAR_AMPLITUDE, travel)
+        return 1e-3 * high, high
     low, high = joint.output_amplitude(np.array(_default_slides(joint)))
     high = min(high, _max_amplitude(joint))
     return min(low, MIN_AMPLITUDE_FACTOR * high), high

@@ -18,8 +18,9 @@ from .records import ROUND_OFF_ERROR, Curve, make_curve
 
 # Numbers of harmonics that are tried in turn, each with four times the samples of the previous one.
 HARMONIC_COUNTS = (9, 19, 39)
-# Number of fixed-point steps to the damping that sustains the motion of a linear rig; they converge fast.
-N_LINEAR_STEPS = 8
+# Number of fixed-point steps to the damping that sustains the motion of a linear rig. They converge slowly where a force at
+# the output moves other modes; where no force holds the phase resonance, the damping grows beyond 1.
+N_LINEAR_STEPS = 200
 NO_MOTION = "no free motion of these amplitudes was found"
 NO_OSCILLATION = "the mode does not oscillate at these amplitudes: its damping ratio is above 1"
 

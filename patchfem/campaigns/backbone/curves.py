@@ -8,12 +8,12 @@ import numpy as np
 from scipy.optimize import brentq
 
 from ...core import NotConverged, PatchfemError
-from ...effects import law_has_trait
 from ...formatting import format_length
 from ...model.model import Model
 from ...model.source import locate_errors
 from ...response.errors import finer_errors
 from ...runs.joint import find_stuck_patch_stiffness
+from ...scene.keys.removed import describe_removed
 from . import words
 from .amplitudes import default_amplitudes, find_amplitudes_of_forces
 from .balance import compute_balance_curve
@@ -35,11 +35,6 @@ CURVES = {"balance": compute_balance_curve, "quasi-static": compute_static_curve
 # Ratio of the smallest amplitude of gross slip to the amplitude at which the complete contact
 # begins to slip.
 MIN_GROSS_SLIP_RATIO = 3.0
-REMOVED_METHODS = {
-    "decay": 'was removed in patchfem 1.3; run a release with drive.kind = "free", whose result has frequency and damping '
-    "over the amplitude",
-    "all": "was removed in patchfem 1.3; leave it out: both methods are the default",
-}
 # Relative error of the flutter amplitude, smaller than the digits that are printed.
 FLUTTER_TOL = 1e-8
 
@@ -67,12 +62,10 @@ def choose_methods(method: str | None) -> tuple[str, ...]:
     """
     if not method:
         return METHODS
-    if method in REMOVED_METHODS:
-        raise PatchfemError(f"backbone: method {method!r} {REMOVED_METHODS[method]}")
     if method not in METHODS:
-        raise PatchfemError(
-            f"backbone: method {method!r} does not exist; use one of {', '.join(METHODS)}"
-        )
+        shown = f"backbone: method {method!r}"
+        removed = describe_removed(f"backbone --method {method}", shown)
+        raise PatchfemError(removed or f"{shown} does not exist; use one of {', '.join(METHODS)}")
     return (method,)
 
 
@@ -282,9 +275,8 @@ def _fit_exponents(joint: JointMode, curve: Curve | None) -> LossExponents:
     two points. A loss counts if it exceeds MIN_LOSS_RATIO times its error and the round-off of the
     energy.
     """
-    theory = _theoretical_exponent(joint)
     if curve is None or curve.amplitude.size < 2 or not joint.friction_limit:
-        return LossExponents(micro_theory=theory)
+        return LossExponents()
     amplitude = curve.amplitude
     loss = curve.loss
     speed = 2 * np.pi * curve.frequency * amplitude / joint.reach
@@ -303,22 +295,7 @@ def _fit_exponents(joint: JointMode, curve: Curve | None) -> LossExponents:
             ends = points[[first, -1]]
             slope = float(np.diff(np.log(loss[ends]))[0] / np.diff(np.log(amplitude[ends]))[0])
         slopes.append(slope)
-    return LossExponents(*slopes, theory)
-
-
-def _theoretical_exponent(joint: JointMode) -> float | None:
-    """Return the theoretical loss exponent in micro-slip; None if no theory applies.
-
-    It is chi + 3 for sliders (Segalman 2005), and 3 for bonds and for pieces whose pressure falls
-    to 0 at the edges of the contact (Cattaneo, Mindlin).
-    """
-    friction = joint.model.friction
-    if friction is None or not joint.friction_limit:
-        return None
-    if law_has_trait(friction.law, "cells"):
-        return friction.chi + 3
-    is_elastic = joint.model.partial_slip or joint.model.rig.friction.has_partial_slip
-    return 3.0 if law_has_trait(friction.law, "bonds") or is_elastic else None
+    return LossExponents(*slopes)
 
 
 def _find_flutter_amplitude(joint: JointMode, curves: dict[str, Curve]) -> float | None:

@@ -16,7 +16,9 @@ from ...scene.backbone_scene import ASSUMED_MASS, BackboneTables, GivenMode, par
 # Fraction of the stiffness of a mode that a joint of unknown `slide` is assumed to contribute.
 ASSUMED_JOINT_FRACTION = 0.1
 MAX_JOINT_FRACTION = 0.5  # Largest sum of these fractions over all modes.
-IGNORED_TABLES_NOTE = "{tables} {verb} ignored: a backbone is the motion of a mode at every amplitude, without a drive"
+IGNORED_TABLE_NOTE = (
+    "{table} is ignored: a backbone is the motion of a mode at every amplitude, without a drive"
+)
 ASSUMED_SIGNS_NOTE = (
     "every assumed `slide` is positive, so these modes are assumed to move the contact in the same direction when they "
     "move the output in the same direction; the curves of all methods depend on this assumption, so give the signs of "
@@ -47,7 +49,7 @@ def prepare_model(build: Callable, modes: str | Iterable = "") -> PreparedModel:
     """
     tables = BackboneTables(parse_modes(modes) if modes else (), stuck=False)
     model = build(tables, is_written=False)
-    notes = _note_ignored_tables(tables.ignored)
+    notes = tuple(IGNORED_TABLE_NOTE.format(table=name) for name in tables.ignored)
     if not tables.modes:
         return PreparedModel(model, notes)
     given_modes = tables.modes
@@ -106,14 +108,6 @@ def _assume_slides(modes: tuple, stiffness_per_mass: float) -> tuple:
 def _assumed_fraction(n_modes: int) -> float:
     """Return the fraction of the stiffness of each mode that is assumed to be due to the joint."""
     return min(ASSUMED_JOINT_FRACTION, MAX_JOINT_FRACTION / n_modes)
-
-
-def _note_ignored_tables(names: list) -> tuple:
-    """Return a note on tables of the scene that are ignored."""
-    if not names:
-        return ()
-    tables = " and ".join(f"[{name}]" for name in names)
-    return (IGNORED_TABLES_NOTE.format(tables=tables, verb="is" if len(names) == 1 else "are"),)
 
 
 def _note_modes(modes: tuple, *, is_assumed: bool, is_stuck: bool) -> tuple:

@@ -143,6 +143,17 @@ class JointMode(NamedTuple):
         return False
 
     @property
+    def has_cells(self) -> bool:
+        """Whether a law has a density of sliders, which is cut into cells."""
+        interfaces = self.model.rig.friction.interfaces
+        return any(law_has_trait(interface.numbers.law, "cells") for interface in interfaces)
+
+    @property
+    def has_partial_slip(self) -> bool:
+        """Whether a part of a contact slips before the whole."""
+        return self.model.partial_slip or self.model.rig.friction.has_partial_slip
+
+    @property
     def spring(self) -> float:
         """Stiffness of the mode without the contact [N/m], per unit of its coordinate."""
         return self.modes.mass * float(self.modes.omega[self.mode] or self.stuck_mode.omega) ** 2
@@ -218,20 +229,17 @@ class JointMode(NamedTuple):
             Function of a JointMode and a LawGroup that returns the quantity as an array.
         """
         model = self.model
-        laws = [interface.numbers.law for interface in model.rig.friction.interfaces]
-        has_cells = any(law_has_trait(law, "cells") for law in laws)
-        has_partial_slip = model.partial_slip or model.rig.friction.has_partial_slip
         error = 0.0
-        if not self.has_errors or not (has_cells or has_partial_slip):
+        if not self.has_errors or not (self.has_cells or self.has_partial_slip):
             return error
         group = self.steady_laws()
-        if has_partial_slip:
+        if self.has_partial_slip:
             error = error + decays.estimate_mesh_error(
                 group,
                 decays.make_laws_on_coarse_meshes(model, self.coarse, self.stiffer),
                 lambda laws: compute(self.with_modes(laws.modes, laws.stiffness()), laws),
             )
-        if has_cells:
+        if self.has_cells:
             best = compute(self, group)
             changes = []
             for cells in CELL_MERGES:

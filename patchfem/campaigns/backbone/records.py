@@ -122,12 +122,11 @@ class LossExponents(NamedTuple):
 
     An exponent is None if it is not determined.
 
-    micro: in micro-slip; gross: in gross slip; micro_theory: theoretical value in micro-slip.
+    micro: in micro-slip; gross: in gross slip.
     """
 
     micro: float | None = None
     gross: float | None = None
-    micro_theory: float | None = None
 
 
 class Backbone(NamedTuple):

@@ -2,10 +2,9 @@
 
 import numpy as np
 
-from ...effects import law_has_trait
 from ...formatting import format_length, format_number, format_quantity
 from ...runs.patch import faces
-from .joint import MIN_AMPLITUDE_FACTOR, JointMode
+from .joint import JointMode
 from .records import ROUND_OFF_ERROR, Backbone, Curve, match_amplitudes
 
 # Largest ratio of an amplitude of micro-slip to the amplitude at the onset of gross slip.
@@ -33,11 +32,6 @@ NO_CURVE = (
     "No method gives a curve at these amplitudes; give others with --amplitudes, or run a release with "
     'drive.kind = "free".'
 )
-SECANT = (
-    "--method quasi-static takes the stiffness from the two turning points of the motion; --method balance takes the "
-    "stiffness from the first harmonic of the force, and this stiffness is lower once the contact slips. The frequencies "
-    "by quasi-static are therefore higher than the frequencies by balance"
-)
 
 
 def write_notes(joint: JointMode, amplitudes, backbone: Backbone) -> tuple[str, ...]:
@@ -55,12 +49,13 @@ def write_notes(joint: JointMode, amplitudes, backbone: Backbone) -> tuple[str, 
         notes += _note_gaps(amplitudes, method, curve)
         notes += _note_missing_forces(joint, method, curve)
     if not joint.is_linear:
-        if backbone.exponents.micro_theory is not None and backbone.exponents.micro is None:
-            notes.append(_note_micro_slip(joint, amplitudes))
+        if (joint.has_cells or joint.has_partial_slip) and backbone.exponents.micro is None:
+            edge = format_length(MAX_MICRO_SLIP_RATIO * joint.slip_amplitude, 2)
+            notes.append(
+                f"the exponent of micro-slip cannot be determined: fewer than two amplitudes below {edge} have an energy "
+                f"loss of at least {MIN_LOSS_RATIO:g} times the error of the loss"
+            )
         notes += _note_missing_mesh(joint)
-        slips = amplitudes[-1] > MAX_MICRO_SLIP_RATIO * joint.slip_amplitude
-        if joint.friction_limit and slips and set(curves) == {"quasi-static"}:
-            notes.append(SECANT)
     if model.wear is not None:
         notes.append("these curves are for unworn pieces: [wear] is ignored")
     return tuple(notes)
@@ -76,24 +71,6 @@ def _note_missing_mesh(joint: JointMode) -> list[str]:
     if model.patch is not None and model.patch.mesh.file is not None:
         advice = "split the elements of contact.mesh"
     return [f"{MISSING_ERRORS}the interface has too few elements for a coarser mesh; {advice}"]
-
-
-def _note_micro_slip(joint: JointMode, amplitudes) -> str:
-    """Return a note on why the exponent of micro-slip is not determined."""
-    edge = MAX_MICRO_SLIP_RATIO * joint.slip_amplitude
-    if amplitudes[0] > edge:
-        begin = format_length(MIN_AMPLITUDE_FACTOR / MAX_MICRO_SLIP_RATIO * edge, 2)
-        return (
-            f"the smallest amplitude, {format_length(amplitudes[0], 3)}, lies above the range of "
-            f"micro-slip, which ends at about {format_length(edge, 2)}; to get the exponent of "
-            f"micro-slip, begin --amplitudes at {begin}"
-        )
-    return (
-        "the exponent of micro-slip cannot be determined: fewer than two amplitudes below "
-        f"{format_length(edge, 2)} have an energy loss of at least {MIN_LOSS_RATIO:g} times the "
-        f"error of the loss; give amplitudes up to {format_length(edge, 2)}, or a smaller "
-        "accuracy.tolerance"
-    )
 
 
 def _note_missing_forces(joint: JointMode, method: str, curve: Curve) -> list[str]:
@@ -172,10 +149,7 @@ def _describe_slip(joint: JointMode, curve: Curve) -> list[str]:
         f"At the stiffness of the sticking contact, friction would reach its limit at {edge}."
     ]
     # Micro-slip has no onset: the smallest slider of a mesh or of a density sets where its loss begins.
-    model = joint.model
-    has_partial_slip = model.partial_slip or model.rig.friction.has_partial_slip
-    laws = [interface.numbers.law for interface in model.rig.friction.interfaces]
-    if has_partial_slip or any(law_has_trait(law, "cells") for law in laws):
+    if joint.has_cells or joint.has_partial_slip:
         return sentences
     slips = curve.loss > ROUND_OFF_ERROR * joint.spring * (curve.amplitude / joint.reach) ** 2
     count = int(np.argmax(slips)) if slips.any() else curve.amplitude.size
@@ -205,10 +179,8 @@ def describe_band_width(backbone: Backbone) -> str:
     content = "the numerical error"
     if any(match_amplitudes(curve, other)[0].size for other in others):
         content += " and the difference of the two methods"
-    # as many digits as show the width of the band
-    digits = int(np.clip(2 - np.log10(max(damping[k], 1e-6)), 3, 6))
     ends = np.array([band.damping_low, band.damping_high, curve.damping])[:, k].tolist()
-    low, high, best = (format_number(value, digits) for value in ends)
+    low, high, best = (format_number(value, 6) for value in ends)
     return (
         f"Its band is {content}; it is widest at {format_length(curve.amplitude[k], 3)}, where the damping ratio is "
         f"{low} to {high} beside {best}, and the frequency is "
@@ -224,11 +196,9 @@ def describe_static_curve(curves: dict[str, Curve]) -> list[str]:
     if len(curves) < 2:
         return []
     here, there = match_amplitudes(curves["balance"], curves["quasi-static"])
-    if not here.size:
-        return []
     balance = curves["balance"].at(here)
     static = curves["quasi-static"].at(there)
-    agrees = np.ones(balance.amplitude.size, bool)
+    agrees = np.ones(here.size, bool)
     for name in ("frequency", "damping"):
         value = getattr(balance, name)
         error = getattr(balance, f"{name}_error") + getattr(static, f"{name}_error")
@@ -236,18 +206,13 @@ def describe_static_curve(curves: dict[str, Curve]) -> list[str]:
         agrees &= np.abs(getattr(static, name) - value) <= limit
 
     # the range ends at the first amplitude at which they differ
-    tolerance = f"{100 * AGREEMENT:g} % and both errors"
-    if agrees.all():
-        return [
-            f"The quasi-static curve holds within {tolerance} at all amplitudes of both curves."
-        ]
-    first = int(np.argmin(agrees))
-    if not first:
-        return [
-            f"The quasi-static curve differs by more than {tolerance} from its smallest amplitude on."
-        ]
-    edge = format_length(balance.amplitude[first - 1], 3)
-    return [f"The quasi-static curve holds up to {edge} within {tolerance}."]
+    count = agrees.size if agrees.all() else int(np.argmin(agrees))
+    if not count:
+        return []
+    edge = format_length(balance.amplitude[count - 1], 3)
+    return [
+        f"The quasi-static curve holds up to {edge} within {100 * AGREEMENT:g} % and both errors."
+    ]
 
 
 def _describe_coupling(joint: JointMode, curve: Curve) -> list[str]:

@@ -23,16 +23,11 @@ from ...inputs.units import RATIO_UNITS
 from ...model.model import Model
 from ...model.source import locate_errors
 from ...response.errors import convergence_error
-from ...scene.overrides import BaseScene
+from ...scene.assignments import Range
 from ...scene.scene import Scene
 from ..backbone.curves import compute_backbone
-from .problem import (
-    FittedKeys,
-    FreeKeys,
-    build_changed_model,
-    format_assignments,
-    parse_ranges,
-)
+from .options import FitOptions
+from .problem import DEFAULT_OPTIONS, FittedKeys, FreeKeys
 
 UNITS = {
     "amplitude": {"m": 1.0, "mm": 1e-3, "um": 1e-6},
@@ -50,7 +45,6 @@ MIN_SPREAD = 1e-6
 METHODS = ("balance", "quasi-static")  # Reference method and fast method.
 DEFAULT_STARTS = 6  # Number of starting points of a search by the fast method.
 PROGRESS_SECONDS = 10.0  # Time between two progress messages [s].
-MAX_LISTED_AMPLITUDES = 6  # Largest number of amplitudes that a message lists.
 SAME_AMPLITUDE = (
     1e-6  # largest relative difference of a measured amplitude and that of its computed point
 )
@@ -196,43 +190,46 @@ def read_damping_curve(path) -> MeasuredCurve:
     )
 
 
-class CurveModel:
-    """Curves of frequency [Hz] and damping ratio (2, k) of a rig, and their fits to measured ones.
+class CurveModel(FreeKeys):
+    """Free keys of a rig, and its curves of frequency [Hz] and damping ratio (2, k) with their values.
 
     Parameters
     ----------
-    keys : FreeKeys
+    scene : Scene
+    ranges : sequence of Range
+        Bounds of the free keys.
     amplitude : (k,) array
         Measured amplitudes [m].
     say : callable, optional
         Called with a line of text that reports the progress.
     """
 
-    def __init__(self, keys: FreeKeys, amplitude: np.ndarray, say=None):
-        self.keys = keys
-        self.base = BaseScene(keys.scene)
+    def __init__(
+        self,
+        scene: Scene,
+        ranges: Sequence[Range],
+        amplitude: np.ndarray,
+        say: Callable | None = None,
+    ):
+        super().__init__(scene, ranges)
         self.amplitude = amplitude
         self.say = say
-        self.begin = perf_counter()
-        self.last_progress = self.begin
+        self.last_progress = self.start_time
         self.n_computed = 0
         # each step of the search needs some of the last curves again
         self._compute_once = lru_cache(8)(self._compute)
 
-    def build_model(self, values) -> Model:
-        """Build the rig model for given free parameters."""
-        return build_changed_model(self.base, format_assignments(self.keys.ranges, values))
-
     def _compute(self, values: tuple[float, ...], method: str) -> np.ndarray:
-        """Compute frequency and damping for given free parameters, and report the progress."""
-        if self.say and perf_counter() - self.last_progress >= PROGRESS_SECONDS:
-            self.last_progress = perf_counter()
-            elapsed = self.last_progress - self.begin
-            self.say(f"{self.n_computed} curves of the model computed in {elapsed:.0f} s")
+        """Compute frequency and damping for values (n,) of the keys, and report the progress."""
+        now = perf_counter()
+        if self.say and now - self.last_progress >= PROGRESS_SECONDS:
+            self.last_progress = now
+            seconds = now - self.start_time
+            self.say(f"{self.n_computed} curves of the model computed in {seconds:.0f} s")
         self.n_computed += 1
         return compute_points(self.build_model(values), self.amplitude, method)
 
-    def compute(self, values, method: str) -> np.ndarray:
+    def compute(self, values: Sequence[float], method: str) -> np.ndarray:
         """Compute frequency and damping (2, k) by one of the methods.
 
         Raises PatchfemError if the mode does not oscillate at one of the amplitudes.
@@ -240,24 +237,23 @@ class CurveModel:
         curve = self._compute_once(tuple(map(float, values)), method)
         missing = self.amplitude[np.isnan(curve[0])]
         if missing.size:
-            listed = [format_length(size, 3) for size in missing[:MAX_LISTED_AMPLITUDES]]
-            etc = ", ..." if missing.size > len(listed) else ""
+            low, high = (format_length(missing[k], 3) for k in (0, -1))
             raise PatchfemError(
-                f"the mode of the model does not oscillate at the amplitudes {', '.join(listed)}{etc}; leave out these "
-                "rows, or narrow the ranges of --free"
+                f"the mode of the model does not oscillate at {missing.size} of {self.amplitude.size} amplitudes, from "
+                f"{low} to {high}; leave out these rows, or narrow the ranges of --free"
             )
         return curve
 
     def solve(
         self, measured: MeasuredCurve, method: str, starts: int = 1, kind: str = "", start=None
     ) -> Fit:
-        """Fit the free parameters to a measured curve.
+        """Fit the keys to a measured curve by a method of the backbone.
 
         Parameters
         ----------
         measured : MeasuredCurve
         method : str
-            Method of the backbone.
+            From METHODS.
         starts : int
             Number of starting points.
         kind : str
@@ -265,7 +261,7 @@ class CurveModel:
         start : (n,) array, optional
             First starting point in place of that of the scene.
         """
-        problem = self.keys.make_problem(
+        problem = self.make_problem(
             lambda values: measured.normalized_residual(self.compute(values, method))
         )
         if start is not None:
@@ -307,30 +303,26 @@ def compute_points(model: Model, amplitudes: np.ndarray, method: str) -> np.ndar
 def fit_curve(
     scene: Scene,
     curve_file: Path,
-    free_parameters: Sequence[str],
+    ranges: Sequence[Range],
+    options: FitOptions = DEFAULT_OPTIONS,
     say: Callable | None = None,
-    starts: int = DEFAULT_STARTS,
 ) -> FittedCurve:
-    """Fit free parameters of a rig to measured frequency and damping as functions of amplitude.
+    """Fit free keys of a rig to measured frequency and damping as functions of amplitude.
 
-    Each row is weighted by its error. Parameters for which the mode does not oscillate count as a
-    failed evaluation. For a reduced structure the intervals include the error of neglected modes.
+    Each row is weighted by its error. Values for which the mode does not oscillate count as a failed evaluation. For a
+    reduced structure the intervals include the error of neglected modes.
 
     Parameters
     ----------
     scene : Scene
     curve_file : Path
         File of the measured curve, in the format of `read_damping_curve`.
-    free_parameters : sequence of str
-        Free parameters with their ranges, "table.key=low..high".
-    say : Callable, optional
+    ranges : sequence of Range
+        Bounds of the free keys.
+    options : FitOptions
+        `starts` is the number of starting points of the search by the fast method.
+    say : callable, optional
         Called with a line of text that reports the progress.
-    starts : int
-        Number of starting points of the search by the fast method.
-
-    Returns
-    -------
-    FittedCurve
 
     Raises
     ------
@@ -339,18 +331,15 @@ def fit_curve(
     PatchfemError
         If the input is invalid, or if neither method has a curve at a starting point.
     """
-    begin = perf_counter()
-    ranges = parse_ranges(free_parameters)
     measured = read_damping_curve(curve_file)
-    keys = FreeKeys(scene, ranges)
-    keys.require_enough_rows(curve_file, measured.value.size, "values")
-    curves = CurveModel(keys, measured.amplitude, say)
+    curves = CurveModel(scene, ranges, measured.amplitude, say)
+    curves.require_enough_rows(curve_file, measured.value.size, "values")
 
     # The fast method gives the start of the search by the reference method, and the errors that the table does not give.
     reasons = {}
     for method in reversed(METHODS):
         try:
-            first = curves.solve(measured, method, starts)
+            first = curves.solve(measured, method, options.starts or DEFAULT_STARTS)
             break
         except NotConverged as reason:
             reasons[method] = reason
@@ -385,7 +374,7 @@ def fit_curve(
         _note_different_methods(reference, measured),
     ]
     return FittedCurve(
-        keys=keys.make_fitted_keys(widened, begin),
+        keys=curves.make_fitted_keys(widened),
         path=Path(curve_file),
         measured=measured,
         model=fitted,
@@ -424,7 +413,7 @@ def extrapolate_curve(
     try:
         curve = compute(fit.values)
         # changes of the curve per half-width of each parameter; a step towards the middle stays within its range
-        for k, bound in enumerate(curves.keys.ranges if is_determined else ()):
+        for k, bound in enumerate(curves.ranges if is_determined else ()):
             values = np.array(fit.values)
             step = np.copysign(BAND_STEP, (bound.low + bound.high) / 2 - values[k])
             values[k] += step * half_widths[k]
@@ -444,7 +433,7 @@ def extrapolate_curve(
     gradients = np.array(slopes) / (1.96 * deviation)
     information = np.einsum("iqk,jqk->kij", gradients, gradients)
     places = [f"at about {format_length(amplitude, 2)}" for amplitude in amplitudes]
-    advice = advise_test(fit, [bound.key for bound in curves.keys.ranges], information, places)
+    advice = advise_test(fit, [bound.key for bound in curves.ranges], information, places)
     return beyond[:, known], advice
 
 
@@ -452,15 +441,11 @@ def _note_different_methods(method: str, measured: MeasuredCurve) -> str:
     """Return a note if the measured and the computed curve come from different methods, else ""."""
     if measured.method == method:
         return ""
-    k = int(np.argmax(measured.value[1]))
-    amplitude_loss = -np.expm1(-2 * np.pi * measured.value[1, k])
-    amplitude = format_length(measured.amplitude[k], 3)
+    amplitude_loss = -np.expm1(-2 * np.pi * measured.value[1].max())
     return (
-        f"the measured curve is compared with the curve by {method} at the same amplitudes, not "
-        "with a computed decay; a decay gives mean values over a cycle, so the two differ most "
-        f"where the damping is largest: at {amplitude} one cycle reduces the amplitude by "
-        f"{100 * amplitude_loss:.2g} %. The intervals do not contain this difference; a run of a release "
-        "computes the decay"
+        f"the measured curve is compared with the curve by {method} at the same amplitudes, not with a computed decay, "
+        f"which gives mean values over a cycle, in which the amplitude falls by up to {100 * amplitude_loss:.2g} %. "
+        "The intervals do not contain this difference; a run of a release computes the decay"
     )
 
 
@@ -498,19 +483,13 @@ def _widen_by_missing_modes(
     error = convergence_error(change, ratio=0.5, order=2.0)
     moved = curves.solve(measured._replace(value=measured.value - error), method, start=fit.values)
     shifts = np.abs(moved.values - fit.values)
-    bounds = np.array([(bound.low, bound.high) for bound in curves.keys.ranges])
+    bounds = np.array([(bound.low, bound.high) for bound in curves.ranges])
     ends = fit.intervals.ends + shifts[:, None] * [-1, 1]
     ends = frozen_array(np.clip(ends, bounds[:, :1], bounds[:, 1:]))
 
-    # what the note tells
-    texts = []
-    for bound, shift, value in zip(curves.keys.ranges, shifts, fit.values):
-        size = f"{100 * shift / abs(value):.2g} %" if value else f"{shift:.2g}"
-        texts.append(f"{bound.key} by {size}")
     frequency, damping = 100 * np.nanmax(np.abs(change / reference), axis=1)
     note = (
         "the intervals contain the error of the modes left out of the structure; a computation "
-        f"with more modes changes frequencies by up to {frequency:.2g} % and damping ratios by up "
-        f"to {damping:.2g} %, and moves {', '.join(texts)}"
+        f"with more modes changes frequencies by up to {frequency:.2g} % and damping ratios by up to {damping:.2g} %"
     )
     return replace(fit, intervals=replace(fit.intervals, ends=ends)), note

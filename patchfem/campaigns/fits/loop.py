@@ -1,25 +1,35 @@
 """Fit of a bench scene with a prescribed displacement to a measured friction loop.
 
-The model is free of stress in the first row of the record and follows the measured displacement,
-which is interpolated linearly between rows. If the force depends on the time steps, they are halved
-until the fit converges.
+The model is free of stress in the first row of the record and follows the measured displacement, which is interpolated
+linearly between rows. If the force depends on the time steps, they are halved until the fit converges.
 """
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from time import perf_counter
 
 import numpy as np
 
-from ...core import NotConverged
+from ...core import NotConverged, PatchfemError
 from ...effects import law_has_trait
 from ...inputs.loops import Loop, read_loop
+from ...model.gap import find_shape_side
+from ...model.model import Model, build
+from ...model.source import locate_errors
+from ...runs.batch.meshes import SharedMeshes
+from ...runs.bench.bench import run_bench
+from ...runs.bench.engine import choose_smooth_bond_summation
+from ...scene.assignments import Range
 from ...scene.scene import Scene, SceneError
-from .loop_model import BenchModel
-from .loop_path import DEFAULT_OPTIONS, LoopOptions, make_offsets
-from .problem import FittedKeys, FreeKeys, parse_ranges
+from .options import FitOptions
+from .problem import DEFAULT_OPTIONS, FittedKeys, FreeKeys, solve_contact
 
+# Number of time steps between two rows at which the steps are not halved any more.
+MAX_STEPS_PER_ROW = 64
+# Largest ratio of a change of the force to the tolerance at which the change is negligible in a fit.
+STEP_FRACTION = 0.1
+# Ratio of the rest speed of growing bonds to the largest measured speed.
+REST_SPEED_FRACTION = 1e-3
 # Smallest fraction of independent rows for which no warning about correlation is issued.
 MIN_INDEPENDENT = 0.6
 # Ratio of the residual to the peak force up to which round-off dominates the residual.
@@ -35,14 +45,12 @@ class FittedLoop:
     Attributes
     ----------
     keys : FittedKeys
-        Fitted values of the free parameters, followed by those of `offsets`.
     loop : Loop
         Measured loop.
-    offsets : list of Offset
     held_out : (k,) bool
         Mask of the rows that were predicted but not fitted.
     model : (k,) array
-        Computed force or friction ratio at the rows of `loop`.
+        Computed force [N] or friction ratio at the rows of `loop`.
     step_error : float
         Largest change of `model` when the time steps are halved.
     steps_per_row : int
@@ -51,7 +59,6 @@ class FittedLoop:
 
     keys: FittedKeys
     loop: Loop
-    offsets: list
     held_out: np.ndarray
     model: np.ndarray
     step_error: float
@@ -67,35 +74,151 @@ class FittedLoop:
         """Root mean square residual of the held-out rows; None if there are none."""
         return self._residual_rms(self.held_out) if self.held_out.any() else None
 
-    def _residual_rms(self, mask) -> float:
+    def _residual_rms(self, mask: np.ndarray) -> float:
         """Return the root mean square residual of the rows in a mask (k,)."""
         residual = self.model - self.loop.reading
         return float(np.sqrt(np.mean(residual[mask] ** 2)))
 
 
+class BenchModel:
+    """Force [N] or friction ratio (k,) at the rows of a measured loop, as a function of the values of free keys.
+
+    Parameters
+    ----------
+    keys : FreeKeys
+        Free keys of a scene with [slide].
+    loop : Loop
+        Measured loop.
+    time : (k,) array
+        Times of its rows [s].
+    say : callable, optional
+        Called with a line of text that reports the progress.
+    """
+
+    def __init__(self, keys: FreeKeys, loop: Loop, time: np.ndarray, say: Callable | None = None):
+        self.keys = keys
+        self.loop = loop
+        self.time = time
+        self.say = say
+        law = keys.scene.friction.law
+        is_rigid = law_has_trait(law, "set-valued") and not law_has_trait(law, "averaged")
+        self.is_discontinuous = law_has_trait(law, "creeps") or is_rigid
+        self.is_exact = _is_step_independent(keys.scene)
+        steps = keys.scene.accuracy.steps_per_cycle
+        self.has_fixed_steps = steps is not None
+        self.steps_per_row = 1
+        if self.has_fixed_steps and not self.is_exact:
+            self.steps_per_row = max(1, -(-steps // (loop.reading.size - 1)))
+        self.patch = None
+        self.meshes = None
+
+    def __call__(self, values: np.ndarray) -> np.ndarray:
+        """Compute the reading (k,) at the rows for values (n,) [SI] of the keys.
+
+        Raises PatchfemError if the scene is invalid for these values, or if nothing presses the pieces together.
+        """
+        model = self.keys.build_model(values)
+        with locate_errors(model.source):
+            return self._compute_reading(model)
+
+    def _compute_reading(self, model: Model) -> np.ndarray:
+        """Compute the force or the friction ratio (k,) along the measured displacement."""
+        patch = self._solve_patch(model)
+        corner = np.arange(self.time.size) * self.steps_per_row
+        number = np.arange(corner[-1] + 1)
+        time = np.interp(number, corner, self.time)
+        displacement = np.interp(number, corner, self.loop.displacement)
+        choice = choose_smooth_bond_summation(model, displacement)
+        samples = (time, displacement, 0, 0.0)
+        run = run_bench(model, patch, 4, path=samples, choice=choice, say=self.say)
+        if not run.load[0] > 0:
+            raise PatchfemError(
+                "the normal load is 0 or less; give a load that presses the pieces together", ""
+            )
+        reading = run.force[corner]
+        if self.is_discontinuous:
+            # At a row between two straight segments the reading is the mean of the forces before and after it.
+            after = run.force[np.minimum(corner + 1, number[-1])]
+            reading = np.where(corner == 0, after, (reading + after) / 2)
+        return reading / run.load[0] if self.loop.quantity == "friction_ratio" else reading
+
+    def _solve_patch(self, model: Model):
+        """Return the solved contact patch of a model; None for a [normal] contact."""
+        if model.patch is None:
+            return None
+        if self.keys.changes_contact:
+            if self.meshes is None:
+                self.meshes = self._choose_meshes()
+            self.patch = solve_contact(self.meshes.with_shared_meshes(model))
+        elif self.patch is None:
+            self.patch = solve_contact(model)
+        return self.patch
+
+    def _choose_meshes(self) -> SharedMeshes:
+        """Return common meshes of all values: those of the lower ends, the middles and the upper ends of the ranges."""
+        models = []
+        for part in (0.0, 0.5, 1.0):
+            values = [bound.low + part * (bound.high - bound.low) for bound in self.keys.ranges]
+            try:
+                models.append(self.keys.build_model(values))
+            except PatchfemError:
+                continue  # the search counts this error as a failed evaluation, too
+        return SharedMeshes(models, False)
+
+    def measure_step_error(self, values: np.ndarray) -> float:
+        """Return the largest change of the computed reading when the time steps are halved; 0 if they have no effect."""
+        if self.is_exact:
+            return 0.0
+        coarse = self(values)
+        self.steps_per_row *= 2
+        fine = self(values)
+        self.steps_per_row //= 2
+        return float(np.abs(fine - coarse).max())
+
+    def refine_steps(self, values: np.ndarray) -> None:
+        """Halve the time steps until their effect on the reading is negligible, unless the scene sets them."""
+        limit = STEP_FRACTION * self.keys.scene.accuracy.tolerance
+        while not self.has_fixed_steps and self.steps_per_row < MAX_STEPS_PER_ROW:
+            if self.measure_step_error(values) <= limit * np.abs(self(values)).max():
+                return
+            self.steps_per_row *= 2
+            if self.say:
+                self.say(f"{self.steps_per_row} time steps between neighbouring rows of the record")
+
+
+def _is_step_independent(scene: Scene) -> bool:
+    """Return whether the computed force at the rows does not depend on the time steps."""
+    law = scene.friction
+    contact = scene.contact
+    bonds = law_has_trait(law.law, "bonds")
+    is_closed_form = law.rest_growth is None and (law.reading == "report" or law.order == 1)
+    if bonds and not is_closed_form:
+        return False
+    if contact is None:
+        return True
+    return not (bonds and contact.compliance_key) and find_shape_side(contact) != "lower"
+
+
 def fit_hysteresis_loop(
     scene: Scene,
     loop_file: Path,
-    free_parameters: Sequence,
-    held_out_rows: Sequence = (),
+    ranges: Sequence[Range],
+    options: FitOptions = DEFAULT_OPTIONS,
     say: Callable | None = None,
-    options: LoopOptions = DEFAULT_OPTIONS,
 ) -> FittedLoop:
-    """Fit free parameters of a bench scene to the measured friction loop in a file.
+    """Fit free keys of a bench scene to the measured friction loop in a file.
 
     Parameters
     ----------
     scene : Scene
     loop_file : Path
         File of the measured loop.
-    free_parameters : sequence of str
-        Free parameters with their ranges, "table.key=low..high".
-    held_out_rows : sequence of str
-        Selectors "column=value,value" of rows that are predicted but not fitted.
-    say : Callable, optional
+    ranges : sequence of Range
+        Bounds of the free keys.
+    options : FitOptions
+        `hold` selects rows that are predicted but not fitted.
+    say : callable, optional
         Called with a line of text that reports the progress.
-    options : LoopOptions
-        Fitted offsets and warm-up cycles.
 
     Returns
     -------
@@ -108,7 +231,6 @@ def fit_hysteresis_loop(
     NotConverged
         If the model cannot be evaluated at any starting point.
     """
-    begin = perf_counter()
     if scene.kind != "bench":
         raise SceneError(
             [
@@ -116,55 +238,84 @@ def fit_hysteresis_loop(
                 f"with [slide], but this is a {scene.kind} scene; add [slide]"
             ]
         )
-    ranges = parse_ranges(free_parameters)
     loop = read_loop(loop_file)
     held_out = np.zeros(loop.reading.size, bool)
-    for selector in held_out_rows:
+    for selector in options.hold:
         held_out |= loop.select_rows(selector)
-    offsets = make_offsets(options.offsets, loop)
+    time, notes = _find_row_times(scene, loop)
+    keys = FreeKeys(scene, ranges, _set_rest_speed(scene, ranges, loop, time), notes)
+    keys.require_enough_rows(loop_file, np.count_nonzero(~held_out), "rows")
+
+    with locate_errors(scene):
+        build(scene)  # mistakes in the files that the scene names do not depend on the keys
 
     # least squares of the deviations, as fractions of the largest force
-    bench = BenchModel(scene, loop, ranges, offsets, warm_up=options.warm, say=say)
+    bench = BenchModel(keys, loop, time, say)
     scale = float(np.abs(loop.reading[~held_out]).max(initial=0.0))
-    offset_ranges = [offset.range for offset in offsets]
-    keys = FreeKeys(scene, ranges, offset_ranges, bench.assignments, bench.notes)
-    keys.require_enough_rows(loop_file, np.count_nonzero(~held_out), "rows")
     problem = keys.make_problem(lambda values: (bench(values) - loop.reading)[~held_out] / scale)
     try:
-        if bench.is_exact:
-            fit = problem.solve(interval_kind="series")
-        else:
-            # the steps are chosen at the result of a fit with the largest steps
-            first = problem.solve(interval_kind="")
-            bench.refine_steps(first.values)
-            fit = replace(problem, start=first.values).solve(1, "series")
-            fit = fit.count_earlier_search(first)
-    except NotConverged as error:
-        if bench.n_computed == 0:
-            raise bench.first_error or error from None
+        fit = problem.solve(interval_kind="series" if bench.is_exact else "")
+    except NotConverged:
+        keys.base.override(keys.assign([bound.low for bound in ranges]))  # raises its mistakes
         raise
-    step_error = 0.0 if bench.is_exact else bench.measure_step_error(fit.values)
+    if not bench.is_exact:
+        # the steps are chosen at the result of the fit with the largest steps
+        first = fit
+        bench.refine_steps(first.values)
+        fit = replace(problem, start=first.values).solve(1, "series")
+        fit = fit.count_earlier_search(first)
     fitted = FittedLoop(
-        keys=keys.make_fitted_keys(fit, begin),
+        keys=keys.make_fitted_keys(fit),
         loop=loop,
-        offsets=offsets,
         held_out=held_out,
         model=bench(fit.values),
-        step_error=step_error,
+        step_error=bench.measure_step_error(fit.values),
         steps_per_row=bench.steps_per_row,
     )
-    has_lead_in = bool(offsets) or options.warm
-    doubts = _warn_of_doubtful_fit(fitted, scene, has_lead_in=has_lead_in)
-    warnings = [*fitted.keys.warnings, *doubts]
-    return replace(fitted, keys=replace(fitted.keys, warnings=warnings))
+    return replace(fitted, keys=keys.make_fitted_keys(fit, _warn_of_doubtful_fit(fitted)))
 
 
-def _warn_of_doubtful_fit(fitted: FittedLoop, scene: Scene, *, has_lead_in: bool) -> list:
-    """Return warnings about correlated residuals, the initial state and the time steps.
+def _find_row_times(scene: Scene, loop: Loop) -> tuple[np.ndarray, list[str]]:
+    """Return the times (k,) [s] of the rows, and a note on times that the record does not give.
 
-    `has_lead_in`: whether the model may carry stress in the first row.
+    Raises PatchfemError if the force depends on times that the record does not give.
     """
+    if loop.time is not None:
+        return loop.time, []
+    law = scene.friction
+    has_plain_bonds = law_has_trait(law.law, "bonds") and law.rest_growth is None
+    load_varies = scene.normal is not None and scene.normal.amplitude
+    if load_varies or not (law_has_trait(law.law, "timeless") or has_plain_bonds):
+        raise PatchfemError(
+            f"{loop.path}:1: law '{law.law}' needs the times of the rows of this record; add a column time [s]"
+        )
+    note = (
+        f"{loop.path} has no column of time: its rows are taken as evenly spaced in time, "
+        f"which does not affect the force of law '{law.law}'"
+    )
+    return np.arange(float(loop.reading.size)), [note]
+
+
+def _set_rest_speed(
+    scene: Scene, ranges: Sequence[Range], loop: Loop, time: np.ndarray
+) -> list[str]:
+    """Return the assignment of the rest speed of growing bonds from the largest measured speed.
+
+    The list is empty if the scene sets the rest speed or frees it, or if the bonds do not grow. time (k,) [s].
+    """
+    law = scene.friction
+    grows = law_has_trait(law.law, "bonds") and law.rest_growth is not None
+    is_free = "friction.rest_speed" in {bound.key for bound in ranges}
+    if not grows or law.rest_speed is not None or is_free:
+        return []
+    speeds = np.abs(np.diff(loop.displacement) / np.diff(time))
+    return [f"friction.rest_speed={REST_SPEED_FRACTION * float(speeds.max())!r} m/s"]
+
+
+def _warn_of_doubtful_fit(fitted: FittedLoop) -> list[str]:
+    """Return warnings about correlated residuals, a first row with force, and coarse time steps."""
     loop = fitted.loop
+    scene = fitted.keys.scene
     peak = float(np.abs(loop.reading).max())
     n_used = np.count_nonzero(~fitted.held_out)
     n_independent = fitted.keys.fit.intervals.rows
@@ -176,14 +327,12 @@ def _warn_of_doubtful_fit(fitted: FittedLoop, scene: Scene, *, has_lead_in: bool
             "is systematic"
         )
     first_force = abs(loop.reading[0])
-    starts_at_rest = (
-        fitted.held_out[0] or has_lead_in or law_has_trait(scene.friction.law, "memoryless")
-    )
+    starts_at_rest = fitted.held_out[0] or law_has_trait(scene.friction.law, "memoryless")
     if first_force > MAX_FIRST_FORCE * peak and not starts_at_rest:
         warnings.append(
             f"the force in the first row is {first_force / peak:.0%} of the largest force, but the model "
-            "starts without force: use --warm-up, hold out the first cycle, or give a record that "
-            "begins at rest"
+            "starts without force: repeat the rows of the first cycle before the record, with a column of labels, and hold "
+            "out this cycle, as --hold cycle=1, or give a record that begins at rest"
         )
     if fitted.step_error > scene.accuracy.tolerance * peak:
         warnings.append(

@@ -1,7 +1,7 @@
-"""Least-squares problem for free parameters of a scene, and the record of the fitted values.
+"""Free keys of a scene as the unknowns of a least-squares problem, and the record of their fitted values.
 
-A fit to a loop, a curve or a response table makes a `Problem` of its free parameters, solves it, and
-returns `FittedKeys` with all warnings.
+A fit to a loop, a curve or a response table makes a `Problem` of its `FreeKeys` and of a residual, which compares the model
+that `FreeKeys.build_model` returns with the measurement. `make_fitted_keys` returns the result with all warnings.
 """
 
 from collections.abc import Callable, Iterable, Sequence
@@ -20,26 +20,40 @@ from ...scene.assignments import BOUNDS, Range, read_assignments
 from ...scene.lines import find_scene_value
 from ...scene.overrides import BaseScene
 from ...scene.scene import Scene, SceneError, add_sets
+from .options import FitOptions
 
-# Largest ratio high/low of a range whose middle is the arithmetic mean; the middle of a wider range
-# is the geometric mean, as in `identify.space`.
-MAX_LINEAR_RATIO = 10.0
 # Tables of the joint that was bolted when the modes were measured.
 JOINT_TABLES = ("contact.", "normal.", "friction.", "structure.bonded.", "structure.interface.")
 
 
+@dataclass(frozen=True, slots=True)
+class Listener:
+    """Callbacks by which a fit reports its progress.
+
+    - say: takes a line of text.
+    - progress: takes the completed fraction, from 0 to 1.
+    """
+
+    say: Callable | None = None
+    progress: Callable | None = None
+
+
+DEFAULT_OPTIONS = FitOptions()
+SILENT = Listener()
+
+
 @dataclass(frozen=True, eq=False, slots=True)
 class FittedKeys:
-    """Fitted values of the free parameters of a scene, with confidence intervals and warnings.
+    """Fitted values of the free keys of a scene, with confidence intervals and warnings.
 
     Attributes
     ----------
     scene : Scene
         The scene before the fit.
     ranges : list of Range
-        Bounds of the free parameters.
+        Bounds of the free keys.
     fit : Fit
-        Values and intervals in the order of `ranges`, followed by fitted offsets.
+        Values and intervals in the order of `ranges`.
     sets : list of str
         The ``table.key=value`` strings of the fitted scene.
     warnings : list of str
@@ -48,10 +62,10 @@ class FittedKeys:
     """
 
     scene: Scene
-    ranges: list
+    ranges: list[Range]
     fit: Fit
-    sets: list
-    warnings: list
+    sets: list[str]
+    warnings: list[str]
     seconds: float
 
     @property
@@ -64,37 +78,65 @@ class FittedKeys:
         return add_sets(self.scene, self.sets)
 
 
-@dataclass(frozen=True, eq=False, slots=True)
 class FreeKeys:
-    """Free parameters of a scene as the unknowns of a least-squares problem.
+    """Free keys of a scene, and the models of the scene with their values.
 
-    Attributes
+    Parameters
     ----------
     scene : Scene
         Scene with the initial values.
-    ranges : list of Range
-        Bounds of the free parameters.
-    offsets : sequence of Range
-        Bounds of additional unknowns that are not scene keys.
+    ranges : sequence of Range
+        Bounds of the free keys.
     sets : sequence of str
-        The ``table.key=value`` strings that are set for all values of the parameters.
+        The ``table.key=value`` strings that are set for all values of the keys.
     notes : sequence of str
-        Assumptions of the model, which are added to the warnings.
+        Assumptions of the fit, which are added to the warnings.
     """
 
-    scene: Scene
-    ranges: list
-    offsets: Sequence = ()
-    sets: Sequence = ()
-    notes: Sequence = ()
+    def __init__(
+        self,
+        scene: Scene,
+        ranges: Sequence[Range],
+        sets: Sequence[str] = (),
+        notes: Sequence[str] = (),
+    ):
+        self.scene = scene
+        self.ranges = list(ranges)
+        self.sets = list(sets)
+        self.notes = list(notes)
+        self.base = BaseScene(add_sets(scene, self.sets))
+        self.start_time = perf_counter()
+
+    def assign(self, values: Iterable[float]) -> list[str]:
+        """Return the ``table.key=value`` strings that set the keys to values (n,) [SI]."""
+        return [bound.format_assignment(value) for bound, value in zip(self.ranges, values)]
 
     @property
-    def bounds(self) -> list:
-        """Ranges of all unknowns; those of the scene keys come first."""
-        return [*self.ranges, *self.offsets]
+    def changes_contact(self) -> bool:
+        """Whether a key changes the static contact solution."""
+        return any(bound.key.startswith("contact.") for bound in self.ranges)
+
+    def build_model(self, values: Iterable[float]) -> Model:
+        """Build the model of the scene with values (n,) [SI] of the keys.
+
+        Raises PatchfemError if the scene is invalid with them; a search counts this as a failed evaluation.
+        """
+        try:
+            return build(self.base.override(self.assign(values)))
+        except SceneError as error:
+            raise PatchfemError(error.mistakes[0]) from None
+
+    def start(self) -> list[float]:
+        """Return the values of the scene, clipped to their ranges; NaN for a key that the scene does not set."""
+        values = []
+        for bound in self.ranges:
+            _, value = find_scene_value(self.scene, bound.key)
+            known = value if isinstance(value, float) else np.nan
+            values.append(float(np.clip(known, bound.low, bound.high)))
+        return values
 
     def require_enough_rows(self, path: Path, count: int, name: str) -> None:
-        """Raise PatchfemError if a measurement has too few values to determine the unknowns and their intervals.
+        """Raise PatchfemError if a measurement has too few values to determine the keys and their intervals.
 
         Parameters
         ----------
@@ -105,51 +147,35 @@ class FreeKeys:
         name : str
             Word for these values, such as "rows".
         """
-        if count <= len(self.bounds):
+        if count <= len(self.ranges):
             raise PatchfemError(
                 f"{path}: only {count} {name} are used for the fit (what is held out does not count), too few to determine "
-                f"{len(self.bounds)} values and their intervals"
+                f"{len(self.ranges)} values and their intervals"
             )
 
     def make_problem(self, residual: Callable) -> Problem:
-        """Return the least-squares problem for a residual function of the unknowns.
+        """Return the least-squares problem of a residual, a function of the values (n,) [SI] of the keys."""
+        low = [bound.low for bound in self.ranges]
+        high = [bound.high for bound in self.ranges]
+        return Problem(residual, low, high, self.start())
 
-        The starting point has the values of the scene, or the middle of a range if there is none.
-        """
-        return Problem(
-            residual,
-            low=[bound.low for bound in self.bounds],
-            high=[bound.high for bound in self.bounds],
-            start=[_find_initial_value(self.scene, bound) for bound in self.bounds],
+    def make_fitted_keys(self, fit: Fit, warnings: Sequence[str] = ()) -> FittedKeys:
+        """Return the fitted values with their intervals and all warnings, after those of this kind of fit."""
+        undetermined = describe_fit(fit, [bound.key for bound in self.ranges])
+        every = [*self.scene.remarks, *self.notes, *undetermined, *warnings]
+        every += warn_of_bolted_joint(self.scene, self.ranges)
+        return FittedKeys(
+            self.scene,
+            self.ranges,
+            fit,
+            [*self.sets, *self.assign(fit.values)],
+            every,
+            perf_counter() - self.start_time,
         )
 
-    def make_fitted_keys(
-        self, fit: Fit, start_time: float, extra_warnings: Sequence = ()
-    ) -> FittedKeys:
-        """Return the fitted values with their confidence intervals and all warnings.
 
-        Parameters
-        ----------
-        fit : Fit
-        start_time : float
-            Value of `perf_counter` at the start of the fit [s].
-        extra_warnings : sequence of str
-            Additional warnings of this kind of fit.
-        """
-        undetermined = describe_fit(fit, [bound.key for bound in self.bounds])
-        warnings = [*self.scene.remarks, *self.notes, *undetermined, *extra_warnings]
-        warnings += warn_of_bolted_joint(self.scene, self.ranges)
-        sets = [*self.sets, *format_assignments(self.ranges, fit.values)]
-        return FittedKeys(self.scene, self.ranges, fit, sets, warnings, perf_counter() - start_time)
-
-
-def format_assignments(ranges: Iterable, values: Iterable) -> list:
-    """Return the ``table.key=value`` strings that set free parameters to values (n,)."""
-    return [bound.format_assignment(value) for bound, value in zip(ranges, values)]
-
-
-def parse_ranges(texts: Iterable) -> list:
-    """Parse the ranges of free parameters from "table.key=low..high" strings.
+def parse_ranges(texts: Iterable[str]) -> list[Range]:
+    """Parse the ranges of free keys from "table.key=low..high" strings.
 
     Raises SceneError with all validation errors.
     """
@@ -159,29 +185,8 @@ def parse_ranges(texts: Iterable) -> list:
     return ranges
 
 
-def build_changed_model(base: BaseScene, sets: Iterable) -> Model:
-    """Build the model of a scene with changes.
-
-    Parameters
-    ----------
-    base : BaseScene
-        Scene before the changes.
-    sets : iterable of str
-        ``table.key=value`` strings of the changes.
-
-    Raises
-    ------
-    PatchfemError
-        If the changed scene is invalid; a search counts this as a failed evaluation.
-    """
-    try:
-        return build(base.override(sets))
-    except SceneError as error:
-        raise PatchfemError(error.mistakes[0]) from None
-
-
-def warn_of_bolted_joint(scene: Scene, ranges: Iterable) -> list:
-    """Return a list with a warning if a free parameter changes a joint that was bolted in the modal test, or []."""
+def warn_of_bolted_joint(scene: Scene, ranges: Iterable[Range]) -> list[str]:
+    """Return a list with a warning if a free key changes a joint that was bolted in the modal test, or []."""
     structure = scene.structure
     if structure is None or structure.measured == "free" or structure.measured_joint == "case":
         return []
@@ -203,16 +208,3 @@ def solve_contact(model: Model):
     if patch.pressure.outcome is Outcome.NO_CONTACT:
         raise PatchfemError(patch.pressure.outcome.sentence, "")
     return patch
-
-
-def _find_initial_value(scene: Scene, bound: Range) -> float:
-    """Return the starting value of a free parameter: its value in the scene, clipped to its range.
-
-    It is the middle of the range if the scene does not set the parameter.
-    """
-    _, value = find_scene_value(scene, bound.key)
-    if not isinstance(value, float):
-        value = (bound.low + bound.high) / 2
-        if bound.low > 0 and bound.high > MAX_LINEAR_RATIO * bound.low:
-            value = np.sqrt(bound.low * bound.high)
-    return float(np.clip(value, bound.low, bound.high))

@@ -1,117 +1,36 @@
 """Fit of keys of a scene to a measurement: the tables of the scene and the file choose the kind of fit."""
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, fields
+from collections.abc import Sequence
 from pathlib import Path
-from typing import NamedTuple
 
 from ...core import PatchfemError
 from ...inputs.measured import COLUMN_UNITS, TABLE_FORMAT
 from ...inputs.tables import read_text
 from ...model.model import build
 from ...scene.scene import Scene
-from ..rows.checkpoint import SearchCheckpoint
-from ..rows.condition_models import FitRequest
-from ..rows.fit import (
-    UNSTABLE_MEANINGS,
-    FittedRows,
-    RowsOptions,
-    fit_rows,
-)
-from .curve import DEFAULT_STARTS, HEADER, UNITS, FittedCurve, fit_curve
+from ..rows.fit import FittedRows, fit_rows
+from .curve import HEADER, UNITS, FittedCurve, fit_curve
 from .loop import FittedLoop, fit_hysteresis_loop
-from .loop_path import LoopOptions
-from .problem import parse_ranges
+from .options import FitOptions
+from .problem import Listener, parse_ranges
 from .wear import FittedCoefficient, fit_wear
 
-DEFAULT_ROW_STARTS = 8  # default number of random starting points of a fit to rows
-
-
-class Kind(NamedTuple):
-    """Kind of fit: what is fitted, what scene that needs, and the options that it has."""
-
-    target: str
-    scene: str
-    options: tuple[str, ...] = ()
-
-
+# options of each kind of fit
 KINDS = {
-    "loop": Kind("a loop under a prescribed slide", "a bench", ("hold", "offset", "warm_up")),
-    "rows": Kind(
-        "rows of a rig", "a rig", ("hold", "starts", "leave_out", "seed", "unstable", "resume")
-    ),
-    "curve": Kind(
-        "frequency and damping of a rig against amplitude",
-        "a rig, fitted to a curve of frequency and damping against amplitude",
-        ("starts",),
-    ),
-    "wear": Kind("a worn depth", "one with [wear]"),
+    "loop": ("hold",),
+    "rows": ("hold", "leave_out", "starts"),
+    "curve": ("starts",),
+    "wear": (),
 }
-
-
-@dataclass(frozen=True, slots=True)
-class FitOptions:
-    """Options of a fit, besides the keys that are fitted.
-
-    Each kind of fit refuses the options that it does not have.
-
-    Attributes
-    ----------
-    hold : sequence of str
-        Rows to predict without fitting them, such as "frequency=135 Hz,150 Hz"; for a loop or rows.
-    offset : sequence of str
-        For a loop: offsets to fit as well, "force" (a constant force over the whole record) or "displacement" (distance
-        of the first row from the stress-free position).
-    warm_up : bool
-        For a loop: whether the whole cycles of the record are computed once, as a run-in, before the fitted cycles.
-    leave_out : str
-        For rows: a column; each of its values is left out in turn.
-    starts : int or None
-        For rows or a curve of frequency and damping against amplitude: number of random starting points inside the
-        ranges; the best result is used. By default 8, or 6 for a curve.
-    seed : int
-        For rows: seed of the starting points.
-    unstable : str
-        For rows: treatment of those with the flag U (unstable), "bound", "out" or "read".
-    resume : bool
-        For rows: whether the fit in the results folder is continued.
-    """
-
-    hold: Sequence = ()
-    offset: Sequence = ()
-    warm_up: bool = False
-    leave_out: str = ""
-    starts: int | None = None
-    seed: int = 0
-    unstable: str = "bound"
-    resume: bool = False
-
-    def names_given(self) -> list[str]:
-        """Return the names of the fit options that differ from their defaults."""
-        return [field.name for field in fields(self) if getattr(self, field.name) != field.default]
-
-
-@dataclass(frozen=True, slots=True)
-class Listener:
-    """Callbacks by which a fit reports its progress.
-
-    - say: takes a line of text.
-    - progress: takes the completed fraction, from 0 to 1.
-    - format_option: takes the name of an option and returns its spelling for the caller.
-    """
-
-    say: Callable | None = None
-    progress: Callable | None = None
-    format_option: Callable = str
+TARGETS = {
+    "hold": "a loop under a prescribed slide or rows of a rig",
+    "leave_out": "rows of a rig",
+    "starts": "rows of a rig or frequency and damping of a rig against amplitude",
+}  # what is fitted with an option
 
 
 def fit_measurement(
-    scene: Scene,
-    to: str,
-    free: Sequence[str],
-    options: FitOptions,
-    listener: Listener,
-    checkpoint: Path | None = None,
+    scene: Scene, to: str, free: Sequence[str], options: FitOptions, listener: Listener
 ) -> FittedLoop | FittedCurve | FittedRows | FittedCoefficient:
     """Fit keys of a scene to a measurement.
 
@@ -124,8 +43,6 @@ def fit_measurement(
         Free keys with their ranges, "table.key=low..high".
     options : FitOptions
     listener : Listener
-    checkpoint : Path, optional
-        File with the finished searches of a fit to rows.
 
     Returns
     -------
@@ -139,36 +56,18 @@ def fit_measurement(
         If the model cannot be computed at any starting point.
     """
     kind = choose_kind(scene, to)
-    check_options(kind, options, listener.format_option)
+    check_options(kind, options)
     if not to:
-        raise PatchfemError(
-            f"{listener.format_option('to')} MEASURED and {listener.format_option('free')} KEYS are needed"
-        )
+        raise PatchfemError("--to MEASURED and --free KEYS are needed")
+    ranges = parse_ranges(free)
     if kind == "wear":
-        return fit_wear(build(scene), to, free, listener.progress)
+        return fit_wear(build(scene), to, ranges, listener.progress)
     path = Path(to)
     if kind == "curve":
-        return fit_curve(scene, path, free, listener.say, options.starts or DEFAULT_STARTS)
+        return fit_curve(scene, path, ranges, options, listener.say)
     if kind == "loop":
-        loop_options = LoopOptions(options.offset, options.warm_up)
-        return fit_hysteresis_loop(scene, path, free, options.hold, listener.say, loop_options)
-
-    ranges = parse_ranges(free)
-    # an interrupted search continues only with the same inputs
-    inputs = (scene.resolved(), free, options.hold, options.leave_out, options.seed)
-    content = path.read_bytes() if path.is_file() else ""
-    stored = None
-    if checkpoint is not None:
-        stored = SearchCheckpoint(checkpoint, (*inputs, options.unstable, content), options.resume)
-    row_options = RowsOptions(
-        hold=options.hold,
-        leave_out=options.leave_out,
-        starts=options.starts or DEFAULT_ROW_STARTS,
-        seed=options.seed,
-        unstable=options.unstable,
-        checkpoint=stored,
-    )
-    return fit_rows(FitRequest(scene, ranges, path), row_options, listener.say, listener.progress)
+        return fit_hysteresis_loop(scene, path, ranges, options, listener.say)
+    return fit_rows(scene, path, ranges, options, listener)
 
 
 def choose_kind(scene: Scene, to: str) -> str:
@@ -195,40 +94,13 @@ def choose_kind(scene: Scene, to: str) -> str:
     )
 
 
-def check_options(kind: str, options: FitOptions, format_option: Callable) -> None:
-    """Check the options of a fit.
-
-    Parameters
-    ----------
-    kind : str
-        Kind of the fit.
-    options : FitOptions
-    format_option : callable
-        Turns the name of an option into the words of a message.
-
-    Raises
-    ------
-    PatchfemError
-        If an option is invalid or belongs to another kind of fit.
-    """
-    reasons = []
-    for name in options.names_given():
-        targets = [other.target for other in KINDS.values() if name in other.options]
-        if KINDS[kind].target not in targets:
-            reasons.append(f"{format_option(name)} applies only to fits to {' or '.join(targets)}")
-    if reasons:
-        these = "this option" if len(reasons) == 1 else "these options"
-        raise PatchfemError(
-            f"{'; '.join(reasons)}; this scene is {KINDS[kind].scene}; leave {these} out"
-        )
+def check_options(kind: str, options: FitOptions) -> None:
+    """Raise PatchfemError if an option is invalid or belongs to another kind of fit than a key of KINDS."""
+    for name, target in TARGETS.items():
+        if getattr(options, name) and name not in KINDS[kind]:
+            raise PatchfemError(
+                f"--{name.replace('_', '-')} applies only to fits to {target}; leave this option out"
+            )
     starts = options.starts
     if starts is not None and (not isinstance(starts, int) or starts < 1):
-        raise PatchfemError(f"{format_option('starts')} {starts}: at least one is needed")
-    if not isinstance(options.seed, int) or options.seed < 0:
-        raise PatchfemError(
-            f"{format_option('seed')} {options.seed}: a whole number >= 0 is needed"
-        )
-    if options.unstable not in UNSTABLE_MEANINGS:
-        raise PatchfemError(
-            f"{format_option('unstable')} {options.unstable}: one of {', '.join(UNSTABLE_MEANINGS)} is needed"
-        )
+        raise PatchfemError(f"--starts {starts}: at least one is needed")

@@ -6,7 +6,7 @@ then checked and corrected by further runs.
 """
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import NamedTuple
@@ -21,7 +21,6 @@ from ...runs.patch.press import nodal_areas
 from ...runs.wear import evolve
 from ...scene.assignments import Range
 from ...scene.keys.quantities import parse_quantity
-from .problem import parse_ranges
 
 # Names of the wear depths in compare.json, the more accurate one first.
 QUANTITIES = ("worn_depth_mean", "worn_depth_max")
@@ -80,13 +79,6 @@ class WearCurve(NamedTuple):
     fraction: np.ndarray
     depth: np.ndarray
 
-    def make_inverse(self) -> Callable:
-        """Return a function that interpolates the fraction of the cycles at a given wear depth."""
-        is_growing = np.diff(self.depth, prepend=-1.0) > 0
-        return PchipInterpolator(
-            self.depth[is_growing], self.fraction[is_growing], extrapolate=False
-        )
-
 
 def read_measured_depth(text: str) -> MeasuredDepth:
     """Read a measured depth from a string, or from a JSON file written by `compare`.
@@ -142,7 +134,7 @@ def _read_depth_file(path: Path) -> MeasuredDepth:
 
 
 def fit_wear(
-    model: Model, measured_depth: str, free_parameters, progress=None
+    model: Model, measured_depth: str, ranges: Sequence[Range], progress: Callable | None = None
 ) -> FittedCoefficient:
     """Fit the wear coefficient so that the computed worn depth equals the measured one.
 
@@ -152,8 +144,8 @@ def fit_wear(
         Model with wear.
     measured_depth : str
         Measured depth, in the format of `read_measured_depth`.
-    free_parameters : sequence of str
-        Range of the coefficient, ("wear.coefficient=low..high",).
+    ranges : sequence of Range
+        Bounds of the coefficient alone.
     progress : Callable, optional
         Called with the completed fraction of a run.
 
@@ -168,7 +160,6 @@ def fit_wear(
     NotConverged
         If the runs do not converge to a coefficient.
     """
-    ranges = parse_ranges(free_parameters)
     if [bound.key for bound in ranges] != [COEFFICIENT_KEY]:
         raise PatchfemError(
             f"--free: in a scene with [wear] only {COEFFICIENT_KEY} can be fitted, for example {COEFFICIENT_KEY}=1e-16 "
@@ -196,19 +187,17 @@ def fit_wear(
     curve = compute(bounds.high)
     max_depth = float(curve.depth[-1])
     if not max_depth >= target.value:
-        advice = "raise the high bound"
-        if curve.fraction[-1] < 1:
-            advice = (
-                "with this bound as the coefficient the coating is worn through before the last "
-                "cycle"
-            )
         raise PatchfemError(
             f"--free {COEFFICIENT_KEY}: with the high bound {bounds.high:.4g} m^2/N the scene reaches only "
-            f"{target.name} = {max_depth:.4g}, but {target.value:.4g} was measured; {advice}"
+            f"{target.name} = {max_depth:.4g}, but {target.value:.4g} was measured; raise the high bound, "
+            "unless the coating is worn through"
         )
 
     # the interpolated coefficient is corrected until a run with it has the measured depth
-    inverse = curve.make_inverse()
+    is_growing = np.diff(curve.depth, prepend=-1.0) > 0
+    inverse = PchipInterpolator(
+        curve.depth[is_growing], curve.fraction[is_growing], extrapolate=False
+    )
     value = float(bounds.high * inverse(target.value))
     n_runs = 1
     while n_runs < MAX_RUNS:

@@ -68,8 +68,7 @@ class Readings:
         Raises PatchfemError for a column other than "frequency", "input", "flag" and "run".
         """
         if name == "run":
-            runs = self.row_names
-            return [runs[k] for k in self.row]
+            return [self.row_names[k] for k in self.row]
         if name not in ("frequency", "input", "flag"):
             raise PatchfemError(
                 f"{self.path}: there is no column {name} by which rows can be held out or left out; "
@@ -101,18 +100,16 @@ class Readings:
             selected |= is_equal
         return selected
 
-    def group_by_column(self, name: str, selected) -> dict:
-        """Group the selected readings by the distinct values of a table column.
+    def group_by_column(self, name: str, selected: np.ndarray) -> dict[str, np.ndarray]:
+        """Group the readings of a mask `selected` (n,) by the values of a table column.
 
-        Returns a dict from the formatted value to a mask (n,), in the order of the rows. Readings
-        outside the mask `selected` (n,) belong to no group.
+        Returns masks (n,) by the text of the value, in the order of the rows.
         """
-        column = self.column_values(name)
-        groups = {}
-        for value in dict.fromkeys(column):
-            readings = np.array([other == value for other in column]) & selected
-            if readings.any():
-                groups[_format_cell(name, value)] = readings
+        groups: dict[str, np.ndarray] = {}
+        for reading, value in enumerate(self.column_values(name)):
+            if selected[reading]:
+                group = groups.setdefault(_format_cell(name, value), np.zeros(selected.size, bool))
+                group[reading] = True
         return groups
 
     def compute_log_ratios(self, acceleration, displacement) -> np.ndarray:

@@ -1,57 +1,28 @@
 """Fit of a rig to a table of measured responses, with hold-out and cross-validation.
 
-A score is the root mean square of ln(computed/measured). Scores are given for the fitted, the held-out
-and the left-out readings. A search does not use the readings that are held out or left out; they are
-predicted after the fit.
+A score is the root mean square of ln(computed/measured). Scores are given for the fitted, the held-out and the left-out
+readings. A search does not use the readings that are held out or left out; they are predicted after the fit. A reading
+flagged U (unstable) is a lower bound: the motion was still growing, so that only a smaller computed value is a misfit.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
-from time import perf_counter
+from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
 from ...core import G_N, PatchfemError
 from ...identify.advice import advise_test
 from ...identify.least_squares import Descents, Fit, Search
-from ..fits.problem import FittedKeys, FreeKeys
+from ...scene.assignments import Range
+from ...scene.scene import Scene
+from ..fits.options import FitOptions
+from ..fits.problem import SILENT, FittedKeys, Listener
 from .cells import MAX_LOG_RATIO, Readings, compute_rms_scores, read_response_table
-from .checkpoint import SearchCheckpoint
-from .condition_models import ConditionModels, FitRequest
+from .condition_models import ConditionModels
 from .model_readings import ModelReadings
 
-# Treatments of a reading flagged U (unstable), and their meanings.
-UNSTABLE_MEANINGS = {
-    "bound": "count in the fit as lower bounds",
-    "out": "are left out of the fit",
-    "read": "count in the fit like all other readings",
-}
-
-
-@dataclass(frozen=True, eq=False, slots=True)
-class RowsOptions:
-    """Options of a fit to a response table: validation readings, and the search from random starting points.
-
-    Attributes
-    ----------
-    hold : sequence of str
-        Selectors "column=value,value" of rows that are predicted but not fitted.
-    leave_out : str
-        Column for cross-validation, whose values are left out one at a time.
-    starts, seed : int
-        Number of starting points, and seed of the random numbers.
-    unstable : str
-        Treatment of readings flagged U, a key of UNSTABLE_MEANINGS.
-    checkpoint : SearchCheckpoint or None
-        Finished descents, which are not repeated.
-    """
-
-    hold: Sequence[str] = ()
-    leave_out: str = ""
-    starts: int = 8
-    seed: int = 0
-    unstable: str = "bound"
-    checkpoint: SearchCheckpoint | None = None
+DEFAULT_STARTS = 8  # number of random starting points of a search
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -61,12 +32,11 @@ class FittedRows:
     Attributes
     ----------
     keys : FittedKeys
-        Fitted parameters from all readings that are not held out.
-    models : ConditionModels
-        Models of the rig at the measured conditions.
+        Fitted keys from all readings that are not held out.
+    instrument : object
+        Table [measured] of the scene, or None.
     cells : Readings
         Measured readings.
-    options : RowsOptions
     held_out : (n,) bool
         Mask of the readings that were held out.
     computed : (2, c) array
@@ -82,9 +52,8 @@ class FittedRows:
     """
 
     keys: FittedKeys
-    models: ConditionModels
+    instrument: object
     cells: Readings
-    options: RowsOptions
     held_out: np.ndarray
     computed: np.ndarray
     logs: np.ndarray
@@ -110,38 +79,41 @@ class FittedRows:
         dict
             Result of `cells.compute_rms_scores` for "fitted", "held_out" and "left_out".
         """
-        is_eligible = ~self.cells.unstable if only_stable else np.ones(self.held_out.size, bool)
-        is_left_out = ~np.isnan(self.left_out_logs)
+        counts = ~self.cells.unstable if only_stable else np.ones(self.held_out.size, bool)
+        groups = {
+            "fitted": (self.logs, ~self.held_out),
+            "held_out": (self.logs, self.held_out),
+            "left_out": (self.left_out_logs, ~np.isnan(self.left_out_logs)),
+        }
         return {
-            "fitted": compute_rms_scores(self.cells, self.logs, is_eligible & ~self.held_out),
-            "held_out": compute_rms_scores(self.cells, self.logs, is_eligible & self.held_out),
-            "left_out": compute_rms_scores(
-                self.cells, self.left_out_logs, is_eligible & is_left_out
-            ),
+            name: compute_rms_scores(self.cells, logs, counts & is_in_group)
+            for name, (logs, is_in_group) in groups.items()
         }
 
 
 def fit_rows(
-    request: FitRequest,
-    options: RowsOptions,
-    say: Callable | None = None,
-    progress: Callable | None = None,
+    scene: Scene,
+    measured: Path,
+    ranges: Sequence[Range],
+    options: FitOptions,
+    listener: Listener = SILENT,
+    seed: int = 0,
 ) -> FittedRows:
-    """Fit free parameters of a rig to a table of measured responses.
+    """Fit free keys of a rig to a table of measured responses.
 
     Parameters
     ----------
-    request : FitRequest
-        Scene, free parameters and data file.
-    options : RowsOptions
-    say : Callable, optional
-        Called with a line of text before code is compiled.
-    progress : Callable, optional
-        Called with the fraction of descents that are finished.
-
-    Returns
-    -------
-    FittedRows
+    scene : Scene
+    measured : Path
+        File of the table.
+    ranges : sequence of Range
+        Bounds of the free keys.
+    options : FitOptions
+        Rows that are held out or left out in turn, and the number of starting points.
+    listener : Listener
+        Told before code is compiled, and the fraction of the descents that are finished.
+    seed : int
+        Seed of the random starting points.
 
     Raises
     ------
@@ -150,8 +122,7 @@ def fit_rows(
     NotConverged
         If all descents of a search fail.
     """
-    begin = perf_counter()
-    cells = read_response_table(request.measured)
+    cells = read_response_table(measured)
     held_out = np.zeros(cells.row.size, bool)
     for selector in options.hold:
         held_out |= cells.select_readings(selector)
@@ -162,83 +133,84 @@ def fit_rows(
             "in this column, so leaving this value out leaves no rows for the fit; choose another "
             "column"
         )
-    trainings = {"all": ~held_out}
-    trainings |= {f"without {name}": ~held_out & ~group for name, group in groups.items()}
-    models = request.make_condition_models(cells.conditions)
-    keys = FreeKeys(models.scene, models.ranges, sets=models.sets, notes=models.notes)
-    for training in trainings.values():
-        is_used = _select_fitted(cells, training, options.unstable)
-        keys.require_enough_rows(request.measured, np.count_nonzero(is_used), "readings")
+    models = ConditionModels(scene, cells.conditions, ranges, measured)
+    for left_out in (np.zeros(held_out.size, bool), *groups.values()):
+        models.require_enough_rows(measured, np.count_nonzero(~held_out & ~left_out), "readings")
 
-    # readings of the model, and the counter of finished descents
-    computed = ModelReadings(models, say)
+    computed = ModelReadings(models, listener.say)
+    n_starts = options.starts or DEFAULT_STARTS
     n_finished = 0
 
-    def report(count: int) -> None:
+    def report() -> None:
         """Report the fraction of the descents that are finished."""
         nonlocal n_finished
-        n_finished += count
-        if progress is not None:
-            progress(n_finished / (options.starts * len(trainings)))
+        n_finished += 1
+        if listener.progress is not None:
+            listener.progress(n_finished / (n_starts * (1 + len(groups))))
 
-    def fit(name: str, training, interval_kind: str) -> Fit:
-        """Fit the parameters to some of the readings.
+    def fit(training: np.ndarray, interval_kind: str) -> Fit:
+        """Fit the keys to the readings of a mask (n,), with intervals of a kind of `IntervalKind`.
 
         The first motions of each descent start from rest, so that its result depends only on its starting point and on
-        the training readings.
-
-        Parameters
-        ----------
-        name : str
-            Under which the finished descents are stored.
-        training : (n,) bool
-            Mask of the readings.
-        interval_kind : str
-            As in `Problem.solve`.
+        these readings.
         """
-        search = Search(options.starts, options.seed, computed.reset_motions, report)
-        if options.checkpoint is not None:
-            search = replace(search, **options.checkpoint.make_callbacks(name))
-        residual = make_residual(cells, computed, training, options.unstable)
-        return keys.make_problem(residual).search(search, interval_kind)
+        problem = models.make_problem(make_residual(cells, computed, training))
+        search = Search(n_starts, seed, computed.reset_motions, report)
+        return problem.search(search, interval_kind)
 
-    best = fit("all", ~held_out, "rows")
+    best = fit(~held_out, "rows")
     prediction = computed.predict(best.values, range(len(cells.conditions)))
     logs = cells.compute_log_ratios(*prediction)
+
+    # each group is predicted by a fit that has not seen it
     left_out_logs = np.full(held_out.size, np.nan)
-    for name, group in groups.items():
-        fold = fit(f"without {name}", ~held_out & ~group, "")
+    for group in groups.values():
+        fold = fit(~held_out & ~group, "")
         conditions = sorted(set(cells.condition[group].tolist()))
         fold_logs = cells.compute_log_ratios(*computed.predict(fold.values, conditions))
         left_out_logs[group] = fold_logs[group]
-    warnings = _warn_of_doubtful_fit(cells, best.descents, logs, options)
     return FittedRows(
-        keys=keys.make_fitted_keys(best, begin, warnings),
-        models=models,
+        keys=models.make_fitted_keys(best, _warn_of_doubtful_fit(cells, best.descents, logs)),
+        instrument=models.instrument,
         cells=cells,
-        options=options,
         held_out=held_out,
         computed=prediction,
         logs=logs,
         left_out_logs=left_out_logs,
         n_motions=computed.n_motions,
-        advice=_advise_condition(cells, best, request.ranges, options.unstable, ~held_out),
+        advice=_advise_condition(cells, best, ranges, ~held_out),
     )
 
 
-def _select_fitted(readings: Readings, training: np.ndarray, unstable: str) -> np.ndarray:
-    """Return the mask (n,) of the readings of a training set (n,) that the fit uses."""
-    return training & ~readings.unstable if unstable == "out" else training
+def make_residual(
+    readings: Readings, model_readings: ModelReadings, training: np.ndarray
+) -> Callable:
+    """Return the function that computes the log ratios of the readings of a mask (n,) from values of the free keys.
+
+    A reading flagged U has no residual where the computed value is larger.
+    """
+    conditions = sorted(set(readings.condition[training].tolist()))
+    is_lower_bound = readings.unstable[training]
+
+    def residual(values) -> np.ndarray:
+        """Return the log ratios (r,) of computed to measured readings for values (n,)."""
+        logs = readings.compute_log_ratios(*model_readings(values, conditions))[training]
+        return np.where(is_lower_bound, np.minimum(logs, 0.0), logs)
+
+    return residual
 
 
 def _advise_condition(
-    readings: Readings, fit: Fit, ranges: Sequence, unstable: str, training: np.ndarray
+    readings: Readings, fit: Fit, ranges: Sequence[Range], training: np.ndarray
 ) -> str:
-    """Return a sentence on the measured condition whose repetition would narrow an interval most, or ""."""
-    is_used = _select_fitted(readings, training, unstable)
-    condition = readings.condition[is_used]
+    """Return a sentence on the measured condition whose repetition would narrow an interval most, or "".
+
+    training: mask (n,) of the fitted readings.
+    """
+    condition = readings.condition[training]
+    is_acceleration = readings.is_acceleration[training]
     information = np.zeros((len(readings.conditions), len(ranges), len(ranges)))
-    for is_of_kind in (readings.is_acceleration[is_used], ~readings.is_acceleration[is_used]):
+    for is_of_kind in (is_acceleration, ~is_acceleration):
         for k in set(condition[is_of_kind].tolist()):
             # a repetition gives one reading of each kind
             gradient = fit.intervals.effects[is_of_kind & (condition == k)].mean(axis=0)
@@ -247,8 +219,11 @@ def _advise_condition(
     return advise_test(fit, [bound.key for bound in ranges], information, places)
 
 
-def _warn_of_doubtful_fit(readings: Readings, search: Descents, logs, options: RowsOptions) -> list:
-    """Return warnings about rows without readings, unstable readings and an unreliable search."""
+def _warn_of_doubtful_fit(readings: Readings, search: Descents, logs: np.ndarray) -> list[str]:
+    """Return warnings about rows without readings, unstable readings and an unreliable search.
+
+    logs: log ratios (n,) of the best fit.
+    """
     warnings = []
     if readings.empty_rows:
         numbers = ", ".join(str(k + 1) for k in readings.empty_rows)
@@ -259,8 +234,8 @@ def _warn_of_doubtful_fit(readings: Readings, search: Descents, logs, options: R
     n_unstable = int(readings.unstable.sum())
     if n_unstable:
         warnings.append(
-            f"{n_unstable} readings flagged U (unstable) {UNSTABLE_MEANINGS[options.unstable]}; "
-            "scores_stable leaves these readings out"
+            f"{n_unstable} readings flagged U (unstable) count in the fit as lower bounds; scores_stable leaves these "
+            "readings out"
         )
     unbounded = set()
     for k in readings.row[np.abs(logs) >= MAX_LOG_RATIO]:
@@ -270,39 +245,9 @@ def _warn_of_doubtful_fit(readings: Readings, search: Descents, logs, options: R
             f"no bounded motion is found at {'; '.join(sorted(unbounded))}: each row at these inputs "
             f"counts as if the model were wrong by a factor of {np.exp(MAX_LOG_RATIO):.0f}"
         )
-    if search.n_best == 1 and options.starts > 1:
+    if search.n_best == 1 and search.rms.size > 1:
         warnings.append(
-            f"only one of {options.starts} searches ended within 1 % of the best training score, so "
+            f"only one of {search.rms.size} searches ended within 1 % of the best training score, so "
             "a better fit may exist; raise --starts"
         )
     return warnings
-
-
-def make_residual(
-    readings: Readings, model_readings: ModelReadings, training, unstable: str
-) -> Callable:
-    """Return the function that computes the log ratios of selected readings from free parameters.
-
-    Parameters
-    ----------
-    readings : Readings
-    model_readings : ModelReadings
-    training : (n,) bool
-        Mask of the readings in the residual.
-    unstable : str
-        Treatment of readings flagged U. "bound": such a reading is a lower bound, because the
-        motion was still growing, so that only a smaller computed value gives a residual; "out":
-        the reading is excluded; "read": it is treated like any other reading.
-    """
-    is_used = _select_fitted(readings, training, unstable)
-    conditions = sorted(set(readings.condition[is_used].tolist()))
-    is_lower_bound = (
-        readings.unstable[is_used] if unstable == "bound" else np.zeros(int(is_used.sum()), bool)
-    )
-
-    def residual(values):
-        """Return the log ratios (r,) of computed to measured readings for parameters (n,)."""
-        logs = readings.compute_log_ratios(*model_readings(values, conditions))[is_used]
-        return np.where(is_lower_bound, np.minimum(logs, 0.0), logs)
-
-    return residual

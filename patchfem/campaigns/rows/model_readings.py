@@ -1,7 +1,10 @@
 """Instrument readings that a rig model predicts at the measured conditions."""
 
+from collections.abc import Callable, Iterable, Sequence
+
 import numpy as np
 
+from ...model.model import Model
 from ...model.source import locate_errors
 from ...response.spectrum import read_instrument
 from ...runs.batch.motion_observer import MotionObserver
@@ -11,23 +14,26 @@ from .condition_models import GAIN_KEYS, ConditionModels
 
 
 class ModelReadings:
-    """Callable that computes the instrument readings of a rig for given free parameters.
+    """Instrument readings (2, c) of a rig as a function of the values of its free keys.
 
-    Each motion is continued from the motion for the previous parameters, which makes a descent
-    fast. After `reset_motions` it starts from rest, so that the result does not depend on earlier
-    evaluations.
+    A call returns the acceleration reading [m s-2] and the displacement amplitude [m] at each condition. They are NaN at
+    conditions that were not requested, and infinite if no bounded motion exists. Each motion is continued from the motion
+    for the previous values, which makes a descent fast. After `reset_motions` it starts from rest, so that the result does
+    not depend on earlier evaluations.
 
-    A call returns the acceleration reading [m s-2] and the displacement amplitude [m], (c,) each.
-    They are NaN at conditions that were not requested, and infinite if no bounded motion exists.
+    Parameters
+    ----------
+    models : ConditionModels
+    say : callable, optional
+        Called with a line of text before code is compiled.
     """
 
-    def __init__(self, models: ConditionModels, say=None):
+    def __init__(self, models: ConditionModels, say: Callable | None = None):
         self.models = models
         self.say = say
         self.patch = None
-        self.last_motions = {}
-        self.last_readings = (None, {})
         self.n_motions = 0
+        self.reset_motions()
         instrument = models.instrument
         self.reading = ("peak", None)
         self.gains = (1.0, 1.0)
@@ -39,42 +45,44 @@ class ModelReadings:
 
     def reset_motions(self) -> None:
         """Discard the stored motions, so that the next computations start from rest."""
-        self.last_motions = {}
-        self.last_readings = (None, {})
+        self.last_motions: dict = {}
+        self.last_values: tuple = ()
+        self.last_readings: dict[int, tuple[float, float]] = {}
 
-    def predict(self, values, conditions) -> np.ndarray:
+    def predict(self, values: Sequence[float], conditions: Iterable[int]) -> np.ndarray:
         """Predict the readings (2, c) with motions that start from rest."""
         self.reset_motions()
         return self(values, conditions)
 
-    def __call__(self, values, conditions) -> np.ndarray:
+    def __call__(self, values: Sequence[float], conditions: Iterable[int]) -> np.ndarray:
+        # the gains do not change the motion
         key_values = tuple(float(values[k]) for k in self.models.model_parameters)
-        last_values, last_readings = self.last_readings
-        readings = last_readings if last_values == key_values else {}
-        missing = [k for k in conditions if k not in readings]
+        if key_values != self.last_values:
+            self.last_values = key_values
+            self.last_readings = {}
+        missing = [k for k in conditions if k not in self.last_readings]
         if missing:
-            readings = readings | self._compute_readings(values, missing)
-            self.last_readings = key_values, readings
+            self.last_readings |= self._compute_readings(values, missing)
         out = np.full((2, len(self.models.rigs)), np.nan)
         for k in conditions:
-            out[:, k] = readings[k]
+            out[:, k] = self.last_readings[k]
         for row, gain, free in zip(out, self.gains, self.free_gains):
             row *= gain if free is None else values[free]
         return out
 
-    def _compute_readings(self, values, conditions) -> dict:
-        """Return the acceleration reading without gain and the displacement for each condition."""
+    def _compute_readings(self, values, conditions) -> dict[int, tuple[float, float]]:
+        """Return the acceleration reading without gain [m s-2] and the displacement [m] by condition."""
         model = self.models.build_model(values)
+        needs_cycle = self.reading[0] not in ("peak", "fundamental")
         readings = {}
         with locate_errors(model.source):
             model, patch = self._solve_contact(model)
-            needs_cycle = self.reading[0] not in ("peak", "fundamental")
             observer = MotionObserver(model, patch, self.say, needs_cycle)
             for k in conditions:
                 self.n_motions += 1
                 if not observer.finds_periodic_motion:
-                    model_at_k = self.models.with_condition_drive(model, k)
-                    observer = MotionObserver(model_at_k, patch, self.say, needs_cycle)
+                    driven = self.models.with_condition_drive(model, k)
+                    observer = MotionObserver(driven, patch, self.say, needs_cycle)
                 drive = self.models.sine_drive(k)
                 motion = observer(drive, self.last_motions.get(k))
                 if motion is None:
@@ -91,20 +99,14 @@ class ModelReadings:
             return abs(motion.fundamental)
         return read_instrument(motion.window, drive, motion.acceleration, *self.reading)
 
-    def _solve_contact(self, model) -> tuple:
+    def _solve_contact(self, model: Model) -> tuple[Model, object]:
         """Return a model without the joint of bolted modes, and its solved patch; None for a [normal] contact.
 
-        The contact is solved again only if a free parameter changes it.
+        The contact is solved again only if a free key changes it.
         """
         if model.has_bolted_patch:
             model, patches, _ = solve_without_joint(model)
             return model, patches[0]
-        return model, self._get_solved_patch(model)
-
-    def _get_solved_patch(self, model):
-        """Return the solved patch of a model whose modes are those without the joint."""
-        if model.patch is None:
-            return None
-        if self.patch is None or self.models.changes_contact:
+        if model.patch is not None and (self.patch is None or self.models.changes_contact):
             self.patch = solve_contact(model)
-        return self.patch
+        return model, self.patch

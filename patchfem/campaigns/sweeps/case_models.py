@@ -38,8 +38,6 @@ class SweepScene:
     text : str
     sets : tuple of str
         --set strings of all cases.
-    of : str
-        Requested measure; "" for the default measure.
     n_written : int
         Number of the first strings of `sets` that belong to the scene as written, whose joint is
         subtracted from bolted modes.
@@ -48,7 +46,6 @@ class SweepScene:
     path: Path
     text: str
     sets: tuple = ()
-    of: str = ""
     n_written: int = 0
 
     def read_scene(self, sets: Sequence[str]) -> Scene:

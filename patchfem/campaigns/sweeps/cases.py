@@ -3,10 +3,10 @@
 import json
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import lru_cache
 from hashlib import sha256
 from itertools import chain
 from math import isfinite, prod
+from pathlib import Path
 
 import numpy as np
 
@@ -14,7 +14,6 @@ from ...disk.file_hashes import hash_named_files
 from ...scene.assignments import Axis
 from .case_models import SweepScene
 
-MAX_CACHED_VALUES = 4096  # values of keys whose text is kept while the cases are named
 # Prefixes of the keys that change the pieces or their mesh.
 PIECE_KEYS = (
     "contact.length",
@@ -133,29 +132,28 @@ class Cases:
         depend on units, on the order of keys or on the other cases of the sweep, unless the mesh is
         chosen for all cases together.
         """
-        keys = [json.dumps(axis.key) for axis in self.axes]
-        # The order of the keys is the same for all cases.
-        order = sorted(range(len(keys)), key=keys.__getitem__)
-
-        @lru_cache(MAX_CACHED_VALUES)
-        def describe_value(axis: int, index: int) -> str:
-            """Return a key and its value as JSON, with the hash of the files that the value names."""
-            value = self.axes[axis].values[index]
-            if isinstance(value, float) and isfinite(value):
-                return f'[{keys[axis]}, {value!r}, ""]'
-            files = hash_named_files([str(value)], sweep_scene.path.parent)
-            content = " ".join(sign for _, sign in files)
-            return f"[{keys[axis]}, {json.dumps(value)}, {json.dumps(content)}]"
-
+        # the order of the keys is the same for all cases
+        order = np.argsort([axis.key for axis in self.axes], kind="stable")
+        texts = [_describe_values(axis, sweep_scene.path.parent) for axis in self.axes]
         common_text = sweep_scene.hash_common_data()
         hashes = np.empty(len(self), np.uint64)
         for number in range(len(self)):
-            indices = list(map(int, self.axis_indices(number)))
-            values = [describe_value(axis, indices[axis]) for axis in order]
+            indices = self.axis_indices(number)
+            values = [texts[axis][int(indices[axis])] for axis in order]
             hashes[number] = _hash_to_integer("\n".join([common_text, *values]).encode())
         if sweep_scene.has_shared_meshes([axis.key for axis in self.axes]):
             hashes ^= np.uint64(_hash_to_integer(np.sort(hashes).tobytes()))
         return hashes
+
+
+def _describe_values(axis: Axis, folder: Path) -> list[str]:
+    """Return key and value of each value of a swept key as JSON, with the hash of the files in a folder that it names."""
+    texts = []
+    for value in axis.values:
+        is_number = isinstance(value, float) and isfinite(value)
+        files = [] if is_number else [sign for _, sign in hash_named_files([str(value)], folder)]
+        texts.append(json.dumps([axis.key, value, files]))
+    return texts
 
 
 def _hash_to_integer(content: bytes) -> int:

@@ -42,8 +42,7 @@ class SweepAnalysis:
     cases : dict
         Counts of `SweepTable.count_cases`.
     ranges : list of MeasureRange
-        Ranges of the main measures that vary by more than their errors, largest change first; a
-        requested measure is the first one.
+        Ranges of the main measures that vary by more than their errors, largest change first.
     limits : list of KeyLimit
     peaks : list of PeakOnLine
     ranking : dict
@@ -60,20 +59,20 @@ class SweepAnalysis:
     quantiles: dict[str, np.ndarray]
 
 
-def analyse(table: SweepTable, requested: str = "") -> SweepAnalysis:
-    """Analyse the results of a sweep; `requested` is the measure that comes first, "" for none."""
+def analyse(table: SweepTable) -> SweepAnalysis:
+    """Analyse the results of a sweep."""
     ranges = []
-    for name in dict.fromkeys((requested, *MAIN_MEASURES)):
+    for name in MAIN_MEASURES:
         if name in table.measures:
             ranges += find_range(table, name)
-    ranges.sort(key=lambda entry: (entry.measure != requested, -entry.relative))
+    ranges.sort(key=lambda entry: -entry.relative)
     return SweepAnalysis(
         cases=table.count_cases(),
         ranges=ranges,
         limits=find_limits(table),
         peaks=find_peaks(table),
-        ranking=rank_keys(table, requested),
-        quantiles=compute_quantiles(table, requested),
+        ranking=rank_keys(table),
+        quantiles=compute_quantiles(table),
     )
 
 

@@ -7,13 +7,10 @@ import os
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from difflib import get_close_matches
 from itertools import chain
 from math import prod
 from pathlib import Path
 
-from ...response import rows
-from ...runs.results import patch_rows
 from ...scene.assignments import LISTS, RANDOM, Axis, read_assignments
 from ...scene.keys.quantities import NUMBER_PATTERN
 from ...scene.lines import split_assignment, split_key
@@ -25,7 +22,6 @@ from .cases import Cases, combine_cases
 
 N_CHECKED = 32  # Largest number of cases that are validated before a sweep starts.
 MAX_PRINTED = 12  # Largest number of validation errors that are printed.
-MAX_SUGGESTIONS = 4  # Largest number of measures that are suggested for an unknown name.
 # Largest number of cases; the hashes and columns of more cases take gigabytes.
 MAX_CASES = 3_000_000
 MAX_PRINTED_LENGTH = 2000  # Largest number of characters of the values in a printed command.
@@ -46,8 +42,6 @@ class Request:
     sobol : bool
         Whether the random cases form a Sobol sequence.
     seed : int
-    of : str
-        Measure at the beginning of the summary; "" for the default measure.
     """
 
     over: Sequence[str] = ()
@@ -55,7 +49,6 @@ class Request:
     count: int = 0
     sobol: bool = False
     seed: int = 0
-    of: str = ""
 
 
 def read_sweep(path: Path, sets: Sequence[str], request: Request) -> tuple[SweepScene, Cases]:
@@ -78,7 +71,7 @@ def read_sweep(path: Path, sets: Sequence[str], request: Request) -> tuple[Sweep
     SceneError
         As for `read_cases`, and if a key is both set for all cases and swept.
     """
-    sweep_scene = SweepScene(Path(path), read_text(path), tuple(sets), request.of)
+    sweep_scene = SweepScene(Path(path), read_text(path), tuple(sets))
     cases = read_cases(sweep_scene, request)
     swept_keys = {sweep_scene.replace_mode_name(axis.key): axis.key for axis in cases.axes}
     errors = []
@@ -120,7 +113,6 @@ def read_cases(sweep_scene: SweepScene, request: Request) -> Cases:
         if listed is not None:
             parts.append(listed)
             file_axes = listed.axes
-    errors += _validate_measure_name(request.of)
     axes, axis_errors = read_assignments(request.over, RANDOM if request.count else LISTS)
     errors += axis_errors
     if not request.over and request.file is None:
@@ -180,18 +172,6 @@ def _format_arguments(request: Request, folder: Path) -> tuple[str, ...]:
     return tuple(arguments)
 
 
-def _validate_measure_name(measure: str) -> list[str]:
-    """Return a validation error for an unknown measure, with the most similar names; [] if it is known."""
-    known = [*rows.TABLE, *patch_rows.TABLE]
-    if not measure or rows.remove_interface_number(measure) in known:
-        return []
-    advice = "use a name that `patchfem run -v` prints, such as loop_area"
-    names = get_close_matches(measure, known, MAX_SUGGESTIONS, 0.5)
-    if names:
-        advice = f"did you mean {' or '.join(map(repr, names))}?"
-    return [f"--of {measure}: unknown measure; {advice}"]
-
-
 def _find_duplicate_keys(sweep_scene: SweepScene, keys: Sequence[str]) -> list[str]:
     """Return a validation error for each swept key that is equivalent to an earlier key.
 
@@ -237,14 +217,7 @@ def _check_cases(sweep_scene: SweepScene, cases: Cases) -> str:
             lines = [*lines[:MAX_PRINTED], f"and {len(lines) - MAX_PRINTED} more"]
         raise SceneError(lines)
 
-    # the key that the swept one contradicts is named by the message
-    message = invalid[0][0]
-    swept = {sweep_scene.replace_mode_name(axis.key) for axis in cases.axes}
-    key = re.search(r"(?:^|: )([a-z_]+(?:\.[\w-]+)+): ", message)
-    advice = "give other values in --over"
-    if key and sweep_scene.replace_mode_name(key[1]) not in swept:
-        advice = f"sweep {key[1]}, too, remove this key from the scene, or {advice}"
     extent = f"{len(invalid)} of {len(numbers)} cases"
     if len(numbers) != len(cases):
         extent += " that were checked"
-    return f"{extent} will fail: {message}; {advice}"
+    return f"{extent} will fail: {invalid[0][0]}; give other values in --over, or sweep the contradicting key, too"

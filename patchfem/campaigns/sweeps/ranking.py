@@ -54,14 +54,8 @@ class SobolIndex(NamedTuple):
     high: float
 
 
-def rank_keys(table: SweepTable, requested: str = "") -> dict[str, list[SobolIndex]]:
-    """Compute the Sobol indices of the swept keys for each measure that varies by more than its error.
-
-    Parameters
-    ----------
-    table : SweepTable
-    requested : str
-        Measure that is ranked besides RANKED_MEASURES, as the first one.
+def rank_keys(table: SweepTable) -> dict[str, list[SobolIndex]]:
+    """Compute the Sobol indices of the swept keys for each ranked measure that varies by more than its error.
 
     Returns
     -------
@@ -72,7 +66,7 @@ def rank_keys(table: SweepTable, requested: str = "") -> dict[str, list[SobolInd
     varied = [axis for axis, key in enumerate(table.keys) if key.count > 1]
     if len(varied) < 2 or not (table.is_grid or table.is_random):
         return {}
-    names = [name for name in dict.fromkeys((requested, *RANKED_MEASURES)) if _varies(table, name)]
+    names = [name for name in RANKED_MEASURES if _varies(table, name)]
     columns = {name: table.measures[name].values for name in names}
     if table.is_grid:
         names = [name for name in names if np.isfinite(columns[name]).all()]
@@ -191,17 +185,17 @@ def _compute_surface_indices(surface) -> tuple[np.ndarray, np.ndarray]:
     return np.atleast_2d(indices.first_order), np.atleast_2d(indices.total_order)
 
 
-def compute_quantiles(table: SweepTable, requested: str = "") -> dict[str, np.ndarray]:
+def compute_quantiles(table: SweepTable) -> dict[str, np.ndarray]:
     """Return the quantiles of QUANTILE_LEVELS [SI] of each ranked measure over the random cases.
 
-    `requested` is a measure that comes first. Measures of which fewer than 90 % of the cases have a
+    Measures of which fewer than 90 % of the cases have a
     settled value have none, because the others may be the extreme ones.
     """
     quantiles = {}
     settled = table.has_settled
     if not table.is_random or len(table) < MIN_RANDOM_CASES:
         return {}
-    for name in dict.fromkeys((requested, *RANKED_MEASURES)):
+    for name in RANKED_MEASURES:
         if _varies(table, name):
             values = table.measures[name].values
             counts = np.isfinite(values) & settled

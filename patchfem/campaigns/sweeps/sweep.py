@@ -5,7 +5,7 @@ If a worker dies, the cases of its chunk are repeated one by one.
 In: `WorkerData`, case numbers and an executor of `executors/`. Out: results by chunk from `iterate_chunks`.
 """
 
-from collections import Counter, deque
+from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from time import perf_counter
@@ -22,8 +22,6 @@ from ...runs.batch.meshes import SharedMeshes
 from .case_models import SweepScene
 from .cases import Cases
 
-# Number of deaths of a worker after which a case is abandoned: another case may have caused the first one.
-MAX_DEATHS = 3
 # Target time of a chunk [s], which is long compared with its transfer to a worker and short compared
 # with a sweep.
 CHUNK_SECONDS = 1.0
@@ -68,7 +66,6 @@ def compute_chunk(
     work: WorkerData,
     numbers: Sequence[int],
     say: Callable | None = None,
-    rewrite: Callable[[str], str] = str,
 ) -> tuple[float, tuple[CaseResults, list]]:
     """Compute the results of a chunk of cases.
 
@@ -79,8 +76,6 @@ def compute_chunk(
         Numbers of the cases.
     say : callable, optional
         Called with a line of text.
-    rewrite : callable, optional
-        Changes the messages of failed cases.
 
     Returns
     -------
@@ -94,7 +89,6 @@ def compute_chunk(
         models = [_build_case_model(work, number) for number in numbers]
     keep = work.keep and (lambda case, result: work.keep(numbers[case], result))
     results = batches.solve_models(models, keep, say, True, len(work.cases))
-    results.messages = {case: rewrite(text) for case, text in results.messages.items()}
     extras = []
     if work.extract is not None:
         for case, (number, model) in enumerate(zip(numbers, models)):
@@ -183,8 +177,7 @@ class ChunkQueue:
         self.min_size = min_size
         self.remaining = deque(numbers)
         self.suspects: deque[int] = deque()
-        self.last_suspects: deque[int] = deque()
-        self.deaths: Counter[int] = Counter()
+        self.repeated: set[int] = set()
         self.workers = max(workers, 1)
         # Elapsed time per case of the last chunk, with a guess before the first chunk.
         self.seconds_per_case = CHUNK_SECONDS
@@ -192,14 +185,15 @@ class ChunkQueue:
     def take_chunk(self, *, is_idle: bool = True) -> list | None:
         """Return the case numbers of the next chunk; None if none is available at present.
 
-        Cases of failed chunks are returned last and one by one. The last attempt is only made if `is_idle`, that is, if no
-        other chunk is being computed, so that the case itself has killed the worker.
+        Cases of failed chunks are repeated last and one by one, only if `is_idle`, that is, if no other chunk is being
+        computed, so that a case that kills its worker then has done it itself.
         """
         n_remaining = len(self.remaining)
         if not n_remaining:
-            if self.suspects:
-                return [self.suspects.popleft()]
-            return [self.last_suspects.popleft()] if self.last_suspects and is_idle else None
+            if not (self.suspects and is_idle):
+                return None
+            self.repeated.add(self.suspects[0])
+            return [self.suspects.popleft()]
         max_size = n_remaining
         if self.workers > 1:
             # A chunk has at most half of the remaining cases per worker, so that all workers finish
@@ -215,17 +209,10 @@ class ChunkQueue:
 
     def record_death(self, numbers: Sequence[int]) -> list[int]:
         """Record the failure of a chunk: return the cases to abandon, and queue the others to be repeated alone."""
-        abandoned: list[int] = []
-        self.deaths.update(numbers)
-        for number in numbers:
-            n_left = MAX_DEATHS - self.deaths[number]
-            if n_left > 1:
-                self.suspects.append(number)
-            elif n_left == 1:
-                self.last_suspects.append(number)
-            else:
-                abandoned.append(number)
-        return abandoned
+        if self.repeated.issuperset(numbers):
+            return list(numbers)
+        self.suspects += numbers
+        return []
 
 
 def iterate_chunks(

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...core import Response
-from ..integrated import find_accelerations
+from ...structure.histories import make_response
 from .forces import LawGroup
 from .laws import Interlock, Jenkins
 from .series import half_range
@@ -169,19 +169,19 @@ def make_cycle_response(motion: SteadyMotion, modes, drive, samples: int = 1000)
     z = (motion.modal.T @ waves).real.T
     rate = ((1j * k * omega * motion.modal).T @ waves).real.T
     total = select(np.array([sum(force.force for force in row) for row in forces]))
-    base = motion.level * waves[1].imag
-    acceleration = find_accelerations(modes, base, z, rate, total @ motion.group.rows)
-    floor = base if drive.moving else 0 * base
-    return Response(
-        np.arange(samples + 1) * (2 * np.pi / omega / samples),
-        z,
-        rate,
-        select(slides.q[0]),
-        select(omega * slides.rate[0]),
-        z @ modes.output,
-        rate @ modes.output,
-        acceleration @ modes.output + floor,
-        floor,
-        select(sum_friction(motion.group.laws[0], forces[0])),
-        select(find_slip(slides.q[0], forces[0])),
+    time = np.arange(samples + 1) * (2 * np.pi / omega / samples)
+    interface = (
+        slides.q[0],
+        omega * slides.rate[0],
+        sum_friction(motion.group.laws[0], forces[0]),
+        find_slip(slides.q[0], forces[0]),
+    )
+    return make_response(
+        modes,
+        drive,
+        motion.level * waves[1].imag,
+        (time, z, rate),
+        total @ motion.group.rows,
+        tuple(map(select, interface)),
+        {},
     )

@@ -1,4 +1,4 @@
-"""Import of laboratory files: as a table for scenes and fits, as modes of a scene, or as a frequency response."""
+"""Import of laboratory files: as a table for scenes and fits, or as modes of a scene."""
 
 from collections.abc import Iterable
 from pathlib import Path
@@ -12,9 +12,9 @@ from ...disk.atomic_write import write_text
 from ...identify import measured_modes
 from ...inputs import laboratory, records
 from ...inputs import universal as universal_files
-from ...inputs.units import CHANNEL_UNITS, SI_UNITS
+from ...inputs.units import SI_UNITS
 from ...scene.keys import quantities
-from ...structure import universal as universal_modes
+from ...scene.keys.removed import describe_removed
 from . import universal
 from .universal import Column
 from .write import format_columns
@@ -22,25 +22,16 @@ from .write import format_columns
 # columns of an exported file that can be its displacement, in order of preference; 1.x wrote the first one
 EXPORTED_NAMES = {"displacement": ("output_displacement", "relative_displacement", "slide")}
 # form of a file by its ending, and the options that each form uses
-FORMS = {".csv": "table", ".toml": "modes", ".uff": "response", ".unv": "response"}
-USED = {
-    "table": (),
-    "decay": ("decay", "begin"),
-    "modes": ("segment", "window", "band", "decay", "begin"),
-    "response": ("segment", "window"),
-}
+FORMS = {".csv": "table", ".toml": "modes"}
+USED = {"table": (), "decay": ("decay", "begin"), "modes": ("band", "decay", "begin")}
 DECAY_UNITS = {"time": "s", "amplitude": "m", "frequency": "Hz", "damping": "1"}
 
 
 class EstimateOptions(NamedTuple):
-    """User settings for the estimation of modes or of a frequency response.
+    """User settings for the identification of modes.
 
     Attributes
     ----------
-    segment : str
-        Length of a segment, such as "2 s".
-    window : str
-        "hann" or "none".
     band : str
         Frequencies, such as "20 Hz..400 Hz".
     decay : bool
@@ -49,8 +40,6 @@ class EstimateOptions(NamedTuple):
         Time at which it begins, such as "0.2 s".
     """
 
-    segment: str = ""
-    window: str = ""
     band: str = ""
     decay: bool = False
     begin: str = ""
@@ -59,7 +48,7 @@ class EstimateOptions(NamedTuple):
 def convert_file(
     file: Path, out: Path, requests: Iterable[str], zero: bool, settings: EstimateOptions
 ) -> dict:
-    """Convert a laboratory file to records (.csv), modes (.toml) or a response (.uff).
+    """Convert a laboratory file to records (.csv) or modes (.toml).
 
     Parameters
     ----------
@@ -83,9 +72,8 @@ def convert_file(
     """
     form = FORMS.get(out.suffix.lower())
     if form is None:
-        raise PatchfemError(
-            f"{out}: records are written as .csv, modes as .toml, a frequency response as .uff"
-        )
+        removed = describe_removed(f"import -o {out.suffix}", "writing a frequency response")
+        raise PatchfemError(f"{out}: {removed or 'records are written as .csv, modes as .toml'}")
     if form == "table" and settings.decay:
         form = "decay"
     if zero and form != "table":
@@ -96,20 +84,16 @@ def convert_file(
     unused = [f"--{name}" for name in given if name not in USED[form]]
     if unused:
         raise PatchfemError(
-            f"{out}: {', '.join(unused)} can be used only for modes (-o modes.toml); --segment and --window also for "
-            "responses (-o response.uff), --begin with --decay also for a table of the decay"
+            f"{out}: {', '.join(unused)} can be used only for modes (-o modes.toml), --begin with --decay also for "
+            "a table of the decay"
         )
     if form == "table":
         return _write_table(file, out, requests, zero)
-    if form == "modes" and (shapes := _read_shapes(file, requests, settings)):
-        return _write_modes(shapes, out, file.name, [])
+    if form == "modes" and _has_mode_shapes(file):
+        raise PatchfemError(
+            describe_removed("import of mode shapes", f"{file}: the import of mode shapes")
+        )
     values, notes = _read_records(file, requests)
-    if settings.window not in ("", "hann", "none"):
-        raise PatchfemError(f"--window {settings.window}: hann or none")
-    segment = _parse_quantity(settings.segment, "time", "--segment")
-    averaging = (segment, settings.window or None)
-    if form == "response":
-        return _write_response(values, out, averaging, notes)
     begin = _parse_quantity(settings.begin, "time", "--begin")
     if form == "decay":
         return _write_decay(values, out, begin, notes)
@@ -117,7 +101,7 @@ def convert_file(
         modes = measured_modes.identify_decay_modes(values, begin)
     else:
         band = _parse_band(settings.band)
-        modes = measured_modes.identify_driven_modes(values, *averaging, band)
+        modes = measured_modes.identify_driven_modes(values, band)
     return _write_modes(modes, out, file.name, notes)
 
 
@@ -201,20 +185,6 @@ def format_structure(modes: measured_modes.ListedModes, source: str) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _write_response(values: dict, out: Path, averaging: tuple, notes: list[str]) -> dict:
-    """Write a frequency response as a universal file, estimated with a length [s] and a window of the segments."""
-    estimate, step, drive, response = measured_modes.estimate_record(values, *averaging)
-    universal.write_response(out, estimate, drive, response)
-    return {
-        "lines": estimate.frequency.size,
-        "segments": estimate.segments,
-        "window": estimate.window,
-        "notes": notes,
-        "told": f"{response} over {drive}, {estimate.frequency.size} frequencies from {estimate.segments} segments of "
-        f"{estimate.segment * step:.4g} s, window {estimate.window}",
-    }
-
-
 def _read_records(file: Path, requests) -> tuple[dict[str, np.ndarray], list[str]]:
     """Return measured records by quantity with notes; PatchfemError if none of them is a response."""
     found = laboratory.read_records(file, records.parse_requests(requests), EXPORTED_NAMES)
@@ -227,24 +197,12 @@ def _read_records(file: Path, requests) -> tuple[dict[str, np.ndarray], list[str
     return found.values, found.notes
 
 
-def _read_shapes(
-    file: Path, requests: Iterable[str], settings: EstimateOptions
-) -> measured_modes.ListedModes | None:
-    """Return the modes of mode shapes or frequency responses in a universal file; None for a file of records."""
-    names = {text.partition("=")[0].strip() for text in requests}
-    is_universal = file.suffix.lower() in laboratory.UNIVERSAL_EXTENSIONS
-    if not is_universal or settings != EstimateOptions() or names & set(CHANNEL_UNITS):
-        return None
+def _has_mode_shapes(file: Path) -> bool:
+    """Return whether a file is a universal file with mode shapes (dataset 55)."""
+    if file.suffix.lower() not in laboratory.UNIVERSAL_EXTENSIONS:
+        return False
     datasets = universal_files.read_datasets(file)
-    if not any(one["type"] == 55 or int(one.get("func_type", 0)) == 4 for one in datasets):
-        return None
-    try:
-        shapes = universal_modes.read_universal(file)
-    except PatchfemError as error:
-        raise type(error)(str(error).removeprefix("structure.file: ")) from None
-    places = records.parse_requests(requests, measured_modes.SHAPE_QUANTITIES)
-    sources = {request.quantity: request.source for request in places}
-    return measured_modes.list_shape_modes(shapes, sources)
+    return any(dataset["type"] == 55 for dataset in datasets)
 
 
 def _parse_quantity(text: str, kind: str, option: str) -> float | None:

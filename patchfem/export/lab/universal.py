@@ -126,36 +126,6 @@ def write_histories(
     write_datasets(path, [make_dataset(*curve, id4=line or "NONE") for curve in curves])
 
 
-def write_response(path: Path, estimate, drive: str, response: str) -> None:
-    """Write an estimated frequency response and its coherence.
-
-    Response and reference are at point 1 in direction +x. If the input is a force, structure.file can read the file.
-
-    Parameters
-    ----------
-    path : Path
-    estimate : object
-        With frequency (k,) [Hz], complex value (k,) and coherence (k,) or None.
-    drive, response : str
-        Quantities of input and output, such as "force" and "acceleration".
-    """
-    units = {"displacement": "m", "velocity": "m s-1", "force": "N"}
-    unit, drive_unit = (units.get(name, "m s-2") for name in (response, drive))
-    x = Column("frequency", "Hz", estimate.frequency)
-    y = Column(response, unit, estimate.value)
-    place = {"ref_node": 1, "ref_dir": 1}
-    denominator = {
-        "orddenom_spec_data_type": TYPES[drive_unit],
-        "orddenom_axis_units_lab": LABELS.get(drive_unit, drive_unit),
-    }
-    datasets = [make_dataset(f"{response} over {drive}", RESPONSE, x, y, **place, **denominator)]
-    if estimate.coherence is not None:
-        y = Column("coherence", "", estimate.coherence)
-        name = f"coherence of {response} and {drive}"
-        datasets.append(make_dataset(name, COHERENCE, x, y, ordinate_spec_data_type=0, **place))
-    write_datasets(path, datasets)
-
-
 def write_datasets(path: Path, datasets: list[dict]) -> None:
     """Write the units and datasets 58 into a new file by pyuff, with correct byte counts; Missing without pyuff."""
     try:

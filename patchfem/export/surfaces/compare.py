@@ -15,7 +15,7 @@ from ...surface.compare.compare import DEFAULTS, Options
 from ...surface.compare.records import Comparison, Track
 from ...surface.profile import level, resample_evenly
 from ...surface.quantity import LEVEL, SIDE, Quantity
-from ...surface.roughness.spectrum import BAND
+from ...surface.spectrum import BAND
 from ..answer import Answer, Remarks, Variable
 from ..surface_definitions import name_in_track
 from . import predicted as predicted_wear
@@ -288,19 +288,16 @@ def _make_abbott(heights) -> dict[str, Variable]:
 
 def _add_pressed(answer: Answer, runs: SurfaceRuns) -> Answer:
     """Add the measures and pressures of a scene that was run with the surface before and after wear."""
-    pressed = pressing.surface_runs_to_dict(runs)
+    pressed = runs.as_dict()
     data = dict(answer.data)
-    for side in SIDES:
-        run = getattr(runs, side)
-        if run is not None:
-            x = f"x_pressed_{side}"
-            data |= make_variables(x, **{x: run.x}) | make_variables(
-                x, "Pa", **{f"pressure_{side}": run.stress}
-            )
+    for side, (places, stress) in runs.pressures().items():
+        x = f"x_pressed_{side}"
+        data |= make_variables(x, **{x: places})
+        data |= make_variables(x, "Pa", **{f"pressure_{side}": stress})
     warnings = (*answer.remarks.warnings, *runs.failed, *pressed["warnings"])
     return replace(
         answer,
         data=data,
-        remarks=Remarks(warnings, (*answer.remarks.notes, *runs.lacking)),
+        remarks=Remarks(warnings, answer.remarks.notes),
         details=answer.details | {"pressed": pressed},
     )

@@ -12,7 +12,7 @@ from ...surface.quantity import LEVEL, Mean, Quantity, average_quantities
 from ...surface.roughness import peaks, report
 from ...surface.roughness.parameters import abbott_curve
 from ...surface.roughness.report import RoughnessReport
-from ...surface.roughness.spectrum import BAND
+from ...surface.spectrum import BAND
 from ..answer import Answer, Remarks, Variable
 from . import sentences
 from .variables import make_variables, maps
@@ -233,6 +233,9 @@ def _make_data(reports: list[RoughnessReport]) -> dict[str, Variable]:
         data |= make_variables(
             "x_rough", x_rough=rough.x, roughness=rough.z, waviness=surface.waviness.z
         )
-    is_wave = surface.spectrum.frequency > 0
-    data |= make_variables("wavelength", wavelength=1 / surface.spectrum.frequency[is_wave])
-    return data | make_variables("wavelength", "m3", density=surface.spectrum.density[is_wave])
+    spectrum = surface.spectrum
+    return (
+        data
+        | make_variables("wavelength", wavelength=spectrum.waves)
+        | make_variables("wavelength", "m3", density=spectrum.density)
+    )

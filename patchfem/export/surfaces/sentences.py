@@ -52,7 +52,8 @@ SCANS = {
     ),
     "no_wear": (
         VERDICTS["no_wear"],
-        "A worn square of {side} x {side} points is not seen below a mean depth of {detection_limit}.",
+        "A worn square as large as those that are tested, up to 25 x 25 points, is not seen below a mean depth of "
+        "{detection_limit}.",
     ),
 }
 
@@ -69,8 +70,6 @@ IN_VERDICT = {
 WARNINGS = {
     "other_gain": "All heights after wear are {gain} times those before, as another gain of the instrument would make "
     "them, and wear does not; calibrate z of both measurements.",
-    "other_step": "The traces have different steps, {before} before and {after} after; slopes and the largest depth depend "
-    "on them.",
     "likely_place": "The place is likely, not sure: there the surfaces agree by {significance} standard deviations more "
     "than at other places, and more than {sure} make a place sure; compare their curves.",
     "drift": "The datum drifts by {height} (rms), more than the noise of neighbouring depths ({noise}); the intervals "
@@ -79,11 +78,6 @@ WARNINGS = {
 NOTES = {
     "left_out": "{before} heights before wear and {after} after it are spikes, dropouts or dust and are left out; "
     "--keep-spikes keeps them.",
-    "other_tracks": "Further tracks: {count}, which compare.json lists.",
-    "sure_place": "The place is sure: there the surfaces agree by {significance} standard deviations more than at "
-    "other places, and more than {sure} make a place sure.",
-    "track_cut": "The track leaves the common part, so that it may be wider than stated.",
-    "deposits": "{amount} of material lie above the first surface: deposits or pile-up.",
     "mirrored": "The second surface was measured in the opposite direction; it was mirrored, so that its x counts from "
     "the other end.",
     "other_length": "Lengths in the second trace are {scale} ({low} to {high}) times those in the first.",
@@ -119,7 +113,7 @@ REASONS = {
 
 # SI units of the numbers of findings other than lengths; of areas between traces, and of volumes between scans
 RATIOS = ("unworn", "scale", "low", "high", "gain", "significance", "sure")
-UNITS = {"volume": "m3"} | dict.fromkeys(RATIOS, "1")
+UNITS = dict.fromkeys(RATIOS, "1")
 AMOUNTS = ("grown", "lost", "area")
 
 
@@ -263,7 +257,6 @@ def _format_numbers(numbers: dict, is_areal: bool) -> dict[str, str]:
             fields[name] = format_rounded(number, unit, digits)
         elif number is not None:
             fields[name] = str(number)
-    fields["amount"] = fields.get("volume", fields["area"])
     # without a limit there is nothing to state
     fields["limit"] = f", by up to {fields['limit']} on average," if "limit" in fields else ""
     return fields

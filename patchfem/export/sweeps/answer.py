@@ -41,11 +41,9 @@ def make_answer(
     case_folders : sequence of str
         Folders of the cases inside cases/; empty if there are none.
     """
-    analysis = analyse(table, sweep_scene.of)
+    analysis = analyse(table)
     verdict = make_verdict(table, analysis)
     notes = [sweep_scene.note_bolted_joint()] if sweep_scene.note_bolted_joint() else []
-    if sweep_scene.of and sweep_scene.of not in table.measures:
-        notes.append(f"no case has a value of {sweep_scene.of.replace('_', ' ')}")
     details = {"answer": verdict[0], "sentences": list(verdict)}
     details |= _make_details(table, analysis) | {"of": identify_sweep(sweep_scene, cases)}
     keys = " × ".join(key.key for key in table.keys)
@@ -84,8 +82,6 @@ def _make_command(sweep_scene: SweepScene, cases: Cases) -> str:
     words = ["patchfem", "sweep", sweep_scene.path.name]
     for assignment in sweep_scene.sets:
         words += ["--set", assignment]
-    if sweep_scene.of:
-        words += ["--of", sweep_scene.of]
     return shlex.join([*words, *cases.arguments])
 
 

@@ -47,23 +47,20 @@ def _describe_change(table: SweepTable, analysis: SweepAnalysis) -> str:
     if not analysis.ranges:
         return f"No main measure of {n_known} cases changes by more than its error."
 
-    name, *cases, relative = analysis.ranges[0]
-    # a requested measure comes first even if others change more
-    is_most = relative == max(entry.relative for entry in analysis.ranges)
-    changes = "changes most:" if is_most else "changes"
+    name, *cases, _ = analysis.ranges[0]
     column = table.measures[name]
     low, high = (_format_measure(name, column.unit, column.values[case]) for case in cases)
     varied = [key for key in table.keys if key.count > 1]
     if len(varied) == 1:
         places = [format_value(varied[0].values[case], varied[0].unit) for case in cases]
         return (
-            f"With {varied[0].key}, {_label(name)} {changes} from {low} at {places[0]} "
+            f"With {varied[0].key}, {_label(name)} changes most: from {low} at {places[0]} "
             f"to {high} at {places[1]}."
         )
     share = ""
     for index in analysis.ranking.get(name, ())[:1]:
         share = f", mainly with {index.key} ({100 * index.total:.0f} % of its variance)"
-    return f"{_label(name).capitalize()} {changes} from {low} to {high}{share}."
+    return f"{_label(name).capitalize()} changes most: from {low} to {high}{share}."
 
 
 def _label(name: str) -> str:

@@ -1,4 +1,4 @@
-"""Growth of bonds at an elevated surface temperature (eq. 2.13), and frictional heating of the surface.
+"""Growth of bonds at an elevated surface temperature (eq. 2.13).
 
 The report states a_s = a_0 exp(-T_a/T_s) and l_k = l_0 exp(T_l/T_s). Here both are referred to a temperature T_ref at
 which a_s and l_k are known, so that a surface at this temperature changes nothing:
@@ -9,7 +9,6 @@ Eq. 2.13 is the limit of an infinite T_ref. Temperatures are absolute, in kelvin
 law whose two rates are arrays (m,): `points.FirstOrderBonds` then has a bond length per point.
 """
 
-from math import pi, sqrt
 from typing import NamedTuple
 
 import numpy as np
@@ -88,26 +87,3 @@ def _scale_rate(name: str, value: float, exponent, key: str):
     else:
         rate = np.exp(total)
     return float(rate) if np.ndim(rate) == 0 else rate
-
-
-def surface_temperature_rise(
-    flux: float, time: float, conductivity: float, heat_capacity: float
-) -> float:
-    """Return the temperature rise 2 q sqrt(t/(pi k rho c)) [K] at the surface of a heated half-space.
-
-    Source: Carslaw and Jaeger, section 2.9. Heat flows in one dimension, so it is an upper bound for a patch that is
-    small compared with sqrt(k t/(rho c)).
-
-    Parameters
-    ----------
-    flux, time : float
-        Constant flux q [W/m2], and time t [s] since it started.
-    conductivity, heat_capacity : float
-        k [W m-1 K-1] and rho c [J m-3 K-1].
-
-    Returns
-    -------
-    float
-        Temperature rise [K].
-    """
-    return 2 * flux * sqrt(time / (pi * conductivity * heat_capacity))

@@ -1,7 +1,7 @@
 """Batch of lumped cases, with one mode and one contact point, by time steps of `points.cases`.
 
-In: models of a group. Out: `CaseResults`. Each case has as many steps as its tolerance needs. A case that misses it, or
-whose free vibration during stick is not resolved, is computed by a single run.
+In: models of a group. Out: `CaseResults`. Each case has as many steps as its tolerance needs. A case that misses it
+is computed by a single run.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...core import Measure, Outcome, Response, SineDrive
+from ...core import Outcome, Response, SineDrive
 from ...effects import law_has_trait, needs_bond_list
 from ...model.model import Model
 from ...model.similar_models import SimilarModels, collect_columns
@@ -39,7 +39,6 @@ from ...response.reasons import (
     STICKS_AT_REVERSAL_REASON,
     find_missing,
 )
-from ...response.ringing import MIN_PERIODS
 from ...response.rows import (
     AMPLITUDE,
     INTERNAL_VALUES,
@@ -48,7 +47,6 @@ from ...response.rows import (
     error_floor,
     larger_term,
 )
-from ...response.run_events import measure_ringing_in_sticks
 from ...response.settling import (
     CLASSES,
     extrapolate_steady_amplitudes,
@@ -81,9 +79,6 @@ MAX_STICK_SLIP = 1e-3
 # Largest product of micro-damping and a typical speed relative to the kinetic friction, with which the power of the LuGre
 # law is not negative
 MAX_MICRO_DAMPING = 4.0
-# Smallest length of a stick in which a free vibration is fitted, relative to the shortest one that shows it.
-STICK_FRACTION = 0.9
-MIN_RING_STEPS = 24  # smallest number of steps per period of a free vibration
 RIGID_SECANT = "secant_stiffness"
 
 
@@ -132,7 +127,6 @@ def refusal_reason(model: Model) -> str:
         model.kind != "rig"
         or model.patch is not None
         or model.wear is not None
-        or model.heat is not None
         or has_unreadable_measurements(model)
     ):
         return "the contact of the case is not a single point, or its table of measured responses cannot be read"
@@ -189,7 +183,7 @@ def _solve_cases(models: Sequence[Model], report: Callable | None) -> CaseResult
     results = make_results(models, cases, scales, refined)
     _insert_texts(models, results)
     is_alone = needs_single_run(cases, scales, refined, results)
-    is_alone |= add_ringing(models, cases, scales, refined, results, is_alone)
+    mark_loading_cases(models, cases, scales, refined, results, is_alone)
     results.seconds[:] = (perf_counter() - begin) / len(models)
     one_by_one.replace_by_single_runs(results, models, is_alone, report)
     return results
@@ -447,18 +441,17 @@ def needs_single_run(
     return is_alone
 
 
-def add_ringing(
+def mark_loading_cases(
     models: Sequence[Model],
     cases: Cases,
     scales: Scales,
     refined: Refined,
     results: CaseResults,
     is_done: np.ndarray,
-) -> np.ndarray:
-    """Add the free vibration during stick; return the cases (n,) in which it is not resolved.
+) -> None:
+    """Call the sticking cases whose friction force still increases transient.
 
-    While an elastic interface sticks for longer than a period of the free vibration, a transient rings. It is fitted as
-    in a single run to the samples of another march, whose steps resolve it, and of one with half of the steps.
+    Their forces are those of another march, which keeps its samples.
 
     Parameters
     ----------
@@ -467,47 +460,20 @@ def add_ringing(
     is_done : (n,) of bool
         Cases that are left out.
     """
-    march, columns = refined.march, cases.parameters.T
-    stiffness = columns[Number.STIFFNESS] + scales.stick_stiffness * columns[Number.MOBILITY]
-    omega = np.sqrt(stiffness)
-    may_ring = omega * march.longest_stick >= 2 * np.pi * STICK_FRACTION * MIN_PERIODS
-    may_ring &= (scales.stick_stiffness > 0) & ~is_done
-    may_ring &= ~(march.repeats & (march.values["stick_fraction"] == 1))
-    steps = np.maximum(refined.steps, MIN_RING_STEPS * omega / columns[Number.OMEGA])
-    steps = 2.0 ** np.ceil(np.log2(steps))
-    is_unresolved = may_ring & (steps > STEPS[-1])
-    may_ring &= ~is_unresolved
+    march = refined.march
+    may_load = (results.outcome == str(Outcome.STUCK)) & (scales.stick_stiffness > 0) & ~is_done
+    may_load &= ~(march.repeats & (march.values["stick_fraction"] == 1))
     is_loading = np.zeros(len(models), bool)
-    for count in np.unique(steps[may_ring]).astype(int).tolist():
-        part = np.flatnonzero(may_ring & (steps == count))
-        counts = (count, count // 2)
-        runs = [march_cases(cases.select(part), n, has_samples=True) for n in counts]
+    for count in np.unique(refined.steps[may_load]).astype(int).tolist():
+        part = np.flatnonzero(may_load & (refined.steps == count))
+        samples = march_cases(cases.select(part), count, has_samples=True).samples
         for row, case in enumerate(part.tolist()):
             drive, modes = models[case].rig.drive.signal, models[case].rig.modes
-            windows = [
-                _make_window(modes, drive, run.samples[row], n) for run, n in zip(runs, counts)
-            ]
-            is_loading[case] = is_still_loading(windows[0], drive.period, scales.tolerance[case])
-            tolerance = MAX_STICK_SLIP * float(scales.limit[case] / scales.stick_stiffness[case])
-            (fine, fit_errors), (rough, _) = (
-                measure_ringing_in_sticks(
-                    window, modes, drive, None, tolerance, repeats=bool(run.repeats[row])
-                )
-                for window, run in zip(windows, runs)
-            )
-            is_unresolved[case] = fine.keys() != rough.keys()
-            errors = convergence_errors(fine, rough) if fine and rough else {}
-            for name, error in errors.items():
-                error = float(error + fit_errors[name])
-                definition = TABLE[name]
-                measure = Measure(fine[name], definition.unit, error, definition.floor)
-                results.fill(case, {name: measure})
+            window = _make_window(modes, drive, samples[row], count)
+            is_loading[case] = is_still_loading(window, drive.period, scales.tolerance[case])
 
-    # The force of an interface that sticks may still increase.
-    is_loading &= results.outcome == str(Outcome.STUCK)
     results.outcome[is_loading] = str(Outcome.TRANSIENT)
     _put_reason(results, STEADY_AMPLITUDE, np.flatnonzero(is_loading), CHANGE_NOT_RESOLVED_REASON)
-    return is_unresolved
 
 
 def _make_window(modes, drive, samples, steps: int) -> Response:

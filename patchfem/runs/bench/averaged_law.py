@@ -1,7 +1,7 @@
 """Friction law with a spatially averaged pressure, for a bench run or a rigidly sliding block.
 
-In: a model with law 'convolution' and its Patch with the static contact solution. Out: the law
-object, the ratio of its slip force to mu_s N, and nodal tractions.
+In: a model with law 'convolution' and its Patch with the static contact solution. Out: the averaged pressure, the ratio
+of the slip force to mu_s N, and nodal tractions.
 """
 
 import numpy as np
@@ -18,15 +18,27 @@ def _import_averaged_law():
     return import_effect("friction.law=convolution")
 
 
-def make_averaged_law(model, patch):
-    """Return the averaged friction law of a model on its patch (None for a single point)."""
-    friction = model.friction
-    law = _import_averaged_law()
-    if patch is None:
-        return law.Convolution(friction.static, friction.bond_length, friction.order)
+def average_behind(model, patch, direction: float, offset: float = 0.0) -> np.ndarray:
+    """Return the pressure (m,) [Pa] that the law averages behind the nodes of the upper piece.
 
-    pattern = patch.pressure.sigma_n if model.side == "lower" else None
-    return law.Convolution(friction.static, friction.bond_length, friction.order, patch.x, pattern)
+    Parameters
+    ----------
+    model : Model
+    patch : Patch
+    direction : float
+        Sign of the motion.
+    offset : float
+        Displacement [m] of the upper piece over the pressure.
+    """
+    friction = model.friction
+    return _import_averaged_law().average_pressure(
+        patch.x + offset,
+        patch.x,
+        patch.pressure.sigma_n,
+        direction,
+        friction.bond_length,
+        friction.order,
+    )
 
 
 def slip_force_ratio(model, patch) -> float:
@@ -74,15 +86,10 @@ def distribute_slip_force(model, patch, force) -> np.ndarray:
     (f, m)
         Tractions [Pa].
     """
-    friction = model.friction
-    x = patch.x
-    sigma = patch.pressure.sigma_n
     weight = patch.pieces.interface.weight
     unit_tractions = []
     for direction in (1.0, -1.0):
-        average = _import_averaged_law().average_pressure(
-            x, x, sigma, direction, friction.bond_length, friction.order
-        )
-        traction = np.where(sigma > 0, average, 0.0)
+        average = average_behind(model, patch, direction)
+        traction = np.where(patch.pressure.sigma_n > 0, average, 0.0)
         unit_tractions.append(traction / max(weight @ traction, 1e-300))
     return np.array([value * unit_tractions[0 if value >= 0 else 1] for value in force])

@@ -4,7 +4,7 @@ In: a model with [slide] and its Patch with the static contact solution, or None
 Out: a `BenchRun`. The pieces may be rigid or deform in shear.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from time import perf_counter
 
 import numpy as np
@@ -22,11 +22,8 @@ from ...response.measures import (
     compute_step_harmonic,
     work_difference,
 )
-from . import rigid, shear
-from .closed_form import slide_in_closed_form
-from .engine import BenchEngine, Method, choose_bench_engine
-from .ledger import DEFAULT_OPTIONS, BenchOptions, SlideHistories, SlideTask
-from .step_by_step import slide_step_by_step
+from .engine import BenchEngine, choose_bench_engine
+from .slides import SlideHistories, SlideTask, follow_path
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -34,6 +31,7 @@ class BenchRun:
     """Histories, fields and measures of an interface under a prescribed displacement, at k samples.
 
     - time, slide, rate (k,): time [s], relative displacement [m] and velocity [m/s].
+    - force, load, slip (k,): friction force [N], normal load [N], irreversible displacement [m].
     - ledger (4, k): cumulative work, stored energy, cumulative dissipated and created energy [J].
     - frames (f,): indices of the samples at which fields are stored.
     - tau, local (f, m): traction [Pa] and slip [m] at the nodes in each frame.
@@ -60,7 +58,7 @@ class BenchRun:
 
 
 def run_bench(
-    model, patch, steps: int, frames: int = 0, path=None, options: BenchOptions = DEFAULT_OPTIONS
+    model, patch, steps: int, frames: int = 0, path=None, choice=None, springs=None, **callbacks
 ) -> BenchRun:
     """Compute the friction response of a model to its prescribed displacement.
 
@@ -75,12 +73,23 @@ def run_bench(
         Number of output frames of the fields.
     path : tuple, optional
         Displacement path in the form of `SlidePath.samples`; default: the path of the model.
-    options : BenchOptions
-        Options and callbacks.
+    choice : EngineChoice, optional
+        Method of bond summation; default: chosen by the tolerance.
+    springs : callable, optional
+        See `BenchEngine`.
+    **callbacks
+        Fields `say` and `progress` of `SlideTask`.
 
     Returns
     -------
     BenchRun
+
+    Raises
+    ------
+    Missing
+        If the sum over lists of bonds would take too long.
+    NotConverged
+        If the force of a step has too large an error.
     """
     begin = perf_counter()
     time, slide, first, omega = model.slide.samples(steps) if path is None else path
@@ -88,31 +97,39 @@ def run_bench(
         start = time[first]
         time, slide = model.point.refine_samples(model.slide, time, slide, steps)
         first = int(np.searchsorted(time, start))
-    engine = choose_bench_engine(model, slide, 1 if patch is None else patch.x.size, options.choice)
-    histories = _compute_histories(SlideTask(model, patch, time, slide, frames, engine, options))
+    engine = replace(choose_bench_engine(model, slide, choice), springs=springs)
+    stored = _choose_frames(slide.size, frames)
+    histories = follow_path(SlideTask(model, patch, time, slide, stored, engine, **callbacks))
     jumps = reversal_force_rule(model) == "jumps"
-    values = _compute_measures(model, time, slide, histories, first)
+    values = _compute_measures(model, histories, first)
     values |= _compute_loop_measures(model, time, slide, histories, first, omega) if omega else {}
     values["work_check"] = work_difference(histories.ledger[0], [(slide, histories.force)], jumps)
     span = time[-1]  # Scaling by the time span avoids overflow for extremely slow motions.
     rate = np.zeros(time.size)
     if time.size > 2:
         rate = np.gradient(slide, time / span) / span
-    return BenchRun(time, slide, rate, *histories, values, perf_counter() - begin, first, engine)
+    return BenchRun(
+        time=time,
+        slide=slide,
+        rate=rate,
+        frames=stored,
+        values=values,
+        seconds=perf_counter() - begin,
+        first=first,
+        engine=engine,
+        **histories._asdict(),
+    )
 
 
-def _compute_histories(task: SlideTask) -> SlideHistories:
-    """Compute the friction histories of a bench run."""
-    if task.model.partial_slip:
-        return shear.slide_in_shear(task)
-    if task.engine.method is Method.STEPPED:
-        return slide_step_by_step(task)
-    if task.engine.method is Method.CLOSED:
-        return slide_in_closed_form(task)
-    return rigid.slide_rigidly(task)
+def _choose_frames(n_samples: int, n_frames: int) -> np.ndarray:
+    """Return the indices of the samples with stored fields; the initial state is not one of them."""
+    if not n_frames:
+        return np.zeros(0, int)
+    numbers = np.linspace(0, n_samples - 1, n_frames + 1).round().astype(int)[1:]
+    return np.unique(numbers[numbers > 0])
 
 
-def _compute_measures(model, time, slide, histories: SlideHistories, cycle_start: int) -> dict:
+def _compute_measures(model, histories: SlideHistories, cycle_start: int) -> dict:
     """Compute all measures of a bench run except those of the friction loop."""
     force = histories.force
     load = histories.load

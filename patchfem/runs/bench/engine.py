@@ -1,13 +1,14 @@
 """Method and sizes of a bench run.
 
 In: a model with [slide]. Out: `BenchEngine`, steps per cycle and `BenchSizes`. A law without memory has a
-closed form. Recursion, bond lists and parallel elements use the compiled kernels of the rigs. If
-the pressure at a point changes during the motion, an object of the law is evaluated sample by sample.
+closed form. Recursion, bond lists and parallel elements use the compiled kernels of the rigs.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from enum import Enum
 from math import ceil
+from time import thread_time
 from typing import NamedTuple
 
 import numpy as np
@@ -15,13 +16,10 @@ import numpy as np
 from ...core import Missing
 from ...effects import law_has_trait, needs_bond_list
 from ...friction.bonds import engines as bond_engines
-from ...friction.bonds import parameters
+from ...friction.bonds.parameters import MAX_LIST_SECONDS
 
 MAX_GROOVE_STEPS = 200_000  # Largest number of steps per cycle over grooves.
 N_SAMPLES_PER_RADIAN = 20  # Number of samples per radian of the groove phase.
-# Ratio of the passes through a bond list per time step to those in a rig. A prescribed displacement
-# needs no iteration for the displacement increment.
-LIST_PASS_RATIO = 1 / 3
 
 
 class Method(Enum):
@@ -36,7 +34,6 @@ class Method(Enum):
     RECURSION = "recursion"
     LIST = "bond list"
     LISTS = "bond lists"
-    STEPPED = "law step by step"
 
 
 LIST_METHODS = (Method.LIST, Method.LISTS)
@@ -48,10 +45,13 @@ class BenchEngine:
 
     - method: Method.
     - choice: engine of bond summation with its settings; None for other methods.
+    - springs: function that replaces the stiffnesses and yield displacements of parallel elements; None: they are used
+      unchanged.
     """
 
     method: Method
     choice: "bond_engines.EngineChoice | None" = None
+    springs: Callable | None = None
 
     @property
     def name(self) -> str:
@@ -62,7 +62,7 @@ class BenchEngine:
 
 
 def choose_bench_engine(
-    model, slide, n_points: int = 1, choice: "bond_engines.EngineChoice | None" = None
+    model, slide, choice: "bond_engines.EngineChoice | None" = None
 ) -> BenchEngine:
     """Choose the method that computes the friction force of a bench run.
 
@@ -71,15 +71,8 @@ def choose_bench_engine(
     model : Model
     slide : (k,)
         Relative displacement [m].
-    n_points : int
-        Nodes of the interface.
     choice : EngineChoice, optional
         Method of the sum over bonds, if it is known.
-
-    Raises
-    ------
-    Missing
-        If the sum over bonds would take too long.
     """
     f = model.friction
     has_bonds = law_has_trait(f.law, "bonds")
@@ -87,20 +80,13 @@ def choose_bench_engine(
         if model.grooves is None and (
             needs_bond_list(f) or find_requested_engine(model) not in ("auto", "recursion")
         ):
-            choice = choice or choose_bond_summation(model, slide)
-            return _make_bond_sum_engine(model, slide, n_points, choice)
+            return _make_bond_sum_engine(model, choice or choose_bond_summation(model, slide))
         return BenchEngine(Method.POINTS)
-    if model.partial_slip:
-        return BenchEngine(Method.ELEMENTS)
-    if has_changing_pressure(model) and model.grooves is None and not has_bonds:
-        return BenchEngine(Method.STEPPED)
-    if law_has_trait(f.law, "memoryless"):
+    if law_has_trait(f.law, "memoryless") and not model.partial_slip:
         return BenchEngine(Method.CLOSED)
     if not has_bonds:
         return BenchEngine(Method.ELEMENTS)
-    return _make_bond_sum_engine(
-        model, slide, n_points, choice or choose_bond_summation(model, slide)
-    )
+    return _make_bond_sum_engine(model, choice or choose_bond_summation(model, slide))
 
 
 def steps_per_cycle(model) -> int:
@@ -186,31 +172,48 @@ def mean_stroke(slide) -> tuple:
     return float(np.abs(moves).sum()) / count, max(directions.size / count, 1.0)
 
 
-def _make_bond_sum_engine(
-    model, slide, n_points: int, choice: "bond_engines.EngineChoice"
-) -> BenchEngine:
-    """Return the bench engine of a nonlocal law on `n_points` points."""
-    law = model.bonds
-    is_stepped = has_changing_pressure(model) and model.grooves is None and not model.partial_slip
+def _make_bond_sum_engine(model, choice: "bond_engines.EngineChoice") -> BenchEngine:
+    """Return the bench engine of a nonlocal law with a method of bond summation."""
     if choice.engine == "recursion":
-        return BenchEngine(Method.STEPPED if is_stepped else Method.RECURSION, choice)
-    n_lists = n_points if model.partial_slip else 1
-    size = slide.size
-    max_move = float(np.abs(np.diff(slide)).max())
-    strips = min(choice.strips, size * max(1.0, 4 * max_move / law.length))
-    seconds = (LIST_PASS_RATIO if n_lists == 1 else n_lists) * choice.seconds
-    if choice.strips:
-        seconds *= strips / choice.strips
-    if size * seconds > parameters.MAX_LIST_SECONDS:
-        raise Missing(
-            f"the sum over the list of bonds (about {strips:.0f} entries) would need a computing time of "
-            f"about {size * seconds:.0f} s, more than the limit of {parameters.MAX_LIST_SECONDS:.0f} s; lower "
-            "accuracy.steps_per_cycle or slide.cycles, or raise accuracy.tail or accuracy.merge",
-            "",
-        )
-    if is_stepped:
-        return BenchEngine(Method.STEPPED, choice)
-    return BenchEngine(Method.LIST if n_lists == 1 else Method.LISTS, choice)
+        return BenchEngine(Method.RECURSION, choice)
+    has_lists = model.partial_slip or model.side == "lower"
+    return BenchEngine(Method.LISTS if has_lists else Method.LIST, choice)
+
+
+class BondListGuard:
+    """Progress callback that stops a run whose lists of bonds take too much CPU time.
+
+    The cost per step does not decrease, because a list never becomes shorter. Therefore the whole
+    run takes at least the elapsed time divided by the completed fraction.
+    """
+
+    def __init__(self, progress=None):
+        self.progress = progress
+        # CPU time [s] and completed fraction at the first call, so that compilation does not count.
+        self.start = None
+
+    def __call__(self, fraction: float) -> None:
+        """Report the completed fraction of the steps, and stop a run that takes too long.
+
+        Raises
+        ------
+        Missing
+            If the whole run would take more than MAX_LIST_SECONDS of CPU time.
+        """
+        now = thread_time()
+        if self.start is None:
+            self.start = now, fraction
+        spent = now - self.start[0]
+        done = fraction - self.start[1]
+        if done > 0 and spent > MAX_LIST_SECONDS / 60 and spent > MAX_LIST_SECONDS * done:
+            raise Missing(
+                f"the sum over the list of bonds would need a computing time of about {spent / done:.0f} s, more than "
+                f"the limit of {MAX_LIST_SECONDS:.0f} s; lower the number of cycles or accuracy.steps_per_cycle, raise "
+                'accuracy.tail or accuracy.merge, or use reading = "stretch" with order = 1',
+                "",
+            )
+        if self.progress is not None:
+            self.progress(fraction)
 
 
 def uses_parallel_elements(model) -> bool:
@@ -220,6 +223,11 @@ def uses_parallel_elements(model) -> bool:
         and model.grooves is None
         and not law_has_trait(model.friction.law, "bonds")
     )
+
+
+def nodal_element_limit(model, patch):
+    """Return the nodal friction limits (m,) [Pa] of parallel elements; None for other methods."""
+    return model.friction.static * patch.pressure.sigma_n if uses_parallel_elements(model) else None
 
 
 class BenchSizes(NamedTuple):
@@ -235,20 +243,13 @@ class BenchSizes(NamedTuple):
     samples: int
 
 
-def count_bench_sizes(model, n_points: int) -> BenchSizes:
-    """Count the unknowns and the samples of a bench run.
-
-    Parameters
-    ----------
-    model : Model
-    n_points : int
-        Number of interface nodes; 1 without a patch.
-    """
+def count_bench_sizes(model) -> BenchSizes:
+    """Count the unknowns and the samples of a bench run."""
     per_cycle = steps_per_cycle(model)
     time, slide = model.slide.samples(per_cycle)[:2]
     if model.load_varies:
         time, slide = model.point.refine_samples(model.slide, time, slide, per_cycle)
-    engine = choose_bench_engine(model, slide, n_points)
+    engine = choose_bench_engine(model, slide)
     # The comparison runs keep their samples; a cell density needs one run more.
     has_cells = law_has_trait(model.friction.law, "cells") and engine.method is Method.ELEMENTS
     unknowns = {}

@@ -13,17 +13,20 @@ from typing import NamedTuple
 import numpy as np
 
 from ...effects import law_has_trait
+from ...friction.cells import CELL_MERGES, join_cells
 from ...response.coarser import CoarserRuns, StepRun, estimate_errors, second_order_errors
 from ...response.errors import (
+    ERROR_MEASURES,
     FrictionScale,
+    absolute_change,
     convergence_errors,
     finer_errors,
     friction_errors,
+    merged_cell_errors,
 )
 from ...slip import shear_modes
-from . import bench, rigid, shear
+from . import bench, shear
 from .engine import Method, uses_parallel_elements
-from .ledger import BenchOptions
 
 # Tolerance that sets the steps of runs on coarser meshes. It differs from that of the run, because
 # parallel elements follow any path exactly.
@@ -38,7 +41,8 @@ class CoarseRun(NamedTuple):
     - steps: steps per cycle.
     - level: index of the mesh; 0 is the finest one.
     - choice: engine of bond summation with its settings.
-    - springs, modes: see `BenchOptions`.
+    - springs: see `BenchEngine`.
+    - modes: number of shear modes of the pieces; None: set by the scene or the tolerance.
     """
 
     steps: int
@@ -80,9 +84,19 @@ def estimate_bench_errors(model, patches: list, fine_run, steps: int, say=None) 
 
     def solve(variant: CoarseRun):
         """Compute a bench run with coarser settings."""
-        options = BenchOptions(variant.choice, say, springs=variant.springs, modes=variant.modes)
         begin = process_time()
-        coarse_run = bench.run_bench(model, patches[variant.level], variant.steps, options=options)
+        coarse_model = model
+        if variant.modes is not None:
+            accuracy = model.accuracy.model_copy(update={"shear_modes": variant.modes})
+            coarse_model = replace(model, accuracy=accuracy)
+        coarse_run = bench.run_bench(
+            coarse_model,
+            patches[variant.level],
+            variant.steps,
+            choice=variant.choice,
+            springs=variant.springs,
+            say=say,
+        )
         cpu_seconds[variant] = process_time() - begin
         return coarse_run
 
@@ -127,11 +141,9 @@ def list_coarser_runs(model, patches: list, fine_run, steps: int) -> list:
     if has_coarser_mesh and uses_parallel_elements(model):
         length = model.friction.bond_length
         steps_on_coarse_mesh = model.slide.steps(MESH_TOL, model.accuracy.steps_per_cycle, length)
-        out.append(
-            shear.list_coarser_element_runs(
-                len(patches) - 1, quarter._replace(steps=steps_on_coarse_mesh)
-            )
-        )
+        reference = quarter._replace(steps=steps_on_coarse_mesh)
+        runs = tuple(reference._replace(level=level) for level in range(1, len(patches)))
+        out.append(CoarserRuns(runs, _estimate_mesh_errors, reference, "mesh"))
     elif has_coarser_mesh:
         # Both runs have the same number of modes, so that only the mesh changes.
         count = shear.count_shear_modes(model, patch) if model.partial_slip else None
@@ -141,7 +153,10 @@ def list_coarser_runs(model, patches: list, fine_run, steps: int) -> list:
             coarser = quarter._replace(modes=shear_modes.comparison_mode_count(count))
             out.append(CoarserRuns((coarser,), second_order_errors, quarter, "modes"))
     if law_has_trait(model.friction.law, "cells") and fine_run.engine.method is Method.ELEMENTS:
-        out.append(rigid.list_merged_cell_runs(quarter))
+        # Groups of four cells are merged into one.
+        joins = [partial(join_cells, *merge) for merge in CELL_MERGES]
+        runs = tuple(quarter._replace(springs=join) for join in joins)
+        out.append(CoarserRuns(runs, merged_cell_errors, quarter, "cells"))
     if choice is not None and choice.merge > 0:
         narrow = quarter._replace(choice=replace(choice, merge=FINER_MERGE_FACTOR * choice.merge))
         out.append(CoarserRuns((narrow,), finer_errors, quarter, "bonds"))
@@ -165,3 +180,14 @@ def _estimate_bond_sum_errors(model, fine_run) -> dict:
         float(work[fine_run.first :].sum()),
     )
     return friction_errors(fine_run.values, find_bond_sum_error(fine_run.engine), scale)
+
+
+def _estimate_mesh_errors(*values: dict) -> dict:
+    """Estimate the mesh errors of the measures from their values on nested meshes.
+
+    Measures that are themselves errors, such as the energy balance, have their change as error.
+    """
+    changes = absolute_change(values[0], values[1])
+    errors = convergence_errors(*values)
+    errors.update({name: changes[name] for name in ERROR_MEASURES if name in changes})
+    return errors

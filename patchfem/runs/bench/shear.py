@@ -1,7 +1,6 @@
-"""Sliding of pieces that deform in shear, by parallel elements or shear modes.
+"""Contact points of pieces that deform in shear, over grooves, or under the pressure of a lower piece.
 
-In: a `SlideTask` of a model with [contact.shear]. Out: `SlideHistories`, and coarser runs that show the
-mesh error of parallel elements.
+In: a model and its Patch. Out: `points.contacts.Contact`s of benches and rigs, and the fields of grooves.
 """
 
 from dataclasses import replace
@@ -10,15 +9,9 @@ import numpy as np
 
 from ...contact.stiffness import tangential_stiffness
 from ...effects import law_has_trait
-from ...friction.record import make_law
 from ...points import contacts
-from ...response.coarser import CoarserRuns
-from ...response.errors import ERROR_MEASURES, absolute_change, convergence_errors
 from ...slip import shear_modes
-from ...slip.fields import bond_shear_modes, element_fields, point_fields
-from ..patch.jenkins_elements import elements
-from .ledger import SlideHistories, SlideTask
-from .path_response import follow_slide, make_slide_histories
+from ...slip.fields import bond_shear_modes
 
 # Ratio of the assumed pressure of an initially unloaded node of the lower piece to the mean
 # pressure.
@@ -28,47 +21,6 @@ OPEN_PRESSURE_FRACTION = 1e-3
 COULOMB_LENGTH_RATIO = 0.1
 # Smallest bond length for the choice of shear modes over grooves, relative to the slide at gross slip.
 MIN_LENGTH_RATIO = 1e-3
-
-
-def slide_in_shear(task: SlideTask) -> SlideHistories:
-    """Compute the friction histories of pieces that deform in shear.
-
-    Raises
-    ------
-    NotConverged
-        If a time step has too large a residual.
-    """
-    if task.model.grooves is not None:
-        return _slide_over_grooves(task)
-    if law_has_trait(task.model.friction.law, "bonds"):
-        return _slide_bond_points(task)
-    return _slide_elements(task)
-
-
-def _slide_elements(task: SlideTask) -> SlideHistories:
-    """Compute the friction histories of elastic pieces that are replaced by parallel elements."""
-    patch = task.patch
-    friction = task.model.friction
-    length = make_law(friction).element(1.0).length
-    reduction = elements(patch, friction.static, length)
-    springs = reduction.stiffness, reduction.yield_displacement
-    if task.options.springs:
-        springs = task.options.springs(*springs)
-    motion = follow_slide(contacts.make_parallel_contact(*springs, np.zeros(0)), task)
-    states = [(one.slide, one.stretch) for one in motion.snapshots]
-    tau, local = element_fields(patch, reduction, states, length)
-    return make_slide_histories(task, motion, patch.pressure.load, tau, local)
-
-
-def _slide_over_grooves(task: SlideTask) -> SlideHistories:
-    """Compute the friction histories of elastic pieces over grooves by shear modes."""
-    model = task.model
-    patch = task.patch
-    load = patch.pressure.load
-    contact = make_flank_contact(model, load, patch, model.accuracy.shear_modes)
-    motion = follow_slide(contact, task)
-    tau, local = compute_groove_fields(patch, contact, motion.snapshots)
-    return make_slide_histories(task, motion, load, tau, local)
 
 
 def make_flank_contact(model, load: float, patch=None, n_modes: int | None = None):
@@ -156,24 +108,6 @@ def compute_groove_fields(patch, contact, snapshots) -> tuple:
     return tau, local
 
 
-def _slide_bond_points(task: SlideTask) -> SlideHistories:
-    """Compute the friction histories of bonds at points of elastic pieces, by shear modes."""
-    model = task.model
-    patch = task.patch
-    law = model.bonds
-    bond_sum = make_bond_sum(law, task.engine.choice)
-    modes = compute_point_shear_modes(model, patch, task.options.modes)
-    row = np.zeros(0)
-    if model.side == "lower":
-        contact = make_lower_contact(model, patch, row, modes, bond_sum)
-    else:
-        force = patch.pressure.sigma_n * patch.pieces.interface.weight
-        contact = contacts.make_bond_contact(law, force[modes.points], row, modes, bond_sum)
-    motion = follow_slide(contact, task)
-    tau, local = point_fields(patch, modes, motion.snapshots)
-    return make_slide_histories(task, motion, patch.pressure.load, tau, local)
-
-
 def make_bond_sum(law, choice) -> "contacts.BondSum | None":
     """Return the settings of a sum over lists of bonds; None for the recursion.
 
@@ -235,7 +169,7 @@ def count_shear_modes(model, patch) -> int | None:
     return compute_point_shear_modes(model, patch).stiffness.size
 
 
-def make_lower_contact(model, patch, row, shear, bond_sum) -> contacts.Contact:
+def make_lower_contact(model, patch, row, modes, bond_sum) -> contacts.Contact:
     """Return the points of bonds at all nodes, under a pressure that is fixed to the lower piece.
 
     Parameters
@@ -244,7 +178,7 @@ def make_lower_contact(model, patch, row, shear, bond_sum) -> contacts.Contact:
     patch : Patch
     row : (n,) array
         Slide per modal coordinate.
-    shear : ShearModes or None
+    modes : ShearModes or None
         Shear modes at the nodes; None for pieces that are rigid in shear.
     bond_sum : BondSum or None
         Sum over lists of bonds, or None for the recursion.
@@ -254,32 +188,7 @@ def make_lower_contact(model, patch, row, shear, bond_sum) -> contacts.Contact:
         model.bonds,
         mean * patch.pieces.interface.weight,
         row,
-        shear,
+        modes,
         bond_sum,
         np.stack([patch.x, patch.pressure.sigma_n / mean]),
     )
-
-
-def list_coarser_element_runs(n_meshes: int, reference_run) -> CoarserRuns:
-    """List bench runs with parallel elements on coarser meshes.
-
-    Parameters
-    ----------
-    n_meshes : int
-        Number of coarser meshes.
-    reference_run : CoarseRun
-        Run with which they are compared.
-    """
-    runs = tuple(reference_run._replace(level=level) for level in range(1, n_meshes + 1))
-    return CoarserRuns(runs, estimate_mesh_errors, reference_run, "mesh")
-
-
-def estimate_mesh_errors(*values: dict) -> dict:
-    """Estimate the mesh errors of the measures from their values on nested meshes.
-
-    Measures that are themselves errors, such as the energy balance, have their change as error.
-    """
-    changes = absolute_change(values[0], values[1])
-    errors = convergence_errors(*values)
-    errors.update({name: changes[name] for name in ERROR_MEASURES if name in changes})
-    return errors

@@ -28,9 +28,6 @@ MAX_SMALL_STRAIN = 0.02
 
 # Smallest ratio of normal to tangential displacement under a shear force that a note reports.
 MIN_COUPLING_RATIO = 0.02
-# Smallest ratio of load to buckling load that a note reports; it is about the relative error of the
-# sideways motion of a tall piece.
-MIN_BUCKLING_RATIO = 0.02
 
 
 def make_piece_meshes_of_run(model) -> tuple:
@@ -171,9 +168,6 @@ def notes_on_neglected_effects(face) -> list:
     patch_model = model.patch
     patch, *coarse = face.patches
     out = [text for text in patch.notes if nodes.is_note(text)]
-    out += notes_on_tall_pieces(
-        patch_model, patch.pressure.load / patch.pieces.interface.weight.sum()
-    )
     if patch.points is not None:
         out.append(
             f"each static measure is computed on the mesh and on points {format_length(patch.averaging, 3)} apart, and "
@@ -266,28 +260,3 @@ def _compute_dundurs_beta(patch_model) -> float:
     lower = shear[0] * (kappa[1] - 1), shear[0] * (kappa[1] + 1)
     upper = shear[1] * (kappa[0] - 1), shear[1] * (kappa[0] + 1)
     return (lower[0] - upper[0]) / (lower[1] + upper[1])
-
-
-def notes_on_tall_pieces(patch_model, mean_pressure: float) -> list:
-    """Return notes on tall pieces whose bending moves the load sideways.
-
-    The model neglects that bending increases the lever arm of the load. The relative error of the
-    sideways motion is about the ratio of load to buckling load; the latter, for a piece clamped at
-    the holder and free at the patch, is Euler's pi^2 E' L^2/48 H^2 as a mean pressure. There is no
-    note on pieces that are not taller than long. mean_pressure: pressure averaged over the interface [Pa].
-    """
-    pieces = patch_model.pieces
-    out = []
-    for side, piece in (("lower", pieces.lower), ("upper", pieces.upper)):
-        young = piece.substrate.young
-        if pieces.plane == "strain":
-            young = young / (1 - piece.substrate.poisson**2)
-        buckling_pressure = np.pi**2 * young * pieces.length**2 / (48 * piece.height**2)
-        ratio = mean_pressure / buckling_pressure
-        if piece.height > pieces.length and ratio > MIN_BUCKLING_RATIO:
-            out.append(
-                f"the {side} piece is {piece.height / pieces.length:.3g} times as tall as it is long and carries "
-                f"{ratio:.2g} of the load at which it would buckle sideways (limit {MIN_BUCKLING_RATIO:g}); the "
-                "computation neglects that bending lengthens the lever arm of the load"
-            )
-    return out

@@ -15,9 +15,9 @@ import numpy as np
 from ...core import PatchfemError
 from ...formatting import format_length, format_quantity
 from ...model import profile
-from ...surface.fine import NEGLIGIBLE_LOST, unrepresented_fraction, wave_spectrum
 from ...surface.profile import Profile
 from ...surface.roughness.peaks import PERSSON, trace_moments
+from ...surface.spectrum import ELEMENTS_PER_CURVE, NEGLIGIBLE_LOST, wave_spectrum
 
 PROFILE_KEY = "contact.profile.file"
 
@@ -169,6 +169,7 @@ def advise_split(patch_model, element: float) -> list[str]:
         split = split_trace(patch_model, element=element)
     except PatchfemError:
         return []
-    if unrepresented_fraction(_level_trace(patch_model, element), element) <= NEGLIGIBLE_LOST:
+    spectrum = wave_spectrum(_level_trace(patch_model, element), is_tapered=True)
+    if spectrum.lost_fraction(ELEMENTS_PER_CURVE * element) <= NEGLIGIBLE_LOST:
         return []
     return [split.describe_split()]

@@ -1,17 +1,14 @@
-"""Warnings and notes of a run on its friction law and on frictional heating.
+"""Warnings and notes of a run on its friction law.
 
 In: a model, its histories and measures. Out: lists of sentences.
 """
 
 from math import ceil, log2
 
-import numpy as np
-
 from ...core import Outcome
 from ...effects import law_has_trait
 from ...formatting import format_length
-from ...friction.bonds import parameters, temperature
-from ...scene.keys.materials import MATERIALS
+from ...friction.bonds import parameters
 from .result import Advice
 
 # Largest relative difference of the friction works from samples and from energies without a
@@ -47,27 +44,6 @@ def note_on_groove_slope(model, patch) -> list:
         f"the holders, which is {max_lag / model.grooves.wavelength:.2g} of the wavelength; the normal force at each "
         "point is in proportion to the total load"
     ]
-
-
-def note_on_heating(model, patch, response, work: float | None = None) -> list:
-    """Return a list with a note on the rise of the surface temperature in a run.
-
-    The list is empty if the scene does not ask for the note.
-
-    Parameters
-    ----------
-    model : Model
-    patch : Patch or None
-    response
-        Histories.
-    work : float, optional
-        Friction work [J]; None: computed from the histories.
-    """
-    if model.heat is None:
-        return []
-    if work is None:
-        work = float(np.trapezoid(response.force, response.slide))
-    return note_on_surface_temperature(model, patch, work, float(response.time[-1]))
 
 
 def warn_of_bonds(model, speed: float, measures: dict, outcome: Outcome) -> list:
@@ -192,61 +168,6 @@ def advise_harmonics(n_harmonics: int, n_law_harmonics: float = 0.0) -> Advice:
     n_needed = min(ceil(n_law_harmonics), MAX_PROPOSED_HARMONICS)
     n_proposed = max(HARMONICS_FACTOR * n_harmonics, MIN_PROPOSED_HARMONICS, n_needed)
     return Advice.set_key("accuracy.harmonics", n_proposed)
-
-
-def note_on_surface_temperature(model, patch, work: float, duration: float) -> list:
-    """Return a list with a note on the rise of the surface temperature due to frictional heating.
-
-    All heat is assumed to flow through the loaded area into a single half-space of the substrate;
-    two identical pieces would warm by half as much. The list is empty without loaded area or motion.
-
-    Parameters
-    ----------
-    model : Model
-    patch : Patch or None
-    work : float
-        Friction work [J].
-    duration : float
-        Time in which the work is done [s].
-    """
-    if patch is None:
-        return ["frictional heating is not estimated: a contact given by [normal] has no area"]
-    substrate = model.patch.pieces.substrate
-    record = MATERIALS.get(substrate.name)
-    thermal = None if record is None else record.heat
-    if thermal is None:
-        names = [name for name, record in MATERIALS.items() if record.heat is not None]
-        return [
-            "frictional heating is not estimated: the conductivity of contact.substrate is not "
-            f"known; choose one of the materials {', '.join(names)}"
-        ]
-
-    area = float(patch.pieces.interface.weight[patch.active].sum())
-    if not (area > 0 and duration > 0 and np.isfinite(work)):
-        return []
-    period = _motion_period(model)
-    flux = work / duration / area
-    material_constants = (thermal.conductivity, thermal.heat_capacity * substrate.density)
-    rises = [
-        f"{temperature.surface_temperature_rise(flux, duration, *material_constants):.2g} K after {duration:.3g} s"
-    ]
-    if period is not None:
-        rises.insert(
-            0,
-            f"{temperature.surface_temperature_rise(flux, period, *material_constants):.2g} K after one cycle",
-        )
-    return [
-        f"friction dissipates {work / duration:.2g} W on {1e6 * area:.3g} mm2; if one half-space took all this "
-        f"heat, the surface temperature would rise by {', '.join(rises)}; the run does not include this rise and "
-        "keeps friction.temperature.surface as given"
-    ]
-
-
-def _motion_period(model) -> float | None:
-    """Return the period [s] of the prescribed motion; None for a path that does not repeat."""
-    if model.rig is not None:
-        return 1 / model.rig.drive.frequency if model.rig.drive.frequency else None
-    return model.slide.period
 
 
 def warn_of_created_energy(model, created: float, exchanged: float) -> list:

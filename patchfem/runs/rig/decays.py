@@ -304,27 +304,23 @@ def estimate_stuck_mode_mesh_errors(
     return _interpolate_over_amplitude(amplitude, at, errors), reason
 
 
-def describe_unknown_mesh_errors(reasons: dict, coarser_runs) -> list:
-    """Return sentences on the results whose mesh error is unknown.
+def describe_unknown_mesh_error(reason: str, coarser_runs: list) -> str:
+    """Return a sentence on a decay curve whose mesh error is unknown.
 
     Parameters
     ----------
-    reasons : dict
-        Reason, or "", by the name of the result.
-    coarser_runs : callable
-        Function that returns the `CoarserRuns` in space that contribute to these errors.
+    reason : str
+        Why it is unknown.
+    coarser_runs : list of CoarserRuns
+        Coarser runs in space whose changes are part of the errors.
     """
-    sentences = []
-    for reason in dict.fromkeys(filter(None, reasons.values())):
-        names = " and of ".join(name for name, cause in reasons.items() if cause == reason)
-        lacks = "no error of the mesh"
-        if any(kind.source == "mesh" for kind in coarser_runs()):
-            lacks = (
-                "the change on a coarser mesh, but not the energy that is lost in slip too small "
-                "for either mesh to resolve"
-            )
-        sentences.append(f"the errors of {names} include {lacks}, because {reason}")
-    return sentences
+    lacks = "no error of the mesh"
+    if any(kind.source == "mesh" for kind in coarser_runs):
+        lacks = (
+            "the change on a coarser mesh, but not the energy that is lost in slip too small "
+            "for either mesh to resolve"
+        )
+    return f"the errors of the decay curve include {lacks}, because {reason}"
 
 
 def _find_nearest_mode(modes, laws, frequency: float) -> int:

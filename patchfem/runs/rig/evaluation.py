@@ -1,4 +1,4 @@
-"""Evaluation of a run of any engine: measures, stick, ringing, outcome and drive levels.
+"""Evaluation of a run of any engine: measures, stick, outcome and drive levels.
 
 In: a run of an engine. Out: its Solution. Subclasses of `RunEvaluator` override the methods for
 quantities that their engine computes more accurately than from samples.
@@ -9,7 +9,7 @@ import numpy as np
 from ...core import IntegratedMeasures, Outcome
 from ...effects import law_has_trait
 from ...friction import path_work
-from ...response import run_events
+from ...response.events import is_all_stuck
 from ...response.levels import LEVEL_MEASURES, Level
 from ...response.loops import reversal_force_rule
 from ...response.measures import (
@@ -128,18 +128,10 @@ class RunEvaluator:
         """Return whether all interfaces or strips stick during the last cycles of a run."""
         if not self.has_friction or self.creeps:
             return False
-        return run_events.is_all_stuck(run.window, self.stick_tolerance)
-
-    def measure_ringing(self, run, drive) -> tuple:
-        """Measure frequency and damping of the free vibration during stick, with error estimates."""
-        if not self.has_friction or self.creeps:
-            return {}, {}
-        return run_events.measure_ringing_in_sticks(
-            run.window, self.model.rig.modes, drive, getattr(run, "log", None), self.stick_tolerance
-        )
+        return is_all_stuck(run.window, self.stick_tolerance)
 
     def estimate_run_errors(self, run, drive, values: dict) -> dict:
-        """Estimate the errors of the measures without coarse runs, except those of ringing.
+        """Estimate the errors of the measures without coarse runs.
 
         Parameters
         ----------
@@ -161,7 +153,7 @@ class RunEvaluator:
 
         Measures follow from the last `numerics.window` cycles; the amplitude is half the difference of
         the largest and the smallest output of these cycles. `run_errors` are the errors that the run
-        itself shows: of ringing, of sampling, and those of its engine. Errors due to steps and mesh
+        itself shows: of sampling, and those of its engine. Errors due to steps and mesh
         need coarse runs and are not part of it.
 
         Parameters
@@ -178,11 +170,7 @@ class RunEvaluator:
         drive = drive or self.model.rig.drive.signal
         n_cycles = self.numerics.window
         stuck = self.is_stuck(run)
-        rings, ring_errors = self.measure_ringing(run, drive)
-        values = (
-            self.evaluate_measures(run, drive, run.response.extra.get("ledger"), stuck=stuck)
-            | rings
-        )
+        values = self.evaluate_measures(run, drive, run.response.extra.get("ledger"), stuck=stuck)
         ends = window_end_values(run.extremes, run.phasors, n_cycles)
         fields = {
             "message": getattr(run, "message", ""),
@@ -201,7 +189,7 @@ class RunEvaluator:
             seconds=seconds,
             contact=self.contact,
             stick_tolerance=self.stick_tolerance,
-            run_errors=ring_errors | self.estimate_run_errors(run, drive, values),
+            run_errors=self.estimate_run_errors(run, drive, values),
             extremes=run.extremes,
             **(fields | other_fields),
         )

@@ -19,23 +19,21 @@ from ...core import (
     Response,
     SineDrive,
 )
-from ...dynamics.integrated import find_accelerations
 from ...hybrid import cases, periodic
 from ...hybrid import runs as engine
 from ...hybrid.laws import is_rigid
 from ...hybrid.laws.masing import has_stick
 from ...hybrid.records import Margin, Memory, State, Status
-from ...response import run_events
 from ...response.errors import ERROR_MEASURES, absolute_change, convergence_error
 from ...response.events import (
-    EXACT_SOURCE,
     SEGMENT_BORDER,
     Events,
     classify_changes,
+    find_segment_borders,
     sort_events,
 )
 from ...response.measures import MIN_SLIDE_RANGE, compute_harmonic
-from ...response.ringing import compute_stuck_vibration, make_ringing_measures, select_strongest
+from ...response.ringing import compute_stuck_vibration, select_strongest
 from ...response.rows import AMPLITUDE, find_definition, select_names
 from ...structure.drive_sizes import (
     choose_samples_per_cycle,
@@ -44,6 +42,7 @@ from ...structure.drive_sizes import (
     is_periodic,
     is_sinusoidal,
 )
+from ...structure.histories import find_accelerations
 from . import strips
 from .evaluation import RunEvaluator, compute_sampled_work, compute_work_check, thin_samples
 from .hybrid_laws import Joints, make_joints
@@ -354,13 +353,13 @@ class LumpedEvaluator(RunEvaluator):
         rows = motion.event_rows
         modes = self.model.rig.modes
         slides = rows[:, 1 : 1 + modes.omega.size] @ modes.interfaces.T
-        borders = [start for start in run_events.find_segment_borders(drive) if start < motion.time]
+        borders = [start for start in find_segment_borders(drive) if start < motion.time]
         events = [(start, 0, SEGMENT_BORDER, np.nan) for start in borders]
         for k, states in enumerate(directions.T):
             changed = np.flatnonzero(states[:-1] != states[1:])
             kinds = classify_changes(states[changed], states[changed + 1])
             events += zip(rows[changed, 0], [k + 1] * changed.size, kinds, slides[changed, k])
-        return sort_events(events, source=EXACT_SOURCE)
+        return sort_events(events)
 
     def _list_snapshots(self, motion, response: Response, times, start) -> list[ElementSnapshot]:
         """Return the stretches of the elements of patches at given times, from all reversals before.
@@ -439,29 +438,6 @@ class LumpedEvaluator(RunEvaluator):
         """
         return {"is_single_interface": self.strips_slide_apart}
 
-    def measure_ringing(self, run, drive) -> tuple:
-        """Compute frequency and damping of the free vibration during stick, with error estimates.
-
-        Both have a closed form if every interface is a single spring that sticks until the end of a run without
-        sinusoidal drive. In other runs they are measured in the stick intervals.
-        """
-        vibration = self._find_stuck_vibration(run, run.window, drive)
-        if not self.has_friction or self.creeps:
-            return {}, {}
-        if not vibration:
-            return run_events.measure_ringing_in_sticks(
-                run.window,
-                self.model.rig.modes,
-                drive,
-                run.log,
-                self.stick_tolerance,
-                repeats=run.repeats,
-            )
-        mode = select_strongest(vibration, "acceleration")
-        omega = 2 * np.pi * mode.frequency
-        peak = float(np.abs(run.window.acceleration).max())
-        return make_ringing_measures(mode.acceleration, omega, mode.damping, peak), {}
-
     def _find_stuck_vibration(self, run, motion: Response, drive) -> list:
         """Return the free vibration of the modes in a part of the motion in which no interface slips; [] if one does."""
         springs = self.joints.springs
@@ -483,7 +459,7 @@ class LumpedEvaluator(RunEvaluator):
             return {}
         after = response.select(response.time >= response.time[moves[-1] + 1])
         vibration = self._find_stuck_vibration(run, after, drive)
-        return {"tail": select_strongest(vibration, "displacement")} if vibration else {}
+        return {"tail": select_strongest(vibration)} if vibration else {}
 
     def estimate_run_errors(self, run, drive, values: dict) -> dict:
         """Estimate the errors of the samples of a random motion.

@@ -12,11 +12,8 @@ import numpy as np
 from ...core import Measure, SineDrive
 from ...response.events import join_events
 from ...response.levels import (
-    MIN_JUMP_FACTOR,
     Level,
     bracket_onset,
-    largest_hysteresis,
-    largest_jump,
     make_no_onset_reason,
     make_onset_test,
 )
@@ -27,10 +24,6 @@ from ...structure.drive_sizes import find_drive_omega
 EXACT_RELATIVE_ERROR = 1e-9
 # Largest number of bisections of an onset; 40 of them reduce the bracket to 1e-12.
 MAX_BISECTIONS = 40
-NO_JUMP_REASON = (
-    "the amplitude does not jump: between neighbouring drive levels the ratio of the amplitudes is always below "
-    f"{MIN_JUMP_FACTOR:g} times the ratio of the levels"
-)
 
 
 def add_level_errors(levels, coarser_runs: list, solutions: dict) -> tuple:
@@ -68,7 +61,7 @@ def _find_level_values(solution, number: int) -> dict:
     return solution.levels[number].values if number < len(solution.levels) else {}
 
 
-def find_onset(levels, run_level, tolerance: float, is_past_onset=None) -> tuple | None:
+def find_onset(levels, run_level, tolerance: float, is_past_onset) -> tuple | None:
     """Find the drive level [m s-2] of the onset by bisection, with its uncertainty.
 
     The bisection starts between the last level before the onset and the first level after it, and
@@ -82,16 +75,14 @@ def find_onset(levels, run_level, tolerance: float, is_past_onset=None) -> tuple
         Function (index, level) -> Level that runs a level [m s-2] from the final state of the level
         with this index, or from rest for the index -1.
     tolerance : float
-    is_past_onset : callable, optional
-        Function of a Level that returns whether the onset is reached, see `make_onset_test`;
-        default: onset of slip.
+    is_past_onset : callable
+        Function of a Level that returns whether the onset is reached, see `make_onset_test`.
 
     Returns
     -------
     tuple or None
         None if no level reaches the onset.
     """
-    is_past_onset = make_onset_test("slip") if is_past_onset is None else is_past_onset
     bracket = bracket_onset(levels, is_past_onset)
     if bracket is None:
         return None
@@ -110,61 +101,36 @@ def find_onset(levels, run_level, tolerance: float, is_past_onset=None) -> tuple
     return (low + high) / 2, (high - low) / 2
 
 
-def compute_level_measures(
-    rig, levels, run_level, tolerance: float, *, has_friction: bool, coarser=()
-) -> dict:
-    """Compute onset level, largest jump and hysteresis of a drive in levels.
-
-    The measures are onset_level, jump_level and level_hysteresis; a measure without a value has a
-    reason.
+def measure_onset_level(rig, solution, tolerance: float) -> Measure:
+    """Return the drive level of the onset; without a value and with the reason if no level reaches it.
 
     Parameters
     ----------
     rig : Rig
         Defines the kind of onset.
-    levels : sequence of Level
-    run_level : callable
-        See `find_onset`.
+    solution : Solution
+        The difference of the onset levels of its coarse runs is added to the error.
     tolerance : float
-    has_friction : bool
-        Whether the rig has friction.
-    coarser : sequence
-        Pairs of `Solution.coarser`; the difference of their onset levels is added to the error.
     """
     unit = _find_level_unit(rig)
-    unit_factor = _find_level_factor(rig)
-    measures = {}
-    if has_friction:
-        measures["onset_level"] = _make_missing(
-            "onset_level", unit, make_no_onset_reason(*rig.drive.levels.onset)
-        )
     is_past_onset = make_onset_test(*rig.drive.levels.onset)
-    lowest = find_onset(levels, run_level, tolerance, is_past_onset) if has_friction else None
-    if lowest is not None:
-        level, half_width = lowest
-        change = 0.0
-        for run, beside in coarser:
-            coarse_onset = find_onset(run.levels, run.run_level, tolerance, is_past_onset)
-            reference = lowest
-            if beside is not None:
-                reference = find_onset(beside.levels, beside.run_level, tolerance, is_past_onset)
-            is_missing = coarse_onset is None or reference is None
-            change += level if is_missing else abs(coarse_onset[0] - reference[0])
-        error = unit_factor * (half_width + change)
-        measures["onset_level"] = Measure(unit_factor * level, unit, error, 1e-9)
 
-    measures["jump_level"] = _make_missing("jump_level", unit, NO_JUMP_REASON)
-    if (jump := largest_jump(levels)) is not None:
-        width = unit_factor * float(jump[2])  # The jump may lie anywhere between two levels.
-        measures["jump_level"] = Measure(unit_factor * jump[0], unit, width, width)
-    if (loop := largest_hysteresis(levels)) is not None:
-        measures["level_hysteresis"] = Measure(float(loop[0]), "m", float(loop[1]), 1e-10)
-    return measures
+    def find(run) -> tuple | None:
+        """Return the onset level and its uncertainty in a run."""
+        return find_onset(run.levels, run.run_level, tolerance, is_past_onset)
 
-
-def _make_missing(name: str, unit: str, reason: str) -> Measure:
-    """Return a measure of the levels without a value."""
-    return Measure(None, unit, None, TABLE[name].floor, reason=reason)
+    onset = find(solution)
+    if onset is None:
+        reason = make_no_onset_reason(*rig.drive.levels.onset)
+        return Measure(None, unit, None, TABLE["onset_level"].floor, reason=reason)
+    level, error = onset
+    for run, beside in solution.coarser:
+        coarse_onset = find(run)
+        reference = onset if beside is None else find(beside)
+        is_missing = coarse_onset is None or reference is None
+        error += level if is_missing else abs(coarse_onset[0] - reference[0])
+    factor = _find_level_factor(rig)
+    return Measure(factor * level, unit, factor * error, 1e-9)
 
 
 def convert_to_scene_units(rig, levels) -> tuple:

@@ -23,9 +23,10 @@ from ...structure.drive_sizes import (
     has_full_cycle,
     is_sinusoidal,
 )
+from ..bench.engine import BondListGuard
 from . import levels as rig_levels
 from . import strips
-from .bond_lists import BondListGuard, choose_bond_summation, has_bond_list
+from .bond_lists import choose_bond_summation, has_bond_list
 from .evaluation import RunEvaluator, compute_work_check
 from .interface import make_contact
 from .solution import (

@@ -15,13 +15,11 @@ from ..results.interfaces import merge_sentences
 from ..results.notes import (
     note_on_groove_slope,
     note_on_growth,
-    note_on_heating,
     warn_of_bonds,
     warn_of_created_energy,
     warn_of_work_check,
 )
 from ..results.travel import warn_of_large_slide
-from . import strips
 from .costs import explain_time_steps
 from .engines import ENGINES, find_obstacle_of_map
 from .hybrid_laws import list_elements
@@ -52,7 +50,6 @@ def collect_warnings(run) -> list:
     warnings = [
         *model.rig.structure.notes,
         *_warn_of_single_point(model, patch, run.numerics),
-        *note_on_heating(model, patch, solution.response, book["friction"]),
     ]
     if run.has_friction:
         speed = float(np.abs(solution.window.slide_rate).max())
@@ -86,6 +83,7 @@ def collect_warnings(run) -> list:
             warnings.append(describe_ringing(ratio, limits, run.numerics.cycles))
     if solution.message and solution.outcome is not Outcome.LEAVES_GROOVES:
         warnings.append(solution.message)
+    warnings += _warn_of_peak_at_sweep_end(run)
     warnings += merge_sentences(
         model,
         run.inputs.faces,
@@ -101,71 +99,21 @@ def _warn_of_interface_patch(face, response) -> list:
     return [*warnings, *warn_of_large_slide(face.patch, face.slide(response))]
 
 
-def warn_of_peak_at_sweep_end(run, modes) -> list:
-    """Return a list with a warning if the largest response is at an end of the sweep.
-
-    Parameters
-    ----------
-    run : postprocessing.CoupledRun
-    modes : callable
-        Function that returns the modes, see `plan.mode_frequencies`.
-    """
+def _warn_of_peak_at_sweep_end(run) -> list:
+    """Return a list with a warning if the largest response is at an end of the sweep."""
     peak = run.measures.get("peak_frequency")
-    drive = run.model.rig.drive.signal
-    end = None
-    if peak is not None and peak.value is not None:
-        end = find_sweep_end(peak.value, drive.low, drive.high)
-    if end is None or not run.measures["relative_displacement_amplitude"].value > 0:
+    if peak is None or not peak.value or not run.measures[AMPLITUDE].value > 0:
         return []
-    upper = end == max(drive.low, drive.high)
-    key = "drive.from" if end == drive.low else "drive.to"
-    side, move = ("above", "raise") if upper else ("below", "lower")
-    resonance = _describe_nearest_resonance(modes(), end, is_above=upper)
-    beyond = f"no mode of the scene has its resonance {side} this frequency"
-    if resonance:
-        beyond = (
-            f"a resonance may lie {side} this frequency: {resonance}; {move} {key} to include it"
-        )
-    return [
-        f"the largest response lies at {key} = {format_number(end, 6)} Hz, the {'upper' if upper else 'lower'} end of the "
-        f"swept frequencies, so that it may be no resonance; {beyond}"
-    ]
-
-
-def find_sweep_end(frequency: float, *ends: float) -> float | None:
-    """Return the end [Hz] of a sweep at which a frequency [Hz] lies; None if there is none."""
-    return next((end for end in ends if abs(frequency - end) <= EQUAL_FREQUENCY_TOL * end), None)
-
-
-def _describe_nearest_resonance(modes: list, frequency: float, *, is_above: bool) -> str:
-    """Describe the nearest resonance above or below a frequency; "" if there is none.
-
-    Parameters
-    ----------
-    modes : list of dict
-        See `plan.mode_frequencies`.
-    frequency : float
-        Frequency [Hz].
-    is_above : bool
-        Whether to search above the frequency.
-    """
-    candidates = []
-    for mode in modes:
-        free = mode["free_frequency"]
-        stuck = mode["stuck_frequency"]
-        low = free
-        high = free if stuck is None else max(free, stuck)
-        is_beyond = 0 < low < frequency * (1 - EQUAL_FREQUENCY_TOL)
-        if is_above:
-            is_beyond = high > frequency * (1 + EQUAL_FREQUENCY_TOL)
-        if is_beyond:
-            phrase = f"{mode['name']} has its resonance at {format_number(low, 4)} Hz"
-            if high > low:
-                phrase += (
-                    f" with a free interface and {format_number(high, 4)} Hz with one that sticks"
-                )
-            candidates.append((max(low - frequency, frequency - high, 0.0), phrase))
-    return min(candidates)[1] if candidates else ""
+    drive = run.model.rig.drive.signal
+    ends = {"drive.from": drive.low, "drive.to": drive.high}
+    for key, end in ends.items():
+        if abs(peak.value - end) <= EQUAL_FREQUENCY_TOL * end:
+            side, move = ("upper", "raise") if end == max(ends.values()) else ("lower", "lower")
+            return [
+                f"the largest response lies at {key} = {format_number(end, 6)} Hz, the {side} end of the swept "
+                f"frequencies, so that it may be no resonance; {move} {key}"
+            ]
+    return []
 
 
 def collect_notes(run) -> list:
@@ -223,22 +171,10 @@ def _note_on_release(run) -> list:
 
 def _note_on_lateral_motion(run) -> list:
     """Return a list with a note on the neglected lateral motion of strips that yaw."""
-    if (
-        not run.model.rig.friction.strips_slide_apart
-        or run.patch.strips.offsets.size < 2
-        or not run.patch.strips.load
-    ):
+    if not run.model.rig.friction.strips_slide_apart:
         return []
-    amplitude, lengthening = strips.estimate_lateral_motion(
-        run.patch, run.solution.window, run.drive.period
-    )
-    if not amplitude > 0:
-        return []
-    computed = "friction is" if run.model.wear is None else "friction and the wear are"
     return [
-        f"the yaw moves the ends of the patch by up to {format_length(amplitude)} across x, but the "
-        f"{computed} computed without this motion, which would lengthen the sliding path of the last cycle by "
-        f"{100 * lengthening:.2g} % (mean over the patch, weighted by the pressure)"
+        "the yaw also moves the ends of the patch across x; this motion and its friction are neglected"
     ]
 
 

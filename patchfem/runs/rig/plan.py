@@ -9,7 +9,6 @@ from math import inf, pi
 import numpy as np
 
 from ...effects import law_has_trait
-from ...friction.bonds import parameters
 from ...model.model import Model
 from ...response.rows import add_interface_number, remove_interface_number
 from ...slip import shear_modes
@@ -107,8 +106,8 @@ def count_unknowns(model: Model) -> dict:
         return counts
     has_bonds = model.grooves is None and law_has_trait(f.law, "bonds")
     if has_bonds and bond_lists.has_bond_list(model, numerics):
-        entries = int(bond_lists.estimate_bond_list_cost(model, numerics).strips)
-        return counts | {"bond_list_about": entries}
+        length = bond_lists.estimate_bond_list_length(model, numerics)
+        return counts | {"bond_list_about": length}
     is_changed = has_bonds or model.grooves is not None or model.rig.friction.load_varies
     if model.partial_slip and is_changed:
         counts["shear_modes"] = numerics.shear_modes or shear_modes.N_SHEAR_MODES
@@ -258,33 +257,10 @@ def describe_bond_summation(model: Model, numerics) -> list[str]:
         return [f"{count} friction element{'s' * (count > 1)} by engine {numerics.engine}"]
     choice = bond_lists.choose_bond_summation(model, numerics)
     sentences = ["method of the sum over bonds: " + choice.describe()]
-    if choice.engine == "recursion":
-        return sentences
-    if bond_lists.is_bond_list_growing(model):
-        remedy = 'set friction.reading = "stretch" to give the block a finite stiffness'
-        if bond_lists.is_stuck_without_stiffness(model):
-            remedy = "set friction.order above 0 to give the block a stiffness"
-        return [*sentences, f"{_describe_stuck_block(model)}; {remedy}"]
-    seconds = bond_lists.estimate_bond_list_cost(model, numerics).seconds
-    if seconds > parameters.MAX_LIST_SECONDS:
+    if not model.partial_slip and bond_lists.is_stuck_by_printed_law(model):
         sentences.append(
-            "`run` will refuse this scene: the sum over the list of bonds would need a computing time of about "
-            f"{seconds:.0f} s, more than the limit of {parameters.MAX_LIST_SECONDS:.0f} s"
+            "with the law as printed in the report the block hardly slides or does not slide at all: it reverses its "
+            "motion in almost every time step, and each reversal makes the list of bonds longer; set "
+            'friction.reading = "stretch" to give the block a finite stiffness'
         )
     return sentences
-
-
-def _describe_stuck_block(model: Model) -> str:
-    """Describe how bonds stop a block while its bond list grows."""
-    if bond_lists.is_stuck_without_stiffness(model):
-        motion = "bonds of order 0 keep the block from sliding, but they have no stiffness"
-    elif bond_lists.is_stuck_after_release(model):
-        motion = "with the law as printed in the report the block does not slide after its release"
-    else:
-        motion = (
-            "with the law as printed in the report the block hardly slides or does not slide at all"
-        )
-    return (
-        f"{motion}: it reverses its motion in almost every time step, and each reversal makes the list of bonds "
-        "longer"
-    )

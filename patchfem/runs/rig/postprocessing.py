@@ -8,9 +8,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ...core import ErrorCauses, Outcome
+from ...core import Outcome
 from ...model.rig import MAX_TRAVEL
-from ...response import reasons, run_events, stationary
+from ...response import reasons, stationary
 from ...response.decay_curve import DecayCurve
 from ...response.errors import add_run_error_estimates
 from ...response.outcome import judge_outcome, remove_errors
@@ -18,7 +18,7 @@ from ...structure.drive_sizes import find_decay_rate
 from ..patch import faces
 from ..results.result import RunInputs, can_estimate_mesh_error
 from ..results.travel import check_pieces_overlap
-from . import decays, flutter, levels, motion_warnings
+from . import decays, flutter, levels
 from .engines import ENGINES, describe_balance_error
 from .numerics import Numerics
 from .solution import Solution
@@ -76,19 +76,11 @@ class CoupledRun:
         )
 
 
-def add_level_measures(run: CoupledRun) -> CoupledRun:
-    """Return the run with the measures over all drive levels."""
-    solution = run.solution
+def add_onset_level(run: CoupledRun) -> CoupledRun:
+    """Return the run with the drive level at the onset of slip."""
     model = run.model
-    measures = levels.compute_level_measures(
-        model.rig,
-        solution.levels,
-        solution.run_level,
-        model.accuracy.tolerance,
-        has_friction=run.has_friction,
-        coarser=solution.coarser,
-    )
-    return replace(run, measures=run.measures | measures)
+    onset = levels.measure_onset_level(model.rig, run.solution, model.accuracy.tolerance)
+    return replace(run, measures=run.measures | {"onset_level": onset})
 
 
 def add_outcome_and_errors(run: CoupledRun) -> CoupledRun:
@@ -144,84 +136,35 @@ def add_missing_value_reasons(run: CoupledRun) -> CoupledRun:
 def add_decay_curve(run: CoupledRun) -> CoupledRun:
     """Return a released run with its decay curve, including mesh errors.
 
-    The mesh error of the ringing is that at its amplitude in the last stick interval. Notes name
-    the results whose mesh error is unknown.
+    A note says where the mesh error is unknown.
     """
     model = run.model
     solution = run.solution
     run = replace(run, decay=decays.compute_decay_curve(solution))
-    if not (model.partial_slip or model.rig.friction.has_partial_slip):
+    has_partial_slip = model.partial_slip or model.rig.friction.has_partial_slip
+    if run.decay is None or not has_partial_slip:
         return run
+    decay = run.decay
     coarse = run.inputs.coarse[0]
-    causes = {}
-    ringing_amplitude = _find_ringing_amplitude(run)
-    if ringing_amplitude > 0:
-        errors, causes["ring_frequency and ring_damping"] = decays.estimate_stuck_mode_mesh_errors(
-            np.array([ringing_amplitude]),
-            run.measures["ring_frequency"].value,
-            model,
-            run.patch,
-            coarse,
-            run.inputs.stiffer,
-        )
-        measures = dict(run.measures)
-        for name, error in zip(("ring_frequency", "ring_damping"), errors[:, 0]):
-            measure = measures[name]
-            if error > measure.error:
-                measures[name] = replace(
-                    measure, error=float(error), causes=ErrorCauses({"mesh": float(error)})
-                )
-        run = replace(run, measures=measures)
-    if run.decay is not None:
-        errors, causes["the decay curve"] = decays.estimate_stuck_mode_mesh_errors(
-            run.decay.amplitude,
-            run.decay.frequency[-1],
-            model,
-            run.patch,
-            coarse,
-            run.inputs.stiffer,
-        )
-        decay = run.decay._replace(
-            frequency_error=np.fmax(run.decay.frequency_error, errors[0]),
-            damping_error=np.fmax(run.decay.damping_error, errors[1]),
-        )
-        run = replace(run, decay=decay)
+    stiffer = run.inputs.stiffer
+    errors, reason = decays.estimate_stuck_mode_mesh_errors(
+        decay.amplitude, decay.frequency[-1], model, run.patch, coarse, stiffer
+    )
+    decay = decay._replace(
+        frequency_error=np.fmax(decay.frequency_error, errors[0]),
+        damping_error=np.fmax(decay.damping_error, errors[1]),
+    )
+    if not reason:
+        return replace(run, decay=decay)
     engine = ENGINES[run.numerics.engine]
-    notes = decays.describe_unknown_mesh_errors(
-        causes,
-        lambda: engine.coarser_in_space(model, run.numerics, run.patch, coarse, solution),
-    )
-    return replace(run, notes=tuple(notes))
-
-
-def _find_ringing_amplitude(run: CoupledRun) -> float:
-    """Return the amplitude [m] of the output in the last stick interval with ringing."""
-    solution = run.solution
-    window = solution.window
-    ring = run.measures.get("ring_frequency")
-    if ring is None or not ring.value or ring.error is None:
-        return 0.0
-    sticks = run_events.find_stick_intervals(
-        window, run.drive, solution.log, solution.stick_tolerance
-    )
-    if not sticks:
-        return 0.0
-    return np.ptp(window.output[window.time >= sticks[-1][0]]) / 2
+    coarser = engine.coarser_in_space(model, run.numerics, run.patch, coarse, solution)
+    return replace(run, decay=decay, notes=(decays.describe_unknown_mesh_error(reason, coarser),))
 
 
 def add_flutter_amplitude(run: CoupledRun) -> CoupledRun:
     """Return the run with the amplitude of the unstable limit cycle of a self-excited mode."""
     measures, notes = flutter.compute_flutter_amplitude(run)
     return replace(run, measures=run.measures | measures, notes=(*run.notes, *notes))
-
-
-def collect_warnings(run: CoupledRun) -> list:
-    """Return all warnings of a completed run."""
-    plan = run.inputs.plan
-    return [
-        *motion_warnings.collect_warnings(run),
-        *motion_warnings.warn_of_peak_at_sweep_end(run, lambda: plan.modes(plan.chain)),
-    ]
 
 
 def find_final_outcome(run: CoupledRun) -> Outcome:
@@ -260,10 +203,8 @@ def collect_summary_data(run: CoupledRun, measures: dict, notes: list) -> dict:
     snapshots = solution.snapshots
     if rig.friction.has_partial_slip and snapshots and hasattr(snapshots[0], "faces"):
         extra["shots"] = snapshots
-    if run.has_friction:
-        extra["events"] = run_events.list_events(
-            solution.window, run.drive, solution.log, solution.stick_tolerance
-        )
+    if solution.log is not None:
+        extra["events"] = solution.log
     reduced = getattr(solution.contact, "reduction", None)
     if reduced is not None:
         name = "elements" if hasattr(reduced, "yield_displacement") else "shear_modes"

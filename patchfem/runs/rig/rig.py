@@ -22,7 +22,7 @@ from . import bond_lists, levels, postprocessing
 from .costs import MAX_MARCH_STEPS, MAX_RUN_STEPS
 from .engines import ENGINES
 from .fields import collect_interface_fields
-from .motion_warnings import collect_notes
+from .motion_warnings import collect_notes, collect_warnings
 from .numerics import Numerics, choose_numerics
 from .postprocessing import CoupledRun
 from .runner import Runner
@@ -65,15 +65,15 @@ def run_rig(inputs: RunInputs) -> Result:
     numerics = choose_numerics(model)
     refuse_long_run(model, numerics)
     run = run_refined(inputs, numerics)
-    if run.solution.levels:
-        run = postprocessing.add_level_measures(run)
+    if run.solution.levels and run.has_friction:
+        run = postprocessing.add_onset_level(run)
     run = postprocessing.add_outcome_and_errors(run)
     run = postprocessing.add_missing_value_reasons(run)
     if rig.drive.kind == "free" and run.has_errors:
         run = postprocessing.add_decay_curve(run)
     if run.has_friction and find_decay_rate(rig.modes) < 0:
         run = postprocessing.add_flutter_amplitude(run)
-    warnings = postprocessing.collect_warnings(run)
+    warnings = collect_warnings(run)
     notes = [*collect_notes(run), *run.notes]
     measures = set_final_floors(run.measures, model.accuracy.tolerance)
     if ENGINES[run.numerics.engine].finds_periodic_motion and run.outcome is Outcome.GROWS:

@@ -40,8 +40,8 @@ def solve_rig(model, numerics, patch, frames: int = 0, say=None, progress=None) 
 
 
 def refuse_long_run(model, numerics) -> None:
-    """Raise Missing if a run would take too much CPU time."""
+    """Raise Missing if a run would take too much CPU time, or has too long time steps."""
     if numerics.engine == "hybrid":
         costs.refuse_long_hybrid_run(model)
     elif numerics.engine == "march":
-        bond_lists.refuse_long_bond_list(model, numerics)
+        bond_lists.refuse_unresolved_bond_vibration(model, numerics)

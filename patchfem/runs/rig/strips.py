@@ -54,34 +54,3 @@ def average_histories_over_strips(response, loads, offsets):
         slip=slips @ weights,
         extra=extra | {"yaw_moment": forces @ np.asarray(offsets)},
     )
-
-
-def estimate_lateral_motion(patch, window, period: float) -> tuple:
-    """Estimate the lateral amplitude and the lengthening of the slip path of a patch that yaws.
-
-    The yaw rotates the patch about its centre. A point of strip j moves by its displacement s_j
-    along x, and by the rotation times x in the lateral direction.
-
-    Returns
-    -------
-    tuple
-        Lateral amplitude [m], and relative increase of the path of the last cycle due to the
-        lateral motion (mean over the patch, weighted by the pressure).
-    """
-    last = window.time >= window.time[-1] - period * (1 + 1e-9)
-    slides = window.extra["slides"][last]
-    y = patch.strips.offsets
-    x = np.abs(patch.x)
-    yaw = (slides[:, -1] - slides[:, 0]) / (y[-1] - y[0])
-    steps = np.abs(np.diff(slides, axis=0))
-    yaw_steps = np.abs(np.diff(yaw))
-    along = 0.0
-    total = 0.0
-    for step, force in zip(steps.T, patch.strips.force):
-        is_loaded = force > 0
-        along += float(step.sum() * force.sum())
-        total += float(
-            np.hypot(step[:, None], yaw_steps[:, None] * x[is_loaded]).sum(axis=0)
-            @ force[is_loaded]
-        )
-    return float(np.ptp(yaw)) / 2 * float(x.max()), total / along - 1 if along > 0 else 0.0

@@ -12,8 +12,8 @@ import numpy as np
 from ...core import Measure, Outcome
 from ...response.outcome import judge_outcome
 from ..bench import bench
-from ..bench.closed_form import integrate_steps
 from ..bench.engine import steps_per_cycle
+from ..bench.slides import integrate_steps
 from ..patch.press import nodal_areas
 from ..results.travel import check_pieces_overlap
 from ..rig import fields, numerics, solve

@@ -16,7 +16,6 @@ from .types import (
     FileName,
     Force,
     Length,
-    LimitReason,
     Position,
     Positive,
     Table,
@@ -35,10 +34,7 @@ MAX_PAIRS = 1_000_000  # largest number of equal patches, far more than any join
 MAX_STRIPS = 10_000
 # Largest angle [rad] between the pieces; the gap is angle * x, which differs from tan(angle) * x by 0.3 % there.
 MAX_SMALL_ANGLE = 0.1
-SmallAngle = Annotated[
-    quantity("angle", ge=-MAX_SMALL_ANGLE, le=MAX_SMALL_ANGLE),
-    LimitReason("the gap is computed as this angle times the distance"),
-]
+SmallAngle = quantity("angle", ge=-MAX_SMALL_ANGLE, le=MAX_SMALL_ANGLE)
 MATERIAL_REQUIREMENT = (
     'a material name or {young = "121 GPa", poisson = 0.32, density = "4370 kg/m^3"} is needed'
 )

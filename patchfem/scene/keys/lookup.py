@@ -102,6 +102,7 @@ def describe_requirement(key: Key | None, path: str) -> str:
     Parameters
     ----------
     key : Key or None
+        Key with its type and documentation.
     path : str
         Dotted key, which a clause about a table names.
     """
@@ -173,6 +174,7 @@ def describe_error(key: Key, error: Any, value: Any, path: str) -> str:
     Parameters
     ----------
     key : Key
+        Key with its type and documentation.
     error : dict
         One of `ValidationError.errors()`.
     value
@@ -188,9 +190,10 @@ def describe_error(key: Key, error: Any, value: Any, path: str) -> str:
         if bound and key.kind:
             text = quantities.format_si(bound, key.kind)
         # A limit is compared only after the number and its unit were read, so that these are right.
-        reason = key.limit_reason if float in key.types else needed
-        refusal = f"must be {limit.sign} {text}, not {format_for_message(value)}"
-        return f"{refusal}; {reason}" if reason else refusal
+        reason = "" if float in key.types else f"; {needed}"
+        return f"must be {limit.sign} {text}, not {format_for_message(value)}{reason}"
+
+    # Arrays of a wrong length.
     if error["type"] == "too_short" and value and error["ctx"]["min_length"] > 1:
         return f"at least {error['ctx']['min_length']} values are needed, not {len(value)}"
     if error["type"] == "too_long":
@@ -203,6 +206,8 @@ def describe_error(key: Key, error: Any, value: Any, path: str) -> str:
         return f"{len(value)} values are too many; at most {most} are possible{remedy}"
     if error["type"] == "missing" and isinstance(value, list) and value:
         return f"{needed}, not {len(value)} value{'s' if len(value) > 1 else ''}"
+
+    # Values that no limit describes.
     if error["type"] == "string_too_short":
         return "must not be an empty text"
     if error["type"] == "value_error":

@@ -33,14 +33,6 @@ class YieldStrength(NamedTuple):
     source: str
 
 
-class ThermalProperties(NamedTuple):
-    """Thermal conductivity [W m-1 K-1] and heat capacity [J kg-1 K-1] near 20 degC, with the source of the numbers."""
-
-    conductivity: float
-    heat_capacity: float
-    source: str
-
-
 class MaterialRecord(NamedTuple):
     """Isotropic elastic constants and other properties of one material at 20 degC.
 
@@ -49,7 +41,6 @@ class MaterialRecord(NamedTuple):
     - other_names: names that mean the same material.
     - strength: yield strength; None for a material that breaks before it yields, or whose yield
       strength is not known.
-    - heat: thermal properties; None if they are not known.
     """
 
     young: float
@@ -58,7 +49,6 @@ class MaterialRecord(NamedTuple):
     source: str
     other_names: Sequence[str] = ()
     strength: YieldStrength | None = None
-    heat: ThermalProperties | None = None
 
 
 def _read_materials() -> dict[str, MaterialRecord]:
@@ -67,8 +57,7 @@ def _read_materials() -> dict[str, MaterialRecord]:
     materials = {}
     for name, row in tomllib.loads(text).items():
         strength = YieldStrength(**row.pop("strength")) if "strength" in row else None
-        heat = ThermalProperties(**row.pop("heat")) if "heat" in row else None
-        materials[name] = MaterialRecord(**row, strength=strength, heat=heat)
+        materials[name] = MaterialRecord(**row, strength=strength)
     return materials
 
 

@@ -114,13 +114,8 @@ def normalize_unit(unit: str) -> str:
 
 def _describe_non_text(value: object, kind: str) -> str:
     """Return the message about a value that is not a string."""
-    reason = "not a quantity"
-    if isinstance(value, bool):
-        reason = f"{str(value).lower()} is not a quantity"
-    elif isinstance(value, list | dict):
-        reason = f"{'an array' if isinstance(value, list) else 'a table'} is not a quantity"
-    elif isinstance(value, int | float):
-        reason = "a bare number without a unit"
+    is_number = isinstance(value, int | float) and not isinstance(value, bool)
+    reason = "a bare number without a unit" if is_number else "not a quantity"
     return f"{reason}; {describe_requirement(kind)}"
 
 
@@ -129,6 +124,8 @@ def _describe_malformed_text(words: str, kind: str) -> str:
     displayed_text = (
         words if len(words) <= _MAX_SHOWN_CHARACTERS else f"{words[: _MAX_SHOWN_CHARACTERS - 3]}..."
     )
+
+    # The first cause that fits is named.
     glued = _JOINED_UNIT_PATTERN.fullmatch(words)
     if _BARE_NUMBER_PATTERN.fullmatch(words):
         reason = f"'{displayed_text}' is a bare number without a unit"
@@ -146,6 +143,7 @@ def _describe_malformed_text(words: str, kind: str) -> str:
         reason = (
             f"'{displayed_text}' does not consist of one number and one unit ({_list_units(kind)})"
         )
+
     return f"{reason}; {describe_requirement(kind)}"
 
 

@@ -410,7 +410,7 @@ class Structure(Table):
     interface: tuple[Interface, ...] = ()
     file: optional(
         FileName,
-        "file of matrices, modes or measured responses (.npz, .mat, .uff); replaces the tables of modes",
+        "file of matrices (.npz, .mat) or mode shapes (.uff); replaces the tables of modes",
     )
     reduced: Reduced | None = None
     slide_at: optional(

@@ -63,10 +63,6 @@ class Kind(str):
     """Annotation of a key whose value is a quantity of this kind (see `quantities.UNIT_FACTORS`)."""
 
 
-class LimitReason(str):
-    """Annotation of a key with limits: why a value beyond them is refused, as a clause of a message."""
-
-
 # Annotation of a key that names a file.
 FILE_MARK = object()
 
@@ -192,7 +188,7 @@ def key(kind: Any, meaning: str, required: str = "") -> Any:
     kind
         Type of the value: of `quantity`, `number` or `whole_number`, one of the names below, or a Literal.
     meaning, required : str
-        As in `KeyRecord`.
+        Meaning of the key, and the condition under which it is required.
     """
     return Annotated[kind, KeyRecord(meaning, required)]
 
@@ -202,8 +198,10 @@ def optional(kind: Any, meaning: str, required: str = "") -> Any:
 
     Parameters
     ----------
-    kind, meaning, required
-        As in `key`.
+    kind
+        Type of the value if the key is given.
+    meaning, required : str
+        Meaning of the key, and the condition under which it is required.
     """
     return Annotated[kind | None, KeyRecord(meaning, required), Field(default=None)]
 
@@ -321,7 +319,6 @@ class Key:
     - allowed: the words of a key that accepts one of a few.
     - accepts_value: whether the key accepts a value, as a material or a coating does in place of its table.
     - kind: kind of quantity of the value or of its items; None without unit.
-    - limit_reason: why a value beyond the limits is refused; "" where this needs no words.
     - names_file: whether a text of this key is the name of a file.
     - record: documentation; that of a table is empty.
     """
@@ -343,8 +340,6 @@ class Key:
         self.allowed: tuple[str, ...] = get_args(literals[0]) if literals else ()
         self.accepts_value = self.inner is None or self.inner.has_name or bool(literals)
         self.kind = next((str(mark) for mark in marks if isinstance(mark, Kind)), None)
-        reasons = (str(mark) for mark in marks if isinstance(mark, LimitReason))
-        self.limit_reason = next(reasons, "")
         self.names_file = FILE_MARK in marks
         self.record = next(filter(_is_record, field.metadata), KeyRecord(""))
 

@@ -10,6 +10,7 @@ from ..keys.tables import Tables
 from .contact import iterate_patches
 from .methods import MotionFeatures, find_motion_features
 from .scene_draft import SceneDraft
+from .view import UNKNOWN_VALUE
 
 
 class SettingScope(NamedTuple):
@@ -42,6 +43,7 @@ def has_effect(setting: str, kind: str, method: str) -> bool:
     Parameters
     ----------
     setting : str
+        Key of [accuracy].
     kind : str
         Kind of the scene.
     method : str
@@ -59,13 +61,11 @@ def list_fixed_settings(accuracy: Accuracy) -> list[str]:
 def check_quadrature(draft: SceneDraft, kind: str) -> None:
     """Add a remark on a quadrature if there is no sum over bonds."""
     scene = draft.values
-    quadrature = scene.accuracy.quadrature
     laws = [table.law for table in (scene.friction, *scene.structure.interface)]
     is_summed = kind in ("bench", "rig") and any(law_has_trait(law, "bonds") for law in laws)
-    if quadrature and quadrature != "auto" and not is_summed:
+    if scene.accuracy.quadrature not in ("auto", UNKNOWN_VALUE) and not is_summed:
         draft.add_remark(
-            "accuracy.quadrature",
-            f"= '{quadrature}' has no meaning without law 'nonlocal' and is not used",
+            "accuracy.quadrature", "has no meaning without law 'nonlocal' and is not used"
         )
 
 
@@ -76,10 +76,10 @@ def check_settings(draft: SceneDraft, kind: str) -> None:
             draft.add_remark(
                 f"accuracy.{setting}", f"is not used, because it has no effect {where}"
             )
-        where = _find_reason_without_repetition(draft, kind)
-        if draft.tables.accuracy.max_seconds is not None and where:
+        if draft.tables.accuracy.max_seconds is not None and not _is_repeated(draft, kind):
             draft.add_remark(
-                "accuracy.max_seconds", f"is not used, because no run {where} is repeated"
+                "accuracy.max_seconds",
+                "is not used, because this run is never repeated with a finer mesh or more steps",
             )
 
 
@@ -108,22 +108,17 @@ def list_repeated_axes(
     return ("mesh",) * has_automatic_mesh + ("steps",) * has_free_steps
 
 
-def _find_reason_without_repetition(draft: SceneDraft, kind: str) -> str:
-    """Return why a run is never repeated with finer meshes or more steps, "" if it may be."""
+def _is_repeated(draft: SceneDraft, kind: str) -> bool:
+    """Return whether a run that misses its tolerance may be repeated."""
     tables = draft.tables
     patches = [patch for _, patch in iterate_patches(draft)]
-    if list_repeated_axes(
+    axes = list_repeated_axes(
         kind,
         has_wear=bool(tables.wear),
         has_automatic_mesh=any(one.element_size is None and one.mesh is None for one in patches),
         has_fixed_steps=bool(tables.accuracy.steps_per_cycle),
-    ):
-        return ""
-    if kind == "patch" or tables.wear:
-        return "of a pressed patch" if kind == "patch" else "with [wear]"
-    if kind == "bench":
-        return "with accuracy.steps_per_cycle"
-    return "with fixed meshes" if patches else "without a patch"
+    )
+    return bool(axes)
 
 
 def find_unused_settings(tables: Tables, kind: str) -> dict[str, str]:
@@ -150,6 +145,8 @@ def _find_reason_without_effect(setting: str, accuracy: Any, motion: MotionFeatu
     laws = [joint.law for joint in motion.joints]
     if trait and not any(law_has_trait(law.law, trait) for law in laws):
         return f"without law '{next(name for name in LAWS if law_has_trait(name, trait))}'"
+
+    # Sums by recursion have neither a tail nor merged bonds.
     if trait == "bonds":
         engine = accuracy.quadrature
         if engine in ("direct", "recursion") or (engine, setting) == ("truncated", "merge"):
@@ -158,6 +155,8 @@ def _find_reason_without_effect(setting: str, accuracy: Any, motion: MotionFeatu
         return "" if is_summed else "for a law that is summed by recursion"
     if setting != "shear_modes":
         return ""
+
+    # Elements in closed form need no shear modes.
     if not motion.compliance:
         return "for pieces that are rigid in shear"
     if (

@@ -5,11 +5,10 @@ A rule sees the tables as far as they could be read and is silent about values t
 
 from __future__ import annotations
 
-from ...effects import find_waveform, law_has_trait
+from ...effects import law_has_trait
 from .accuracy import check_quadrature, check_settings
 from .contact import check_patches
 from .drive import check_drive, check_length
-from .facts import TableFacts
 from .friction import check_laws
 from .grooves import check_grooves
 from .needed_keys import check_needed_keys
@@ -28,7 +27,7 @@ def check_scene(draft: SceneDraft) -> str:
     check_laws(draft)
     check_structure(draft)
     check_drive(draft)
-    _check_small_tables(draft)
+    _check_slide(draft)
     check_wear(draft)
     check_grooves(draft)
     kind = find_kind(draft)
@@ -45,18 +44,9 @@ def check_scene(draft: SceneDraft) -> str:
     return kind
 
 
-def _check_small_tables(draft: SceneDraft) -> None:
-    """Report mistakes inside [normal], [slide] and [measured]."""
+def _check_slide(draft: SceneDraft) -> None:
+    """Report mistakes inside [slide]."""
     scene = draft.values
-    reading = scene.measured.reading
-    if (
-        reading in ("fundamental", "rms", "lowpass")
-        and not find_waveform(draft.tables.drive).is_sine
-    ):
-        draft.add_remark(
-            "measured.reading", "has a meaning only under a sine drive and is not used"
-        )
-
     slide = scene.slide
     if slide.kind in ("constant", "dwell") and slide.distance == 0:
         draft.add_mistake("slide.distance", f"must be > 0 m for kind '{slide.kind}'")
@@ -89,15 +79,7 @@ def find_kind(draft: SceneDraft) -> str:
 
 
 def _remark_unused(draft: SceneDraft, kind: str) -> None:
-    """Add remarks on keys that have no effect because the scene has no sliding or no friction."""
-    if kind == "patch":
-        patch = TableFacts(draft, "contact", draft.tables.contact)
-        shapes = patch.table.shapes.items() if patch.table is not None else ()
-        keys = [f"{name}.on" for name, shape in shapes if shape.on == "lower" and name != "tilt"]
-        for key in keys:
-            patch.add_remark(
-                key, "has no meaning in a patch scene, where nothing slides, and is not used"
-            )
+    """Add remarks on motions of modes that have no effect because the scene has no friction."""
     for index, mode in enumerate(draft.values.structure.mode if kind == "linear" else ()):
         for key in ("normal", "pitch", "yaw"):
             if mode[key]:

@@ -120,6 +120,7 @@ def find_unsupported_feature(support: EngineSupport, motion: MotionFeatures) -> 
     support : EngineSupport
         Features of the solver, such as ENGINE_SUPPORT["march"].
     motion : MotionFeatures
+        Features of the scene.
 
     Returns
     -------
@@ -281,6 +282,8 @@ def _find_obstacle(method: str, motion: MotionFeatures) -> str:
     limits = {name: find_unsupported_feature(row, motion) for name, row in ENGINE_SUPPORT.items()}
     if method == "harmonic":
         return _find_harmonic_obstacle(motion, limits)
+
+    # What each engine lacks.
     by_events = limits["hybrid"]
     in_steps = limits["march"]
     without_events = f"the motion cannot be computed from event to event {by_events}"
@@ -293,6 +296,8 @@ def _find_obstacle(method: str, motion: MotionFeatures) -> str:
         "exact": by_events and f"{without_events}; use 'march' or leave `method` out",
         "march": in_steps and f"'march' {in_steps} is not supported yet; leave `method` out",
     }
+
+    # The return map of a law knows no flanks.
     if method == "march" and is_climbing and not in_steps:
         return (
             f"the motion over grooves under law '{law}' is computed from event to event; use 'exact' or leave "

@@ -53,8 +53,10 @@ def _check_file(structure: TableFacts) -> None:
         advice = advise_on_name(extension, (*ARRAY_EXTENSIONS, ".uff"))
         structure.add_mistake(
             "file",
-            f"{_describe_extension(extension)}; {advice}: matrices or modes as arrays, or universal files",
+            f"{_describe_extension(extension)}; {advice}: matrices as arrays, or universal files",
         )
+
+    # The arrays of a file have names, the places of a universal file have keys.
     if extension not in UNIVERSAL_EXTENSIONS:
         keys = LOCATION_KEYS if extension in ARRAY_EXTENSIONS else ()
         for key in filter(structure.has, keys):
@@ -64,6 +66,8 @@ def _check_file(structure: TableFacts) -> None:
                 f"names a place in a universal file; a {extension} file contains the array {array}",
             )
         return
+
+    # What a universal file does not say.
     if not structure.has("moving_mass"):
         structure.add_missing(
             "moving_mass", "the modes of a universal file are scaled to this mass"
@@ -181,12 +185,15 @@ def describe_default_outputs(tables: Tables) -> list[str]:
     drive = tables.drive
     kind = drive.kind if drive is not None else ""
     sentences = []
+
+    # The first mode alone moves the output by default.
     for mode in modes[:1]:
         if mode.output is None and kind == "force":
             sentences.append(
                 f"the force acts at the output point, which moves by 1 per unit of the coordinate of mode '{mode.name}' "
                 f"(default of `output`); the patch moves by {mode.slide:g} (`slide`)"
             )
+
     for mode in modes[1:]:
         if mode.slide and (mode.output, mode.accelerometer, mode.gauge) == (None, None, None):
             sentence = (

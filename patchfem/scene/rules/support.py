@@ -187,6 +187,9 @@ LAW_FEATURES = {
     "law with memory for a constant pressure": lambda j: (
         not j.has_trait("memoryless") and not j.has_trait("bonds") and j.lacks("varying-load")
     ),
+    "law with memory but without bonds": lambda j: (
+        not j.has_trait("memoryless") and not j.has_trait("bonds")
+    ),
     "law for rigid pieces": lambda j: (
         not j.is_interface and not j.has_trait("bonds") and j.lacks("shear")
     ),
@@ -333,6 +336,7 @@ COMBINATIONS = {
     ),
     "recursion": (
         "sum over all stretched bonds, changing load",
+        "sum over all stretched bonds, normal.amplitude, bench",
         "sum over all bonds, grooves",
     ),
     "stiff": ("law that sticks rigidly, partial slip, changing load",),
@@ -344,7 +348,7 @@ COMBINATIONS = {
         "shape on the lower piece, changing load",
         "shape on the lower piece, law without bonds, rig",
         "shape on the lower piece, law without bonds, partial slip",
-        "shape on the lower piece, bench, law with memory for a constant pressure",
+        "shape on the lower piece, bench, law with memory but without bonds",
         "shape on the lower piece, interface",
         "shape on the lower piece, grooves",
     ),
@@ -355,7 +359,6 @@ COMBINATIONS = {
         "named method of the sum, grooves",
     ),
     SINGLE_SUMS: (
-        "accuracy.quadrature=merged, bench, patch that slips as a whole, shape on the lower piece",
         "accuracy.quadrature=merged, bench, patch that slips as a whole, normal.amplitude",
     ),
     f"leave out {{compliance}}, or {suggest_laws('pieces', 'shear')}": (

@@ -12,7 +12,7 @@ from __future__ import annotations
 from functools import lru_cache
 from typing import Any, NamedTuple
 
-from ...effects import LAWS, law_takes_stiffness_or_length
+from ...effects import GAP_SHAPES, LAWS, WAVEFORMS, law_takes_stiffness_or_length
 from .contact import iterate_patches
 from .outlines import END_KEYS, PIECE_NAMES
 from .scene_draft import SceneDraft
@@ -24,6 +24,9 @@ INTERFACE_EXCLUDES = (
 )
 # The law takes a stiffness or the bond length that determines it.
 TAKES_EITHER = f"friction.law={'|'.join(filter(law_takes_stiffness_or_length, LAWS))}"
+OTHER_WAVEFORMS = (
+    f"drive.waveform={'|'.join(name for name, wave in WAVEFORMS.items() if not wave.is_sine)}"
+)
 JOINS_MASSES = f"joins masses, which cannot be used with [contact]; {MODES_ADVICE}"
 MISTAKES = {
     # tables
@@ -68,7 +71,7 @@ MISTAKES = {
     "structure.damper & !structure.masses & contact": JOINS_MASSES,
     **dict.fromkeys(
         (f"structure.{key} & !structure.file" for key in LOCATION_KEYS),
-        "names a place in a file of modes or responses, but the scene has no such file; give structure.file",
+        "names a place in a universal file, but the scene has no such file; give structure.file",
     ),
     "structure.measured_joint & !structure.measured=stuck": "names the joint that is subtracted from the modes, but nothing "
     'is subtracted; add measured = "stuck" or leave `measured_joint` out',
@@ -88,8 +91,15 @@ REMARKS = {
     "patch.element_size & patch.mesh": "is not used, because the file of contact.mesh gives the elements",
     "patch.length & patch.upper.length & patch.lower.length": "is not used: [contact.upper] and [contact.lower] set their "
     "own lengths",
-    "contact.holder.tangential_stiffness & kind=patch": "has no meaning in a patch scene, where nothing slides, and is not "
-    "used",
+    **dict.fromkeys(
+        (
+            "contact.holder.tangential_stiffness & kind=patch",
+            # The angle of a tilt depends on the piece.
+            *(f"contact.{name}.on=lower & kind=patch" for name in GAP_SHAPES if name != "tilt"),
+            "contact.profile.on=lower & kind=patch",
+        ),
+        "has no meaning in a patch scene, where nothing slides, and is not used",
+    ),
     "contact.grooves.lifted_mass & slide": "has no meaning with [slide], because a prescribed slide has no inertia, and is "
     "not used",
     "normal.grooves.lifted_mass & slide": "has no meaning with [slide], because a prescribed slide has no inertia, and is "
@@ -98,6 +108,7 @@ REMARKS = {
     "structure.moving_mass & structure.masses": "has no meaning with structure.masses and is not used",
     "structure.moving_mass & structure.reduced": "has no meaning with structure.reduced and is not used",
     "structure.reduced.moved & drive.kind=force|free": "is not used, because it applies only to a base drive",
+    f"measured.reading=fundamental|rms|lowpass & {OTHER_WAVEFORMS}": "has a meaning only under a sine drive and is not used",
     "wear.jumps & normal": WITHOUT_PATCH,
     "wear.upper_share & normal": WITHOUT_PATCH,
     "wear.upper_share & !normal & !contact.grooves & !contact.coating & !contact.upper.coating & "
@@ -150,6 +161,7 @@ def holds(draft: SceneDraft, kind: str, condition: str) -> bool:
     Parameters
     ----------
     draft : SceneDraft
+        Scene with its written values.
     kind : str
         Kind of the scene.
     condition : str

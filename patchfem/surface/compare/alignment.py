@@ -51,15 +51,15 @@ MIN_GAIN_DEVIATIONS = 3.0  # smallest change of the gain that is corrected, in s
 class Aligned:
     """Two surfaces after alignment, or the code of the reason why they cannot be compared.
 
-    - gain: factor by which the heights of the second surface were divided; 1 if no other one shows.
+    - numbers: what the sentence on the reason needs.
     - gain_error: standard deviation of the gain, as far as the unworn heights show it.
     """
 
     reason: str = ""
+    numbers: dict[str, float] | None = None
     model: Model | None = None
     fit: Fit | None = None
     place: Place | None = None
-    gain: float = 1.0
     gain_error: float = MAX_GAIN_ERROR
 
 
@@ -79,28 +79,30 @@ def align(
     place = Place(-np.array([shift]), 0.0) if shift is not None else find_place(first, second)
     model = _make_model(first, second, place)
     if model is None:
-        return Aligned(_find_reason(first, second))
+        return _refuse(first, second)
     state = model.refine_place()
     model.keep_common(state)
     if model.known.sum() < MIN_HEIGHTS:
-        return Aligned(_find_reason(first, second))
+        return _refuse(first, second)
 
     digit = EVEN_DEVIATION * float(np.hypot(_find_digit(first.z), _find_digit(second.z)))
     digit = max(digit, MIN_NOISE)
     fit = _fit_datum(model, state, digit, is_straight=is_straight)
     fit, gain_error = _fit_gain(model, fit, digit)
-    aligned = Aligned("", model, fit, place, 1 + float(fit.state[-1]), gain_error)
+    aligned = Aligned("", None, model, fit, place, gain_error)
 
     if shift is None and not _is_same_place(aligned):
-        return replace(aligned, reason=_find_reason(first, second))
-    if fit.unworn.mean() < MIN_AGREEING:
-        return replace(aligned, reason="no_datum")
+        return _refuse(first, second)
+    unworn = float(fit.unworn.mean())
+    if unworn < MIN_AGREEING:
+        return Aligned("no_datum", {"unworn": unworn})
     return _use_all_points(aligned, first, second, digit)
 
 
-def _find_reason(first: Raster, second: Raster) -> str:
-    is_finish = find_mirror_finish([fill_gaps(surface.z) for surface in (first, second)])
-    return "mirror_finish" if is_finish else "elsewhere"
+def _refuse(first: Raster, second: Raster) -> Aligned:
+    """Return why no place is found: a mirror finish, or surfaces that have none."""
+    numbers = find_mirror_finish([fill_gaps(surface.z) for surface in (first, second)])
+    return Aligned("mirror_finish" if numbers else "elsewhere", numbers)
 
 
 def _make_model(first: Raster, second: Raster, place: Place, stride: int = 0) -> Model | None:
@@ -119,14 +121,11 @@ def _use_all_points(aligned: Aligned, first: Raster, second: Raster, digit: floa
     model = aligned.model
     if model.own.z.shape == order(first, second)[0].z.shape:
         return aligned
-    place = aligned.place._replace(
-        shift=fit.state[: model.n_axes], turn=float(fit.state[model.n_axes])
-    )
-    model = _make_model(first, second, place, stride=1)
-    model.max_gain_change = aligned.model.max_gain_change
-    return replace(
-        aligned, model=model, fit=evaluate(model, fit.state, fit.free, digit), place=place
-    )
+    shift = fit.state[: model.n_axes]
+    place = aligned.place._replace(shift=shift, turn=float(fit.state[model.n_axes]))
+    whole = _make_model(first, second, place, stride=1)
+    whole.max_gain_change = model.max_gain_change
+    return replace(aligned, model=whole, fit=evaluate(whole, fit.state, fit.free, digit))
 
 
 def _is_same_place(aligned: Aligned) -> bool:

@@ -49,6 +49,7 @@ def find_changed(depth, noise) -> np.ndarray:
     limit = compute_threshold(len(windows) * known.sum())
     pull = MAX_PULL[depth.ndim]
     remainder = np.clip(relative, -pull, pull)
+
     for side in windows:
         if side > min(depth.shape) / 4:
             break
@@ -66,6 +67,7 @@ def find_changed(depth, noise) -> np.ndarray:
             changed |= ndimage.binary_opening(high, np.ones((spot,) * depth.ndim))
         else:
             changed |= ndimage.binary_dilation(high, np.ones((side,) * depth.ndim))
+
     side = MIN_SIDE
     if depth.ndim == 1:
         places = np.flatnonzero(known)
@@ -133,16 +135,11 @@ def find_shallow_track(depth) -> ShallowTrack:
     return ShallowTrack(slice(edges[first], edges[stop]), limit)
 
 
-def find_largest_window(shape: tuple[int, int]) -> int:
-    """Return the side, in points, of the largest squares of a scan whose mean depth is tested."""
-    return max(side for side in WINDOWS[2] if side <= max(min(shape) / 4, 1))
-
-
 def find_detection_limit(depth, noise) -> float:
     """Return the mean depth [m] from which on a track of a trace is found, or below which a square of a scan is not."""
     if depth.ndim == 1:
         return find_shallow_track(depth).limit
-    side = find_largest_window(depth.shape)
+    side = max(side for side in WINDOWS[2] if side <= max(min(depth.shape) / 4, 1))
     mean = ndimage.uniform_filter(np.clip(depth / noise, -MAX_PULL[2], MAX_PULL[2]), side)
     scatter = max(estimate_one_sided_scale(mean.ravel(), UNCHANGED_FRACTION[2]), 1 / side)
     threshold = compute_threshold(len(WINDOWS[2]) * depth.size)

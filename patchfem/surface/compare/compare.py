@@ -19,7 +19,7 @@ from ..profile import Profile, robust_deviation
 from ..quantity import SIDE, Quantity
 from . import waves
 from .alignment import SURE_SIGNIFICANCE, Aligned, align
-from .changes import find_detection_limit, find_largest_window
+from .changes import find_detection_limit
 from .depth_map import UNWORN_LIMIT, DepthMap
 from .depths import make_depths, measure_largest
 from .flanks import find_flanked_track
@@ -34,9 +34,9 @@ from .records import (
     name_quantity,
     name_unknown,
 )
-from .statistics import find_mirror_finish, remove_long_waves
+from .statistics import remove_long_waves
 from .track import find_spans, get_margin, measure_track
-from .verdict import find_sure_loss, judge_change, limit_wear, measure_sharp_loss
+from .verdict import find_sure_loss, judge_change, measure_sharp_loss
 
 END_SAMPLES = 7  # number of lines from an end at which growth includes it
 MIN_GROWN_LINE = 0.5  # fraction of a line near an end that grew, from which on the end grew
@@ -46,12 +46,10 @@ MAX_TRACK_FRACTION = 0.8
 MIN_SCAR_FRACTION = 0.9  # fraction of worn heights in such a scar; worn tops have a smaller one
 # Mean height of a bow relative to the short waves, from which on it may be a scar.
 MIN_BOW = 3.0
-MIN_DEPOSITS = 0.05  # smallest grown area or volume that is reported, relative to the lost one
 MIN_OTHER_LENGTH = 5e-4  # smallest error of length that is reported
 MAX_STEP_RATIO = 1.01  # ratio of two sampling intervals that counts as equal
 # Fraction of worn heights in a track below which it consists of worn tops.
 MIN_TOPS_FRACTION = 0.6
-RATIO_NAMES = ("amplitude_ratio", "slope_ratio")
 
 
 class Names(NamedTuple):
@@ -78,14 +76,14 @@ NAMES = {
             "worn_depth_within",
             *("worn_from_before", "worn_from_after", "worn_to_before", "worn_to_after"),
         ),
-        place=("shift", "tilt", "scale", "offset", "gain"),
+        place=("shift", "scale", "gain"),
     ),
     2: Names(
         lost="worn_volume",
         grown="grown_volume",
         region="common_area",
         wear=("worn_volume", "grown_volume", "worn_share", "worn_depth_mean", "worn_depth_max"),
-        place=("shift_x", "shift_y", "rotation", "offset", "gain"),
+        place=("shift_x", "shift_y", "rotation", "gain"),
     ),
 }
 
@@ -148,6 +146,8 @@ def compare_surfaces(
     removed = tuple(
         int(clean.missing.sum() - raw.missing.sum()) for clean, raw in zip(cleaned, surfaces)
     )
+
+    # Equal heights would have no noise.
     first, second = (make_raster(surface) for surface in cleaned)
     names = NAMES[first.z.ndim]
     if np.array_equal(first.z, second.z, equal_nan=True) and (first.origin == second.origin).all():
@@ -158,6 +158,7 @@ def compare_surfaces(
         result = _measure(surfaces, (first, second), aligned)
         ratios = _compare_waves((first, second), result, options.direction)
         result = replace(result, values=result.values | ratios)
+
     evidence = replace(result.evidence, removed=removed)
     findings = result.findings
     if any(removed):
@@ -168,25 +169,17 @@ def compare_surfaces(
 def _check_options(surfaces: tuple[Profile | Areal, Profile | Areal], options: Options) -> None:
     """Raise PatchfemError if the options do not suit the surfaces, or a trace stands beside a scan."""
     n_scans = sum(isinstance(surface, Areal) for surface in surfaces)
-    of_traces = options.shift is not None or bool(options.datum)
-    rules = (
-        (
-            options.datum not in ("", "straight"),
-            f"datum {options.datum!r}: straight is needed, or nothing",
-        ),
-        (
-            options.direction not in ("", "x", "y"),
-            f"direction {options.direction!r}: x or y is needed",
-        ),
-        (n_scans == 1, "two traces are needed, or two areal scans"),
-        (
-            n_scans == 2 and of_traces,
-            "a shift and a datum can be given only for traces; those of scans are found",
-        ),
-    )
-    for is_wrong, message in rules:
-        if is_wrong:
-            raise PatchfemError(f"compare: {message}")
+    if n_scans == 1:
+        raise PatchfemError("compare: two traces are needed, or two areal scans")
+    if n_scans and (options.shift is not None or options.datum):
+        raise PatchfemError(
+            "compare: a shift and a datum can be given only for traces; those of scans are found"
+        )
+    if options.datum not in ("", "straight") or options.direction not in ("", "x", "y"):
+        raise PatchfemError(
+            f"compare: datum {options.datum!r}, direction {options.direction!r}: the datum is straight, and the direction x "
+            "or y, or nothing"
+        )
 
 
 def _name_unknowns(names: tuple[str, ...], reason: str) -> dict[str, Quantity]:
@@ -210,29 +203,28 @@ def _measure(
         placement = Placement(_name_unknowns(names.place, "elsewhere"), basis="flanks")
         hidden = name_unknown("hidden_wear", "not_hidden")
     if depths is None:
-        numbers = {}
-        if aligned.reason == "no_datum":
-            numbers["unworn"] = float(aligned.fit.unworn.mean())
-        if aligned.reason == "mirror_finish":
-            numbers = find_mirror_finish([fill_gaps(raster.z) for raster in rasters])
         unknown = (*names.wear, *names.place, "hidden_wear")
         values = _name_unknowns(unknown, aligned.reason)
-        return Comparison(*surfaces, Finding(aligned.reason, numbers), values)
+        return Comparison(*surfaces, Finding(aligned.reason, aligned.numbers), values)
 
     # What the same tests find above the first surface is a control for what they find below it.
     spans = find_spans(depths) if is_trace else []
-    area, error = depths.integrate(_cover_loss(depths, spans))
+    covered = _cover_loss(depths, spans)
+    area, error = depths.integrate(covered)
     is_grown = _enlarge(depths.grown) & depths.inside & ~depths.worn
     grown, grown_error = depths.integrate(is_grown, -1.0)
-    sure_area = depths.integrate(depths.worn)[0]
     is_placed = placement.basis == "place"
     # The flanks of a track were compared with random traces, which choose their deepest place too.
     sure_loss = find_sure_loss(depths) if is_placed else SIDE
     # Drift may be as large as the loss of sharp tops, but is no cause of it.
     sharp = measure_sharp_loss(depths) if is_placed else 0.0
     drift = 0.0 if sharp > 0 else error
-    loss = _bound_loss(depths, spans, sharp)
-    code = judge_change(loss.value, drift, sure_loss, sure_area, grown, grown_error)
+    largest = max(area, sharp)
+    lowest = max(area - SIDE * error, (1 - SIDE * depths.errors.model) * sharp, 0.0)
+    highest = max(area + SIDE * error + depths.measure_hidden(covered), sharp)
+    loss = name_quantity(names.lost, largest, lowest, highest)
+    sure_area = depths.integrate(depths.worn)[0]
+    code = judge_change(largest, drift, sure_loss, sure_area, grown, grown_error)
     if not is_placed and code != "worn":
         code = "elsewhere"
     tracks = ()
@@ -240,7 +232,8 @@ def _measure(
         # The area of a single track is that of the common part.
         whole = loss[:3] if len(spans) == 1 else None
         tracks = tuple(measure_track(depths, span, whole) for span in spans)
-    bend = _get_bend(aligned)
+    # The subtracted parabola of a trace, 0 without one.
+    bend = float(aligned.fit.state[-2]) if is_trace and is_placed else 0.0
     code, possible = _doubt(code, depths, spans, tracks, (area, grown, bend))
     tracks = tracks if code.startswith("worn") else ()
 
@@ -262,24 +255,13 @@ def _measure(
         if is_trace and is_placed:
             regions, cutoff = waves.measure_roughness(depths, spans)
     limit = _find_detection_limit(depths) if is_placed else None
-    numbers = {"lost": area, "grown": grown, "basis": placement.basis}
-    numbers |= limit_wear(loss.high / depths.size, limit) | possible
-    if not is_trace:
-        numbers["side"] = find_largest_window(depths.depth.shape)
-    verdict = Finding(code, numbers)
+    # A track over a third of the common part may be as deep as the limit without being found.
+    at_most = max(highest / depths.size, (limit or 0.0) / 3)
+    numbers = {"lost": area, "grown": grown, "basis": placement.basis, "at_most": at_most}
+    verdict = Finding(code, numbers | {"detection_limit": limit} | possible)
     evidence = Evidence(placement, depths, regions, cutoff)
-    findings = _collect_findings(verdict, evidence, bend, tracks, rasters)
+    findings = _collect_findings(evidence, bend, tracks)
     return Comparison(*surfaces, verdict, values, tracks, findings, evidence)
-
-
-def _bound_loss(depths: DepthMap, spans: list[tuple[int, int]], sharp: float) -> Quantity:
-    """Return the lost area [m2] or volume [m3] with its interval; sharp: what sure tops of it have lost."""
-    covered = _cover_loss(depths, spans)
-    area, error = depths.integrate(covered)
-    low = max(area - SIDE * error, (1 - SIDE * depths.errors.model) * sharp, 0.0)
-    high = area + SIDE * error + depths.measure_hidden(covered)
-    name = NAMES[depths.depth.ndim].lost
-    return name_quantity(name, max(area, sharp), low, max(high, sharp))
 
 
 def _find_detection_limit(depths: DepthMap) -> float:
@@ -294,27 +276,14 @@ def _find_detection_limit(depths: DepthMap) -> float:
     return max(limit, 2 * SIDE * depths.integrate(middle)[1] / (middle.sum() * depths.cell))
 
 
-def _get_bend(aligned: Aligned) -> float:
-    """Return the height [m] of the subtracted parabola of traces, 0 without one."""
-    if aligned.reason or aligned.model.n_axes > 1:
-        return 0.0
-    return float(aligned.fit.state[-2])
-
-
 def _describe_place(aligned: Aligned) -> Placement:
-    """Return shift, turn and datum with the errors that follow from the unworn heights."""
+    """Return shift, turn and gain with the errors that follow from the unworn heights."""
     state = aligned.fit.state
     errors = aligned.fit.errors
-    placed = dict(zip(("shift_y", "shift_x", "rotation", "offset"), zip(state, errors)))
+    placed = dict(zip(("shift_y", "shift_x", "rotation"), zip(state, errors)))
     if aligned.model.n_axes == 1:
-        half = float(aligned.model.own.lengths[0]) / 2
-        placed = {
-            "shift": (-state[0], errors[0]),
-            "scale": (1 / (1 + state[1]), errors[1]),
-            "tilt": (state[3] / half, errors[3] / half),
-            "offset": (state[2], errors[2]),
-        }
-    placed["gain"] = (aligned.gain, aligned.gain_error)
+        placed = {"shift": (-state[0], errors[0]), "scale": (1 / (1 + state[1]), errors[1])}
+    placed["gain"] = (1 + state[-1], aligned.gain_error)
     values = {name: name_estimate(name, *estimate) for name, estimate in placed.items()}
     place = aligned.place
     if np.isfinite(place.significance):
@@ -323,7 +292,7 @@ def _describe_place(aligned: Aligned) -> Placement:
 
 
 def _collect_findings(
-    verdict: Finding, evidence: Evidence, bend: float, tracks: tuple[Track, ...], rasters: tuple
+    evidence: Evidence, bend: float, tracks: tuple[Track, ...]
 ) -> tuple[Finding, ...]:
     """Return what a reader must know of the place, the datum, the gain and the tracks."""
     placement = evidence.placement
@@ -331,46 +300,37 @@ def _collect_findings(
     is_placed = placement.basis == "place"
     gain = placement.values["gain"].value
     scale = placement.values.get("scale")
-    is_longer = False
+    lengths = {}
     if is_placed and scale is not None:
-        is_longer = not scale.low - MIN_OTHER_LENGTH < 1 < scale.high + MIN_OTHER_LENGTH
+        if not scale.low - MIN_OTHER_LENGTH < 1 < scale.high + MIN_OTHER_LENGTH:
+            lengths = {"scale": scale.value, "low": scale.low, "high": scale.high}
+
     # A scar is deepest in the middle of its parabola, wear of both ends at its ends.
     bow = abs(bend)
     bow_area = bow * (2 if bend > 0 else 1) / 3 * float(np.ptp(depths.x))
     has_tops = bool(tracks) and _is_broken(depths, find_spans(depths)[0], MIN_TOPS_FRACTION)
-    grown = verdict.numbers["grown"]
-    has_deposits = (
-        verdict.code.startswith("worn") and grown > MIN_DEPOSITS * verdict.numbers["lost"]
-    )
     known = placement.values.get("significance")
     significance = known.value if known else np.inf
-    is_sure = significance > SURE_SIGNIFICANCE
-    # Rounded up, 11.7 would look as sure as 12.
-    place = {"significance": float(np.floor(significance)), "sure": SURE_SIGNIFICANCE}
+
     # The noise of the depths contains the drift; that of neighbours does not.
     drift = depths.errors.drift
     short_noise = robust_deviation(np.diff(depths.depth)) / np.sqrt(2)
-    steps = [float(raster.steps[-1]) for raster in rasters]
-    is_uneven = depths.y is None and max(steps) > MAX_STEP_RATIO * min(steps)
     first, last = depths.x[depths.worn][[0, -1]] if not is_placed else (0.0, 0.0)
     rows = (
         (not is_placed, "no_old_surface_left", {"from": float(first), "to": float(last)}),
         (bow, "bow_subtracted", {"height": bow, "area": bow_area}),
         (is_placed, "hidden_even_wear", {"limit": None}),
-        (np.isfinite(significance), "sure_place" if is_sure else "likely_place", place),
+        (
+            significance <= SURE_SIGNIFICANCE,
+            "likely_place",
+            # Rounded up, 11.7 would look as sure as 12.
+            {"significance": float(np.floor(significance)), "sure": SURE_SIGNIFICANCE},
+        ),
         (placement.mirrored, "mirrored", {}),
         (gain not in (None, 1.0), "other_gain", {"gain": gain}),
-        (
-            is_longer,
-            "other_length",
-            {} if scale is None else scale._asdict() | {"scale": scale.value},
-        ),
+        (lengths, "other_length", lengths),
         (drift > short_noise, "drift", {"height": drift, "noise": short_noise}),
-        (len(tracks) > 1, "other_tracks", {"count": len(tracks) - 1}),
-        (tracks and any(tracks[0].cut), "track_cut", {}),
         (has_tops, "worn_tops", {}),
-        (has_deposits, "deposits", {"area" if depths.y is None else "volume": grown}),
-        (is_uneven, "other_step", dict(zip(("before", "after"), steps))),
     )
     return tuple(Finding(code, numbers) for applies, code, numbers in rows if applies)
 
@@ -453,15 +413,16 @@ def _has_grown_at_ends(depths: DepthMap) -> bool:
 def _locate_largest(depths: DepthMap) -> dict[str, Quantity]:
     """Return the largest depth and its place."""
     largest, near = measure_largest(depths)
+    best = np.unravel_index(np.argmax(np.where(near, depths.depth, -np.inf)), near.shape)
+    x = depths.x[best[-1]]
     values = {"worn_depth_max": largest}
-    if depths.depth.ndim == 1:
-        best = depths.x[near][int(np.argmax(depths.depth[near]))]
-        places = depths.x[near][[0, -1]]
-        values["worn_depth_max_at"] = name_quantity("worn_depth_max_at", best, *places)
-        return values
-    row, column = np.unravel_index(np.argmax(np.where(near, depths.depth, -np.inf)), near.shape)
-    values["worn_depth_max_x"] = name_quantity("worn_depth_max_x", depths.x[column], None, None)
-    values["worn_depth_max_y"] = name_quantity("worn_depth_max_y", depths.y[row], None, None)
+    if depths.y is None:
+        places = depths.x[near]
+        return values | {
+            "worn_depth_max_at": name_quantity("worn_depth_max_at", x, places[0], places[-1])
+        }
+    for name, place in (("worn_depth_max_x", x), ("worn_depth_max_y", depths.y[best[0]])):
+        values[name] = name_quantity(name, place, None, None)
     return values
 
 
@@ -482,15 +443,13 @@ def _name_ends(
     for end in ("from", "to"):
         before, after = (f"worn_{end}_{side}" for side in ("before", "after"))
         places = track[end][:3]
-        if places[0] is None:
-            values |= _name_unknowns((before, after), "cut_off")
-            continue
-        values[after] = name_quantity(after, *places)
-        values[before] = name_unknown(before, "elsewhere")
-        if shift is not None:
+        values |= _name_unknowns((before, after), "cut_off" if places[0] is None else "elsewhere")
+        if places[0] is not None:
+            values[after] = name_quantity(after, *places)
+        if places[0] is not None and shift is not None:
             scale = placement.values["scale"].value
-            places = [middle + (x - middle) / scale - shift for x in places]
-            values[before] = name_quantity(before, *places)
+            moved = middle + (np.array(places) - middle) / scale - shift
+            values[before] = name_quantity(before, *moved)
     return values
 
 
@@ -501,19 +460,19 @@ def _compare_waves(
     axis = 0 if direction == "y" else -1
     depths = result.evidence.curves
     steps = [float(raster.steps[axis]) for raster in rasters]
-    if depths is not None and result.evidence.placement.basis == "place":
-        lines = [np.moveaxis(z, axis, -1) for z in (depths.before, depths.after)]
-        steps = steps[1:] if depths.y is None else steps[:1]
-    elif max(steps) > MAX_STEP_RATIO * min(steps):
-        return _name_unknowns(RATIO_NAMES, "other_step")
-    else:
-        lines = [np.moveaxis(fill_gaps(raster.z), axis, -1) for raster in rasters]
     # A mirror finish has no depths, but the noise of each surface is known.
     noise = np.sqrt(2) * result.verdict.numbers.get("noise", 0.0)
-    noise = noise if depths is None else depths.noise_level
     ends = []
-    if depths is not None and depths.y is None:
+    if depths is not None:
+        noise = depths.noise_level
         places = [track.values[name].value for track in result.tracks for name in ("from", "to")]
-        known = [place for place in places if place is not None]
-        ends = np.searchsorted(depths.x, known).tolist()
-    return waves.compare_waves([np.atleast_2d(line) for line in lines], steps[0], noise, ends)
+        ends = np.searchsorted(depths.x, [place for place in places if place is not None])
+    heights = [fill_gaps(raster.z) for raster in rasters]
+    if depths is not None and result.evidence.placement.basis == "place":
+        # Depths stand at the samples of the second trace, or of the first scan.
+        heights = [depths.before, depths.after]
+        steps = steps[1:] if depths.y is None else steps[:1]
+    if max(steps) > MAX_STEP_RATIO * min(steps):
+        return _name_unknowns(waves.RATIO_NAMES, "other_step")
+    lines = [np.atleast_2d(np.moveaxis(z, axis, -1)) for z in heights]
+    return waves.compare_waves(lines, steps[0], noise, ends)

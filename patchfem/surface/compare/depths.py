@@ -1,7 +1,5 @@
 """Depths of aligned surfaces, their errors from the means of unworn tiles, and the largest depth."""
 
-from itertools import product
-
 import numpy as np
 from scipy import ndimage, special
 
@@ -41,6 +39,7 @@ def make_depths(model: Model, fit: Fit, gain_error: float = 0.0) -> DepthMap:
         for k in fit.free
         if model.n_axes < k <= model.n_axes + len(model.datum)
     ]
+
     depth = fill_gaps(model.draw(fit.depth))[box]
     noise = model.draw(fit.noise)[box]
     noise = np.where(np.isnan(noise), np.median(fit.noise), noise)
@@ -53,18 +52,14 @@ def make_depths(model: Model, fit: Fit, gain_error: float = 0.0) -> DepthMap:
         first = first / (1 + fit.state[-1]) + depth
     base = model.datum[(terms, *box)]
     before = subtract_plane(first, base[: 1 + model.n_axes])
+
     # An error of the gain moves the heights of the second surface that stand out of the datum.
     unworn = masks["unworn"]
-    columns = base.reshape(len(base), -1).T
-    plane = np.linalg.lstsq(columns[unworn.ravel()], before[unworn], rcond=None)[0]
-    waves = before - (columns @ plane).reshape(before.shape)
-    shifts = [gain_error * (waves - depth)]
+    shifts = [gain_error * (subtract_plane(before, base, unworn) - depth)]
     if model.n_axes == 1:
         shifts.append(_bend_datum(depth, unworn, base))
     errors = estimate_errors(depth, noise, unworn, base, shifts)
-    correlation = 1.0
-    if model.n_axes == 1:
-        correlation = estimate_correlation((depth / noise)[masks["unworn"]])
+
     model_error = float(np.hypot(MODEL_ERROR, gain_error))
     # Holes of missing heights belong to the common part.
     inside = ndimage.binary_fill_holes(model.common[box])
@@ -80,45 +75,39 @@ def make_depths(model: Model, fit: Fit, gain_error: float = 0.0) -> DepthMap:
         inside=inside,
         missing=inside & ~model.known[box],
         cell=float(np.prod(model.own.steps)),
-        errors=errors._replace(correlation=correlation, model=model_error),
+        errors=errors._replace(model=model_error),
     )
 
 
-def make_section(x, heights, sigma: float, worn, grown=None) -> DepthMap:
-    """Return the depths of a section about a straight datum.
+def make_section(x, depth, sigma: float, worn, missing) -> DepthMap:
+    """Return the depths of a section below a straight datum.
 
     Parameters
     ----------
-    x : (n,) array [m]
-    heights : pair of (n,) arrays [m]
-        Before and after wear.
+    x, depth : (n,) array [m]
     sigma : float
         Noise of every depth [m].
-    worn, grown : (n,) bool array
-        No height has grown by default.
+    worn, missing : (n,) bool array
     """
-    before, after = heights
-    depth = before - after
     noise = np.full(depth.size, sigma)
-    grown = np.zeros(depth.size, bool) if grown is None else grown
-    unworn = (np.abs(depth) < UNWORN_LIMIT * sigma) & ~worn & ~grown
-
+    nothing = np.zeros(depth.size, bool)
+    unworn = (np.abs(depth) < UNWORN_LIMIT * sigma) & ~worn
     # The errors are those of the unworn heights about their line.
     base = np.array([np.ones(depth.size), np.linspace(-1, 1, depth.size)])
-    errors = estimate_errors(depth, noise, unworn, base)
     return DepthMap(
         x=x,
-        before=before,
-        after=after,
+        y=None,
+        before=0.0 * depth,
+        after=-depth,
         depth=depth,
         noise=noise,
         unworn=unworn,
         worn=worn,
-        grown=grown,
-        inside=np.ones(depth.size, bool),
-        missing=np.zeros(depth.size, bool),
+        grown=nothing,
+        inside=~nothing,
+        missing=missing,
         cell=float(np.diff(x).mean()),
-        errors=errors._replace(correlation=estimate_correlation(depth[unworn])),
+        errors=estimate_errors(depth, noise, unworn, base),
     )
 
 
@@ -168,7 +157,8 @@ def estimate_errors(depth, noise, unworn, base, shifts=()) -> DepthErrors:
         white = variance * float(moments @ inverse @ moments + part.sum())
         return white + sum(float(shift[part].sum()) ** 2 for shift in shifts)
 
-    return DepthErrors(compute_variance, drift, freedom)
+    correlation = estimate_correlation((depth / noise)[unworn]) if depth.ndim == 1 else 1.0
+    return DepthErrors(compute_variance, drift, freedom, correlation)
 
 
 def _bend_datum(depth, unworn, base) -> np.ndarray:
@@ -177,11 +167,8 @@ def _bend_datum(depth, unworn, base) -> np.ndarray:
     Where a drift is slow, this is the error of a datum in a wide track, which the flanks alone do not show.
     """
     x = np.linspace(-1, 1, depth.size)
-    datums = []
-    for columns in (base, [*base, x ** len(base), x ** (len(base) + 1)]):
-        columns = np.transpose(columns)
-        datums.append(columns @ np.linalg.lstsq(columns[unworn], depth[unworn], rcond=1e-10)[0])
-    return datums[1] - datums[0]
+    bent = np.vstack((base, x ** len(base), x ** (len(base) + 1)))
+    return subtract_plane(depth, base, unworn) - subtract_plane(depth, bent, unworn)
 
 
 def measure_largest(depths: DepthMap) -> tuple[Quantity, np.ndarray]:
@@ -216,12 +203,9 @@ def measure_largest(depths: DepthMap) -> tuple[Quantity, np.ndarray]:
     value = float(smooth[top]) - bias
 
     crest = float(depth.max())
-    halves = product((slice(0, None, 2), slice(1, None, 2)), repeat=n_axes)
-    coarser = float(np.mean([depth[part].max() for part in halves]))
-    unresolved = crest - coarser if np.isfinite(coarser) else 0.0
     sigma = float(np.hypot(sigma, depths.level_error))
     scatter = np.hypot(SCATTER_FACTOR * sigma, depths.errors.model * value)
-    error = SIDE * float(scatter) + unresolved
+    error = SIDE * float(scatter)
     # A missing height may be as much deeper as worn depths scatter about those beside them.
     if (depths.missing & ndimage.binary_dilation(depths.worn)).any():
         crest += SIDE * depths.scatter

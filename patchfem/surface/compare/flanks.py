@@ -4,8 +4,6 @@ It serves where both traces have no heights in common: the track left nothing of
 the first trace was measured at another place and shows the roughness only.
 """
 
-from dataclasses import replace
-
 import numpy as np
 
 from ..profile import find_runs
@@ -75,5 +73,4 @@ def find_flanked_track(first: Raster, second: Raster) -> DepthMap | None:
     worn = np.zeros(z.size, bool)
     worn[edges[start] : edges[stop + 1]] = True
     sigma = float(depth[beside].std())
-    section = make_section(second.axes[0], (0.0 * depth, -depth), sigma, worn)
-    return replace(section, missing=np.isnan(second.z))
+    return make_section(second.axes[0], depth, sigma, worn, np.isnan(second.z))

@@ -59,6 +59,7 @@ def find_place(first: Raster, second: Raster) -> Place:
     longest = max(first.lengths.max(), second.lengths.max())
     finest = min(first.steps.min(), second.steps.min())
     pixel = max(finest, longest / MAX_PIXELS[n_axes])
+
     best = Place(np.zeros(n_axes), 0.0, significance=-np.inf)
     for mirrored in (False, True):
         own, other = order(first, second.mirror() if mirrored else second)
@@ -72,6 +73,7 @@ def find_place(first: Raster, second: Raster) -> Place:
             peak = np.unravel_index(np.argmax(significance), significance.shape)
             if significance[peak] <= best.significance:
                 continue
+
             lag = np.where(
                 np.array(peak) < image.shape, peak, np.subtract(peak, significance.shape)
             )

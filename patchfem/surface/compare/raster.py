@@ -83,10 +83,10 @@ def _find_saturated(z) -> np.ndarray:
     is_saturated = np.zeros(z.shape, bool)
     if levels.size < 4:
         return is_saturated
-    inner = levels[1:-1]
-    for extreme, nearest in ((levels[0], levels[1]), (levels[-1], levels[-2])):
+    span = np.ptp(levels[1:-1]) / 2
+    for extreme, nearest in (levels[:2], levels[:-3:-1]):
         is_extreme = z == extreme
-        if is_extreme.sum() > 1 and abs(extreme - nearest) > np.ptp(inner) / 2:
+        if is_extreme.sum() > 1 and abs(extreme - nearest) > span:
             is_saturated |= is_extreme
     return is_saturated
 

@@ -19,12 +19,7 @@ if TYPE_CHECKING:
 # Unit and definition of each quantity of a comparison.
 DEFINITIONS = {
     "shift": ("m", "x of a feature in the second trace minus its x in the first"),
-    "tilt": ("rad", "slope of the second trace relative to the first"),
     "scale": ("1", "length of the second trace divided by that of the first"),
-    "offset": (
-        "m",
-        "height of the second surface above the first where neither is worn, in the middle",
-    ),
     "gain": (
         "1",
         "factor by which the heights of the second surface were divided; 1 if no other gain of the instrument shows",

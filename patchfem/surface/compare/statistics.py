@@ -139,7 +139,8 @@ def find_box(mask) -> tuple[slice, ...]:
     return ndimage.find_objects(mask.astype(np.int8))[0]
 
 
-def subtract_plane(z, columns) -> np.ndarray:
-    """Subtract the least-squares combination of columns (k, ...) from heights z (...)."""
-    base = columns.reshape(len(columns), -1).T
-    return z - (base @ np.linalg.lstsq(base, z.ravel(), rcond=None)[0]).reshape(z.shape)
+def subtract_plane(z, columns, use=None) -> np.ndarray:
+    """Subtract the least-squares combination of columns (k, ...) from heights z (...); use: mask of those that it fits."""
+    use = np.ones(z.shape, bool) if use is None else use
+    factors = np.linalg.lstsq(columns[:, use].T, z[use], rcond=None)[0]
+    return z - np.tensordot(factors, columns, 1)

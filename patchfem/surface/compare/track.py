@@ -3,7 +3,6 @@
 An end is a change point from the unworn surface to a flank, by profile likelihood.
 """
 
-from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -221,6 +220,8 @@ def measure_track(
         area = lost[0]
         error = (lost[2] - area) / SIDE
         gross = name_quantity("area_gross", *lost)
+
+    # The mean has the errors of the area and of the width.
     mean = area / width
     mean_error = float(np.hypot(error / width, mean * max(shorter, longer) / SIDE / width))
     piled, piled_error = _measure_pile_up(depths, (start, end), width)
@@ -249,13 +250,14 @@ def measure_track(
 
 def _measure_floor(depths: DepthMap, start: float, width: float) -> Quantity:
     """Return the mean depth of the deepest fifth of the width."""
+    inside = np.flatnonzero((depths.x >= start) & (depths.x <= start + width))
     parts = []
-    for first, last in pairwise(start + width * np.arange(N_FIFTHS + 1) / N_FIFTHS):
-        inside = (depths.x >= first) & (depths.x <= last)
-        if not inside.any():
-            inside[int(np.argmin(np.abs(depths.x - (first + last) / 2)))] = True
-        length = float(inside.sum()) * depths.cell
-        mean, error = (number / length for number in depths.integrate(inside))
+    for samples in np.array_split(inside, min(N_FIFTHS, inside.size)):
+        length = samples.size * depths.cell
+        mean, error = (
+            number / length
+            for number in depths.integrate(np.isin(np.arange(depths.x.size), samples))
+        )
         parts.append(name_estimate("depth_floor", mean, error, 0.0))
     return max(parts, key=lambda part: part.value)
 

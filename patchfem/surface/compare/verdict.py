@@ -67,19 +67,3 @@ def judge_change(
     if is_grown and lost > MIN_LOSS * error:
         return "worn_and_grown"
     return "no_wear"
-
-
-def limit_wear(highest: float, detection_limit: float | None) -> dict[str, float | None]:
-    """Return what is known where no wear is shown: the largest mean depth, and the detection limit [m].
-
-    A track over a third of the common part may be as deep as the limit without being found.
-
-    Parameters
-    ----------
-    highest : float
-        Upper bound of the mean depth of the places that changed [m].
-    detection_limit : float or None
-        Mean depth from which on a track over the middle third is found [m].
-    """
-    at_most = max(highest, (detection_limit or 0.0) / 3)
-    return {"detection_limit": detection_limit, "at_most": at_most}

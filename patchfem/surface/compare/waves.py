@@ -3,15 +3,16 @@
 from collections.abc import Sequence
 
 import numpy as np
-from scipy import ndimage, special
+from scipy import special
 
 from ..profile import find_runs
 from ..quantity import Quantity
 from ..roughness.filter import mean_surface
 from ..roughness.report import fitting_cutoff
-from ..roughness.spectrum import BAND
+from ..spectrum import BAND
 from .depth_map import DepthMap
 from .records import DEFINITIONS, name_quantity, name_unknown
+from .statistics import smooth
 from .track import get_margin
 
 MAX_BLOCKS = 12  # largest number of blocks whose ratios show the scatter of a ratio
@@ -23,6 +24,7 @@ RATIO_ERROR = 0.004  # standard deviation of a ratio due to tip, interpolation a
 MAX_NOISE_FRACTION = 0.5  # noise relative to the size of the surface above which a ratio is unknown
 MIN_WAVES = 3.0  # smallest length of a trace relative to the longest wave of the band
 MIN_STEPS = 4.0  # smallest length of the shortest wave of the band in steps
+RATIO_NAMES = ("amplitude_ratio", "slope_ratio")
 # Power of the mean over sections that gives a size of the roughness.
 POWERS = {"Ra": 1.0, "Rq": 0.5, "slope": 0.5}
 # Degree of the polynomial that is the form of a part: the bottom of a track is bent.
@@ -52,16 +54,19 @@ def compare_waves(
     n_lines, count = np.min([line.shape for line in lines], axis=0)
     length = count * step
     if length < MIN_WAVES * BAND[1] or step > BAND[0] / MIN_STEPS:
-        return {name: name_unknown(name, "band") for name in ("amplitude_ratio", "slope_ratio")}
+        return {name: name_unknown(name, "band") for name in RATIO_NAMES}
+
     columns = np.arange(count)
     kept = np.all([np.abs(columns - end) > BAND[1] / step for end in ends], axis=0)
     if kept.sum() * step < MIN_WAVES * BAND[1]:
         kept = np.ones(count, bool)
     # The shape of a track has no part in its waves: the second filter removes what the first one leaves of a bend.
     lines = [_subtract_polynomial(line[:n_lines, :count], 1) for line in lines]
-    lines = [z - _filter(z, BAND[1] / step) for z in lines]
-    passed = [(_filter(z, BAND[0] / step) - _filter(z, BAND[1] / step))[:, kept] for z in lines]
+    deviations = [(0.0, CUTOFF_TO_DEVIATION * wave / step) for wave in BAND]
+    lines = [z - smooth(z, deviations[1]) for z in lines]
+    passed = [(smooth(z, deviations[0]) - smooth(z, deviations[1]))[:, kept] for z in lines]
     slopes = [(np.diff(z, axis=1) / step)[:, kept[1:]] for z in lines]
+
     # White noise has the slope noise sqrt(2)/step, and the fraction of its band in the amplitude.
     band_noise = noise / np.sqrt(2) * np.sqrt(2 * step * (1 / BAND[0] - 1 / BAND[1]))
     # Blocks are parts of a single line, or groups of lines.
@@ -71,16 +76,14 @@ def compare_waves(
         n_blocks = MAX_BLOCKS
         axis = 0
     values = {}
-    for name, sizes, error in (
-        ("amplitude_ratio", passed, band_noise),
-        ("slope_ratio", slopes, noise / step),
-    ):
-        blocks = [_average_squares(size, n_blocks, axis) for size in sizes]
+    errors = (band_noise, noise / step)
+    for name, sizes, error in zip(RATIO_NAMES, (passed, slopes), errors):
+        blocks = [_average_squares(np.array_split(size, n_blocks, axis)) for size in sizes]
         smallest = min(block.mean() for block in blocks)
         if not smallest > 0 or error**2 > MAX_NOISE_FRACTION * smallest:
             values[name] = name_unknown(name, "noise")
             continue
-        values[name] = _divide_means(*blocks, 0.5, DEFINITIONS[name][1])._replace(name=name)
+        values[name] = name_quantity(name, *_divide_means(*blocks, 0.5))
     return values
 
 
@@ -90,31 +93,24 @@ def _subtract_polynomial(z, degree: int) -> np.ndarray:
     return z - z @ basis @ basis.T
 
 
-def _average_squares(values, n_blocks: int, axis: int) -> np.ndarray:
-    """Return the mean squares (n_blocks,) of blocks of values (k, n)."""
-    return np.array([np.mean(part**2) for part in np.array_split(values, n_blocks, axis)])
+def _average_squares(parts: list[np.ndarray]) -> np.ndarray:
+    """Return the mean squares (k,) of parts of values."""
+    return np.array([np.mean(part**2) for part in parts])
 
 
-def _filter(z, wave: float) -> np.ndarray:
-    """Return the Gaussian mean lines (k, n) [m] of a cut-off in samples."""
-    return ndimage.gaussian_filter1d(z, CUTOFF_TO_DEVIATION * wave)
-
-
-def _divide_means(before, after, power: float, text: str) -> Quantity:
-    """Return the ratio of the means of blocks (k,), after divided by before, to a power; text: its definition.
+def _divide_means(before, after, power: float) -> np.ndarray:
+    """Return the ratio of the means of blocks (k,), after divided by before, to a power, and the ends of its interval.
 
     Both surfaces have the same blocks, so the scatter of the ratio does not contain that of the surface.
     """
     first = before.mean()
     second = after.mean()
-    ratio = float((second / first) ** power)
     # Linearised ratio of two means: the scatter of its numerator and denominator together.
     influence = after / second - before / first
     scatter = power * influence.std(ddof=1) / np.sqrt(len(before))
     student = float(special.stdtrit(len(before) - 1, 0.975))
     width = student * float(np.hypot(scatter, RATIO_ERROR))
-    ends = ratio * np.exp(np.array([-width, width]))
-    return Quantity(ratio, *ends.tolist(), "1", text)
+    return (second / first) ** power * np.exp([0.0, -width, width])
 
 
 def measure_roughness(depths: DepthMap, spans: list[tuple[int, int]]) -> tuple[dict, float | None]:
@@ -138,6 +134,7 @@ def measure_roughness(depths: DepthMap, spans: list[tuple[int, int]]) -> tuple[d
     cutoff : float or None
         Cut-off [m] that fits both regions.
     """
+    # Half a flank belongs neither to the track nor to what is beside it.
     step = depths.cell
     outside = np.ones(depths.x.size, bool)
     for first, last in spans:
@@ -161,12 +158,15 @@ def measure_roughness(depths: DepthMap, spans: list[tuple[int, int]]) -> tuple[d
                 z = getattr(depths, side)[first + edge : last + 1 - edge]
                 sections += _cut_sections(z, cutoff / step, FORM_DEGREE[region])
             sizes[side] = _measure_sections(sections, step)
-        regions[region] = {side: _average_all(table) for side, table in sizes.items()}
-        regions[region]["ratio"] = {}
+        table = {"before": {}, "after": {}, "ratio": {}}
         for name, power in POWERS.items():
-            pair = (sizes[side][name] for side in ("before", "after"))
+            pair = [sizes[side][name] for side in ("before", "after")]
+            for side, values in zip(table, pair):
+                bounds = _divide_means(np.ones(len(values)), values, power)
+                table[side][name] = name_quantity(name, *bounds)
             text = f"{DEFINITIONS[name][1]}, after wear divided by before"
-            regions[region]["ratio"][name] = _divide_means(*pair, power, text)
+            table["ratio"][name] = Quantity(*_divide_means(*pair, power).tolist(), "1", text)
+        regions[region] = table
     return regions, cutoff
 
 
@@ -195,18 +195,6 @@ def _measure_sections(sections: list[np.ndarray], step: float) -> dict[str, np.n
     """Return the mean (k,) in each section of the absolute height [m], of its square, and of the squared slope."""
     return {
         "Ra": np.array([np.abs(part).mean() for part in sections]),
-        "Rq": np.array([np.mean(part**2) for part in sections]),
-        "slope": np.array([np.mean(np.diff(part) ** 2) for part in sections]) / step**2,
+        "Rq": _average_squares(sections),
+        "slope": _average_squares([np.diff(part) / step for part in sections]),
     }
-
-
-def _average_all(table: dict[str, np.ndarray]) -> dict[str, Quantity]:
-    """Return the sizes of all sections together; means (k,) of sections are of the square, but for Ra."""
-    sizes = {}
-    for name, values in table.items():
-        mean = values.mean()
-        student = float(special.stdtrit(len(values) - 1, 0.975))
-        error = student * values.std(ddof=1) / np.sqrt(len(values))
-        bounds = np.array([mean, max(mean - error, 0.0), mean + error])
-        sizes[name] = name_quantity(name, *bounds ** POWERS[name])
-    return sizes

@@ -1,25 +1,20 @@
-"""Bytes of a file: read within limits, unpacked from gzip or zip, and its format by the first bytes."""
+"""Bytes of a file: read within limits, unpacked from gzip, and its format by the first bytes."""
 
 import gzip
 import io
-import zipfile
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import NamedTuple
 
 from ...core import Missing, PatchfemError
-from .spellings import shorten
+from ...inputs.damage import refuse_damage
 
 MIB = 2**20  # number of bytes in a mebibyte
 MAX_BYTES = 512 * MIB  # largest size of a file, or of its unpacked content, in bytes
 MAX_TEXT_BYTES = 64 * MIB  # largest size of a text file, in bytes: four million samples
 HEAD_BYTES = 4096  # number of bytes at the start of a file that determine its format
-BLOCK_BYTES = 65_536  # number of bytes read at a time, so that memory is allocated only as needed
 _FIRST_BYTES = {  # format of a file by its first bytes
     b"\x1f\x8b": "gzip",
-    b"PK\x03\x04": "zip",
-    b"PK\x05\x06": "zip",
+    b"PK\x03\x04": "instrument",  # such as X3P
     b"\x93NUMPY": "npy",
     b"MATLAB 5.0 MAT-file": "mat",
     b"MATLAB 7.3 MAT-file": "mat",
@@ -38,7 +33,7 @@ DAMAGED = "the file is cut off or damaged; save or export it anew"
 class Content(NamedTuple):
     """Content of a surface file after unpacking.
 
-    path: name for messages; kind: "text", "npy", "mat", "x3p" or "instrument"; suffix: of the unpacked
+    path: name for messages; kind: "text", "npy", "mat" or "instrument"; suffix: of the unpacked
     file in lower case; data: bytes; is_packed: whether the file itself has other bytes.
     """
 
@@ -47,17 +42,6 @@ class Content(NamedTuple):
     suffix: str
     data: bytes
     is_packed: bool = False
-
-
-@contextmanager
-def refuse_damage(path) -> Iterator[None]:
-    """Turn any exception of a library that reads a damaged file into a PatchfemError."""
-    try:
-        yield
-    except PatchfemError:
-        raise
-    except Exception as error:  # a damaged file leads to any kind of exception in a library
-        raise PatchfemError(f"{path}: {DAMAGED} ({shorten(error, 120)})") from None
 
 
 def fetch(path) -> Content:
@@ -70,54 +54,34 @@ def fetch(path) -> Content:
         if file_path.exists() and not file_path.is_file():
             raise PatchfemError(f"{path}: not a file; a profile is a text file with two columns")
         with open(file_path, "rb") as file:
-            content = _read_limited(file_path, file_path, file)
+            content = _read_limited(file_path, file_path.suffix, file)
     except FileNotFoundError:
         raise Missing(f"{path}: there is no such file") from None
     except (OSError, ValueError) as error:
         raise PatchfemError(f"{path}: the profile cannot be read ({error})") from None
+    if content.kind != "gzip":
+        return content
 
+    suffix = Path(file_path.stem).suffix
+    with refuse_damage(f"{path}: {DAMAGED}"), gzip.open(io.BytesIO(content.data)) as file:
+        content = _read_limited(file_path, suffix, file)
     if content.kind == "gzip":
-        with refuse_damage(path), gzip.open(io.BytesIO(content.data)) as file:
-            content = _read_limited(file_path, Path(file_path.stem), file)
-        content = content._replace(is_packed=True)
-    if content.kind == "zip":
-        content = _open_zip(content)
-    if content.kind in ("gzip", "zip"):
         raise PatchfemError(f"{path}: the file was compressed twice; unpack it once")
-    return content
+    return content._replace(is_packed=True)
 
 
-def _open_zip(content: Content) -> Content:
-    """Return the only member of a zip file; a zip file of several members is a file of its own format."""
-    path = content.path
-    with refuse_damage(path), zipfile.ZipFile(io.BytesIO(content.data)) as archive:
-        names = [name for name in archive.namelist() if not name.endswith("/")]
-        if any(Path(name).name == "main.xml" for name in names):
-            return content._replace(kind="x3p")
-        if len(names) != 1:
-            return content._replace(kind="instrument")
-        with archive.open(names[0]) as file:
-            return _read_limited(path, Path(names[0]), file)._replace(is_packed=True)
-
-
-def _read_limited(path, name: Path, file) -> Content:
-    """Read a file up to the limit for its format."""
+def _read_limited(path: Path, suffix: str, file) -> Content:
+    """Read a file up to the limit for its format; suffix: of its name, such as ".CSV"."""
     data = bytearray(file.read(HEAD_BYTES))
-    kind = _detect_format(bytes(data))
-    suffix = name.suffix.lower()
-    if kind == "instrument" and suffix in (".csv", ".txt") and not data.startswith(b"Wyko"):
-        kind = "text"  # a damaged text
+    suffix = suffix.lower()
+    # Numbers below five are control characters, which a text has only if it is damaged.
+    is_binary = bool(set(data) & set(range(5))) and suffix not in (".csv", ".txt")
+    kind = "instrument" if is_binary else "text"
+    kind = next((name for mark, name in _FIRST_BYTES.items() if data.startswith(mark)), kind)
+
     limit = MAX_TEXT_BYTES if kind == "text" else MAX_BYTES
-    while len(data) <= limit and (block := file.read(BLOCK_BYTES)):
-        data += block
+    data += file.read(limit + 1 - len(data))
     if len(data) > limit:
         remedy = " of text; thin out the samples of the profile" if kind == "text" else ""
         raise PatchfemError(f"{path}: more than {limit // MIB} MiB{remedy}")
     return Content(path, kind, suffix, bytes(data))
-
-
-def _detect_format(head: bytes) -> str:
-    for mark, kind in _FIRST_BYTES.items():
-        if head.startswith(mark):
-            return kind
-    return "instrument" if set(head) & set(range(5)) else "text"

@@ -1,8 +1,9 @@
-"""Files in formats of instruments, which the optional package SurfaceTopography reads.
+"""Files in formats of instruments and X3P, which the optional package SurfaceTopography reads.
 
 The examples of its version 1.27.1 were compared with texts of the same scans: steps and units agree, but a
 scan of Digital Surf (.mnt) is longer by one step than its .bcrf, scans of Igor (.ibw) have no units, so the
-user states them, and the Nikon reader (.nms) states lengths in a wrong unit, which are refused as too long.
+user states them, and the Nikon reader (.nms) states lengths in a wrong unit, which are refused as too long. Of X3P
+files it reads matrices with their masks, and refuses traces and dates that it does not know.
 """
 
 import io
@@ -11,11 +12,11 @@ import numpy as np
 
 from ...core import Missing, PatchfemError
 from .content import Content
-from .spellings import HEADER_EXAMPLE, shorten
 from .table import MAX_POINTS, Table
+from .units import HEADER_EXAMPLE, shorten
 
 
-def read_instrument(content: Content, _units=None) -> Table:
+def read_instrument(content: Content) -> Table:
     """Read a file in the format of an instrument with the package SurfaceTopography.
 
     Raises Missing without the package, and PatchfemError if it cannot read the file.
@@ -27,9 +28,11 @@ def read_instrument(content: Content, _units=None) -> Table:
         from SurfaceTopography.IO import open_topography
     except ImportError:
         raise Missing(
-            f"{path}: a file in an instrument's own format; the package SurfaceTopography can read many such "
+            f"{path}: an X3P file or one in an instrument's own format; the package SurfaceTopography can read many such "
             f"formats: pip install 'patchfem[profiles]', or export the surface as text and {HEADER_EXAMPLE}"
         ) from None
+
+    # x runs along the first axis of SurfaceTopography, and a missing height is masked.
     try:
         reader = open_topography(io.BytesIO(content.data) if content.is_packed else str(path))
         channel = reader.default_channel
@@ -41,6 +44,7 @@ def read_instrument(content: Content, _units=None) -> Table:
         unit = topography.unit
         if unit is not None:
             topography = topography.to_unit("m")
+
         z = np.ma.filled(np.ma.asarray(topography.heights(), float), np.nan)
         if z.ndim == 1:
             columns = {"x": np.asarray(topography.positions(), float), "z": z}
@@ -51,8 +55,9 @@ def read_instrument(content: Content, _units=None) -> Table:
     except Exception as error:  # a damaged file leads to any kind of exception in a library
         reason = shorten(f"{type(error).__name__}: {error}", 120)
         raise PatchfemError(
-            f"{path}: SurfaceTopography cannot read this file ({reason}); export the surface as text or X3P"
+            f"{path}: SurfaceTopography cannot read this file ({reason}); export the surface as text"
         ) from None
+
     name = type(reader).__name__.removesuffix("Reader")
     note = f"{path}: read as {name} by SurfaceTopography {SurfaceTopography.__version__}"
     return Table(
@@ -62,5 +67,5 @@ def read_instrument(content: Content, _units=None) -> Table:
         str(path),
         notes=(note,),
         are_units_fixed=unit is not None,
-        remedy="export the surface as text or X3P",
+        remedy="export the surface as text",
     )

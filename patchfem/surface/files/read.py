@@ -10,15 +10,8 @@ from .content import TEXT_SUFFIXES, fetch
 from .instruments import read_instrument
 from .table import make_surface
 from .text import read_text
-from .x3p import read_x3p
 
-READERS = {
-    "text": read_text,
-    "npy": read_npy,
-    "mat": read_mat,
-    "x3p": read_x3p,
-    "instrument": read_instrument,
-}
+READERS = {"npy": read_npy, "mat": read_mat, "instrument": read_instrument}
 
 
 def read_surface(path, units: tuple[str, str] | None = None) -> Profile | Areal:
@@ -43,18 +36,13 @@ def read_surface(path, units: tuple[str, str] | None = None) -> Profile | Areal:
     PatchfemError
         If the file cannot be read, with file and line.
     """
-    if units is not None and (
-        isinstance(units, str) or not hasattr(units, "__len__") or len(units) != 2
-    ):
-        raise PatchfemError(
-            f'{path}: give two units, of x and of z, such as ("mm", "um"), not {units!r}'
-        )
     content = fetch(path)
+    if content.kind != "text":
+        return make_surface(READERS[content.kind](content), units)
     try:
-        return make_surface(READERS[content.kind](content, units), units)
+        return make_surface(read_text(content, has_units=units is not None), units)
     except PatchfemError:
-        is_plain_text = content.kind != "text" or content.suffix in ("", *TEXT_SUFFIXES)
-        if is_plain_text or find_spec("SurfaceTopography") is None:
+        if content.suffix in ("", *TEXT_SUFFIXES) or find_spec("SurfaceTopography") is None:
             raise
     return make_surface(read_instrument(content), units)
 

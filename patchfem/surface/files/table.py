@@ -8,33 +8,25 @@ from ...core import PatchfemError, frozen_array
 from ...formatting import format_length
 from ..areal import Areal
 from ..profile import Profile
-from .spellings import (
-    GIVE_PIXEL_SIZE,
+from .units import (
     GIVE_UNITS,
     HEADER_EXAMPLE,
-    SCAN_HEADER_EXAMPLE,
-    SIZE_LINES,
     UNIT_LIST,
-    UNITS,
     parse_length_unit,
-    parse_pixel_size,
     shorten,
 )
 
 MAX_POINTS = 50_000_000  # largest number of heights
 MAX_LENGTH = 10.0  # length or coordinate [m] above which a number has a wrong unit
 MIN_LENGTH = 1e-9  # length [m] below which a trace has a wrong unit
-ATOM_WIDTH = 1e-10  # span of heights [m] below which they have a wrong unit
-# Largest fraction of the highest, and of the lowest, heights that may be faults, such as 999 um for no signal.
+# Fraction of the highest, and of the lowest, heights that may be faults, such as 999 um for no signal.
 FAULT_FRACTION = 0.01
-MIN_ROUNDED = (
-    10  # smallest number of positions that shows whether they are even apart from rounding
-)
-MAX_ROUNDING = (
-    0.75  # largest distance from even positions in printed digits, half of which is rounding
-)
+MIN_ROUNDED = 10  # smallest number of positions that show whether they are even but for rounding
+# Largest distance from even positions in printed digits, half of which is rounding.
+MAX_ROUNDING = 0.75
 MIN_PRINTED_DIGIT = 1e-11  # smallest printed digit of a position [m]
-DIGIT_TOL = 1e-4  # largest deviation from a multiple of a digit, relative to it, that is round-off
+# Largest distance of positions that count as even, and smallest difference of two steps, relative to a step.
+EVEN_TOL = 1e-6
 # Largest distance of positions that count as equal, relative to the length of the axis.
 ROUND_OFF = 1e-9
 MAX_CELLS_PER_POINT = 4  # largest number of raster cells per point; scattered points need more
@@ -44,10 +36,10 @@ class Table(NamedTuple):
     """Numbers of a file in its own units.
 
     columns: "x" and "z" (n,) of a trace, with "y" (n,) of the points of a scan, or "z" (m, n) of a matrix with
-    "x" (n,) and "y" (m,) if the file gives them; NaN: missing height. units: of each column, None where the
-    file states none. place: file, with the line that names the columns if there is one. lines: of each sample
-    in the file. notes: sentences on the file. are_units_fixed: whether the format defines or always states its
-    units. remedy: how the file would state its units. length: of the scan [m], if the header gives it.
+    "x" (n,) and "y" (m,); NaN: missing height. units: of each column, none where the file states none. place: file,
+    with the line that names the columns if there is one. lines: of each sample in the file. notes: sentences on the
+    file. are_units_fixed: whether the format defines or always states its units. remedy: how the file would state its
+    units. length: of the scan [m], if the header gives it.
     """
 
     path: object
@@ -60,9 +52,9 @@ class Table(NamedTuple):
     remedy: str = HEADER_EXAMPLE
     length: float | None = None
 
-    def add_notes(self, *texts: str) -> "Table":
-        """Return the table with further sentences about the file."""
-        return self._replace(notes=(*self.notes, *(f"{self.place}: {text}" for text in texts)))
+    def add_note(self, text: str) -> "Table":
+        """Return the table with a further sentence about the file."""
+        return self._replace(notes=(*self.notes, f"{self.place}: {text}"))
 
     def locate(self, sample: int) -> str:
         """Return the place of a sample in the file for a message."""
@@ -80,78 +72,60 @@ def make_surface(table: Table, units: tuple[str, str] | None = None) -> Profile 
     ----------
     table : Table
     units : tuple of str, optional
-        Units of x (and y) and of z, or the size of a pixel and the unit of z. They complete and overrule those
-        of the file, with a note, except in formats that always state their units.
+        Units of x (and y) and of z. They complete and overrule those of the file, with a note, except in formats that
+        always state their units.
     """
+    if units is not None and (len(units) != 2 or None in map(parse_length_unit, units)):
+        raise PatchfemError(
+            f'{table.path}: the units {units!r} are not those of x and of z, such as ("mm", "um"); use two of {UNIT_LIST}'
+        )
+
     size = table.columns["z"].size
     if size > MAX_POINTS:
         raise PatchfemError(
             f"{table.path}: {size} heights, more than {MAX_POINTS:.0e}; export a part of the scan"
         )
     if units is not None and table.are_units_fixed:
-        table = table.add_notes(
-            "the file states its own units; the units that you gave are ignored"
-        )
+        table = table.add_note("the file states its own units; the units that you gave are ignored")
         units = None
-    pixel = parse_pixel_size(units[0]) if units else None
-    for unit in units or ():
-        if parse_length_unit(unit) is None and (pixel is None or unit != units[0]):
-            raise PatchfemError(
-                f"{table.path}: unknown unit '{shorten(unit)}'; use one of {UNIT_LIST}"
-            )
-    table = _set_axes(table, pixel)
+
+    # All that follows is in metres.
     for role in table.columns:
-        # The size of a pixel gives places in metres.
-        given = units[role == "z"] if units else None
-        table = _convert_column(table, role, "m" if pixel and role != "z" else given)
+        table = _convert_column(table, role, units and units[role == "z"])
         _check_numbers(table, role)
     if size and table.columns["z"].ndim == 1 and "y" in table.columns:
         table = _fill_raster(table)
-    _require_heights(table)
-    unit_source = "the file format" if table.are_units_fixed else ""
-    return _make_surface(table, "--units" if units else unit_source)
 
+    z = table.columns["z"]
+    count = np.isfinite(z).sum()
+    if count <= z.ndim:
+        kind = ("a trace needs at least two", "a scan needs at least three")[z.ndim - 1]
+        raise PatchfemError(f"{table.path}: {count} heights; {kind}")
 
-def _set_axes(table: Table, pixel: float | None) -> Table:
-    """Give a matrix of heights the axes of a pixel size [m]; a single row of it is a trace."""
-    columns = dict(table.columns)
-    z = columns["z"]
-    if z.ndim == 1:
-        if pixel is not None:
-            raise PatchfemError(
-                f"{table.path}: the size of a pixel is needed only for a matrix of heights, but this file has columns; "
-                "give the units of the columns"
-            )
-        return table
-    if pixel is not None:
-        if "x" in columns or "y" in columns:
-            table = table.add_notes(
-                "the size of the scan in the header is not used, because --units gives the pixel size"
-            )
-        columns |= {role: pixel * np.arange(n) for role, n in zip("yx", z.shape)}
-        table = table._replace(units=table.units | dict.fromkeys("xy", "m"))
-    if z.shape[0] == 1:
-        columns = {"x": columns.get("x"), "z": z[0]}
-    for role, name in (("x", "width"), ("y", "height")):
-        if columns.get(role, table if z.shape[0] == 1 else None) is None:
-            raise PatchfemError(
-                f"{table.path}: the rows are a matrix of heights (a map, or more than three numbers in a "
-                f"row), but the {name} of the scan is not given; write the scan's {SIZE_LINES} and "
-                f"`# Value units: um` above its rows, or {GIVE_PIXEL_SIZE}"
-            )
-    return table._replace(columns=columns)
+    # Positions of a surface increase, whatever the direction of the measurement.
+    axes = []
+    for axis, role in enumerate("yx"[2 - z.ndim :]):
+        places = table.columns[role]
+        if places[-1] < places[0]:
+            places = places[::-1]
+            z = np.flip(z, axis)
+            table = table._replace(lines=None if table.lines is None else table.lines[::-1])
+        table, places = _undo_rounding(table, role, places)
+        _require_increase(table, role, places)
+        axes.append(frozen_array(places))
+    unit_source = "the file format" if table.are_units_fixed else "--units" if units else ""
+    notes = _check_span(table.path, max(map(np.ptp, axes)), z, unit_source)
+    surface = Profile if z.ndim == 1 else Areal
+    return surface(*reversed(axes), frozen_array(z), str(table.path), table.notes + notes)
 
 
 def _convert_column(table: Table, role: str, given: str | None) -> Table:
     """Convert a column to metres; a unit of the user overrules the file, with a note."""
     stated = table.units.get(role)
-    unit = stated if given is None else given
+    unit = given or stated
     if unit is None:
-        remedy = table.remedy
-        if "y" in table.columns:
-            remedy = remedy.replace(HEADER_EXAMPLE, SCAN_HEADER_EXAMPLE)
         raise PatchfemError(
-            f"{table.place}: the unit of {role} is not given, and units are never guessed; {remedy}, or {GIVE_UNITS}"
+            f"{table.place}: the unit of {role} is not given, and units are never guessed; {table.remedy}, or {GIVE_UNITS}"
         )
     factor = parse_length_unit(unit)
     if factor is None:
@@ -159,7 +133,7 @@ def _convert_column(table: Table, role: str, given: str | None) -> Table:
             f"{table.place}: unknown unit '{shorten(unit)}' of {role}; use one of {UNIT_LIST}"
         )
     if stated is not None and parse_length_unit(stated) != factor:
-        table = table.add_notes(
+        table = table.add_note(
             f"the header gives {role} in {shorten(stated)}, but {unit} is used, as given by --units"
         )
     return table._replace(columns=table.columns | {role: table.columns[role] * factor})
@@ -168,28 +142,15 @@ def _convert_column(table: Table, role: str, given: str | None) -> Table:
 def _check_numbers(table: Table, role: str) -> None:
     """Raise PatchfemError if numbers of a column [m] are not finite or too large; a height may be missing."""
     values = table.columns[role].ravel()
-    bad = np.isinf(values) if role == "z" else ~np.isfinite(values)
-    if bad.any():
-        first = int(np.argmax(bad))
-        raise PatchfemError(
-            f"{table.locate(first)}: {role} is {values[first]:g}; finite numbers are needed"
-        )
-    is_far = np.abs(values) > MAX_LENGTH
-    if is_far.any():
-        first = int(np.argmax(is_far))
-        raise PatchfemError(
-            f"{table.locate(first)}: {role} is {values[first]:.4g} m; is the unit right? "
-            "write a missing height as nan"
-        )
-
-
-def _require_heights(table: Table) -> None:
-    """Raise PatchfemError for fewer than two heights of a trace, or three of a scan."""
-    z = table.columns["z"]
-    count = np.isfinite(z).sum()
-    if count <= z.ndim:
-        kind = ("a trace needs at least two", "a scan needs at least three")[z.ndim - 1]
-        raise PatchfemError(f"{table.path}: {count} heights; {kind}")
+    is_bad = ~(np.abs(values) <= MAX_LENGTH)
+    if role == "z":
+        is_bad &= ~np.isnan(values)
+    if not is_bad.any():
+        return
+    first = int(np.argmax(is_bad))
+    raise PatchfemError(
+        f"{table.locate(first)}: {role} is {values[first]:.4g} m; is the unit right? write a missing height as nan"
+    )
 
 
 def _fill_raster(table: Table) -> Table:
@@ -201,54 +162,32 @@ def _fill_raster(table: Table) -> Table:
         return table._replace(columns={"x": x, "z": z})
     if columns.size == 1:
         return table._replace(columns={"x": y, "z": z})
-    cells = rows.size * columns.size
-    if cells > max(MAX_CELLS_PER_POINT * z.size, 16) or cells > MAX_POINTS:
+
+    # Scattered points would leave nearly all cells of a grid empty.
+    count = rows.size * columns.size
+    if count > max(MAX_CELLS_PER_POINT * z.size, 16) or count > MAX_POINTS:
         raise PatchfemError(
             f"{table.path}: {z.size} points with {columns.size} different x and {rows.size} different y do "
             "not fill a grid; export the scan as a grid, or one trace of two columns"
         )
-    cell = in_row * columns.size + in_column
-    first = np.unique(cell, return_index=True)[1]
-    if first.size < cell.size:
-        second = int(np.setdiff1d(np.arange(cell.size), first)[0])
+    cells, first = np.unique(in_row * columns.size + in_column, return_index=True)
+    if cells.size < z.size:
+        second = int(np.setdiff1d(np.arange(z.size), first)[0])
         raise PatchfemError(
             f"{table.locate(second)}: a second height at x = {format_length(x[second])}, y = "
             f"{format_length(y[second])}; keep one scan per file"
         )
-    heights = np.full(cells, np.nan)
-    heights[cell] = z
-    matrix = {"x": columns, "y": rows, "z": heights.reshape(rows.size, columns.size)}
-    return table._replace(columns=matrix, lines=None)
+
+    heights = np.full((rows.size, columns.size), np.nan)
+    heights[in_row, in_column] = z
+    return table._replace(columns={"x": columns, "y": rows, "z": heights}, lines=None)
 
 
 def _find_positions(values) -> tuple[np.ndarray, np.ndarray]:
     """Return the distinct positions of points (k,) but for round-off, and the index of each point (n,)."""
-    order = np.argsort(values, kind="stable")
-    is_new = np.diff(values[order]) > ROUND_OFF * max(float(np.ptp(values)), 1e-300)
-    index = np.empty(values.size, np.int64)
-    index[order] = np.concatenate([[0], np.cumsum(is_new)])
-    return values[order][np.concatenate([[True], is_new])], index
-
-
-def _make_surface(table: Table, unit_source: str) -> Profile | Areal:
-    """Make the surface of a trace (n,) or of a matrix (m, n) in metres, whose positions increase."""
-    z = table.columns["z"]
-    axes = []
-    for axis, role in enumerate("yx"[2 - z.ndim :]):
-        places = table.columns[role]
-        if places[-1] < places[0]:
-            places = places[::-1]
-            z = np.flip(z, axis)
-            table = table._replace(lines=None if table.lines is None else table.lines[::-1])
-        places, notes = _undo_rounding(table, role, places)
-        table = table.add_notes(*notes)
-        _require_increase(table, role, places)
-        axes.append(frozen_array(places))
-    length = max(float(np.ptp(axis)) for axis in axes)
-    notes = _check_span(table.path, length, z, unit_source)
-    table = table._replace(notes=table.notes + notes)
-    surface = Profile if z.ndim == 1 else Areal
-    return surface(*reversed(axes), frozen_array(z), str(table.path), table.notes)
+    positions, index = np.unique(values, return_inverse=True)
+    is_new = np.diff(positions, prepend=-np.inf) > ROUND_OFF * np.ptp(values)
+    return positions[is_new], (np.cumsum(is_new) - 1)[index]
 
 
 def _require_increase(table: Table, role: str, places) -> None:
@@ -262,70 +201,58 @@ def _require_increase(table: Table, role: str, places) -> None:
     if is_rising.all():
         return
     first = int(np.argmin(is_rising))
-    second = first + 1
-    lines = table.lines
-    if places[first] == places[second]:
-        raise PatchfemError(
-            f"{table.locate(second)}: two samples have {role} = {format_length(places[first])}; delete one of them, or "
-            "write the mean of their heights"
-        )
-    if lines is not None and lines[first] > lines[second]:
-        first, second = second, first
-    raise PatchfemError(
-        f"{table.locate(second)}: {role} reverses: {format_length(places[first])} and then "
-        f"{format_length(places[second])}; {role} must only rise or only fall, so keep one trace or scan per file"
-    )
+    pair = [first, first + 1]
+    if table.lines is not None and table.lines[first] > table.lines[first + 1]:
+        pair.reverse()
+    before, after = places[pair]
+    reason = f"{role} reverses: {format_length(before)} and then {format_length(after)}; {role} must only rise or only "
+    reason += "fall, so keep one trace or scan per file"
+    if before == after:
+        reason = f"two samples have {role} = {format_length(before)}; delete one of them, or write the mean of their heights"
+    raise PatchfemError(f"{table.locate(pair[1])}: {reason}")
 
 
-def _undo_rounding(table: Table, role: str, x) -> tuple[np.ndarray, tuple[str, ...]]:
-    """Return equally spaced positions (n,) [m] if these differ from them only by rounding, with a note.
+def _undo_rounding(table: Table, role: str, x) -> tuple[Table, np.ndarray]:
+    """Return equally spaced positions (n,) [m] if these differ from them only by rounding, and the table with a note.
 
     A step of 0.15625 um printed to 0.1 um makes the slopes 14 % too large. If the header gives a length that fits, it
-    gives the step, else the regression on the positions.
+    gives the step, else the regression on the positions. Rounded even steps are two multiples of the printed digit, and
+    differ by it.
     """
     if x.size < MIN_ROUNDED or not x[-1] > x[0]:
-        return x, ()
-    digit = find_printed_digit(x)
+        return table, x
+
+    # The printed digit is the smallest difference of two steps.
+    gaps = np.diff(np.sort(np.diff(x)))
+    gaps = gaps[gaps > EVEN_TOL * np.ptp(x) / x.size]
+    digit = (
+        max(float(gaps.min(initial=np.ptp(x))), MIN_PRINTED_DIGIT)
+        if gaps.size
+        else MIN_PRINTED_DIGIT
+    )
+
     count = np.arange(x.size) - (x.size - 1) / 2
-    step = float(count @ x / (count @ count))
-    evens = [float(x.mean()) + step * count]
+    evens = [x.mean() + float(count @ x / (count @ count)) * count]
     if table.length is not None:
-        of_length = [x[0] + table.length / n * np.arange(x.size) for n in (x.size, x.size - 1)]
-        evens = [*of_length, *evens]
+        lengths = [table.length / n * np.arange(x.size) for n in (x.size, x.size - 1)]
+        evens = [*(x[0] + places for places in lengths), *evens]
+
     for even in evens:
         distance = float(np.abs(x - even).max())
         step = float(even[1] - even[0])
-        if step > 0 and distance <= MAX_ROUNDING * max(digit, MIN_PRINTED_DIGIT):
-            if distance <= 1e-6 * step:
-                return x, ()
+        if step > 0 and distance <= MAX_ROUNDING * digit:
+            if distance <= EVEN_TOL * step:
+                return table, x
             note = (
                 f"{role} is rounded to {format_length(digit)} in the file; the samples are taken as evenly spaced by "
                 f"{format_length(step)}"
             )
-            return even, (note,)
-    if table.length is None:
-        return x, ()
-    note = (
-        f"the length of {format_length(table.length)} in the header does not fit {x.size} samples that "
-        f"end at {format_length(x[-1])}: the x values of the samples are used"
-    )
-    return x, (note,)
-
-
-def find_printed_digit(x) -> float:
-    """Return the largest power of ten of a metre or of an inch [m] that divides all positions (n,), or 0."""
-    digits = [0.0]
-    for unit in (1.0, UNITS["in"]):
-        largest = int(np.floor(np.log10((x[-1] - x[0]) / unit / 5)))
-        for digit in unit * 10.0 ** np.arange(largest, largest - 8, -1):
-            if np.abs(x / digit - np.rint(x / digit)).max() < DIGIT_TOL:
-                digits.append(float(digit))
-                break
-    return max(digits)
+            return table.add_note(note), even
+    return table, x
 
 
 def _check_span(path, length: float, z, unit_source: str) -> tuple[str, ...]:
-    """Return a note on heights [m] that span less than an atom, or more than the length [m].
+    """Return a note on heights [m] that span more than the length [m], if few of them do, or their units are given.
 
     Raises PatchfemError for a tiny length, and if most heights span more than the length in units from a header, which
     have no other source.
@@ -334,20 +261,18 @@ def _check_span(path, length: float, z, unit_source: str) -> tuple[str, ...]:
         raise PatchfemError(
             f"{path}: the profile is {format_length(length, 3)} long; is the unit of x right?"
         )
-    span = float(np.nanmax(z) - np.nanmin(z))
-    if 0 < span < ATOM_WIDTH:
-        note = f"{path}: heights span {format_length(span)}, less than the width of an atom; is the unit of z right?"
-        return (note,)
-    if span <= length:
+
+    # A few heights that stand out, such as 999 um for no signal, do not count.
+    low, first, last, high = np.nanquantile(z, [0.0, FAULT_FRACTION, 1 - FAULT_FRACTION, 1.0])
+    if high - low <= length:
         return ()
-    text = f"{path}: heights span {format_length(span)} over a length of {format_length(length)}"
-    heights = np.sort(z[np.isfinite(z)])
-    count = int(np.ceil(FAULT_FRACTION * heights.size)) if heights.size >= MIN_ROUNDED else 0
-    inner_span = float(heights[-1 - count] - heights[count])
-    if inner_span <= length:
+    text = (
+        f"{path}: heights span {format_length(high - low)} over a length of {format_length(length)}"
+    )
+    if last - first <= length:
         note = (
-            f"{text}, but only {format_length(inner_span)} without the {count} highest and the {count} lowest of "
-            f"{heights.size}; write nan for each of these heights that is a fault of the measurement"
+            f"{text}, but only {format_length(last - first)} without the highest and the lowest hundredth; write nan for "
+            "each height that is a fault of the measurement"
         )
         return (note,)
     if unit_source:

@@ -10,44 +10,53 @@ else Latin-1. An export of Dektak is such a file; its header gives the length of
 """
 
 import io
-import math
 import re
+from array import array
+from collections.abc import Iterator
 
 import numpy as np
 
 from ...core import PatchfemError
+from ...inputs.tables import NUMBER_PATTERN
 from .content import Content
-from .header import Column, Header, parse_fact, read_header
-from .rows import Rows, read_rows
-from .spellings import HEADER_EXAMPLE, SIZE_LINES, parse_length_unit, shorten
+from .header import COMMENT, MISSING, Column, Header, parse_fact, read_header, split_cells
 from .table import Table
+from .units import HEADER_EXAMPLE, SIZE_LINES, parse_length_unit, shorten
 
 NOT_TEXT = f"export the profile as text with two columns and {HEADER_EXAMPLE}"
-# Largest relative range of the steps of coordinates; the steps of heights vary more.
-MAX_UNEVEN = 1e-6
 _QUOTED_NUMBER = re.compile(r'"\s*([+-]?[0-9]*),([0-9]+(?:[eE][+-]?[0-9]+)?)\s*"')
 _CONTROL = re.compile(r"[\x00-\x08\x0e-\x1f\x7f]")
 
 
-def read_text(content: Content, units: tuple[str, str] | None = None) -> Table:
+def read_text(content: Content, *, has_units: bool = False) -> Table:
     """Read the columns or the matrix of a text file.
 
-    units: those that the user states; with them, columns of unknown names are taken in their order.
+    has_units: whether the user states the units; then columns of unknown names are taken in their order.
     """
     path = content.path
     header, lines = read_header(path, enumerate(io.StringIO(_decode(content)), 1))
-    has_width = "width" in header.facts
-    is_sized = has_width and (header.count == 1 or "height" in header.facts)
+    facts = header.facts
+    is_sized = "width" in facts and (header.count == 1 or "height" in facts)
     if not header.columns and (header.count > 3 or is_sized):
-        return _make_matrix(path, header, read_rows(path, lines, ["z"] * header.count).numbers)
+        return _make_matrix(path, facts, _read_rows(path, lines, ["z"] * header.count)[0])
     place = f"{path}:{header.number}"
-    columns, notes = _find_roles(place, header, has_units=units is not None)
-    rows = read_rows(path, lines, [column.role for column in columns])
-    return _make_columns(path, header, columns, rows)._replace(place=place, notes=notes)
+    columns, notes = _find_roles(place, header, has_units=has_units)
+    numbers, row_lines = _read_rows(path, lines, [column.role for column in columns])
+
+    values = {}
+    units = {}
+    for column, column_numbers in zip(columns, numbers.T):
+        if column.role != "index":
+            values[column.role] = column_numbers
+            fact = facts.get("value units" if column.role == "z" else "lateral units")
+            units[column.role] = fact if column.unit is None else column.unit
+    length, unit = parse_fact(facts.get("length", ""))
+    length = length and length * (parse_length_unit(unit) or 0.0)
+    return Table(path, values, units, place, row_lines, notes, length=length or None)
 
 
 def _decode(content: Content) -> str:
-    """Decode a text file, with \\n at the ends of lines and without quotes."""
+    r"""Decode a text file, with \n at the ends of lines and without quotes."""
     data = content.data
     if data.startswith((b"\xff\xfe", b"\xfe\xff")):
         text = data.decode("utf-16", errors="replace")
@@ -68,20 +77,22 @@ def _find_roles(
     place: str, header: Header, *, has_units: bool
 ) -> tuple[list[Column], tuple[str, ...]]:
     """Return the columns with their roles, by order if units are given and names are unknown, and a note on that."""
-    columns = header.columns or [Column(role) for role in ("xz" if header.count == 2 else "xyz")]
-    if header.count < 2:
-        raise PatchfemError(f"{place}: only one column, but x and z are needed; {HEADER_EXAMPLE}")
+    names = {2: "xz", 3: "xyz"}.get(header.count, "z")
+    columns = header.columns or [Column(role) for role in names]
     data = [column for column in columns if column.role != "index"]
-    known = {2: ["x", "z"], 3: ["x", "y", "z"]}.get(len(data))
-    if known is None:
+    if len(data) not in (2, 3):
         raise PatchfemError(
             f"{place}: {len(data)} columns of numbers, but x and z, or x, y and z, are needed; keep one trace of two "
             f"columns and {HEADER_EXAMPLE}"
         )
+
+    # Roles by name, or in their order where the user knows the units.
+    known = ["x", "z"] if len(data) == 2 else ["x", "y", "z"]
     roles = [column.role for column in data]
     if sorted(roles) == ["x", "y"]:
         # Columns x and y are a trace whose heights are named y.
         roles = [role.replace("y", "z") for role in roles]
+
     notes = ()
     if sorted(roles) != known:
         listed = ", ".join(f"'{shorten(column.name)}'" for column in data)
@@ -91,6 +102,7 @@ def _find_roles(
             )
         notes = (f"{place}: columns {listed} are taken as {', '.join(known)} in this order",)
         roles = known
+
     named = iter(roles)
     return [
         column if column.role == "index" else column._replace(role=next(named))
@@ -98,47 +110,91 @@ def _find_roles(
     ], notes
 
 
-def _make_columns(path, header: Header, columns: list[Column], rows: Rows) -> Table:
-    """Return the table of the columns x and z of a trace, or x, y and z of points of a surface."""
-    values = {}
-    units = {}
-    for column, numbers in zip(columns, rows.numbers.T):
-        if column.role == "index":
-            continue
-        values[column.role] = numbers
-        fact = header.facts.get("value units" if column.role == "z" else "lateral units")
-        units[column.role] = fact if column.unit is None else column.unit
-    length, unit = parse_fact(path, header.facts.get("length", ""))
-    if length is not None:
-        factor = parse_length_unit(unit)
-        length = length * factor if factor else None
-    return Table(path, values, units, str(path), rows.lines, length=length)
-
-
-def _make_matrix(path, header: Header, z) -> Table:
+def _make_matrix(path, facts: dict[str, str], z) -> Table:
     """Return the table of a matrix of heights (m, n), with the size and the units that its header states."""
-    if z.shape[1] == 1 and "height" not in header.facts:
+    if z.shape[1] == 1 and "height" not in facts:
         z = z.T  # a trace with one height in each line
-    has_axes = min(z.shape) > 3 and _is_even(z[0, 1:]) and _is_even(z[1:, 0])
-    if has_axes and not _is_even(z[1, 1:]):
-        raise PatchfemError(
-            f"{path}: the first row and the first column of the matrix grow evenly, like coordinates and not "
-            "heights; leave out this row and this column"
-        )
-
+    axes = (("x", "width", z.shape[1]), ("y", "height", z.shape[0]))
     columns = {}
-    units = {}
-    for role, name, count in (("x", "width", z.shape[1]), ("y", "height", z.shape[0])):
-        size, units[role] = parse_fact(path, header.facts.get(name, ""))
-        if size is not None and 0 < size < math.inf:
-            columns[role] = np.arange(count) * size / count
-    columns["z"] = z
-    units["z"] = header.facts.get("value units")
-    remedy = f"write {SIZE_LINES} and `# Value units: um` above its rows"
-    return Table(path, columns, units, str(path), remedy=remedy)
+    units = {"z": facts.get("value units")}
+    for role, name, count in axes if z.shape[0] > 1 else axes[:1]:
+        size, units[role] = parse_fact(facts.get(name, ""))
+        if size is None:
+            raise PatchfemError(
+                f"{path}: the rows are a matrix of heights (a map, or more than three numbers in a "
+                f"row), but the {name} of the scan is not given; {SIZE_LINES}"
+            )
+        columns[role] = np.arange(count) * size / count
+    columns["z"] = z if z.shape[0] > 1 else z[0]
+    return Table(path, columns, units, str(path), remedy=SIZE_LINES)
 
 
-def _is_even(values) -> bool:
-    """Return whether numbers (n,) increase by equal steps, within MAX_UNEVEN of the first step."""
-    steps = np.diff(values)
-    return bool(steps[0] > 0 and np.ptp(steps) < MAX_UNEVEN * steps[0])
+def _read_rows(
+    path, lines: Iterator[tuple[int, str]], roles: list[str]
+) -> tuple[np.ndarray, np.ndarray]:
+    """Read all rows of numbers of a text file; a million rows of two columns take three seconds.
+
+    Parameters
+    ----------
+    path : Path
+        For messages.
+    lines : iterator of (int, str)
+        Numbers and texts of the lines below the header. The first row shows the delimiter of all.
+    roles : list of str
+        Role of each column; a height "z" may be missing, and an "index" is not read.
+
+    Returns
+    -------
+    numbers : (m, n) array
+    row_lines : (m,) array
+        Line of each row.
+    """
+    is_matrix = set(roles) == {"z"}
+    numbers = array("d")
+    row_lines = array("q")
+    delimiter = None
+    has_comma = has_point = False
+    for number, line in lines:
+        line = line.strip(" \n")
+        place = f"{path}:{number}: '{shorten(line)}'"
+        if line.startswith(COMMENT):
+            if is_matrix and re.search("[:=]", line):
+                raise PatchfemError(
+                    f"{place} ends the scan or begins another one; keep only one scan per file"
+                )
+            continue
+        if not line.strip(" \t,;|"):
+            continue
+        if not row_lines:
+            delimiter = split_cells(line)[1]
+
+        # All rows must have the same decimal sign.
+        has_point |= "." in line
+        has_comma |= delimiter != "," and "," in line
+        if has_comma and has_point:
+            raise PatchfemError(
+                f"{place}: a decimal comma and a decimal point in one file; use the same sign in the whole file"
+            )
+        cells = (line.replace(",", ".") if has_comma else line).split(delimiter)
+        cells = [cell.strip() for cell in cells]
+        while len(cells) > len(roles) and not cells[-1]:
+            cells.pop()
+        if len(cells) != len(roles):
+            is_decimal = delimiter == "," and len(cells) == 2 * len(roles)
+            remedy = "with a decimal comma, separate the columns by semicolons or tabs"
+            remedy = remedy if is_decimal else "write nan for a missing height"
+            raise PatchfemError(f"{place}: {len(roles)} numbers are needed; {remedy}")
+        numbers.extend([_parse_cell(f"{path}:{number}", *pair) for pair in zip(roles, cells)])
+        row_lines.append(number)
+    return np.array(numbers).reshape(-1, len(roles)), np.array(row_lines)
+
+
+def _parse_cell(place: str, role: str, cell: str) -> float:
+    """Return the number in a cell, NaN for a missing height; raise PatchfemError for other text."""
+    if NUMBER_PATTERN.fullmatch(cell):
+        return float(cell)
+    if role == "index" or (role == "z" and MISSING.fullmatch(cell)):
+        return np.nan
+    raise PatchfemError(
+        f"{place}: '{shorten(cell)}' is not a number for {role}; correct the line, or write a missing height as nan"
+    )

@@ -49,11 +49,12 @@ def compute_areal_parameters(z, steps: tuple[float, float]) -> dict[str, float |
         Spacings along y and along x [m].
     """
     heights = z[~np.isnan(z)]
-    values = {f"S{name}": value for name, value in compute_moments(heights).items()}
-    core = compute_core(heights)
-    values |= {f"S{name.lower()}": value for name, value in core.items()}
+    distribution = compute_moments(heights) | compute_core(heights)
+    values = {f"S{name.lower()}": value for name, value in distribution.items()}
     values |= {"Sp": float(heights.max()), "Sv": float(-heights.min())}
-    values["Sz"] = float(np.ptp(heights))
+    values["Sz"] = values["Sp"] + values["Sv"]
+
+    # Slopes of the sides of each cell of the raster.
     slopes = [np.diff(z, axis=axis) / step for axis, step in enumerate(steps)]
     values["Sdq"] = float(np.sqrt(sum(np.nanmean(slope**2) for slope in slopes)))
     values["Sdr"] = _compute_area_ratio(*(slope**2 for slope in slopes))
@@ -114,9 +115,8 @@ def _find_decay_lengths(rho, steps: tuple[float, float]) -> np.ndarray:
     pixels = rays / np.reshape(steps, (2, 1, 1)) + np.reshape(rho.shape, (2, 1, 1)) // 2
     along = ndimage.map_coordinates(rho, pixels, order=1, cval=np.nan)
     is_low = along < DECAY_LEVEL
-    distances = np.full(N_RAYS, np.inf)
-    for k in np.flatnonzero(is_low.any(axis=1)):
-        first = int(is_low[k].argmax())
-        ends = slice(first - 1, first + 1)
-        distances[k] = np.interp(-DECAY_LEVEL, -along[k, ends], radius[ends])
-    return distances
+    first = is_low.argmax(axis=1)
+    rows = np.arange(N_RAYS)
+    last_high, first_low = along[rows, first - 1], along[rows, first]
+    part = (last_high - DECAY_LEVEL) / (last_high - first_low)
+    return np.where(is_low.any(axis=1), (first - 1 + part) * radius[1], np.inf)

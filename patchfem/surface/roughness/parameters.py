@@ -38,7 +38,13 @@ PROFILE = {
     "vk": ("m", "reduced valley depth: triangle on the base 1 - Mr2 with the area below the core"),
     "Mr1": ("1", "fraction of the surface above the core"),
     "Mr2": ("1", "fraction of the surface above the bottom of the core"),
-    "c": ("m", "mean height difference between a hill and the neighbouring dale"),
+}
+# The same of the waves of the levelled trace.
+WAVES = {
+    "band_amplitude": (
+        "m",
+        "amplitude of a sine with the mean square of the waves from 60 to 110 um, of the levelled trace",
+    ),
 }
 
 
@@ -55,19 +61,18 @@ def compute_parameters(z, step: float, section: float | None = None) -> dict[str
         Length [m] over which peaks and valleys are sought, which is the cut-off; by default the whole
         trace. Sections that do not lie wholly in the trace are left out.
     """
-    values = compute_moments(z)
     size = z.size if section is None else round(section / step)
     sections = z[: z.size // size * size].reshape(-1, size)
-    values |= dict.fromkeys(("p", "v", "z"))
+    values = dict.fromkeys(PROFILE) | compute_moments(z) | compute_core(z)
     if len(sections):
-        values["p"] = float(sections.max(axis=1).mean())
-        values["v"] = float(-sections.min(axis=1).mean())
-        values["z"] = float(np.ptp(sections, axis=1).mean())
+        peaks = sections.max(axis=1)
+        valleys = sections.min(axis=1)
+        values |= {"p": float(peaks.mean()), "v": float(-valleys.mean())}
+        values["z"] = float((peaks - valleys).mean())
     values["t"] = float(np.ptp(z))
     values["dq"] = float(np.sqrt(np.mean(np.diff(z) ** 2)) / step)
     rough = values["t"] if values["z"] is None else values["z"]
-    values |= _compute_elements(z, step, rough, section or 0.0) | compute_core(z)
-    return {name: values[name] for name in PROFILE}
+    return values | {"Sm": _compute_element_length(z, step, rough, section or 0.0)}
 
 
 def compute_moments(z) -> dict[str, float | None]:
@@ -79,29 +84,25 @@ def compute_moments(z) -> dict[str, float | None]:
     return out
 
 
-def _compute_elements(z, step: float, rough: float, section: float) -> dict[str, float | None]:
-    """Compute Sm and c from hills and dales that are high and wide enough.
+def _compute_element_length(z, step: float, rough: float, section: float) -> float | None:
+    """Compute Sm from hills and dales that are high and wide enough, relative to Rz and the section [m].
 
     An element reaches from a rise through the mean line to the next rise, or from a fall to the next
     fall. Neighbours of one sign, between which others are left out, are one hill or dale.
     """
-    unknown = {"Sm": None, "c": None}
     above = z > 0
     starts = np.flatnonzero(above[1:] != above[:-1])  # the last sample before each crossing
-    if not starts.size or rough == 0:
-        return unknown
+    if not starts.size:
+        return None
     places = (starts + z[starts] / (z[starts] - z[starts + 1])) * step
-    first = np.concatenate([[0], starts + 1])
+    first = np.append(0, starts + 1)
     extent = np.maximum.reduceat(np.abs(z), first)
     width = np.diff(places, prepend=-np.inf, append=np.inf)  # the ends of the trace cut two off
     is_kept = (extent >= MIN_HEIGHT_FRACTION * rough) & (width >= MIN_WIDTH_FRACTION * section)
     kept = np.flatnonzero(is_kept)
-    changes = np.flatnonzero(np.diff(above[first[kept]].astype(int))) + 1
-    ends = places[kept[changes] - 1]  # a hill or dale begins at the crossing before it
-    if ends.size < 3:
-        return unknown
-    parts = np.maximum.reduceat(np.abs(z), np.floor(ends / step).astype(int) + 1)[:-1]
-    return {"Sm": float((ends[2:] - ends[:-2]).mean()), "c": float((parts[1:] + parts[:-1]).mean())}
+    # A hill or dale begins at the crossing before it.
+    ends = places[kept[1:][np.diff(above[first[kept]])] - 1]
+    return float((ends[2:] - ends[:-2]).mean()) if ends.size > 2 else None
 
 
 def compute_core(z) -> dict[str, float | None]:
@@ -114,15 +115,18 @@ def compute_core(z) -> dict[str, float | None]:
     n = z.size
     if n < 5 or z[0] == z[-1]:
         return dict.fromkeys(("k", "pk", "vk", "Mr1", "Mr2"))
+
+    # The flattest 40 % of the curve, and the line through it.
     size = max(round(CORE_FRACTION * n), 2)
     start = int(np.argmin(z[: n - size + 1] - z[size - 1 :]))
     part = z[start : start + size]
     ratio = (np.arange(start, start + size) + 0.5) / n
-    centred = ratio - ratio.mean()
-    slope = float(centred @ (part - part.mean()) / (centred @ centred))
-    top = float(part.mean() - slope * ratio.mean())
+    slope, top = np.polyfit(ratio, part, 1).tolist()
     bottom = top + slope
-    first, second = (_find_ratio_above(z, level) for level in (top, bottom))
+
+    # What is above and below the core becomes triangles of the same area.
+    levels = np.array((top, bottom))
+    first, second = np.interp(-levels, -z, (np.arange(n) + 0.5) / n, 0.0, 1.0).tolist()
     peaks = 2 * float(np.maximum(z - top, 0.0).sum()) / n
     valleys = 2 * float(np.maximum(bottom - z, 0.0).sum()) / n
     return {
@@ -132,16 +136,6 @@ def compute_core(z) -> dict[str, float | None]:
         "Mr1": first,
         "Mr2": second,
     }
-
-
-def _find_ratio_above(z, level: float) -> float:
-    """Return the fraction of descending heights (n,) above a level, linear between them."""
-    n = z.size
-    k = int(np.searchsorted(-z, -level))
-    if k in (0, n):
-        return k / n
-    fall = z[k - 1] - z[k]
-    return float((k - 0.5 + (z[k - 1] - level) / (fall if fall > 0 else 1.0)) / n)
 
 
 def abbott_curve(z, count: int = 501) -> tuple[np.ndarray, np.ndarray]:

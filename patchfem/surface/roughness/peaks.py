@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...core import PatchfemError
-from ...formatting import format_length, format_number
+from ...formatting import format_length
 from ..profile import Profile, level, remove_spikes, resample_evenly
 from .filter import filter_surface
 from .parameters import MIN_SAMPLES, ROUND_OFF
@@ -66,7 +66,7 @@ class TraceMoments(NamedTuple):
     fine: Moments
     coarse: Moments | None
     not_gaussian: str
-    dust: tuple = ()
+    dust: tuple[str, ...] = ()
 
 
 def trace_moments(trace: Profile, cutoff: float | None = None) -> TraceMoments:
@@ -77,17 +77,35 @@ def trace_moments(trace: Profile, cutoff: float | None = None) -> TraceMoments:
     PatchfemError for fewer than 16 samples, for a flat trace and for a cut-off of fewer than four
     steps.
     """
-    clean = _remove_spikes(trace)
-    removed = int((clean.missing & ~trace.missing).sum())
-    flat = _filter_short_waves(clean, cutoff)
+    clean = remove_spikes(trace)
+    is_removed = clean.missing & ~trace.missing
+    dust = ()
+    if is_removed.mean() > MAX_SPIKE_FRACTION:
+        # So many apparent spikes belong to the surface.
+        clean = trace
+    elif is_removed.any():
+        dust = (
+            f"{is_removed.sum()} of {trace.z.size} heights are spikes, dropouts or dust and are left out",
+        )
+    tilted = resample_evenly(clean)
+    flat = level(tilted)
+    if flat.z.size >= MIN_SAMPLES and not np.ptp(flat.z) > ROUND_OFF * np.ptp(tilted.z):
+        raise PatchfemError(
+            f"{trace.source}: the trace is flat, so it has no peaks; leave [contact.asperities] out"
+        )
+    if cutoff is not None and cutoff < flat.length:
+        flat = filter_surface(flat, cutoff)[1]
     fine = rms_moments(flat)
     coarse = rms_moments(flat, 2) if flat.z.size >= 2 * MIN_SAMPLES - 1 else None
-    dust = ()
-    if removed:
-        dust = (
-            f"{removed} of {trace.z.size} heights are spikes, dropouts or dust and are left out",
+
+    # A few heights, such as those of wide dust, may make up most of m_4.
+    bend = np.diff(flat.z, 2) ** 2
+    order = np.argsort(bend)[::-1][: max(int(SHARPEST_FRACTION * bend.size), 1)]
+    if bend[order].sum() > MAX_SHARPEST_POWER * bend.sum():
+        dust += (
+            f"{order.size} of {flat.z.size} heights, the sharpest at x = {format_length(flat.x[order[0] + 1])}, make up "
+            "most of the mean square curvature, as dust does; if they are dust, write nan for them",
         )
-    dust += _describe_sharpest(flat)
     return TraceMoments(fine, coarse, _describe_skew(flat.z, fine, flat.length), dust)
 
 
@@ -105,39 +123,6 @@ def rms_moments(trace: Profile, every: int = 1) -> Moments:
         )
     return Moments(
         *(float(np.sqrt(np.mean(np.diff(z, order) ** 2)) / step**order) for order in range(3))
-    )
-
-
-def _remove_spikes(trace: Profile) -> Profile:
-    """Remove the spikes of a trace, unless they are too numerous to be spikes."""
-    clean = remove_spikes(trace)
-    return clean if (clean.missing & ~trace.missing).mean() <= MAX_SPIKE_FRACTION else trace
-
-
-def _filter_short_waves(trace: Profile, cutoff: float | None) -> Profile:
-    tilted = resample_evenly(trace)
-    flat = level(tilted)
-    if flat.z.size >= MIN_SAMPLES and not np.ptp(flat.z) > ROUND_OFF * np.ptp(tilted.z):
-        raise PatchfemError(
-            f"{trace.source}: the trace is flat, so it has no peaks; leave [contact.asperities] out"
-        )
-    return flat if cutoff is None or cutoff >= flat.length else filter_surface(flat, cutoff)[1]
-
-
-def _describe_sharpest(trace: Profile) -> tuple[str, ...]:
-    """Describe the few heights, such as those of wide dust, that make up most of m_4; () if none do."""
-    bend = np.diff(trace.z, 2) ** 2
-    order = np.argsort(bend)
-    count = max(int(SHARPEST_FRACTION * bend.size), 1)
-    fraction = float(bend[order[-count:]].sum()) / max(float(bend.sum()), 1e-300)
-    if fraction < MAX_SHARPEST_POWER:
-        return ()
-    curvature = float(np.sqrt(bend[order[:-count]].mean())) / trace.step**2
-    place = format_length(float(trace.x[order[-1] + 1]))
-    return (
-        f"{count} of {trace.z.size} heights, the sharpest at x = {place}, make up {100 * fraction:.3g} % of the mean "
-        f"square curvature, as dust does; without them rms_curvature is {format_number(curvature, 4)} 1/m; if they are "
-        "dust, write nan for them",
     )
 
 

@@ -9,8 +9,9 @@ from scipy import special
 from ...core import PatchfemError, frozen_array
 from ...formatting import format_length
 from ..areal import Areal, find_scan_spikes
-from ..profile import Profile, find_spikes, resample_evenly
+from ..profile import Profile, find_spikes, measure_step, resample_evenly
 from ..quantity import Quantity
+from ..spectrum import BAND, WaveSpectrum, wave_spectrum
 from .areal import AREAL, compute_areal_parameters
 from .filter import filter_surface
 from .form import subtract_form
@@ -19,11 +20,11 @@ from .parameters import (
     MIN_SECTIONS,
     PROFILE,
     ROUND_OFF,
+    WAVES,
     WITHOUT_INTERVAL,
     compute_parameters,
     estimate_errors,
 )
-from .spectrum import BAND, Spectrum, estimate_spectrum
 
 # Standard cut-offs [m]: those of ISO 21920-3 and one more at each end.
 STANDARD_CUTOFFS = (25e-6, 80e-6, 250e-6, 800e-6, 2.5e-3, 8e-3, 25e-3)
@@ -61,7 +62,7 @@ class TraceParts(NamedTuple):
     primary: Profile
     waviness: Profile | None
     roughness: Profile | None
-    spectrum: Spectrum
+    spectrum: WaveSpectrum
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,7 +104,7 @@ def make_report(
     Parameters
     ----------
     surface : Profile or Areal
-        Of at least 16 samples.
+        A trace of at least 16 samples.
     cutoff : float, optional
         Cut-off or nesting index [m]; without it there is the primary profile or the S-F surface
         alone.
@@ -116,137 +117,110 @@ def make_report(
     """
     part = surface if window is None else crop(surface, *window)
     is_scan = isinstance(part, Areal)
-    whole = part if is_scan else _require_samples(resample_evenly(_require_samples(part)))
+    if part.x.size < MIN_SAMPLES and not is_scan:
+        raise PatchfemError(
+            f"{part.source}: {part.x.size} samples; the parameters need at least {MIN_SAMPLES}"
+        )
+    whole = part if is_scan else resample_evenly(part)
     primary, form_name = subtract_form(whole, form)
     if short is not None:
         # The filter changes the plane or line, so the form is subtracted again after it.
         primary = subtract_form(filter_surface(primary, short)[0], form)[0]
-    heights = primary.z[~primary.missing]
-    if heights.size and np.ptp(heights) <= ROUND_OFF * np.nanmax(np.abs(whole.z)):
+    # A straight line has heights of round-off, of which parameters would be made.
+    if np.nanmax(np.abs(primary.z)) <= ROUND_OFF * np.nanmax(np.abs(whole.z)):
         primary = replace(primary, z=frozen_array(primary.z * 0.0))
-    waviness = None
-    roughness = None
-    if cutoff is not None:
-        waviness, roughness = filter_surface(primary, cutoff)
 
-    evaluated = primary if roughness is None else roughness
-    heights = evaluated.z[~evaluated.missing]
-    notes = whole.notes + _describe_spikes(part)
+    # Without a cut-off, the primary profile or the levelled scan is evaluated.
+    waviness, roughness = (None, None) if cutoff is None else filter_surface(primary, cutoff)
+    evaluated = roughness or primary
     if is_scan:
-        quantities, more = _measure_scan(evaluated)
         parts = evaluated
+        quantities, notes = _measure_scan(evaluated)
     else:
-        spectrum = estimate_spectrum(primary.z, whole.step)
-        parts = TraceParts(primary, waviness, roughness, spectrum)
-        quantities, more = _measure_trace(parts, cutoff)
-    size = Sampling(
-        length=float(whole.x[-1] - whole.x[0]),
-        step=float(whole.x[-1] - whole.x[0]) / (whole.x.size - 1),
-        shape=whole.z.shape,
-        measured=None if is_scan else part.x.size,
-    )
-    treatment = Treatment(form_name, short, cutoff, window)
+        parts = TraceParts(primary, waviness, roughness, wave_spectrum(primary, is_tapered=True))
+        quantities, notes = _measure_trace(parts, cutoff)
+
     return RoughnessReport(
-        whole.source, size, treatment, tuple(quantities), notes + more, parts, heights
+        source=whole.source,
+        sampling=Sampling(
+            float(np.ptp(whole.x)),
+            measure_step(whole.x),
+            whole.z.shape,
+            None if is_scan else part.x.size,
+        ),
+        treatment=Treatment(form_name, short, cutoff, window),
+        values=tuple(quantities),
+        notes=whole.notes + _describe_spikes(part) + notes,
+        surface=parts,
+        heights=evaluated.z[~evaluated.missing],
     )
 
 
 def _measure_trace(
     parts: TraceParts, cutoff: float | None
 ) -> tuple[list[Quantity], tuple[str, ...]]:
-    """Return the parameters of the primary profile and of the roughness profile, and notes on the sections."""
+    """Return the parameters of the primary profile and of the roughness profile, and a note on few sections."""
     primary = parts.primary
     values = compute_parameters(primary.z, primary.step)
     del values["z"]  # of one section, which is Pt
-    quantities = [_name_value("P", name, value) for name, value in values.items()]
-    quantities += _measure_waves(primary, parts.spectrum)
+    quantities = [
+        _name_value(f"P{name}", value, *PROFILE[name], "levelled trace")
+        for name, value in values.items()
+    ]
+    has_band = 2 * BAND[1] <= primary.length and BAND[0] >= 2 * primary.step
+    amplitude = parts.spectrum.measure_band() if has_band else None
+    name = "band_amplitude"
+    reason = "" if has_band else "band"
+    quantities.append(Quantity(amplitude, None, None, *WAVES[name], reason, name))
     rough = parts.roughness
     if rough is None:
         return quantities, ()
 
+    # The interval is that of a mean over sections by Student's t of its logarithm.
     errors = estimate_errors(rough.z, primary.step, cutoff)
     n_sections = rough.z.size // round(cutoff / primary.step)
+    student = special.stdtrit(max(n_sections - 1, 1), 1 - CONFIDENCE_TAIL)
     for name, value in compute_parameters(rough.z, primary.step, cutoff).items():
-        quantity = _name_value("R", name, value)
-        quantities.append(_add_interval(quantity, errors.get(name), n_sections))
+        long_name = name if name.startswith("Mr") else f"R{name}"
+        quantity = _name_value(long_name, value, *PROFILE[name], "roughness profile")
+        if value and errors.get(name):
+            factor = float(np.exp(student * errors[name] / value))
+            # A material ratio is at most 1.
+            high = min(value * factor, 1.0) if name.startswith("Mr") else value * factor
+            quantity = quantity._replace(low=value / factor, high=high)
+        elif value is not None and n_sections < MIN_SECTIONS and name not in WITHOUT_INTERVAL:
+            quantity = quantity._replace(reason="sections")
+        quantities.append(quantity)
     if n_sections >= MIN_SECTIONS:
         return quantities, ()
-    advice = (
-        f"evaluate at least {format_length((MIN_SECTIONS + 1) * cutoff)}, or take a shorter cut-off"
-    )
-    if not n_sections:
-        advice = (
-            f"do not use these roughness parameters, as ISO 21920 needs a whole section: {advice}"
-        )
-    plural = "s" * (n_sections != 1)
     note = (
         f"{primary.source}: without half a cut-off at each end, {format_length(rough.length)} are left, which hold "
-        f"{n_sections} section{plural} of {format_length(cutoff)}, and intervals need {MIN_SECTIONS}: {advice}"
+        f"{n_sections} whole sections of {format_length(cutoff)}, but ISO 21920 needs one, and intervals {MIN_SECTIONS}: "
+        f"evaluate at least {format_length((MIN_SECTIONS + 1) * cutoff)}, or take a shorter cut-off"
     )
     return quantities, (note,)
 
 
 def _measure_scan(scan: Areal) -> tuple[list[Quantity], tuple[str, ...]]:
     """Return the parameters of a scan, and a note on missing heights."""
-    if scan.missing.all():
+    count = int(scan.missing.sum())
+    if count == scan.z.size:
         raise PatchfemError(
             f"{scan.source}: no measured height is left within half a cut-off of the borders"
         )
-    steps = tuple(float(axis[-1] - axis[0]) / (axis.size - 1) for axis in (scan.y, scan.x))
+    steps = (measure_step(scan.y), measure_step(scan.x))
     quantities = []
     for name, value in compute_areal_parameters(scan.z, steps).items():
         number, reason = (None, value) if isinstance(value, str) else (value, "")
         quantities.append(Quantity(number, None, None, *AREAL[name], reason, name))
-    count = int(scan.missing.sum())
     note = f"{scan.source}: {count} of {scan.z.size} heights are missing and are left out"
     return quantities, (note,) if count else ()
 
 
-def _measure_waves(primary: Profile, spectrum: Spectrum) -> list[Quantity]:
-    """Return the dominant wavelength, and the amplitude of the waves of the band."""
-    low, high = BAND
-    amplitude = None
-    if 2 * high <= primary.length and low >= 2 * primary.step:
-        amplitude = spectrum.band_amplitude(low, high)
-    of_band = (
-        f"amplitude of a sine with the mean square of the waves from {format_length(low)} to "
-        f"{format_length(high)}, of the levelled trace"
-    )
-    of_octave = (
-        "wavelength of the octave with the largest mean square height, of the levelled trace"
-    )
-    rows = (
-        ("dominant_wavelength", spectrum.dominant_wavelength, of_octave, "undetermined"),
-        ("band_amplitude", amplitude, of_band, "band"),
-    )
-    quantities = []
-    for name, value, text, reason in rows:
-        reason = "" if value is not None else reason
-        quantities.append(Quantity(value, None, None, "m", text, reason, name))
-    return quantities
-
-
-def _name_value(letter: str, name: str, value: float | None) -> Quantity:
-    """Return a parameter of the primary profile "P", or of the roughness profile "R", by its name in PROFILE."""
-    unit, text = PROFILE[name]
-    profile = "the levelled trace" if letter == "P" else "the roughness profile"
-    long_name = name if name.startswith("Mr") and letter == "R" else f"{letter}{name}"
-    reason = "" if value is not None else "undetermined"
-    return Quantity(value, None, None, unit, f"{text}, of {profile}", reason, long_name)
-
-
-def _add_interval(quantity: Quantity, error: float | None, n_sections: int) -> Quantity:
-    """Add the 90 % interval of a mean over sections by Student's t of its logarithm; without errors, the reason."""
-    has_interval = quantity.name[1:] not in WITHOUT_INTERVAL
-    if error is None and n_sections < MIN_SECTIONS and has_interval and not quantity.reason:
-        return quantity._replace(reason="sections")
-    if not quantity.value or not error:
-        return quantity
-    width = float(special.stdtrit(n_sections - 1, 1 - CONFIDENCE_TAIL)) * error / quantity.value
-    low, high = quantity.value * np.exp([-width, width])
-    # A material ratio is at most 1.
-    high = min(high, 1.0) if quantity.name.startswith("Mr") else high
-    return quantity._replace(low=float(low), high=float(high))
+def _name_value(name: str, value: float | None, unit: str, text: str, profile: str) -> Quantity:
+    """Return a parameter of a profile, with the code of the reason where it has no value."""
+    reason = "undetermined" if value is None else ""
+    return Quantity(value, None, None, unit, f"{text}, of the {profile}", reason, name)
 
 
 def fitting_cutoff(length: float, step: float) -> float | None:
@@ -267,44 +241,30 @@ def crop(surface: Profile | Areal, *ends: float) -> Profile | Areal:
         raise PatchfemError(
             f"{surface.source}: a window needs a first and a last position along {' and along '.join(names)}"
         )
-    parts = {}
-    for name, pair in zip(names, (ends[:2], ends[2:])):
-        parts[name] = _find_part(surface.source, name, getattr(surface, name), pair)
-    axes = {name: getattr(surface, name)[part] for name, part in parts.items()}
-    return replace(surface, **axes, z=surface.z[tuple(parts[name] for name in reversed(names))])
-
-
-def _find_part(source: str, name: str, axis: np.ndarray, ends: tuple[float, ...]) -> slice:
-    first, last = ends
-    near = 1e-6 * float(axis[-1] - axis[0]) / (axis.size - 1)
-    if not first < last or first < axis[0] - near or last > axis[-1] + near:
-        raise PatchfemError(
-            f"{source}: the window runs from {format_length(first)} to {format_length(last)}, but the "
-            f"surface along {name} from {format_length(axis[0])} to {format_length(axis[-1])}"
-        )
-    low, high = (max(int(np.searchsorted(axis, end + near, "right")) - 1, 0) for end in ends)
-    return slice(low, high + 1)
-
-
-def _require_samples(trace: Profile) -> Profile:
-    if trace.x.size < MIN_SAMPLES:
-        plural = "s" * (trace.x.size != 1)
-        raise PatchfemError(
-            f"{trace.source}: {trace.x.size} sample{plural}; the parameters need at least {MIN_SAMPLES}"
-        )
-    return trace
+    axes = {}
+    parts = []
+    for name, first, last in zip(names, ends[::2], ends[1::2]):
+        axis = getattr(surface, name)
+        near = 1e-6 * measure_step(axis)
+        if not axis[0] - near <= first < last <= axis[-1] + near:
+            raise PatchfemError(
+                f"{surface.source}: the window runs from {format_length(first)} to {format_length(last)}, but the "
+                f"surface along {name} from {format_length(axis[0])} to {format_length(axis[-1])}"
+            )
+        low, high = np.maximum(np.searchsorted(axis, np.add((first, last), near), "right") - 1, 0)
+        parts.append(slice(low, high + 1))
+        axes[name] = axis[parts[-1]]
+    return replace(surface, **axes, z=surface.z[tuple(reversed(parts))])
 
 
 def _describe_spikes(surface: Profile | Areal) -> tuple[str, ...]:
     """Describe the spikes of a surface in a sentence, or return () if there are none."""
     is_spike = find_scan_spikes(surface) if isinstance(surface, Areal) else find_spikes(surface)
-    count = int(is_spike.sum())
-    if not count:
+    if not is_spike.any():
         return ()
-    *row, column = np.argwhere(is_spike)[0]
-    place = f"x = {format_length(surface.x[column])}"
-    place += "".join(f", y = {format_length(surface.y[k])}" for k in row)
-    clause = f"are spikes (the first at {place}), which count"
-    if count == 1:
-        clause = f"is a spike (at {place}), which counts"
-    return (f"{surface.source}: {count} of {is_spike.size} heights {clause} in every parameter",)
+    place = format_length(surface.x[np.argwhere(is_spike)[0][-1]])
+    note = (
+        f"{surface.source}: {is_spike.sum()} of {is_spike.size} heights are spikes (the first at x = {place}), which count "
+        "in every parameter"
+    )
+    return (note,)

@@ -9,10 +9,10 @@ from command_line import run_cli
 
 import patchfem as pf
 from patchfem import SceneError, run
+from patchfem.campaigns.fits.problem import FitOptions
 from patchfem.campaigns.rows.cells import read_response_table
-from patchfem.campaigns.rows.checkpoint import SearchCheckpoint
-from patchfem.campaigns.rows.condition_models import ConditionModels, FitRequest
-from patchfem.campaigns.rows.fit import RowsOptions, fit_rows, make_residual
+from patchfem.campaigns.rows.condition_models import ConditionModels
+from patchfem.campaigns.rows.fit import fit_rows, make_residual
 from patchfem.campaigns.rows.model_readings import ModelReadings
 from patchfem.core import G_N, PatchfemError
 from patchfem.export.fits import describe_rows_fit
@@ -97,9 +97,10 @@ def read_free_keys(*texts):
     return found
 
 
-def fit_to_rows(scene, path, wanted, **beside):
+def fit_to_rows(scene, path, wanted, seed=0, **beside):
     """Fit a scene to rows and return the result."""
-    return fit_rows(FitRequest(scene, wanted, path), RowsOptions(**{"starts": 2} | beside))
+    options = FitOptions(**{"starts": 2} | beside)
+    return fit_rows(scene, path, wanted, options, seed=seed)
 
 
 LINEAR_FREE = (
@@ -246,15 +247,9 @@ def test_exact_rows_flagged_u_are_lower_bounds(tmp_path):
     every = np.ones(cells.row.size, bool)
     for damping, is_above in ((0.01, True), (0.1, False)):
         logs = cells.compute_log_ratios(*computed([141.0, damping], range(5)))
-        found = {
-            what: make_residual(cells, computed, every, what)([141.0, damping])
-            for what in ("bound", "out", "read")
-        }
-        assert np.array_equal(found["read"], logs) and np.array_equal(
-            found["out"], logs[~cells.unstable]
-        )
+        found = make_residual(cells, computed, every)([141.0, damping])
         assert np.all(logs[cells.unstable] > 0) == is_above
-        assert np.array_equal(found["bound"], np.where(cells.unstable, np.minimum(logs, 0), logs))
+        assert np.array_equal(found, np.where(cells.unstable, np.minimum(logs, 0), logs))
     stable = fit_to_rows(scene, path, read_free_keys(*LINEAR_FREE), starts=1)
     whole, without = (stable.compute_scores(only_stable=part)["fitted"] for part in (False, True))
     assert without["all"] == pytest.approx(np.sqrt(np.mean(stable.logs[~cells.unstable] ** 2)))
@@ -357,46 +352,16 @@ def test_exact_fit_command_writes_documented_json(tmp_path):
     assert again == pytest.approx(linear_response(143.0, G_N, one["value"], damping)[0], rel=1e-4)
 
 
-def test_exact_fit_resumes_from_stored_starts(tmp_path):
-    """A fit resumed from stored starts gives the same bits with less work; starts of another question are ignored."""
-    scene = write_and_load(tmp_path, LINEAR)
-    path = write_rows(tmp_path, make_linear_rows(0.05))
-    wanted = read_free_keys(*LINEAR_FREE)
-    file = tmp_path / "starts.json"
-
-    def go(question, resume):
-        options = RowsOptions(starts=2, checkpoint=SearchCheckpoint(file, question, resume))
-        return fit_rows(FitRequest(scene, wanted, path), options)
-
-    first = go("one", False)
-    again = go("one", True)
-    kept = json.loads(file.read_text())
-    kept["ends"].pop("all/1")
-    file.write_text(json.dumps(kept))
-    half = go("one", True)
-    other = go("other", True)
-    assert again.n_motions < half.n_motions < first.n_motions == other.n_motions
-    for one in (again, half, other):
-        assert np.array_equal(one.keys.fit.values, first.keys.fit.values)
-        assert np.array_equal(one.search.rms, first.search.rms)
-
-
-@pytest.mark.parametrize("text", ["[]", "[" * 100_000, '{"ends": {"all/0": [[1], 2]}}'])
-def test_exact_invalid_stored_starts_are_ignored(tmp_path, text):
-    """A file of stored starts with another structure is ignored."""
-    (tmp_path / "starts.json").write_text(text)
-    assert SearchCheckpoint(tmp_path / "starts.json", "one", True).known == {}
-
-
 @pytest.mark.parametrize(
     "words, message",
     [
-        (["--offset", "force"], "applies only to fits to a loop"),
+        (["--offset", "force"], "fit --offset was removed"),
+        (["--resume"], "fit --resume was removed"),
         (["--placebo", "friction.static=0.1"], "fit --placebo was removed"),
         (["--from-patch"], "fit --from-patch was removed"),
         (["--leave-out", "displacement"], "no column"),
         (["--leave-out", "input"], "leaves no rows"),
-        (["--unstable", "maybe"], "unstable"),
+        (["--unstable", "out"], "hold them out with --hold flag=U"),
     ],
 )
 def test_refuses_unsuitable_rows_options(tmp_path, words, message):

@@ -1,6 +1,7 @@
 """Clusters: workers with other versions or files, a lost scheduler, TLS, and no public web pages."""
 
 import os
+import pickle
 import subprocess
 import sys
 import urllib.error
@@ -13,12 +14,7 @@ from command_line import run_cli
 from scene_texts import BENCH
 
 from patchfem.campaigns import Cases, SweepScene, WorkerData
-from patchfem.campaigns.sweeps.executors import cluster
-from patchfem.campaigns.sweeps.executors.cluster import (
-    Cluster,
-    _compute_on_worker,
-    environment_versions,
-)
+from patchfem.campaigns.sweeps.executors.cluster import Cluster, _compute_on_worker
 from patchfem.campaigns.sweeps.sweep import compute_chunk
 from patchfem.core import Missing
 from patchfem.scene import read_assignments
@@ -52,61 +48,38 @@ def scene_path(tmp_path):
 
 
 def test_exact_worker_in_other_folder_uses_scene_files(scene_path, monkeypatch):
-    """A worker in another folder reads the files of the scene, gives the same results, and stays in its folder."""
+    """A worker in another folder reads the files of the scene and gives the same results; other files are refused."""
     monkeypatch.chdir(scene_path.parent)
     work = make_work(Path("bench.toml"), BY_FILE)
     _, (want, _) = compute_chunk(work, [0, 1, 2])
     there = make_work(scene_path, BY_FILE)
-    mine = environment_versions(work)
+    common_data = work.sweep_scene.hash_common_data()
     monkeypatch.chdir(scene_path.parents[1] / "there")
-    _, (found, _) = _compute_on_worker(there, [0, 1, 2], (mine, Path("bench.toml")))
-    assert found.messages == want.messages and len(want.messages) == 1
+    _, (found, _) = _compute_on_worker(there, [0, 1, 2], common_data)
+    assert found.messages.keys() == want.messages.keys() and len(want.messages) == 1
     assert found.values["friction_work"].tolist()[:2] == want.values["friction_work"].tolist()[:2]
     assert Path.cwd().name == "there"
     (scene_path.parent / "path.csv").write_text(PATH.replace("5", "6"))
-    assert _compute_on_worker(there, [0], (mine, Path("bench.toml")))["files"] != mine["files"]
-
-
-def test_always_worker_differences_are_named():
-    """The error message names the packages and files in which a worker differs from this machine."""
+    with pytest.raises(Missing, match="differ between a worker and this machine") as error:
+        _compute_on_worker(there, [0], common_data)
+    # such an error of a worker ends the sweep, any other one is that of its chunk
     here = Cluster.__new__(Cluster)
-    here.name, mine = "--executor dask:tcp://x:1", environment_versions(make_work(Path("a.toml")))
-    message = str(
-        here._worker_error(mine | {"patchfem": "0.3.0 (sources 12345678)", "files": "other"}, mine)
-    )
-    assert (
-        "a worker has patchfem 0.3.0 (sources 12345678), but this machine has patchfem "
-        + mine["patchfem"]
-        in message
-    )
-    assert "numpy" not in message and "files" not in message
-    assert "numpy 1.0" in str(here._worker_error(mine | {"numpy": "1.0"}, mine))
-    assert "differ between a worker" in str(here._worker_error(mine | {"files": "other"}, mine))
-    assert "is not installed on a worker" in str(
-        here._worker_error(AttributeError("no own_of"), mine)
-    )
-    cancelled, failed = Future(), Future()
+    here.name = "--executor dask:tcp://x:1"
+    lacks, cancelled, failed = Future(), Future(), Future()
+    lacks.set_exception(pickle.loads(pickle.dumps(error.value)))
     cancelled.cancel()
     failed.set_exception(OSError("no"))
+    with pytest.raises(Missing, match="differ between a worker"):
+        here.receive(lacks)
     with pytest.raises(Missing, match="the connection to the scheduler is lost"):
         here.receive(cancelled)
     assert "OSError: no" in here.receive(failed)[1].reason
 
 
-SEEN = []
-
-
-def changing_versions(work=None) -> dict:
-    """Return the versions of this environment with another version of patchfem at each call."""
-    SEEN.append(work)
-    return environment_versions(work) | {"patchfem": f"0.{len(SEEN)}"}
-
-
 def test_refuses_worker_with_other_version(monkeypatch):
-    """A worker with another version of patchfem is refused, before the sweep or at its first chunk."""
+    """A worker with another version of patchfem, or without it, is refused before the sweep."""
     import distributed
 
-    message = r"a worker has patchfem 0.\d, but this machine has patchfem 0.\d; install the same version on all"
     with distributed.LocalCluster(
         1,
         processes=False,
@@ -115,35 +88,30 @@ def test_refuses_worker_with_other_version(monkeypatch):
         dashboard_address=None,
         silence_logs="CRITICAL",
     ) as one:
-        ready = Cluster(one.scheduler.address)
-        left = [[0], [1]]
-        monkeypatch.setattr(cluster, "environment_versions", changing_versions)
-        with pytest.raises(Missing, match=message):
-            Cluster(one.scheduler.address)
-        with pytest.raises(Missing, match=message):
-            list(
-                ready.run(
-                    make_work(Path("a.toml")), lambda is_idle=True: left.pop() if left else None
-                )
-            )
+        Cluster(one.scheduler.address).client.close()
+        ask = distributed.Client.get_versions
+        for other in ("0.3.0", None):
+
+            def answer(self, other=other, **words):
+                """Return the versions with another one of patchfem on the workers."""
+                versions = ask(self, **words)
+                for worker in versions["workers"].values():
+                    worker["packages"]["patchfem"] = other
+                return versions
+
+            monkeypatch.setattr(distributed.Client, "get_versions", answer)
+            with pytest.raises(
+                Missing, match=f"a worker has patchfem {other}, but this machine has"
+            ):
+                Cluster(one.scheduler.address)
 
 
 def test_refuses_tls_without_certificates(tmp_path):
-    """A TLS address without certificates is refused with the names of the variables."""
+    """A TLS address without certificates is refused with the reason of Dask."""
     (tmp_path / "bench.toml").write_text(BENCH)
-    answer = run_cli(
-        "sweep",
-        tmp_path / "bench.toml",
-        "--over",
-        "friction.static=0.2,0.3",
-        "--executor",
-        "dask:tls://127.0.0.1:1",
-        "-o",
-        tmp_path / "out",
-    )
-    assert answer.code == 2
-    for name in ("CA_FILE", "CLIENT__CERT", "CLIENT__KEY"):
-        assert f"DASK_DISTRIBUTED__COMM__TLS__{name}" in answer.err
+    words = ["--over", "friction.static=0.2,0.3", "--executor", "dask:tls://127.0.0.1:1"]
+    answer = run_cli("sweep", tmp_path / "bench.toml", *words, "-o", tmp_path / "out")
+    assert answer.code == 4 and "no scheduler answers at this address (TLS" in answer.err
 
 
 @pytest.mark.parametrize("is_begun", [False, True])

@@ -29,9 +29,7 @@ TRACK_NAMES = {
 }
 TRACE_VALUES = {
     "shift": (-50 * UM, 0.3 * UM),
-    "tilt": (1e-3, 1e-6),
     "scale": (1.00001, 2e-6),
-    "offset": (2 * UM, 0.01 * UM),
     "gain": (1.0, 0.002),
     "common_length": (4000 * UM, 0.0),
     "worn_depth_mean": (0.6 * UM, 0.004 * UM),
@@ -74,18 +72,13 @@ VERDICTS = {
 }
 FINDINGS = {
     "mirrored": {},
-    "sure_place": {"significance": 57.3, "sure": 12.0},
     "likely_place": {"significance": 7.3, "sure": 12.0},
     "no_old_surface_left": {"from": 1e-3, "to": 2e-3},
     "bow_subtracted": {"height": 4e-7, "area": 3e-10},
     "other_length": {"scale": 1.002, "low": 1.0018, "high": 1.0022},
     "other_gain": {"gain": 0.97},
     "hidden_even_wear": {"limit": 3e-7},
-    "deposits": {"area": 5e-11},
-    "other_step": {"before": 5e-7, "after": 1e-6},
     "drift": {"height": 2e-8, "noise": 1.5e-8},
-    "other_tracks": {"count": 2},
-    "track_cut": {},
     "left_out": {"before": 3, "after": 41},
     "worn_tops": {},
 }
@@ -119,7 +112,7 @@ def compare_traces(code: str = "worn", findings: dict | None = None, has_place=T
     if not has_depth:
         for name in ("worn_depth_mean", "worn_depth_max", "worn_area"):
             values[name] = name_unknown(name, "no_wear" if code == "no_wear" else code)
-    place = {name: values.pop(name) for name in ("shift", "tilt", "scale")}
+    place = {name: values.pop(name) for name in ("shift", "scale")}
     worn = depth > 3 * noise
     evidence = Evidence()
     if has_place:

@@ -3,15 +3,12 @@
 import friction_forms
 import numpy as np
 import pytest
-from scene_texts import GROWING, POINT, SHORT, SMALL_PATCH, TRIANGLE
-from scipy.special import erfc
+from scene_texts import GROWING, POINT, TRIANGLE
 
 from patchfem import SceneError, build, plan
 from patchfem.core import PatchfemError
-from patchfem.friction import surface_temperature_rise
 from patchfem.friction.bonds.temperature import growth_at_temperature
 from patchfem.runs.bench import bench
-from patchfem.runs.run import run
 from patchfem.scene import loads
 
 WARM = """[friction.temperature]
@@ -126,64 +123,3 @@ def test_exact_temperature_table_without_effect_is_reported(text, reason):
     scene = loads(POINT + text + table + CONSTANT_SPEED)
     assert [r for r in scene.remarks if "friction.temperature has no effect" in r and reason in r]
     assert scene.friction.temperature is None and loads(scene.resolved()).remarks == []
-
-
-# ---- the rise of the surface temperature
-
-
-@pytest.mark.parametrize(
-    "time, printed, tolerance", [(1 / 143, 0.05, 0.1), (1.0, 0.6, 0.1), (10.0, 1.8, 0.1)]
-)
-def test_exact_temperature_rise_of_half_space(time, printed, tolerance):
-    """The rise of a half-space under constant heat agrees with the printed value and the heat balance of the field.
-
-    The case is 0.2 W on 1 cm2 of titanium.
-    """
-    k = 7.0
-    c = 2.3e6
-    rise = surface_temperature_rise(2000.0, time, k, c)
-    assert rise == pytest.approx(printed, rel=tolerance)
-    diffusion_length = np.sqrt(k / c * time)
-    z = np.linspace(0, 14 * diffusion_length, 40_001)
-    s = z / (2 * diffusion_length)
-    field = 2 * 2000.0 * diffusion_length / k * (np.exp(-(s**2)) / np.sqrt(np.pi) - s * erfc(s))
-    assert field[0] == pytest.approx(rise, rel=1e-14)
-    assert np.trapezoid(c * field, z) == pytest.approx(2000.0 * time, rel=1e-6)
-
-
-def test_exact_temperature_rise_is_reported_with_table():
-    """The temperature rise is reported only for scenes with a temperature table, with the power that the run dissipates."""
-    text = SMALL_PATCH + GROWING + WARM + TRIANGLE
-    lines = [
-        w
-        for w in run(plan(loads(text)), estimate=False).warnings
-        if "the surface temperature would rise" in w
-    ]
-    assert len(lines) == 1 and "after one cycle" in lines[0] and "and keeps" in lines[0]
-    without_table = run(plan(loads(SMALL_PATCH + GROWING + TRIANGLE)), estimate=False)
-    assert not any("warm" in w for w in without_table.warnings)
-    power = (
-        np.trapezoid(without_table.response.force, without_table.response.slide)
-        / without_table.response.time[-1]
-    )
-    assert f"friction dissipates {power:.1g}"[:22] in lines[0]
-    rig = run(
-        plan(loads(SMALL_PATCH + GROWING + WARM + SHORT, sets=["accuracy.steps_per_cycle=100"])),
-        estimate=False,
-    )
-    power = rig.extra["book"]["friction"] / rig.response.time[-1]
-    assert (
-        any(
-            f"friction dissipates {power:.2g} W" in w and "after one cycle" in w
-            for w in rig.warnings
-        )
-        and power > 0
-    )
-    point_warnings = run(plan(loads(POINT + GROWING + WARM + TRIANGLE)), estimate=False).warnings
-    assert any("has no area" in w for w in point_warnings)
-    custom_material = text.replace(
-        SUBSTRATE, 'substrate = {young = "121 GPa", poisson = 0.32, density = "4370 kg/m^3"}'
-    )
-    assert any(
-        "conductivity" in w for w in run(plan(loads(custom_material)), estimate=False).warnings
-    )

@@ -34,7 +34,6 @@ neglect.
 """
 SIZES = {  # Constant -> description of the quantity that it bounds.
     "scene.toml_text.MAX_BYTES": "bytes of a scene file",
-    "scene.lines.MAX_KEY_PARTS": "number of parts, separated by dots, of a key",
     "scene.rules.contact.MAX_ELEMENTS": "number of elements along an interface that has element_size",
     "effects.MAX_COORDINATES": "number of masses or modes that a scene lists",
     "scene.assignments.MAX_RANGE_VALUES": "number of values in one range of a sweep",
@@ -62,8 +61,7 @@ Each strip of `[contact.strips]` is such a section; the strips lie side by side,
 
 **Small strains, linear elasticity.** The pieces are isotropic; plasticity, creep and heat are neglected. The coating is
 bonded, and the far faces are fixed to rigid holders. A note appears if strains exceed {MAX_SMALL_STRAIN:g}.
-The line of action of the load is assumed not to shift along x when a tall piece bends; a note
-appears if this shift would change the result noticeably.
+The line of action of the load is assumed not to shift along x when a tall piece bends.
 
 **No friction in the static patch.** The pressure is computed without shear stress at the interface. If both pieces have
 the same elastic constants, shear stress does not change the pressure. For pieces of different materials, the effect of

@@ -136,7 +136,6 @@ Case, blanks, hyphens and underscores do not matter in a name, except the case o
     def text(cls) -> str:
         """Return the page."""
         rows = []
-        heat_rows = []
         strength_rows = []
         for name, record in MATERIALS.items():
             quoted = f"`{name}`"
@@ -145,11 +144,6 @@ Case, blanks, hyphens and underscores do not matter in a name, except the case o
             if record.strength is not None:
                 strength = f"{record.strength.strength / 1e6:g}"
                 strength_rows.append((quoted, strength, record.strength.source))
-            if record.heat is not None:
-                heat = record.heat
-                heat_rows.append(
-                    (quoted, f"{heat.conductivity:g}", f"{heat.heat_capacity:g}", heat.source)
-                )
             others = ", ".join(record.other_names)
             values = (f"{number:g}" for number in numbers)
             rows.append((quoted, *values, strength, others, record.source))
@@ -163,7 +157,6 @@ Case, blanks, hyphens and underscores do not matter in a name, except the case o
                 "other names",
                 "source",
             ),
-            ("name", "conductivity [W/(m K)]", "heat capacity [J/(kg K)]", "source"),
             ("name", "yield strength [MPa]", "source"),
         )
         return (
@@ -171,11 +164,6 @@ Case, blanks, hyphens and underscores do not matter in a name, except the case o
                 [
                     cls.HEAD.strip(),
                     format_table(heads[0], rows),
-                    "## Heat",
-                    "If a scene has `[friction.temperature]` with an activation temperature above 0, a "
-                    "warning of the run gives the temperature rise of the faces due to friction, estimated "
-                    "from these values.",
-                    format_table(heads[1], heat_rows),
                     "## Strength",
                     "The pieces are assumed to be elastic. A note appears if the von Mises stress in a piece "
                     "exceeds the yield strength, that of the key `yield` or of this table. The stress is "
@@ -185,7 +173,7 @@ Case, blanks, hyphens and underscores do not matter in a name, except the case o
                     "none is given for cast iron, bronze and PTFE, because it depends on the grade. A "
                     "strength is the specified minimum for the condition stated in the source, unless the "
                     "source states otherwise; for another condition, give `yield` in the scene.",
-                    format_table(heads[2], strength_rows),
+                    format_table(heads[1], strength_rows),
                 ]
             )
             + "\n"

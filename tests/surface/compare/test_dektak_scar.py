@@ -46,7 +46,6 @@ def test_exact_scar_in_a_measured_trace(depth):
     values = found.values
     truths = {
         "shift": (-shift, 0.0),
-        "tilt": (3e-5, 0.0),
         "worn_area": (area, 0.0),
         "worn_depth_mean": (area / values["common_length"].value, 0.0),
         "worn_depth_max": (depth, 0.0),

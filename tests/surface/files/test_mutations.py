@@ -19,12 +19,6 @@ from patchfem.surface.areal import Areal
 
 Z = np.where(np.arange(24).reshape(4, 6) == 9, np.nan, write.draw_scan())
 POINTS = np.array([(x * 0.5, y * 0.75, Z[y, x] * 1e6) for y in range(4) for x in range(6)])
-RAW = Z.astype("<f8").tobytes()
-AXES = (
-    write.format_axis("CX", increment=5e-7)
-    + write.format_axis("CY", increment=7.5e-7)
-    + write.format_axis("CZ", "A")
-)
 LINES = "".join(f"{x:.2f},{y:.2f},{float(z)!r}\n" for x, y, z in POINTS)
 
 ROWS = "".join(f"{k}.5,0.{k * 37 % 500:03d}\n" for k in range(40))
@@ -44,12 +38,6 @@ SEEDS = {
     "npy": ("a.npy", write.make_npy(POINTS), bytes),
     "mat": ("a.mat", write.make_mat(False, points=POINTS), bytes),
     "mat packed": ("a.mat", write.make_mat(points=POINTS), bytes),
-    "x3p": ("a.x3p", write.heights_to_x3p(Z, "I", 1e-10), bytes),
-    "x3p main.xml": ("a.x3p", write.make_main_xml(AXES, write.format_matrix(6, 4) + write.format_link(RAW)),
-                     lambda xml: write.make_x3p(xml, RAW)),
-    "x3p heights": ("a.x3p", RAW, lambda raw: write.make_x3p(
-        write.make_main_xml(AXES, write.format_matrix(6, 4) + write.format_link(raw)), raw)),
-    "zip": ("a.zip", write.make_zip({"a.csv": f"x [um],y [um],z [um]\n{LINES}".encode()}), bytes),
 }  # fmt: skip
 
 

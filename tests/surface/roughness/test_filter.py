@@ -84,15 +84,11 @@ def test_exact_uneven_trace_is_resampled_with_notes():
 @pytest.mark.parametrize(
     "cutoff, message",
     [
-        (
-            3 * UM,
-            "1 sines: a cut-off of 3 um is shorter than 4 steps of 1 um; for this trace the cut-off must be at least "
-            "4 um",
-        ),
+        (3 * UM, "1 sines: a cut-off of 3 um is shorter than 4 steps of 1 um"),
         (
             1000 * UM,
-            "1 sines: the trace is 999 um long; half a cut-off of 1 mm is trimmed at each end, so the cut-off "
-            "must be shorter than the trace",
+            "1 sines: half a cut-off of 1 mm is trimmed at each end, so that it must be shorter than the length along x, "
+            "999 um",
         ),
         (np.nan, "a cut-off of"),
     ],

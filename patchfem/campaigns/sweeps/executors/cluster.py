@@ -4,25 +4,19 @@ The cluster is started on this machine, or belongs to a scheduler at a given add
 """
 
 import os
-import sys
 from collections.abc import Iterator
 from concurrent.futures import Future
 from contextlib import contextmanager
 from dataclasses import replace
-from functools import cache
-from hashlib import sha256
 from logging import CRITICAL, getLogger
 from pathlib import Path
 
-import numpy as np
-
-from .... import __version__
-from ....core import Missing, PatchfemError
+from ....core import Missing
 from ..sweep import WorkerData, compute_chunk
 from .pool import FutureExecutor
 
-_TLS = "DASK_DISTRIBUTED__COMM__TLS__"
-CERTIFICATES = f"{_TLS}CA_FILE, {_TLS}CLIENT__CERT and {_TLS}CLIENT__KEY"
+# Software whose versions must be the same on all machines.
+COMPARED_VERSIONS = ("patchfem", "numpy", "python")
 CONNECT_TIMEOUT = "10s"  # Longest time to wait for a connection to the scheduler.
 
 
@@ -40,8 +34,6 @@ class Cluster(FutureExecutor):
     ------
     Missing
         If Dask is not installed, no scheduler answers, or a worker has another version.
-    PatchfemError
-        If the certificates for TLS are missing.
     """
 
     chunks_per_worker = (
@@ -85,30 +77,36 @@ class Cluster(FutureExecutor):
         loggers = (getLogger("tornado"), getLogger("asyncio"))
         for logger in (*getLogger("distributed").handlers, *loggers):
             logger.setLevel(CRITICAL)
-        tls = distributed.Security().get_connection_args("client")["ssl_context"] is not None
-        if address.startswith("tls:") and not tls:
-            raise PatchfemError(
-                f"{self.name}: TLS needs certificates; give the paths of their files in the "
-                f"environment variables {CERTIFICATES}"
-            )
         try:
             self.client = distributed.Client(
                 self.local_cluster or address, timeout=CONNECT_TIMEOUT, set_as_default=False
             )
-        except (OSError, TimeoutError, ValueError) as error:
+        except (OSError, TimeoutError, ValueError, TypeError) as error:
             raise Missing(f"{self.name}: no scheduler answers at this address ({error})") from None
-        versions = self.client.run(environment_versions, on_error="return")
-        self.workers = max(len(versions), 1)
-        for worker_versions in versions.values():
-            if worker_versions != environment_versions():
-                self.client.close()
-                raise self._worker_error(worker_versions, environment_versions())
+        versions = self.client.get_versions(packages=["patchfem"])
+        self.workers = max(len(versions["workers"]), 1)
+        try:
+            for worker in versions["workers"].values():
+                self._require_same_versions(versions["client"], worker)
+        except Missing:
+            self.end()
+            raise
+
+    def _require_same_versions(self, here: dict, worker: dict) -> None:
+        """Raise Missing if a worker has other versions than this machine; both are answers of Dask."""
+        for name in COMPARED_VERSIONS:
+            own, other = ({**node["host"], **node["packages"]}[name] for node in (here, worker))
+            if own != other:
+                raise Missing(
+                    f"{self.name}: a worker has {name} {other}, but this machine has {name} {own}; install the same version "
+                    "on all machines"
+                )
 
     def begin(self, work: WorkerData, *, is_silent: bool) -> None:
         """Store the data of the sweep on the cluster; raise Missing if the connection to the scheduler is lost."""
-        path = work.sweep_scene.path
-        self.origin = (environment_versions(work), path)
-        scene = replace(work.sweep_scene, path=Path(os.path.abspath(path)))
+        scene = work.sweep_scene
+        self.common_data = scene.hash_common_data()
+        scene = replace(scene, path=Path(os.path.abspath(scene.path)))
         # Dask repeats this task if the workers that store its result die.
         with self._report_lost_connection():
             self.shared = self.client.submit(
@@ -119,7 +117,7 @@ class Cluster(FutureExecutor):
     def submit(self, chunk: list) -> Future:
         """Submit a chunk; raise Missing if the connection to the scheduler is lost."""
         with self._report_lost_connection():
-            return self.executor.submit(_compute_on_worker, self.shared, chunk, self.origin)
+            return self.executor.submit(_compute_on_worker, self.shared, chunk, self.common_data)
 
     @contextmanager
     def _report_lost_connection(self) -> Iterator[None]:
@@ -131,66 +129,11 @@ class Cluster(FutureExecutor):
         except ClosedClientError:
             raise self.make_connection_error() from None
 
-    def receive(self, future: Future) -> tuple:
-        """Return the result of a chunk; raise Missing if its worker has other versions or files."""
-        answer = super().receive(future)
-        if isinstance(answer, dict):
-            raise self._worker_error(answer, self.origin[0])
-        return answer
-
     def end(self) -> None:
         """Close the connection, and the cluster if it was started here."""
         self.client.close()
         if self.local_cluster is not None:
             self.local_cluster.close()
-
-    def _worker_error(self, on_worker: dict | Exception, local: dict) -> Missing:
-        """Return the error for a worker whose software or files do not match.
-
-        on_worker: versions of the worker, or an exception instead; local: versions of this
-        machine.
-        """
-        if isinstance(on_worker, Exception):
-            reason = f"{type(on_worker).__name__}: {on_worker}"
-            return Missing(
-                f"{self.name}: patchfem {local['patchfem']} is not installed on a worker ({reason})"
-            )
-        names = [name for name in local if on_worker[name] != local[name] and name != "files"]
-        if names:
-            other_versions = ", ".join(f"{name} {on_worker[name]}" for name in names)
-            own_versions = ", ".join(f"{name} {local[name]}" for name in names)
-            return Missing(
-                f"{self.name}: a worker has {other_versions}, but this machine has {own_versions}; install "
-                "the same version on all machines"
-            )
-        return Missing(
-            f"{self.name}: the files named in the scene differ between a worker and this machine; put the "
-            "files where all machines can read them"
-        )
-
-
-@cache
-def _hash_source_files() -> str:
-    """Return a hash of the source files of this package."""
-    root = Path(__file__).parents[3]
-    paths = root.rglob("*.py")
-    texts = [(path.relative_to(root).as_posix(), path.read_bytes()) for path in paths]
-    return sha256(repr(sorted(texts)).encode()).hexdigest()[:8]
-
-
-def environment_versions(work: WorkerData | None = None) -> dict:
-    """Return the versions and file hashes that must be equal on a worker and in this process.
-
-    Returns a dict of versions by name; `files` is the hash of the scene and the files that it names.
-    """
-    versions = {
-        "patchfem": f"{__version__} (sources {_hash_source_files()})",
-        "numpy": np.__version__,
-        "python": "{}.{}".format(*sys.version_info),
-    }
-    if work is not None:
-        versions["files"] = work.sweep_scene.hash_common_data()
-    return versions
 
 
 def _identity(work: WorkerData) -> WorkerData:
@@ -198,24 +141,15 @@ def _identity(work: WorkerData) -> WorkerData:
     return work
 
 
-def _compute_on_worker(work: WorkerData, chunk: list, origin: tuple) -> tuple | dict:
-    """Compute a chunk on a Dask worker; return (CPU time [s], results).
+def _compute_on_worker(work: WorkerData, chunk: list[int], common_data: str) -> tuple:
+    """Compute a chunk of case numbers on a Dask worker; return the result of `compute_chunk`.
 
-    If the worker has other versions or files, its `environment_versions` are returned instead.
-
-    Parameters
-    ----------
-    work : WorkerData
-    chunk : list
-        Case numbers.
-    origin : tuple
-        `environment_versions` and scene path of the process that started the sweep; error messages
-        contain this path.
+    Raises Missing if the files of the scene differ from those of the process that started the sweep, whose hash is
+    `common_data`.
     """
-    versions, path = origin
-    worker_versions = environment_versions(work)
-    if worker_versions != versions:
-        return worker_versions
-    folder = f"{work.sweep_scene.path.parent}{os.sep}"
-    origin_folder = str(path.parent / "_")[:-1]
-    return compute_chunk(work, chunk, rewrite=lambda text: text.replace(folder, origin_folder))
+    if work.sweep_scene.hash_common_data() != common_data:
+        raise Missing(
+            "--executor dask: the files named in the scene differ between a worker and this machine; put them where all "
+            "machines can read them"
+        )
+    return compute_chunk(work, chunk)

@@ -81,10 +81,12 @@ class FutureExecutor:
     def receive(self, future: Future) -> tuple:
         """Return seconds and answer of a finished future; 0 s and a WorkerDeath if its worker died or failed.
 
-        Raises Missing if the connection to the workers is lost.
+        Raises Missing if the connection to the workers is lost, or if a worker lacks something.
         """
         try:
             return future.result()
+        except Missing:
+            raise
         except CancelledError:
             raise self.make_connection_error() from None
         except Exception as error:

@@ -4,13 +4,13 @@ In: a Model, its Numerics and its Patch. Out: the Solution under a sine, and the
 frequency with its folds (`dynamics.harmonic`).
 """
 
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from time import perf_counter
 from typing import NamedTuple
 
 import numpy as np
 
-from ....core import IntegratedMeasures, NotConverged, Outcome, SineDrive
+from ....core import IntegratedMeasures, NotConverged, Outcome, Response, SineDrive
 from ....dynamics.harmonic import branch as branches
 from ....dynamics.harmonic.forces import LawGroup
 from ....dynamics.harmonic.laws import Interlock, Spring
@@ -19,7 +19,6 @@ from ....dynamics.harmonic.motion import find_regime as balanced_regime
 from ....dynamics.harmonic.stability import add_stability
 from ....dynamics.harmonic.steady import find_steady_motion as periodic_point
 from ....dynamics.harmonic.steady import refine_steady_motion
-from ....dynamics.integrated import EngineResult
 from ....formatting import format_length, format_quantity
 from ....response.errors import finer_errors
 from ....response.measures import compute_peak
@@ -45,6 +44,26 @@ REASONS_OF_END = {
 }
 # Number of samples per cycle from which the measures of a steady motion are computed.
 SAMPLES_PER_CYCLE = 4096
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class CycleRun:
+    """One cycle of a motion from harmonic balance as a run that is evaluated.
+
+    - response, window: histories of the cycle
+    - extremes: (1, 2) smallest and largest output [m]
+    - phasors: (1,) phasor of the output at the drive frequency [m]
+    - ledger: energies [J] by name
+    """
+
+    response: Response
+    window: Response
+    extremes: np.ndarray
+    phasors: np.ndarray
+    ledger: dict
+    outcome: Outcome | None = None
+    message: str = ""
+    snapshots: list = field(default_factory=list)
 
 
 class BalanceEvaluator(RunEvaluator):
@@ -317,7 +336,7 @@ class BalanceFinder:
         top = motion.amplitude(self.modes.output)
         middle = (response.output.max() + response.output.min()) / 2
         extremes = np.array([[middle - top, middle + top]])
-        run = EngineResult(response, response, extremes, np.zeros(1), book)
+        run = CycleRun(response, response, extremes, np.zeros(1), book)
         evaluator = BalanceEvaluator(self.model, self.numerics, self.patch, steps=samples)
         evaluator.turns = motion.find_reversals()
         return CycleMeasures(evaluator.evaluate_measures(run, drive), response, book)

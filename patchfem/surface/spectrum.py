@@ -1,4 +1,4 @@
-"""Fraction of the height of a trace that lies in waves too short for the elements."""
+"""Spectrum of a trace: its density, and the waves that are too short for the elements."""
 
 from typing import NamedTuple
 
@@ -8,18 +8,35 @@ from ..core import PatchfemError
 from ..formatting import format_length
 from .profile import Profile, level, resample_evenly
 
+BAND = (60e-6, 110e-6)  # wavelengths [m] of `band_amplitude`: the 80 um waves of the 1985 report
+N_SMOOTHED = 9  # number of neighbouring waves whose mean is the density at their middle
 ELEMENTS_PER_WAVE = 2  # number of elements per wave; nodes cannot represent a shorter wave
 # Fraction of the rms height in waves that are too short for the elements,
 # above which a warning is given.
 MAX_LOST = 0.1
 NEGLIGIBLE_LOST = MAX_LOST / 10  # same fraction, below which the elements represent a trace
+ELEMENTS_PER_CURVE = (
+    4  # number of elements on a wave that a smooth curve through the nodes represents
+)
 
 
 class WaveSpectrum(NamedTuple):
-    """Mean squares of the waves of a trace by wavelength, longest first."""
+    """Mean squares (n,) [m2] of the waves (n,) [m] of a trace, longest first; waves[0] is twice its length."""
 
     waves: np.ndarray
     power: np.ndarray
+
+    @property
+    def density(self) -> np.ndarray:
+        """One-sided power spectral density (n,) [m3], smoothed."""
+        from scipy.ndimage import uniform_filter1d
+
+        return uniform_filter1d(self.power, N_SMOOTHED, mode="nearest") * self.waves[0]
+
+    def measure_band(self) -> float:
+        """Return the amplitude [m] of the sine that has the mean square of the waves of `BAND`."""
+        inside = (self.waves >= BAND[0]) & (self.waves <= BAND[1])
+        return float(np.sqrt(2 * self.power[inside].sum()))
 
     def lost_fraction(self, length: float) -> float:
         """Return the fraction of the rms height in waves shorter than a given length [m]."""
@@ -29,14 +46,9 @@ class WaveSpectrum(NamedTuple):
 
     def element_length(self, kept: float) -> float:
         """Return the longest element [m] that resolves a given fraction of the rms height."""
-        total = self.power.sum()
-        if not 0 < kept < 1:
-            raise PatchfemError(
-                f"the share of the height to keep must lie between 0 and 1, but is {kept:g}"
-            )
-        if total == 0:
-            return np.inf
-        lost = np.cumsum(self.power[::-1])[::-1] / total  # in this wave and all shorter ones
+        lost = (
+            np.cumsum(self.power[::-1])[::-1] / self.power.sum()
+        )  # in this wave and all shorter ones
         needed = np.flatnonzero(lost > (1 - kept) ** 2)
         return float(self.waves[needed[-1]]) / ELEMENTS_PER_WAVE
 
@@ -67,12 +79,13 @@ class WaveSpectrum(NamedTuple):
         return float(self.waves[is_resolved].min(initial=np.inf))
 
 
-def wave_spectrum(profile: Profile) -> WaveSpectrum:
+def wave_spectrum(profile: Profile, *, is_tapered: bool = False) -> WaveSpectrum:
     """Compute the spectrum of a levelled trace by a discrete cosine transform.
 
     The mirror image of the trace continues it without a jump, so the ends add no false short waves,
     as those of a Fourier series do. The mean squares add up to that of the trace by the trapezoidal
-    rule. Uneven samples are first resampled. Raises PatchfemError for missing heights.
+    rule. With the window of Hann, whose mean square is 3/8, the ends have no kinks either, which blur a single wave, but
+    count less than the middle. Uneven samples are first resampled. Raises PatchfemError for missing heights.
     """
     from scipy.fft import dct
 
@@ -82,73 +95,27 @@ def wave_spectrum(profile: Profile) -> WaveSpectrum:
         )
     z = level(resample_evenly(profile)).z
     count = z.size - 1
+    if is_tapered:
+        z = z * np.sqrt(8 / 3) * np.sin(np.pi * np.arange(z.size) / count) ** 2
     power = (dct(z, type=1) / count)[1:] ** 2 / 2
     power[-1] /= 2  # the transform counts the wave of two samples twice
     return WaveSpectrum(2 * profile.length / np.arange(1, count + 1), power)
 
 
-def fine_fraction(profile: Profile, length: float) -> float:
-    """Return the fraction of the rms height of a trace in waves shorter than a length [m]."""
-    return wave_spectrum(profile).lost_fraction(length)
-
-
-def unrepresented_fraction(profile: Profile, element: float) -> float:
-    """Return the fraction of the rms height of a trace that elements cannot represent.
-
-    It is the rms difference between the trace and the cubic spline through its heights at the nodes.
-    Six elements on a wave represent 99 % of it, two elements hardly any of it.
-
-    Parameters
-    ----------
-    profile : Profile
-    element : float [m]
-
-    Returns
-    -------
-    float
-    """
-    from scipy.interpolate import CubicSpline
-
-    samples = level(resample_evenly(profile))
-    nodes = np.linspace(samples.x[0], samples.x[-1], max(4, round(samples.length / element) + 1))
-    curve = CubicSpline(nodes, CubicSpline(samples.x, samples.z)(nodes))
-    height = np.std(samples.z)
-    return float(np.std(samples.z - curve(samples.x)) / height) if height > 0 else 0.0
-
-
-def describe_lost_waves(profile: Profile, element: float, max_lost: float = MAX_LOST) -> str | None:
-    """Return a warning that elements are too long to resolve a trace, or None if they are not.
-
-    Parameters
-    ----------
-    profile : Profile
-    element : float [m]
-    max_lost : float
-        Fraction of the height that may be lost.
-
-    Returns
-    -------
-    str or None
-    """
+def describe_lost_waves(profile: Profile, element: float) -> str | None:
+    """Return a warning that elements [m] are too long to resolve a trace, or None if they are not."""
     spectrum = wave_spectrum(profile)
     length = ELEMENTS_PER_WAVE * element
     lost = spectrum.lost_fraction(length)
-    if lost <= max_lost:
+    if lost <= MAX_LOST:
         return None
-    sufficient, better = (
-        _round_down(spectrum.element_length(1 - part)) for part in (max_lost, max_lost / 10)
-    )
+    sufficient = spectrum.element_length(1 - MAX_LOST)
+    # It is rounded down to two digits, since a larger one would not suffice.
+    unit = 10.0 ** (np.floor(np.log10(sufficient)) - 1)
+    sufficient = float(np.floor(sufficient / unit * (1 + 1e-12)) * unit)
     return (
         f"{profile.source} has {100 * lost:.0f} % of its rms height in waves shorter than "
         f"{ELEMENTS_PER_WAVE} elements ({format_length(length)}), which the mesh cannot resolve: add "
         "[contact.asperities], or set element_size = "
-        f'"{format_length(sufficient)}", which keeps {100 - 100 * max_lost:g} % of the height '
-        f'("{format_length(better)}" keeps '
-        f"{100 - 10 * max_lost:g} %)"
+        f'"{format_length(sufficient)}", which keeps {100 - 100 * MAX_LOST:g} % of the height'
     )
-
-
-def _round_down(length: float) -> float:
-    """Round a suggested element size down to two digits, since a larger one would not suffice."""
-    unit = 10.0 ** (np.floor(np.log10(length)) - 1)
-    return float(np.floor(length / unit * (1 + 1e-12)) * unit)

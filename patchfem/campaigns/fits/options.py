@@ -1,0 +1,26 @@
+"""Options of a fit, in a module that loads no optimizer, so that the Python interface can name them."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, slots=True)
+class FitOptions:
+    """Options of a fit, besides the keys that are fitted.
+
+    Each kind of fit refuses the options that it does not have.
+
+    Attributes
+    ----------
+    hold : sequence of str
+        Rows to predict without fitting them, such as "frequency=135 Hz,150 Hz"; for a loop or rows.
+    leave_out : str
+        For rows: a column; each of its values is left out in turn.
+    starts : int or None
+        For rows or a curve of frequency and damping against amplitude: number of starting points of the search; the best
+        result is used. By default 8, or 6 for a curve.
+    """
+
+    hold: Sequence[str] = ()
+    leave_out: str = ""
+    starts: int | None = None

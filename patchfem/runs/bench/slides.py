@@ -1,0 +1,416 @@
+"""Response of an interface to the displacement of a bench: in closed form, or by contact points.
+
+In: a `SlideTask`. Out: `SlideHistories`. The force of a law without memory is a fraction of the friction limit, which
+depends only on the direction or the speed of the motion. All other laws are contact points that follow the path
+(`points.slides`). Pieces that are rigid in shear give all points the same displacement; under a pressure that moves with
+the upper piece, one point under the whole load then has the resultant force.
+"""
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+
+from ...core import NotConverged
+from ...effects import law_has_trait
+from ...friction.laws import elastic_plastic
+from ...friction.record import make_law
+from ...points import contacts, slides
+from ...slip import fields
+from ..patch import jenkins_elements
+from . import averaged_law, shear
+from .engine import BenchEngine, BondListGuard, Method, has_changing_pressure
+
+N_GAUSS_POINTS = 8  # Number of Gauss points per time step along the flank of a groove.
+# Largest ratio of created to dissipated energy at which the created energy counts as round-off.
+ROUND_OFF_FRACTION = 1e-13
+
+
+class SlideHistories(NamedTuple):
+    """Histories of force, slip and energies of a bench run, at k samples.
+
+    - force, load (k,): friction force and normal load [N].
+    - slip (k,): irreversible part of the displacement [m].
+    - ledger (4, k): cumulative work, stored energy, cumulative dissipated and created energy [J].
+    - tau, local (f, m): traction [Pa] and slip [m] at the nodes in each frame.
+    """
+
+    force: np.ndarray
+    load: np.ndarray
+    slip: np.ndarray
+    ledger: np.ndarray
+    tau: np.ndarray
+    local: np.ndarray
+
+
+class SlideTask(NamedTuple):
+    """Prescribed displacement of an interface.
+
+    - model, patch: Model, and its Patch or None for a single point.
+    - time, slide (k,): samples of time [s] and relative displacement [m].
+    - frames (f,): indices of the samples at which fields are stored.
+    - engine: method of the friction force.
+    - say, progress: callbacks for messages about compilation and for the completed fraction, or None.
+    """
+
+    model: object
+    patch: object
+    time: np.ndarray
+    slide: np.ndarray
+    frames: np.ndarray
+    engine: BenchEngine
+    say: Callable | None = None
+    progress: Callable | None = None
+
+    @property
+    def weight(self) -> np.ndarray:
+        """Areas (m,) [m2] of the interface nodes; 1 for a single point."""
+        return np.ones(1) if self.patch is None else self.patch.pieces.interface.weight
+
+    def evaluate_pressure(self, samples) -> np.ndarray:
+        """Return the pressures (n, m) [Pa] at the interface nodes, or the loads (n, 1) [N] of a point, at n samples."""
+        model = self.model
+        if model.load_varies:
+            return model.point.evaluate(self.time[samples])[:, None]
+        if self.patch is None:
+            return np.full((len(samples), 1), model.point.load)
+        x = self.patch.x
+        sigma = self.patch.pressure.sigma_n
+        if model.side != "lower":
+            return np.repeat(sigma[None], len(samples), axis=0)
+        # The upper piece is displaced over the pressure, which ends where the lower piece does.
+        places = x + self.slide[samples, None]
+        return np.interp(places, x, sigma, left=0.0, right=0.0)
+
+    def compute_loads(self) -> np.ndarray:
+        """Return the normal load (k,) [N] at each sample."""
+        if not has_changing_pressure(self.model):
+            return np.full(self.slide.size, float(self.evaluate_pressure([0])[0] @ self.weight))
+        blocks = np.array_split(np.arange(self.slide.size), 1 + self.slide.size // slides.BLOCK)
+        return np.concatenate([self.evaluate_pressure(block) @ self.weight for block in blocks])
+
+
+def follow_path(task: SlideTask) -> SlideHistories:
+    """Compute the friction histories of a bench run.
+
+    Raises
+    ------
+    Missing
+        If lists of bonds become too long.
+    NotConverged
+        If the force of a step has too large an error.
+    """
+    if task.engine.method is not Method.CLOSED:
+        return _follow_by_points(task)
+    histories = _climb_grooves(task) if task.model.grooves is not None else _slide_freely(task)
+    if task.progress is not None:
+        task.progress(1.0)
+    return histories
+
+
+# ---- laws without memory
+
+
+def _slide_freely(task: SlideTask) -> SlideHistories:
+    """Compute the histories of a law without memory: the force phi L of the step that ends at a sample.
+
+    L is the friction limit under the pressure at the sample, and phi its fraction, from the direction or the speed of
+    the step. The work of a step has the mean limit of both ends, and is dissipated.
+    """
+    friction = task.model.friction
+    moves = np.diff(task.slide)
+    fraction = _find_limit_fraction(task.model, moves, np.diff(task.time))
+    limits = _FrictionLimits(task)
+    begin, end = limits.compute_resultants(np.sign(moves))
+    force = np.append(0.0, fraction * end)
+    work = fraction * (begin + end) / 2 * moves
+
+    # At rest, a law that sticks keeps its force as far as the limit allows.
+    rests = np.flatnonzero(moves == 0) if law_has_trait(friction.law, "set-valued") else ()
+    for sample in rests:
+        limit = abs(force[sample])
+        if limit > 0 and task.model.load_varies:
+            limit = limits.compute_resultant(sample + 1, np.sign(force[sample]))
+        force[sample + 1] = np.clip(force[sample], -limit, limit)
+    tau = [limits.distribute(sample, force[sample]) for sample in task.frames]
+
+    # A force at the end of a rest is that of the motion that begins there.
+    load = task.compute_loads()
+    for sample, sign in find_rest_ends(task.model, task.slide).items():
+        force[sample] = sign * friction.static * load[sample]
+        for frame in np.flatnonzero(task.frames == sample):
+            tau[frame] = sign * friction.static * task.evaluate_pressure([sample])[0]
+    shape = (task.frames.size, task.weight.size)
+    local = np.repeat(task.slide[task.frames, None], shape[1], axis=1)
+    ledger = stack_energies(work, np.zeros(force.size), work)
+    return SlideHistories(force, load, task.slide, ledger, np.reshape(tau, shape), local)
+
+
+def _find_limit_fraction(model, moves, durations) -> np.ndarray:
+    """Return the ratio (n,) of the friction force to its limit for displacements (n,) [m] in durations (n,) [s]."""
+    if law_has_trait(model.friction.law, "set-valued"):
+        return np.sign(moves)
+    return make_law(model.friction, 1.0).limit_fraction(moves, durations)
+
+
+class _FrictionLimits:
+    """Friction limits of a law without memory, at the samples of a path.
+
+    Parameters
+    ----------
+    task : SlideTask
+    """
+
+    def __init__(self, task: SlideTask):
+        friction = task.model.friction
+        self.task = task
+        self.coefficient = friction.static if friction.kinetic is None else friction.kinetic
+        self.changes = has_changing_pressure(task.model)
+        self._resultants: dict = {}
+
+    def compute_tractions(self, sample: int, direction: float) -> np.ndarray:
+        """Return the largest tractions (m,) [Pa] against a motion to +x (`direction` 1) or to -x (-1)."""
+        task = self.task
+        sigma = task.evaluate_pressure([sample])[0]
+        if task.patch is not None and law_has_trait(task.model.friction.law, "averaged"):
+            offset = task.slide[sample] if task.model.side == "lower" else 0.0
+            average = averaged_law.average_behind(task.model, task.patch, direction, offset)
+            sigma = np.where(sigma > 0, average, 0.0)
+        return self.coefficient * sigma
+
+    def compute_resultant(self, sample: int, direction: float) -> float:
+        """Return the largest force [N] against a motion to +x (`direction` 1) or to -x (-1)."""
+        key = (sample if self.changes else 0, direction)
+        if key not in self._resultants:
+            self._resultants[key] = float(self.compute_tractions(*key) @ self.task.weight)
+        return self._resultants[key]
+
+    def compute_resultants(self, directions) -> tuple:
+        """Return the largest forces (n,) [N] at the begin and at the end of each of n steps of given directions (n,)."""
+        if not self.changes:
+            sizes = [self.compute_resultant(0, direction) for direction in (-1.0, 1.0)]
+            limits = np.where(directions > 0, sizes[1], sizes[0])
+            return limits, limits
+        if not law_has_trait(self.task.model.friction.law, "averaged"):
+            limits = self.coefficient * self.task.compute_loads()
+            return limits[:-1], limits[1:]
+        steps = list(enumerate(directions.tolist()))
+        begin = [self.compute_resultant(step, direction) for step, direction in steps]
+        end = [self.compute_resultant(step + 1, direction) for step, direction in steps]
+        return np.array(begin), np.array(end)
+
+    def distribute(self, sample: int, force: float) -> np.ndarray:
+        """Return the tractions (m,) [Pa] of a force [N], in proportion to the friction limits."""
+        direction = 1.0 if force >= 0 else -1.0
+        limit = self.compute_resultant(sample, direction)
+        ratio = force / limit if limit > 0 else 0.0
+        return ratio * self.compute_tractions(sample, direction)
+
+
+def find_rest_ends(model, slide) -> dict:
+    """Return the samples at which sliding starts from rest, with the sign of the motion.
+
+    These are the first sample of the path and the last sample of each rest. The dict is empty
+    unless the static Coulomb coefficient exceeds the kinetic one.
+
+    Parameters
+    ----------
+    model : Model
+    slide : (k,) array
+        Relative displacement [m].
+    """
+    f = model.friction
+    if not law_has_trait(f.law, "set-valued") or f.kinetic is None or not f.kinetic < f.static:
+        return {}
+    moves = np.sign(np.diff(slide))
+    ends = np.flatnonzero((moves != 0) & np.append(True, moves[:-1] == 0))
+    return {int(k): float(moves[k]) for k in ends}
+
+
+def _climb_grooves(task: SlideTask) -> SlideHistories:
+    """Compute the histories of a law without memory on the flanks of grooves, without inertia.
+
+    The force is N (t + phi)/(1 - phi t), with the slope t and the friction ratio phi = f/R along the flank. The work of
+    lifting the load is stored energy; the friction work along the flank is dissipated.
+    """
+    model = task.model
+    slide = task.slide
+    grooves = model.grooves
+    friction = model.friction
+    load = task.compute_loads()
+    moves = np.diff(slide)
+    durations = np.diff(task.time)
+    if law_has_trait(friction.law, "set-valued"):
+        kinetic = friction.static if friction.kinetic is None else friction.kinetic
+        last = np.maximum.accumulate(np.where(moves != 0, np.arange(moves.size), -1))
+        direction = np.append(0.0, np.where(last < 0, 0.0, np.sign(moves)[last]))
+        ratio = grooves.force_ratio(slide, direction, kinetic)
+        lowest = grooves.force_ratio(slide[0], -1.0, friction.static)
+        highest = grooves.force_ratio(slide[0], 1.0, friction.static)
+        # Before the motion starts, the friction on the flank balances the load as far as its limit allows.
+        ratio[direction == 0] = np.clip(0.0, lowest, highest)
+        loss = load[1:] * grooves.friction_loss(slide[:-1], slide[1:], kinetic)
+    else:
+        speed = np.divide(moves, durations, out=np.zeros_like(moves), where=durations > 0)
+
+        def find_flank(places, speed) -> tuple:
+            """Return the slope t of the flank and the friction ratio phi along it, at places [m] and speeds [m/s]."""
+            t = grooves.slope(places)
+            fraction = _find_limit_fraction(model, np.sqrt(1 + t**2) * speed, 1.0)
+            return t, friction.static * fraction
+
+        def find_loss(places) -> np.ndarray:
+            """Return the dissipated energy per displacement [N] in each step, at places (k - 1,) [m]."""
+            t, phi = find_flank(places, speed)
+            return load[1:] * phi * (1 + t**2) / (1 - phi * t)
+
+        t, phi = find_flank(slide, np.append(0.0, speed))
+        ratio = (t + phi) / (1 - phi * t)
+        loss = integrate_steps(slide, find_loss)
+
+    for sample, sign in find_rest_ends(model, slide).items():
+        ratio[sample] = grooves.force_ratio(slide[sample], sign, friction.static)
+    sigma = task.evaluate_pressure([0])
+    local = np.repeat(slide[task.frames, None], sigma.size, axis=1)
+    rise = load[1:] * grooves.height_difference(slide[:-1], slide[1:])
+    ledger = stack_energies(rise + loss, load * grooves.height(slide), loss)
+    return SlideHistories(
+        load * ratio, load, slide, ledger, ratio[task.frames, None] * sigma, local
+    )
+
+
+def integrate_steps(slide, integrand) -> np.ndarray:
+    """Integrate a function of the displacement over every time step by Gauss quadrature.
+
+    Parameters
+    ----------
+    slide : (k,)
+        [m].
+    integrand : callable
+        Function of the displacements (k - 1,) [m].
+    """
+    move = np.diff(slide)
+    out = np.zeros_like(move)
+    for place, weight in zip(*np.polynomial.legendre.leggauss(N_GAUSS_POINTS)):
+        out += 0.5 * weight * integrand(slide[:-1] + 0.5 * (1 + place) * move) * move
+    return out
+
+
+def stack_energies(work, stored, losses) -> np.ndarray:
+    """Return work, stored, dissipated and created energy (4, k) [J] at k samples.
+
+    Parameters
+    ----------
+    work : (k - 1,)
+        Friction work of each step [J].
+    stored : (k,)
+        Stored energy [J].
+    losses : (k - 1,)
+        Energy that is dissipated in each step [J]; below 0 if it is created.
+    """
+    steps = np.stack([work, np.maximum(losses, 0.0), np.maximum(-losses, 0.0)])
+    work, dissipated, created = np.pad(np.cumsum(steps, axis=1), ((0, 0), (1, 0)))
+    if created[-1] <= ROUND_OFF_FRACTION * dissipated[-1]:
+        created = np.zeros(created.size)
+    return np.stack([work, stored, dissipated, created])
+
+
+# ---- contact points
+
+
+def _follow_by_points(task: SlideTask) -> SlideHistories:
+    """Compute the histories of a law with memory by contact points along the path."""
+    model = task.model
+    patch = task.patch
+    contact, jenkins_set = _make_contact(task)
+    report = task.progress if contact.bond_sum is None else BondListGuard(task.progress)
+    motion = slides.follow(contact, task.time, task.slide, task.frames, task.say, report)
+    if motion.n_unsolved:
+        raise NotConverged(
+            f"in {motion.n_unsolved} time steps of the prescribed slide the friction force has an error "
+            "above the limit; raise accuracy.steps_per_cycle",
+            "",
+        )
+    load = task.compute_loads()
+    slip = motion.slip
+    frames = task.frames
+    if model.partial_slip and model.grooves is not None:
+        tau, local = shear.compute_groove_fields(patch, contact, motion.snapshots)
+    elif jenkins_set is not None:
+        states = [(one.slide, one.stretch) for one in motion.snapshots]
+        length = make_law(model.friction, 1.0).element(1.0).length
+        tau, local = fields.element_fields(patch, jenkins_set, states, length)
+    elif model.partial_slip or model.side == "lower":
+        tau, local = fields.point_fields(patch, contact.reduction, motion.snapshots)
+    else:
+        ratio = np.divide(motion.force, load, out=np.zeros_like(load), where=load > 0)[frames]
+        sigma = task.evaluate_pressure(frames)
+        tau = ratio[:, None] * sigma
+        local = np.where(sigma > 0, slip[frames, None], task.slide[frames, None])
+
+    # The stretch of bonds on rigid pieces is that of their force, at most one bond length.
+    has_bonds = law_has_trait(model.friction.law, "bonds") and model.grooves is None
+    if not model.partial_slip and (has_bonds or model.load_varies):
+        length = model.friction.bond_length or 0.0
+        slip = task.slide - np.clip(_find_stretch(task, motion.force, load), -length, length)
+        stretch = _find_stretch(task, tau, task.evaluate_pressure(frames))
+        local = task.slide[frames, None] - stretch
+    work = motion.mean * np.diff(task.slide)
+    ledger = stack_energies(work, motion.stored, motion.losses)
+    return SlideHistories(motion.force, load, slip, ledger, tau, local)
+
+
+def _find_stretch(task: SlideTask, force, load) -> np.ndarray:
+    """Return the elastic stretch [m] of springs of one bond length under forces and normal loads, or stresses."""
+    limit = task.model.friction.static * load
+    share = np.divide(force, limit, out=np.zeros_like(force), where=limit > 0)
+    return (task.model.friction.bond_length or 0.0) * share
+
+
+def _make_contact(task: SlideTask) -> tuple:
+    """Return the contact points of a bench, and the JenkinsSet of pieces that are replaced by parallel elements, or None."""
+    model = task.model
+    patch = task.patch
+    friction = model.friction
+    row = np.zeros(0)
+    load = float(task.evaluate_pressure([0])[0] @ task.weight)
+    if model.grooves is not None:
+        modes = model.accuracy.shear_modes
+        return shear.make_flank_contact(model, load, patch, modes), None
+    if law_has_trait(friction.law, "bonds"):
+        return _make_bond_contact(task, load, row), None
+    if model.load_varies:
+        point = model.point
+        return contacts.make_pressed_contact(friction, load, row, load=point.evaluate), None
+    if model.partial_slip:
+        length = make_law(friction, 1.0).element(1.0).length
+        jenkins_set = jenkins_elements.elements(patch, friction.static, length)
+        springs = jenkins_set.stiffness, jenkins_set.yield_displacement
+        if task.engine.springs is not None:
+            springs = task.engine.springs(*springs)
+        return contacts.make_parallel_contact(*springs, row), jenkins_set
+    element = make_law(friction, load).element(load)
+    if task.engine.springs is not None:
+        springs = task.engine.springs(*np.split(element.numbers[2:], 2))
+        element = elastic_plastic.parallel_element(*springs)
+    return contacts.make_contact([element], [row]), None
+
+
+def _make_bond_contact(task: SlideTask, load: float, row) -> "contacts.Contact":
+    """Return the points of bonds: at the nodes, at the points of shear modes, or a single one under a load [N]."""
+    model = task.model
+    patch = task.patch
+    law = model.bonds
+    bond_sum = shear.make_bond_sum(law, task.engine.choice)
+    if model.load_varies:
+        point = model.point
+        return contacts.make_pressed_contact(law, load, row, None, bond_sum, load=point.evaluate)
+    modes = None
+    if model.partial_slip:
+        modes = shear.compute_point_shear_modes(model, patch)
+    if model.side == "lower":
+        return shear.make_lower_contact(model, patch, row, modes, bond_sum)
+    if modes is None:
+        return contacts.make_bond_contact(law, load, row, None, bond_sum)
+    force = patch.pressure.sigma_n * patch.pieces.interface.weight
+    return contacts.make_bond_contact(law, force[modes.points], row, modes, bond_sum)
