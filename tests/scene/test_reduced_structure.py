@@ -36,8 +36,7 @@ WHOLE = SCENE[: SCENE.index("[structure.reduced]")].replace(
     "output_mass = 2", 'file = "whole.npz"'
 ) + SCENE[SCENE.index("[[structure.interface]]") :].replace("[1, 0]", "[40, 0]")
 
-SHORT = {"drive.cycles": 4}
-ONCE = SHORT | {"accuracy.max_seconds": 1e-3}  # a run is not repeated with smaller steps
+ONCE = {"accuracy.max_seconds": 1e-3}  # a run is not repeated with smaller steps
 
 
 @pytest.fixture
@@ -92,7 +91,7 @@ def test_always_reduction_errors_cover_full_matrices(matrix_folder, method):
             mass = "mass = 1" if text is SCENE else "mass = 40"
             text = text.replace("modes = 4", put).replace(old or "\0", new)
             text = text.replace(pushed or "\0", f'force = "60 N"\n{mass}')
-            found.append(run_scene(matrix_folder, text, **SHORT))
+            found.append(run_scene(matrix_folder, text))
         reduced, full = found
         # difference of the two runs, and error estimate of the reduced run
         errors = {
