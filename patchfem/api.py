@@ -1066,8 +1066,7 @@ def import_(
     file : path
         Laboratory record.
     out : path
-        Output file, whose extension determines its contents: a table (.csv), modes for a scene (.toml) or a frequency
-        response (.uff).
+        Output file, whose extension determines its contents: a table (.csv) or modes for a scene (.toml).
     map : str or list of str
         Quantity of each channel, such as "force=Load cell [lbf]".
     zero : bool

@@ -125,6 +125,7 @@ def _window() -> Finding:
     except (OSError, subprocess.TimeoutExpired) as error:
         is_drawn = False
         reason = str(error)[:100]
+
     remedy = (
         ""
         if is_drawn

@@ -13,7 +13,7 @@ from .shared import Json, flag_option, note, repeated_option, text_option
 
 @dataclass(frozen=True)
 class EstimateOptions:
-    """Options of a frequency response and its modes."""
+    """Options for the estimation of modes."""
 
     segment: text_option(
         'length of the averaged segments, such as "2 s"; default: the whole record if it begins and ends '
@@ -42,8 +42,7 @@ def import_(
         Path,
         Parameter(
             name=["-o", "--out"],
-            help="file to write: table.csv (records in SI), modes.toml (modes for a scene) or "
-            "response.uff",
+            help="file to write: table.csv (records in SI) or modes.toml (modes for a scene)",
         ),
     ],
     map_: repeated_option(

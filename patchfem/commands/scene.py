@@ -2,12 +2,14 @@
 
 import json
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 from cyclopts import Parameter
 
 from ..campaigns.sweeps import parse_request
 from ..campaigns.sweeps import plan as sweep_plan
+from ..campaigns.sweeps.case_models import SweepScene
+from ..campaigns.sweeps.cases import Cases
 from ..effects import law_has_trait, list_displayed_absent_effects
 from ..formatting import format_quantity, rewrite_powers_of_ten
 from ..mesh import files as mesh_files
@@ -31,37 +33,35 @@ def check(scene: Path, /, *, set_: Sets = (), json_: Json = False):
     checked_scene = load_scene(
         scene, set_, lambda tables, folder, whole: _find_file_mistakes(tables, folder, whole, notes)
     )
-    notes = [rewrite_powers_of_ten(text) for text in dict.fromkeys([*checked_scene.notes, *notes])]
     cases = len(_read_sweep(scene, set_, CaseOptions())[1]) if checked_scene.sweep else None
     for remark in checked_scene.remarks:
         print_message(f"{scene}: {remark}")
+    # several tables may give the same note
+    notes = [rewrite_powers_of_ten(text) for text in dict.fromkeys([*checked_scene.notes, *notes])]
     for text in notes:
         note(text)
-    if json_:
-        print(
-            json.dumps(
-                {
-                    "kind": checked_scene.kind,
-                    "effects": checked_scene.effect_names(),
-                    "remarks": checked_scene.remarks,
-                    "notes": notes,
-                }
-                | ({"cases": cases} if cases else {})
-            )
-        )
-    else:
-        print(
-            f"{scene}: a {checked_scene.kind} scene without mistakes"
-            + (f", {cases} cases" if cases else "")
-        )
+
+    if not json_:
+        count = f", {cases} cases" if cases else ""
+        print(f"{scene}: a {checked_scene.kind} scene without mistakes{count}")
+        return
+    content = {
+        "kind": checked_scene.kind,
+        "effects": checked_scene.effect_names(),
+        "remarks": checked_scene.remarks,
+        "notes": notes,
+    }
+    print(json.dumps(content | ({"cases": cases} if cases else {})))
 
 
-def _read_sweep(scene: Path, sets, what: CaseOptions) -> tuple:
+def _read_sweep(scene: Path, sets: tuple[str, ...], what: CaseOptions) -> tuple[SweepScene, Cases]:
     """Return the data that all cases of a sweep share, and the cases."""
     return parse_request.read_sweep(scene, sets, what.request())
 
 
-def _find_file_mistakes(tables, folder: Path, is_complete: bool, notes: list) -> list:
+def _find_file_mistakes(
+    tables, folder: Path, is_complete: bool, notes: list[str]
+) -> list[tuple[str, str]]:
     """Return the mistakes in the files that a scene names, and append notes on the run to `notes`.
 
     Without such files nothing is imported.
@@ -100,9 +100,11 @@ def plan(
             )
         _plan_sweep(scene, set_, case_options or CaseOptions(), json_, verbose)
         return
+
     run_plan = plans.plan(loaded_scene)
     plan_data = run_plan.as_json()
     if probe:
+        # a plan without a probe computes nothing, so that it needs no engine
         from ..runs.probe import run_probe
 
         measured = run_probe(run_plan)
@@ -138,7 +140,7 @@ def _plan_sweep(scene: Path, sets, what: CaseOptions, json_: bool, verbose: bool
     )
 
 
-def _print_plan(plan_data: dict, is_solved: bool, verbose: bool) -> None:
+def _print_plan(plan_data: dict[str, Any], is_solved: bool, verbose: bool) -> None:
     """Print a plan: effects, measured time, sentences, stiffnesses and groups.
 
     is_solved: whether the stiffness of the pieces is that of a solved patch.
@@ -156,6 +158,28 @@ def _print_plan(plan_data: dict, is_solved: bool, verbose: bool) -> None:
         print(f"  runs   {effect['effect']:<28} {effect['equations']}")
     for sentence in plan_data["verdict"]:
         print(f"says     {rewrite_powers_of_ten(sentence)}")
+
+    # without a solved patch a plan has only an upper bound of the shear stiffness of the pieces
+    is_upper_estimate = not is_solved and _has_pieces(plan_data["stiffness_chain"])
+    _print_chain(plan_data, is_upper_estimate)
+    for name, value in plan_data["groups"].items():
+        print(f"group    {_format_group(value, name)}")
+    if verbose:
+        absent = list_displayed_absent_effects(plan_data["not_in_scene"], plan_data["engine"])
+        print(f"absent   {', '.join(absent)}")
+
+
+def _has_pieces(chain: dict[str, float | str]) -> bool:
+    """Return whether a chain of stiffnesses has the shear stiffness of the pieces as a number."""
+    return any(
+        not isinstance(link, str)
+        for name, link in chain.items()
+        if rows.remove_interface_number(name) == "pieces_shear"
+    )
+
+
+def _print_chain(plan_data: dict[str, Any], is_upper_estimate: bool) -> None:
+    """Print the stiffnesses in series, and the frequencies of the modes without contact and while it sticks."""
     bonded = any(
         law_has_trait(one["effect"].partition("law=")[2], "bonds") for one in plan_data["effects"]
     )
@@ -164,28 +188,16 @@ def _print_plan(plan_data: dict, is_solved: bool, verbose: bool) -> None:
         for name, link in plan_data["stiffness_chain"].items()
     ]
     print("chain    " + " -> ".join(links))
-    is_upper_estimate = not is_solved and any(
-        not isinstance(link, str)
-        for name, link in plan_data["stiffness_chain"].items()
-        if rows.remove_interface_number(name) == "pieces_shear"
-    )
     if is_upper_estimate:
         print(
             "         the shear stiffness of the pieces is an upper estimate; use --probe to compute it"
         )
-    for one in plan_data.get("modes", ()):
-        stuck_text = (
-            ""
-            if one["stuck_frequency"] is None
-            else f", {'at most ' * is_upper_estimate}{one['stuck_frequency']:.5g} Hz while the contact sticks"
-        )
-        print(f"mode     {one['name']} {one['free_frequency']:.5g} Hz without contact{stuck_text}")
-    for name, value in plan_data["groups"].items():
-        print(f"group    {_format_group(value, name)}")
-    if verbose:
-        print(
-            f"absent   {', '.join(list_displayed_absent_effects(plan_data['not_in_scene'], plan_data['engine']))}"
-        )
+    for mode in plan_data.get("modes", ()):
+        stuck = mode["stuck_frequency"]
+        text = f"mode     {mode['name']} {mode['free_frequency']:.5g} Hz without contact"
+        if stuck is not None:
+            text += f", {'at most ' * is_upper_estimate}{stuck:.5g} Hz while the contact sticks"
+        print(text)
 
 
 def _format_link(name: str, bonded: bool) -> str:

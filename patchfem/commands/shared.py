@@ -14,6 +14,7 @@ from cyclopts import Parameter
 
 from ..export import folder as folders
 from ..export import page, runs, show, store
+from ..export.answer import Answer
 from ..export.charts import axes
 from ..model import model
 from ..scene import scene
@@ -112,14 +113,10 @@ OutputGroup = Annotated[OutputOptions, Parameter(name="*")]
 DEFAULT_OUTPUT = OutputOptions()
 
 
-def save(make_answer: Callable, output: Output):
+def save(make_answer: Callable[[Path], Answer], output: Output) -> Answer:
     """Make an answer, write it with its page into its folder, print it and return it.
 
-    Parameters
-    ----------
-    make_answer : callable
-        Function that takes the folder, which is locked meanwhile, and returns the Answer.
-    output : Output
+    make_answer: function that takes the folder, which is locked meanwhile.
     """
     with folders.Folder(output.target) as folder:
         answer = make_answer(folder.path)
@@ -144,16 +141,10 @@ def describe_command() -> str:
     )
 
 
-def present(answer, output: Output, draw_page: Callable[[], None] = lambda: None) -> None:
+def present(answer: Answer, output: Output, draw_page: Callable[[], None] = lambda: None) -> None:
     """Print an answer, draw its page and its picture, and print the names of its files.
 
-    Parameters
-    ----------
-    answer : Answer
-    output : Output
-        Where and how the answer is printed.
-    draw_page : callable
-        Function that is called after the numbers are printed, because they do not need the page.
+    draw_page: function that is called after the numbers are printed, because they do not need the page.
     """
     if output.as_json:
         content = store.make_summary(answer) if answer.is_run else answer.details
@@ -175,7 +166,7 @@ def present(answer, output: Output, draw_page: Callable[[], None] = lambda: None
         sys.stdout.flush()
 
 
-def print_remarks(answer) -> None:
+def print_remarks(answer: Answer) -> None:
     """Print the warnings and notes of an answer on stderr."""
     for text in answer.remarks.warnings:
         # some remarks are followed by tables for the scene file
@@ -199,7 +190,7 @@ def parse_quantity(text: str, kind: str, option: str) -> float | None:
     text : str
         Value of the option.
     kind : str
-        Kind of quantity, as in `scene.keys.quantities`.
+        Kind of quantity, such as "length" or "frequency".
     option : str
         Name of the option, for the message.
 
@@ -251,6 +242,7 @@ def load_scene(path: Path, sets, faults=None, prepare=None):
     Parameters
     ----------
     path : Path
+        Scene file.
     sets : sequence of str
         ``table.key=value`` strings.
     faults : callable, optional

@@ -86,6 +86,7 @@ def _ask(option: str, question: str, answers: dict[str, str]) -> str:
     option : str
         Option that answers the question without a terminal, for the message.
     question : str
+        Question as it is printed.
     answers : dict
         Word of an answer -> its meaning.
 

@@ -216,6 +216,7 @@ def fit(
             with_page=output.has_page,
             command=describe_command(),
         )
+
     present(answer, output)
     if answer.details["outcome"] == "not_converged":
         raise CommandExit(NOT_CONVERGED)

@@ -5,8 +5,13 @@ import io
 
 import numpy as np
 
-from .answer import Answer, Quantity, Variable, Variables
+from .answer import Answer, JsonObject, Quantity, Variable, Variables
 from .charts.table import BACKBONE_METHODS, CSV_FILES, CSV_UNITS, Column, parse_columns
+
+# cells of the columns of a CSV file by heading
+Lists = dict[str, list[str | float]]
+# cells of a row of a table by column
+Cells = dict[str, Quantity | str | float]
 
 
 def format_curves(answer: Answer) -> dict[str, str]:
@@ -32,7 +37,7 @@ def format_curves(answer: Answer) -> dict[str, str]:
     return texts
 
 
-def format_csv(lists: dict[str, list]) -> str:
+def format_csv(lists: Lists) -> str:
     """Return columns of equal length as CSV: heading -> cells."""
     output = io.StringIO()
     writer = csv.writer(output, lineterminator="\n")
@@ -41,7 +46,7 @@ def format_csv(lists: dict[str, list]) -> str:
     return output.getvalue()
 
 
-def list_cells(variable: Variable) -> list:
+def list_cells(variable: Variable) -> list[str | float]:
     """Return the cells of a column; "" for a missing number."""
     cells = np.asarray(variable.values).tolist()
     if variable.meanings:
@@ -54,7 +59,7 @@ def add_unit(name: str, unit: str) -> str:
     return f"{name} [{unit}]" if unit not in ("", "1") else name
 
 
-def _list_variables(data: Variables, columns: list[Column]) -> dict[str, list]:
+def _list_variables(data: Variables, columns: list[Column]) -> Lists:
     """Return columns of variables; {} if there are less than two."""
     lists = {}
     for column in columns:
@@ -70,7 +75,7 @@ def _list_variables(data: Variables, columns: list[Column]) -> dict[str, list]:
     return lists if len(lists) > 1 else {}
 
 
-def _list_objects(rows: list[dict], columns: list[Column], nested: str) -> dict[str, list]:
+def _list_objects(rows: list[JsonObject], columns: list[Column], nested: str) -> Lists:
     """Return columns of a list of objects: texts, and the value and the interval of each quantity."""
     lists = {}
     for name in (column.name for column in columns):
@@ -94,7 +99,7 @@ def _is_number(cell) -> bool:
     return isinstance(cell, dict) and "value" in cell
 
 
-def _stack_methods(data: Variables, columns: list[Column]) -> dict[str, list]:
+def _stack_methods(data: Variables, columns: list[Column]) -> Lists:
     """Return columns with the variables of all methods, and of all cases, below each other."""
     names = [column.name for column in columns]
     methods = [method for method in BACKBONE_METHODS if f"{method}_{names[0]}" in data]
@@ -119,7 +124,7 @@ def _stack_methods(data: Variables, columns: list[Column]) -> dict[str, list]:
     return lists
 
 
-def list_rows(answer: Answer, source: str) -> list[dict[str, Quantity | str | float]]:
+def list_rows(answer: Answer, source: str) -> list[Cells]:
     """Return the rows of a table: a list or objects by name in the details, or the variables of a dimension.
 
     source: as in `Table`.

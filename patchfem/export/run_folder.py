@@ -1,5 +1,6 @@
 """A run that writes its results folder: the run, its answer and its fields first, then its page."""
 
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from time import perf_counter
@@ -7,6 +8,8 @@ from typing import NamedTuple
 
 from .. import __version__
 from ..core import Missing, NotConverged, PatchfemError
+from ..runs.plan import Plan
+from ..runs.results.interfaces import Face
 from ..runs.results.result import Result, shorten_file_names
 from ..runs.run import StateFile, is_march, run
 from . import page, store
@@ -31,7 +34,13 @@ class WrittenRun(NamedTuple):
 
 
 def run_into(
-    run_plan, target: Path, report=None, progress=None, *, fresh: bool = False, resume: bool = False
+    run_plan: Plan,
+    target: Path,
+    report: Callable[[str], None] | None = None,
+    progress: Callable[[float], None] | None = None,
+    *,
+    fresh: bool = False,
+    resume: bool = False,
 ) -> WrittenRun:
     """Run a plan and write its results into a folder, without the page.
 
@@ -42,6 +51,7 @@ def run_into(
     Parameters
     ----------
     run_plan : Plan
+        What the run computes.
     target : Path
         Results folder.
     report, progress : callable, optional
@@ -82,13 +92,13 @@ def _partial_result(error: NotConverged) -> Result:
     return replace(result, warnings=[*reason, *result.warnings])
 
 
-def saves_state(run_plan) -> bool:
+def saves_state(run_plan: Plan) -> bool:
     """Return whether the run of a plan saves its state for a later resume."""
     wears = run_plan.model.wear is not None and run_plan.model.patch is not None
     return wears or is_march(run_plan)
 
 
-def is_complete(run_plan, target: Path) -> bool:
+def is_complete(run_plan: Plan, target: Path) -> bool:
     """Return whether a folder contains the complete run of a plan.
 
     It is False for a folder with the state of an interrupted run. PatchfemError if the folder contains the complete run of
@@ -116,8 +126,10 @@ def write_results(result: Result, folder: Path, case: dict[str, str] | None = No
     Parameters
     ----------
     result : Result
+        Finished run; notes on its files are added to it.
     folder : Path
-    case : dict, optional
+        Existing folder.
+    case : dict of str to str, optional
         Swept keys with their values as written, if the run is a case of a sweep.
     """
     start_time = perf_counter()
@@ -125,23 +137,28 @@ def write_results(result: Result, folder: Path, case: dict[str, str] | None = No
     if result.patch is not None:
         vtkhdf.write_fields(result, folder / store.FIELDS)
     for face in result.faces[:MAX_INTERFACES]:
-        face_folder = folder / INTERFACES_FOLDER / face.folder
-        face_folder.mkdir(parents=True, exist_ok=True)
-        face_result = replace(
-            result,
-            plan=replace(result.plan, model=face.model),
-            patch=face.patch,
-            fields=face.fields,
-            extra={"notes": []},
-        )
-        vtkhdf.write_fields(face_result, face_folder / store.FIELDS)
-        notes += [f"interface {face.name}: {note}" for note in face_result.extra["notes"]]
+        face_notes = _write_face(result, face, folder / INTERFACES_FOLDER / face.folder)
+        notes += [f"interface {face.name}: {note}" for note in face_notes]
     result.seconds["files"] = perf_counter() - start_time
     answer = make_answer(result)
     if case is not None:
         answer = replace(answer, details=answer.details | {"case": case})
     store.write(answer, folder)
     return WrittenRun(answer, result, identify_folder(folder))
+
+
+def _write_face(result: Result, face: Face, folder: Path) -> list[str]:
+    """Write the fields of one interface of a run into a folder of its own, and return notes on them."""
+    folder.mkdir(parents=True, exist_ok=True)
+    face_result = replace(
+        result,
+        plan=replace(result.plan, model=face.model),
+        patch=face.patch,
+        fields=face.fields,
+        extra={"notes": []},
+    )
+    vtkhdf.write_fields(face_result, folder / store.FIELDS)
+    return face_result.extra["notes"]
 
 
 def write_run_page(written: WrittenRun, folder: Path) -> Path:

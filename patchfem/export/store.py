@@ -13,7 +13,7 @@ import numpy as np
 from .. import __version__
 from ..core import Missing, PatchfemError
 from ..disk.atomic_write import write_text
-from .answer import RUN_KINDS, Answer, Quantity, Remarks, Variable
+from .answer import RUN_KINDS, Answer, JsonObject, Quantity, Remarks, Variable
 from .columns import format_curves
 from .netcdf import read_netcdf, write_netcdf
 
@@ -44,18 +44,7 @@ def data_file(kind: str) -> str:
 
 
 def write(answer: Answer, folder: Path) -> None:
-    """Write all files of an answer except its page into an existing folder.
-
-    Parameters
-    ----------
-    answer : Answer
-    folder : Path
-
-    Raises
-    ------
-    OSError or WriteError
-        If a file cannot be written.
-    """
+    """Write all files of an answer except its page into an existing folder; OSError or WriteError without success."""
     if answer.origin.get("resolved"):
         write_text(folder / SCENE, answer.origin["resolved"])
     if answer.data:
@@ -68,13 +57,13 @@ def write(answer: Answer, folder: Path) -> None:
     write_json(make_summary(answer), folder / SUMMARY)
 
 
-def write_json(content: dict, path: Path) -> None:
+def write_json(content: JsonObject, path: Path) -> None:
     """Write an object as strict JSON; ValueError for a number that is not finite."""
     text = json.dumps(content, indent=1, allow_nan=False, ensure_ascii=False)
     write_text(path, text + "\n")
 
 
-def make_summary(answer: Answer) -> dict:
+def make_summary(answer: Answer) -> JsonObject:
     """Return the contents of summary.json, which are those of `run --json` for a run."""
     details = dict(answer.details) if answer.is_run else {}
     summary = {
@@ -98,25 +87,13 @@ def make_summary(answer: Answer) -> dict:
 
 
 def read(folder: Path) -> Answer:
-    """Read an answer from the files in a folder.
-
-    Parameters
-    ----------
-    folder : Path
-
-    Returns
-    -------
-    Answer
-
-    Raises
-    ------
-    PatchfemError
-        If the folder has no complete result, or if one of its files is damaged.
-    """
+    """Read an answer from the files in a folder; PatchfemError if it has no complete result or a damaged file."""
     folder = Path(folder)
     summary = read_summary(folder)
     kind = summary["kind"]
     origin = summary["origin"]
+
+    # the details of a run are the other keys of its summary, those of another verb are a file
     known_keys = {"patchfem", *SUMMARY_TYPES}
     details = {key: value for key, value in summary.items() if key not in known_keys}
     try:
@@ -131,6 +108,7 @@ def read(folder: Path) -> Answer:
             data[CPU_TIMES] = Variable(("accuracy_run",), times, "s", "CPU time of the motion")
     except (OSError, ValueError, KeyError, TypeError, RuntimeError) as error:
         raise PatchfemError(f"{folder}: a file of this folder is damaged: {error}") from None
+
     return Answer(
         kind=kind,
         title=summary["title"],
@@ -143,7 +121,7 @@ def read(folder: Path) -> Answer:
     )
 
 
-def read_summary(folder: Path) -> dict:
+def read_summary(folder: Path) -> JsonObject:
     """Read and check the summary.json of a folder.
 
     Raises
@@ -158,6 +136,7 @@ def read_summary(folder: Path) -> dict:
         raise Missing(f"{folder}: no such results folder")
     if not path.is_file():
         raise PatchfemError(f"{folder}: this is not a results folder: it has no {SUMMARY}")
+
     content = None
     try:
         content = path.read_bytes()
@@ -174,12 +153,13 @@ def read_summary(folder: Path) -> dict:
         return summary
     except (OSError, ValueError, TypeError, RecursionError) as error:
         reason = str(error) or type(error).__name__
+        # every summary since 2.0 has a verdict
         if content is not None and b'"verdict"' not in content:
             reason = "patchfem before 2.0 wrote it; run the scene again"
         raise PatchfemError(f"{path}: this summary cannot be read: {reason}") from None
 
 
-def _check_types(content: dict, types: dict, place: str = "") -> None:
+def _check_types(content: JsonObject, types: dict[str, type], place: str = "") -> None:
     """Raise ValueError if an object lacks an entry, or has one of another type than the table says.
 
     place: where the object is in the file, such as "measures.loop_area.", which the message names.

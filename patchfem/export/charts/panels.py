@@ -24,6 +24,7 @@ def make_panels(answers: Answers, charts: tuple[Chart, ...]) -> list[Panel]:
     answers : dict of str to Answer
         Answers by their name in the legend; one answer may have the name "".
     charts : tuple of Chart
+        Rows of the table of charts, in the order of the page.
     """
     panels = []
     for chart in charts:
@@ -116,7 +117,7 @@ def _make_axes(selected: list[Variables], chart: Chart) -> tuple[Axis, Axis]:
     )
 
 
-def _make_axis(name: str, unit: str, arrays: list, log: str, letter: str) -> Axis:
+def _make_axis(name: str, unit: str, arrays: list[np.ndarray], log: str, letter: str) -> Axis:
     """Return the axis for some arrays [SI]; `log` as in Chart, `letter` is "x" or "y"."""
     values = np.concatenate([np.asarray(values, float).ravel() for values in arrays])
     is_log = letter in log or ("auto" in log and needs_log_scale(values))
@@ -309,6 +310,7 @@ def make_film(frames: dict[str, np.ndarray], title: str, unit: str) -> Panel:
     frames : dict
         `x` (k,) and `y` (j,) [m], `times` (f,) [s], `values` (f, j, k).
     title : str
+        Title of the chart, and name of the values.
     unit : str
         SI unit of the values.
     """

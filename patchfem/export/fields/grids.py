@@ -1,6 +1,10 @@
 """Fields as grids of PyVista, and from them as .vtu, .pvd and .csv."""
 
+from __future__ import annotations
+
+from collections.abc import Iterable
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -10,16 +14,22 @@ from ...runs.pieces import compute_pieces
 from .blocks import FIELDS, PARTS, Block, make_blocks
 from .vtkhdf import Frames, write_blocks
 
+if TYPE_CHECKING:
+    from pyvista import MultiBlock
+
+    from ...runs.results.result import Result
+
 # Field of each part that PyVista colours by default.
 ACTIVE_FIELDS = {"lower": "von_mises", "upper": "von_mises", "interface": "normal_stress"}
 
 
-def make_grids(blocks: dict[str, Block], number: int, time: float):
+def make_grids(blocks: dict[str, Block], number: int, time: float) -> MultiBlock:
     """Return one frame of blocks as a pyvista.MultiBlock of named grids, in SI.
 
     Parameters
     ----------
-    blocks : dict of Block
+    blocks : dict of str to Block
+        Parts and their fields.
     number : int
         Number of the frame.
     time : float
@@ -54,7 +64,7 @@ def _label_units(grid) -> None:
             information.Set(vtkDataArray.UNITS_LABEL(), FIELDS[name].unit)
 
 
-def make_result_grids(result, numbers) -> list:
+def make_result_grids(result: Result, numbers: Iterable[int]) -> list[MultiBlock]:
     """Return frames of a run with a patch as pyvista.MultiBlock objects with stresses in MPa.
 
     The field array `units` of every grid lists the unit of each array.
@@ -78,15 +88,7 @@ def make_result_grids(result, numbers) -> list:
 
 
 def export_frames(frames: Frames, out: Path, number: int) -> None:
-    """Write fields as .vtu or .csv of one frame, or as .pvd or .vtkhdf of all frames.
-
-    Parameters
-    ----------
-    frames : Frames
-    out : Path
-    number : int
-        Number of the frame of a .vtu or .csv.
-    """
+    """Write fields as .vtu or .csv of the frame `number`, or as .pvd or .vtkhdf of all frames."""
     if out.suffix == ".vtkhdf":
         write_blocks(out, frames.blocks, frames.times)
     elif out.suffix == ".pvd":

@@ -1,4 +1,4 @@
-"""Import of laboratory files: as a table for scenes and fits, as modes of a scene, or as a frequency response."""
+"""Import of laboratory files: as a table for scenes and fits, or as modes of a scene."""
 
 from collections.abc import Iterable
 from pathlib import Path
@@ -14,26 +14,28 @@ from ...inputs import laboratory, records
 from ...inputs import universal as universal_files
 from ...inputs.units import CHANNEL_UNITS, SI_UNITS
 from ...scene.keys import quantities
+from ...scene.keys.removed import describe_removed
 from ...structure import universal as universal_modes
+from ..answer import JsonObject
 from . import universal
 from .universal import Column
 from .write import format_columns
 
 # columns of an exported file that can be its displacement, in order of preference; 1.x wrote the first one
 EXPORTED_NAMES = {"displacement": ("output_displacement", "relative_displacement", "slide")}
-# form of a file by its ending, and the options that each form uses
-FORMS = {".csv": "table", ".toml": "modes", ".uff": "response", ".unv": "response"}
+# options that each form of a file uses
 USED = {
     "table": (),
     "decay": ("decay", "begin"),
     "modes": ("segment", "window", "band", "decay", "begin"),
-    "response": ("segment", "window"),
 }
+# records [SI] by quantity
+Records = dict[str, np.ndarray]
 DECAY_UNITS = {"time": "s", "amplitude": "m", "frequency": "Hz", "damping": "1"}
 
 
 class EstimateOptions(NamedTuple):
-    """User settings for the estimation of modes or of a frequency response.
+    """User settings for the estimation of modes.
 
     Attributes
     ----------
@@ -58,18 +60,21 @@ class EstimateOptions(NamedTuple):
 
 def convert_file(
     file: Path, out: Path, requests: Iterable[str], zero: bool, settings: EstimateOptions
-) -> dict:
-    """Convert a laboratory file to records (.csv), modes (.toml) or a response (.uff).
+) -> JsonObject:
+    """Convert a laboratory file to records or a decay (.csv), or to modes (.toml).
 
     Parameters
     ----------
     file : Path
+        Universal file, .mat or table with units.
     out : Path
+        File to write, whose ending chooses the form.
     requests : iterable of str
-        Channels as in `patchfem import --map`.
+        Quantities and their channels, such as "force=Load cell [lbf]".
     zero : bool
         Whether time and displacement are measured from their first row.
     settings : EstimateOptions
+        How modes are estimated.
 
     Returns
     -------
@@ -81,47 +86,55 @@ def convert_file(
     PatchfemError
         If options do not fit together.
     """
-    form = FORMS.get(out.suffix.lower())
-    if form is None:
-        raise PatchfemError(
-            f"{out}: records are written as .csv, modes as .toml, a frequency response as .uff"
-        )
-    if form == "table" and settings.decay:
-        form = "decay"
-    if zero and form != "table":
-        raise PatchfemError(
-            "--zero can be used only when importing a table of records (-o table.csv), not with --decay"
-        )
-    given = [name for name, value in settings._asdict().items() if value]
-    unused = [f"--{name}" for name in given if name not in USED[form]]
-    if unused:
-        raise PatchfemError(
-            f"{out}: {', '.join(unused)} can be used only for modes (-o modes.toml); --segment and --window also for "
-            "responses (-o response.uff), --begin with --decay also for a table of the decay"
-        )
+    form = _choose_form(out, zero, settings)
     if form == "table":
         return _write_table(file, out, requests, zero)
     if form == "modes" and (shapes := _read_shapes(file, requests, settings)):
         return _write_modes(shapes, out, file.name, [])
+
+    # all other forms are estimated from records
     values, notes = _read_records(file, requests)
-    if settings.window not in ("", "hann", "none"):
-        raise PatchfemError(f"--window {settings.window}: hann or none")
-    segment = _parse_quantity(settings.segment, "time", "--segment")
-    averaging = (segment, settings.window or None)
-    if form == "response":
-        return _write_response(values, out, averaging, notes)
     begin = _parse_quantity(settings.begin, "time", "--begin")
     if form == "decay":
         return _write_decay(values, out, begin, notes)
     if settings.decay:
         modes = measured_modes.identify_decay_modes(values, begin)
     else:
+        segment = _parse_quantity(settings.segment, "time", "--segment")
         band = _parse_band(settings.band)
-        modes = measured_modes.identify_driven_modes(values, *averaging, band)
+        window = settings.window or None
+        modes = measured_modes.identify_driven_modes(values, segment, window, band)
     return _write_modes(modes, out, file.name, notes)
 
 
-def _write_table(file: Path, out: Path, requests: Iterable[str], zero: bool) -> dict:
+def _choose_form(out: Path, zero: bool, settings: EstimateOptions) -> str:
+    """Return "table", "decay" or "modes"; PatchfemError for another ending and for options that the form does not use."""
+    endings = {".csv": "decay" if settings.decay else "table", ".toml": "modes"}
+    form = endings.get(out.suffix.lower())
+    if form is None:
+        removed = ""
+        if out.suffix.lower() in laboratory.UNIVERSAL_EXTENSIONS:
+            removed = f"; {describe_removed('import -o response.uff', 'a frequency response')}"
+        raise PatchfemError(f"{out}: records are written as .csv, modes as .toml{removed}")
+    if zero and form != "table":
+        raise PatchfemError(
+            "--zero can be used only when importing a table of records (-o table.csv), not with --decay"
+        )
+
+    # an option without an effect is a mistake of the user
+    given = [name for name, value in settings._asdict().items() if value]
+    unused = [f"--{name}" for name in given if name not in USED[form]]
+    if unused:
+        raise PatchfemError(
+            f"{out}: {', '.join(unused)} can be used only for modes (-o modes.toml); --begin with --decay also for a table "
+            "of the decay"
+        )
+    if settings.window not in ("", "hann", "none"):
+        raise PatchfemError(f"--window {settings.window}: hann or none")
+    return form
+
+
+def _write_table(file: Path, out: Path, requests: Iterable[str], zero: bool) -> JsonObject:
     """Write measured records as a table."""
     found = laboratory.read_records(file, records.parse_requests(requests))
     values = records.shift_to_zero(found.values) if zero else found.values
@@ -133,7 +146,7 @@ def _write_table(file: Path, out: Path, requests: Iterable[str], zero: bool) -> 
     return {"rows": rows, "units": units, "notes": found.notes, "told": told}
 
 
-def _write_decay(values: dict, out: Path, begin: float | None, notes: list[str]) -> dict:
+def _write_decay(values: Records, out: Path, begin: float | None, notes: list[str]) -> JsonObject:
     """Write frequency and damping ratio of a measured decay as a table."""
     curve, curve_notes = measured_modes.compute_decay_curve(values, begin)
     columns = [
@@ -157,7 +170,7 @@ def _write_decay(values: dict, out: Path, begin: float | None, notes: list[str])
 
 def _write_modes(
     modes: measured_modes.ListedModes, out: Path, source: str, notes: list[str]
-) -> dict:
+) -> JsonObject:
     """Write identified modes as tables of a scene."""
     write_text(out, format_structure(modes, source))
     columns = (modes.frequency.tolist(), modes.damping.tolist(), modes.descriptions)
@@ -201,21 +214,7 @@ def format_structure(modes: measured_modes.ListedModes, source: str) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _write_response(values: dict, out: Path, averaging: tuple, notes: list[str]) -> dict:
-    """Write a frequency response as a universal file, estimated with a length [s] and a window of the segments."""
-    estimate, step, drive, response = measured_modes.estimate_record(values, *averaging)
-    universal.write_response(out, estimate, drive, response)
-    return {
-        "lines": estimate.frequency.size,
-        "segments": estimate.segments,
-        "window": estimate.window,
-        "notes": notes,
-        "told": f"{response} over {drive}, {estimate.frequency.size} frequencies from {estimate.segments} segments of "
-        f"{estimate.segment * step:.4g} s, window {estimate.window}",
-    }
-
-
-def _read_records(file: Path, requests) -> tuple[dict[str, np.ndarray], list[str]]:
+def _read_records(file: Path, requests: Iterable[str]) -> tuple[Records, list[str]]:
     """Return measured records by quantity with notes; PatchfemError if none of them is a response."""
     found = laboratory.read_records(file, records.parse_requests(requests), EXPORTED_NAMES)
     responses = measured_modes.DERIVATIVE_ORDERS

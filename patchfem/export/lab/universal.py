@@ -1,4 +1,4 @@
-"""Histories, friction loops and frequency responses as a universal file: datasets 164 (SI) and binary datasets 58.
+"""Histories and friction loops as a universal file: dataset 164 (SI) and binary datasets 58.
 
 The datasets are binary and unevenly spaced, because only then are abscissa and value exact to the last bit. pyuff writes the
 file; it counts the bytes of a dataset without the abscissa, and this number is corrected.
@@ -16,13 +16,11 @@ from ...disk.atomic_write import write_atomically
 
 PROGRAM = f"patchfem {__version__}"
 # type codes of dataset 58 by the unit of a quantity; 1 (general) for other units
-TYPES = {"m": 8, "m s-1": 11, "m s-2": 12, "N": 13, "s": 17, "Hz": 18}
+TYPES = {"m": 8, "m s-1": 11, "m s-2": 12, "N": 13, "s": 17}
 LABELS = {"m s-1": "m/s", "m s-2": "m/s^2"}
 # function types of dataset 58
 LOOP = 0
 HISTORY = 1
-RESPONSE = 4
-COHERENCE = 6
 SI_UNITS = {
     "type": 164,
     "units_code": 1,
@@ -53,19 +51,20 @@ class Column(NamedTuple):
 
 
 def make_dataset(
-    name: str, function: int, x: Column, y: Column, **entries: str | int
+    name: str, function: int, x: Column, y: Column, title: str
 ) -> dict[str, str | int | np.ndarray]:
-    """Return a dataset 58 of one column against another.
+    """Return a dataset 58 of one column against another; pyuff has default values for its other entries.
 
     Parameters
     ----------
     name : str
         First line of identification.
     function : int
-        LOOP, HISTORY, RESPONSE or COHERENCE.
+        LOOP or HISTORY.
     x, y : Column
-    **entries
-        Further entries of the dataset; pyuff has default values.
+        Abscissa and ordinate of equal length.
+    title : str
+        Fourth line of identification.
     """
     return {
         "type": 58,
@@ -73,10 +72,12 @@ def make_dataset(
         "func_type": function,
         "id1": name[:80],
         "id2": PROGRAM,
+        "id4": title,
         "rsp_node": y.number or 1,
         "rsp_dir": 1,
         "ref_node": 0,
         "ref_dir": 0,
+        # the datasets have no denominator
         "orddenom_spec_data_type": 0,
         "abscissa_spec_data_type": TYPES[x.unit],
         "abscissa_axis_units_lab": x.unit,
@@ -84,7 +85,7 @@ def make_dataset(
         "ordinate_axis_units_lab": LABELS.get(y.unit, y.unit),
         "data": np.array(y.values),
         "x": np.array(x.values, float),
-    } | entries
+    }
 
 
 def write_histories(
@@ -98,11 +99,13 @@ def write_histories(
     Parameters
     ----------
     path : Path
+        File to write.
     columns : sequence of Column
         The time comes first; without it there are only loops.
     loops : sequence of (Column, Column)
         Slide and force.
     title : str
+        Title of the results.
 
     Raises
     ------
@@ -123,37 +126,7 @@ def write_histories(
     if not curves:
         raise PatchfemError("there is neither time nor loop to write")
     line = "".join(letter if " " <= letter <= "~" else "?" for letter in title)[:80].strip()
-    write_datasets(path, [make_dataset(*curve, id4=line or "NONE") for curve in curves])
-
-
-def write_response(path: Path, estimate, drive: str, response: str) -> None:
-    """Write an estimated frequency response and its coherence.
-
-    Response and reference are at point 1 in direction +x. If the input is a force, structure.file can read the file.
-
-    Parameters
-    ----------
-    path : Path
-    estimate : object
-        With frequency (k,) [Hz], complex value (k,) and coherence (k,) or None.
-    drive, response : str
-        Quantities of input and output, such as "force" and "acceleration".
-    """
-    units = {"displacement": "m", "velocity": "m s-1", "force": "N"}
-    unit, drive_unit = (units.get(name, "m s-2") for name in (response, drive))
-    x = Column("frequency", "Hz", estimate.frequency)
-    y = Column(response, unit, estimate.value)
-    place = {"ref_node": 1, "ref_dir": 1}
-    denominator = {
-        "orddenom_spec_data_type": TYPES[drive_unit],
-        "orddenom_axis_units_lab": LABELS.get(drive_unit, drive_unit),
-    }
-    datasets = [make_dataset(f"{response} over {drive}", RESPONSE, x, y, **place, **denominator)]
-    if estimate.coherence is not None:
-        y = Column("coherence", "", estimate.coherence)
-        name = f"coherence of {response} and {drive}"
-        datasets.append(make_dataset(name, COHERENCE, x, y, ordinate_spec_data_type=0, **place))
-    write_datasets(path, datasets)
+    write_datasets(path, [make_dataset(*curve, line or "NONE") for curve in curves])
 
 
 def write_datasets(path: Path, datasets: list[dict]) -> None:

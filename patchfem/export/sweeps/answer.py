@@ -18,7 +18,7 @@ from ...campaigns.sweeps.sweep_table import SweepTable, SweptKey
 from ...core import PatchfemError
 from ...runs.results.result import describe_measure
 from ...scene.keys.lookup import find_key
-from ..answer import Answer, Quantities, Quantity, Remarks, Variable, Variables
+from ..answer import Answer, JsonObject, Quantities, Quantity, Remarks, Variable, Variables
 from ..runs import list_versions
 from .tables import sort_measures
 from .words import describe_place, make_peak_quantities, make_verdict
@@ -36,8 +36,11 @@ def make_answer(
     Parameters
     ----------
     sweep_scene : SweepScene
+        What all cases share.
     cases : Cases
+        Values of the keys in each case.
     table : SweepTable
+        Measures and outcome of each case.
     case_folders : sequence of str
         Folders of the cases inside cases/; empty if there are none.
     """
@@ -46,6 +49,8 @@ def make_answer(
     notes = [sweep_scene.note_bolted_joint()] if sweep_scene.note_bolted_joint() else []
     if sweep_scene.of and sweep_scene.of not in table.measures:
         notes.append(f"no case has a value of {sweep_scene.of.replace('_', ' ')}")
+
+    # `of` identifies the sweep that --resume continues
     details = {"answer": verdict[0], "sentences": list(verdict)}
     details |= _make_details(table, analysis) | {"of": identify_sweep(sweep_scene, cases)}
     keys = " × ".join(key.key for key in table.keys)
@@ -89,7 +94,7 @@ def _make_command(sweep_scene: SweepScene, cases: Cases) -> str:
     return shlex.join([*words, *cases.arguments])
 
 
-def _make_details(table: SweepTable, analysis: SweepAnalysis) -> dict:
+def _make_details(table: SweepTable, analysis: SweepAnalysis) -> JsonObject:
     """Return the numbers of sweep.json."""
     ranking = {
         name: [index._asdict() for index in indices] for name, indices in analysis.ranking.items()
@@ -108,7 +113,7 @@ def _make_details(table: SweepTable, analysis: SweepAnalysis) -> dict:
     }
 
 
-def _make_peak_row(table: SweepTable, entry: PeakOnLine) -> dict:
+def _make_peak_row(table: SweepTable, entry: PeakOnLine) -> JsonObject:
     """Return a peak as a row of sweep.json."""
     unit = table.measures[entry.measure].unit
     row = {"measure": entry.measure, "case": describe_place(table, entry)}
@@ -116,7 +121,7 @@ def _make_peak_row(table: SweepTable, entry: PeakOnLine) -> dict:
     return row | {name: quantity.as_json() for name, quantity in quantities.items()}
 
 
-def _make_quantile_row(values: np.ndarray, unit: str) -> dict:
+def _make_quantile_row(values: np.ndarray, unit: str) -> JsonObject:
     """Return quantiles as objects of sweep.json."""
     names = ("low", "median", "high")
     return {name: Quantity(value, unit).as_json() for name, value in zip(names, values.tolist())}
@@ -128,6 +133,8 @@ def _make_quantities(table: SweepTable, analysis: SweepAnalysis) -> Quantities:
     if len(analysis.peaks) == 1:
         unit = table.measures[analysis.peaks[0].measure].unit
         quantities |= make_peak_quantities(analysis.peaks[0], unit)
+
+    # a limit that no case reaches is shown with its reason
     for limit in analysis.limits:
         reason = "" if np.isfinite(limit.value) else "the cases do not show where it lies"
         quantities[f"limit_{limit.measure}"] = Quantity(
@@ -137,6 +144,7 @@ def _make_quantities(table: SweepTable, analysis: SweepAnalysis) -> Quantities:
             high=limit.high,
             reason="it is reached in no case" if limit.is_never_reached else reason,
         )
+
     for name, low, high, _ in analysis.ranges[:MAX_RANGES]:
         column = table.measures[name]
         for word, case in (("smallest", low), ("largest", high)):

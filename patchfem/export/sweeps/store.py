@@ -25,20 +25,7 @@ TABLE_TYPES = {"values": np.float64, "errors": np.float32, "floors": np.float32}
 
 
 def write_chunk(folder: Path, names: np.ndarray, results: CaseResults) -> Path:
-    """Write the results of cases into a file of a folder, and return the file.
-
-    Parameters
-    ----------
-    folder : Path
-    names : (n,) array of int
-        Names of the cases.
-    results : CaseResults
-
-    Raises
-    ------
-    OSError or WriteError
-        If there is no space.
-    """
+    """Write the results of cases with names (n,) into a file of a folder, and return it; WriteError without space."""
     data = {
         "name": Variable(("case",), np.asarray(names, np.uint64), ""),
         "outcome": encode("case", results.outcome),
