@@ -2,14 +2,12 @@
 
 import json
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
 from ..campaigns.sweeps import parse_request
 from ..campaigns.sweeps import plan as sweep_plan
-from ..campaigns.sweeps.case_models import SweepScene
-from ..campaigns.sweeps.cases import Cases
 from ..effects import law_has_trait, list_displayed_absent_effects
 from ..formatting import format_quantity, rewrite_powers_of_ten
 from ..mesh import files as mesh_files
@@ -21,6 +19,10 @@ from ..runs.patch import result
 from ..scene.files import list_named_files
 from .shared import Json, Sets, UsageError, flag_option, load_model, load_scene, note, print_message
 from .sweep import CaseOptions
+
+if TYPE_CHECKING:
+    from ..campaigns.sweeps.case_models import SweepScene
+    from ..campaigns.sweeps.cases import Cases
 
 
 def check(scene: Path, /, *, set_: Sets = (), json_: Json = False):
@@ -54,7 +56,9 @@ def check(scene: Path, /, *, set_: Sets = (), json_: Json = False):
     print(json.dumps(content | ({"cases": cases} if cases else {})))
 
 
-def _read_sweep(scene: Path, sets: tuple[str, ...], what: CaseOptions) -> tuple[SweepScene, Cases]:
+def _read_sweep(
+    scene: Path, sets: tuple[str, ...], what: CaseOptions
+) -> "tuple[SweepScene, Cases]":
     """Return the data that all cases of a sweep share, and the cases."""
     return parse_request.read_sweep(scene, sets, what.request())
 

@@ -8,18 +8,20 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from threading import Event, Thread
 from time import monotonic
-from typing import Annotated, NamedTuple
+from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 from cyclopts import Parameter
 
 from ..export import folder as folders
 from ..export import page, runs, show, store
-from ..export.answer import Answer
 from ..export.charts import axes
 from ..model import model
 from ..scene import scene
 from ..scene.keys import quantities
 from .streams import make_printable
+
+if TYPE_CHECKING:
+    from ..export.answer import Answer
 
 NOT_CONVERGED = 3  # exit code if a numerical method did not converge, or if some cases failed
 
@@ -113,7 +115,7 @@ OutputGroup = Annotated[OutputOptions, Parameter(name="*")]
 DEFAULT_OUTPUT = OutputOptions()
 
 
-def save(make_answer: Callable[[Path], Answer], output: Output) -> Answer:
+def save(make_answer: Callable[[Path], "Answer"], output: Output) -> "Answer":
     """Make an answer, write it with its page into its folder, print it and return it.
 
     make_answer: function that takes the folder, which is locked meanwhile.
@@ -141,11 +143,8 @@ def describe_command() -> str:
     )
 
 
-def present(answer: Answer, output: Output, draw_page: Callable[[], None] = lambda: None) -> None:
-    """Print an answer, draw its page and its picture, and print the names of its files.
-
-    draw_page: function that is called after the numbers are printed, because they do not need the page.
-    """
+def present(answer: "Answer", output: Output) -> None:
+    """Print an answer, draw its picture, and print the names of its files."""
     if output.as_json:
         content = store.make_summary(answer) if answer.is_run else answer.details
         if answer.kind == "pairs":
@@ -157,7 +156,6 @@ def present(answer: Answer, output: Output, draw_page: Callable[[], None] = lamb
         sys.stdout.flush()
     if not output.is_quiet:
         print_remarks(answer)
-    draw_page()
     if output.plot is not None:
         axes.write_plot(answer, output.plot)
     if output.target is not None and not (output.as_json or output.is_quiet):
@@ -166,7 +164,7 @@ def present(answer: Answer, output: Output, draw_page: Callable[[], None] = lamb
         sys.stdout.flush()
 
 
-def print_remarks(answer: Answer) -> None:
+def print_remarks(answer: "Answer") -> None:
     """Print the warnings and notes of an answer on stderr."""
     for text in answer.remarks.warnings:
         # some remarks are followed by tables for the scene file

@@ -132,7 +132,7 @@ def view_results(
     number = grids.find_frame(frames, frame)
     # the folder of an interface has fields alone
     has_summary = (folder / store.SUMMARY).is_file()
-    title = store.read_summary(folder)["title"] if has_summary else ""
+    title = store.read_summary(folder).title if has_summary else ""
     title = title or folder.resolve().name
     if out is None:
         _open_window(frames, number, title)

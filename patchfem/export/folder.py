@@ -203,9 +203,3 @@ def refuse_others(folder: Path, user_path, allowed, kind: str, dots: bool = Fals
             f"{user_path}: {folder.name} contains files that are not {kind} "
             f"({', '.join(others[:3])}{', ...' if len(others) > 3 else ''}); choose another -o"
         )
-
-
-def identify_folder(folder: Path) -> tuple[int, int]:
-    """Return the device and inode numbers that identify a folder."""
-    status = os.stat(folder)
-    return status.st_dev, status.st_ino

@@ -4,6 +4,8 @@ In: a `Result` of `runs`. Out: {name: Variable}. A row of VARIABLES says where a
 new row. What has to be computed or selected first has a function of its own.
 """
 
+from __future__ import annotations
+
 import tomllib
 from dataclasses import replace
 from typing import NamedTuple

@@ -107,7 +107,7 @@ def _make_headline(result: Result, measures: Quantities, details: JsonObject) ->
     for name, text in HEADLINES[kind]:
         if name == "loop_area":
             parts += _describe_interfaces(result, measures, text)
-        elif _is_known(measures, name) and not quantities.is_zero(name, measures[name]):
+        elif _is_shown(measures, name):
             part = text.format(_format(name, measures))
             if (kind, name) == ("patch", "contact_fraction"):
                 part += _describe_place(details.get("contact"), " ({})")
@@ -130,18 +130,20 @@ def _choose_headline(result: Result, measures: Quantities) -> str:
     return {"patch": "patch", "bench": "bench"}.get(result.plan.kind, "rig")
 
 
-def _is_known(measures: Quantities, name: str) -> bool:
-    """Return whether a measure has a value."""
-    return name in measures and measures[name].value is not None
+def _is_shown(measures: Quantities, name: str) -> bool:
+    """Return whether a measure has a value that is not displayed as 0."""
+    measure = measures.get(name)
+    return (
+        measure is not None and measure.value is not None and not quantities.is_zero(name, measure)
+    )
 
 
 def _describe_interfaces(result: Result, measures: Quantities, text: str) -> list[str]:
     """Return the dissipated energy of the interface, or of each of a few interfaces."""
-    names = [name for name in measures if remove_interface_number(name) == "loop_area"]
     names = [
         name
-        for name in names
-        if _is_known(measures, name) and not quantities.is_zero(name, measures[name])
+        for name in measures
+        if remove_interface_number(name) == "loop_area" and _is_shown(measures, name)
     ]
     if not names:
         return []
@@ -152,7 +154,7 @@ def _describe_interfaces(result: Result, measures: Quantities, text: str) -> lis
     has_strips = any(name == "contact.strips" for name in result.plan.effects)
     if len(names) == 1 or has_strips or len(names) > MAX_LISTED:
         where = "" if len(names) == 1 or has_strips else f" at interface 1 of {len(names)}"
-        return [text.format(quantities.format_quantity(names[0], measures[names[0]])) + where]
+        return [text.format(_format(names[0], measures)) + where]
     values = [_format(name, measures) for name in names]
     return [text.format(f"{', '.join(values[:-1])} and {values[-1]}") + " at the interfaces"]
 
@@ -265,14 +267,15 @@ def _describe_place(contact: JsonObject | None, form: str = "In contact: {}.") -
     if len(stretches) == 1 and stretches[0][0] <= first and stretches[0][1] >= last:
         return ""
     unit, scale = choose_unit(UNIT_LADDERS["m"], max(abs(first), abs(last)))
+    count = ""
+    if len(stretches) > MAX_LISTED:
+        count = f"{len(stretches)} regions from "
+        stretches = [(stretches[0][0], stretches[-1][1])]
     texts = [
         f"{format_number(start * scale, 4)} to {format_number(end * scale, 4)}"
-        for start, end in stretches[:MAX_LISTED]
+        for start, end in stretches
     ]
-    if len(stretches) > MAX_LISTED:
-        whole = f"{format_number(stretches[0][0] * scale, 4)} to {format_number(stretches[-1][1] * scale, 4)}"
-        return form.format(f"{len(stretches)} regions from x = {whole} {unit}")
-    return form.format(f"x = {' and '.join(texts)} {unit}")
+    return form.format(f"{count}x = {' and '.join(texts)} {unit}")
 
 
 def _describe_readings(readings: Iterable[JsonObject]) -> str:
@@ -280,13 +283,12 @@ def _describe_readings(readings: Iterable[JsonObject]) -> str:
 
     readings: as `list_readings` returns them; those of repeat runs are left out.
     """
-    parts = [
+    text = " and ".join(
         f"the {row['reading']} is {format_number(row['ratio'], 3)} times the measured one"
         for row in readings
         if "repeat" not in row["reading"]
-    ]
-    text = " and ".join(parts)
-    return f"{text[0].upper()}{text[1:]}." if parts else ""
+    )
+    return f"{text[0].upper()}{text[1:]}." if text else ""
 
 
 def list_readings(result: Result) -> list[JsonObject]:

@@ -144,22 +144,17 @@ def _list_effects(result: Result) -> list[JsonObject]:
     """
     patch_seconds = {} if result.patch is None else result.patch.seconds
     loop_seconds = result.seconds.get("march", result.seconds.get("bench", 0.0))
+    known = {f"contact.{name}": seconds for name, seconds in patch_seconds.items()}
+    known["contact"] = patch_seconds.get("condense", 0.0) + patch_seconds.get("press", 0.0)
+    known["contact.shear"] = result.seconds.get("reduce", 0.0)
+    if result.plan.kind == "linear":
+        known["structure"] = loop_seconds
+
     entries = []
     for name in result.plan.effects:
-        seconds = patch_seconds.get(name.removeprefix("contact."), 0.0)
-        if name == "contact":
-            seconds = patch_seconds.get("condense", 0.0) + patch_seconds.get("press", 0.0)
-        elif name == "contact.shear":
-            seconds = result.seconds.get("reduce", 0.0)
-        elif name.startswith("friction.law=") or (name, result.plan.kind) == (
-            "structure",
-            "linear",
-        ):
-            seconds = loop_seconds
-        equations = EFFECTS[name].equations
-        entries.append(
-            {"effect": name, "equations": equations, "seconds": round(float(seconds), 6)}
-        )
+        is_law = name.startswith("friction.law=")
+        seconds = round(float(loop_seconds if is_law else known.get(name, 0.0)), 6)
+        entries.append({"effect": name, "equations": EFFECTS[name].equations, "seconds": seconds})
     return entries
 
 

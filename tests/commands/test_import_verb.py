@@ -159,7 +159,7 @@ def test_exact_mode_shapes_are_scaled_to_local_mass(tmp_path):
         (["-o", "a.xlsx"], "modes as .toml"),
         (["-o", "a.csv", "--segment", "2 s"], "can be used only for modes"),
         (["-o", "a.toml", "--zero"], "--zero can be used only when importing a table"),
-        (["-o", "a.uff"], "a frequency response was removed in patchfem 2.0"),
+        (["-o", "a.uff"], "modes as .toml"),
         (["-o", "a.toml", "--segment", "2"], "--segment 2:"),
         (["-o", "a.toml", "--window", "flat"], "hann or none"),
         (["-o", "a.toml", "--band", "20 Hz"], "two rising frequencies"),

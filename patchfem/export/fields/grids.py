@@ -99,7 +99,12 @@ def export_frames(frames: Frames, out: Path, number: int) -> None:
 
 
 def _write_vtu(frames: Frames, out: Path, number: int) -> None:
-    """Write a frame as one mesh with the array `part`; fields that a part lacks are NaN or -1 there."""
+    """Write a frame as one mesh with the array `part`; fields that a part lacks are NaN or -1 there.
+
+    VTK makes the text in memory, because it ends the process where it cannot write a file.
+    """
+    from vtkmodules.vtkIOXML import vtkXMLUnstructuredGridWriter
+
     grids = make_grids(frames.blocks, number, float(frames.times[number]))
     for code, name in enumerate(PARTS):
         grids[name].cell_data["part"] = np.full(grids[name].n_cells, code, np.int8)
@@ -111,21 +116,12 @@ def _write_vtu(frames: Frames, out: Path, number: int) -> None:
             for name in samples.keys() - set(data.keys()):
                 hole = np.nan if samples[name].dtype.kind == "f" else -1
                 data[name] = np.full((count, *samples[name].shape[1:]), hole, samples[name].dtype)
+
     merged = grids.combine()
     merged.field_data["TimeValue"] = [frames.times[number]]
     _label_units(merged)
-    _write_grid(merged, out)
-
-
-def _write_grid(grid, out: Path) -> None:
-    """Write a grid as .vtu.
-
-    VTK makes the text in memory, because it ends the process where it cannot write a file.
-    """
-    from vtkmodules.vtkIOXML import vtkXMLUnstructuredGridWriter
-
     writer = vtkXMLUnstructuredGridWriter()
-    writer.SetInputData(grid)
+    writer.SetInputData(merged)
     writer.SetDataModeToBinary()
     writer.SetWriteToOutputString(True)
     writer.Write()
@@ -133,26 +129,16 @@ def _write_grid(grid, out: Path) -> None:
 
 
 def _write_pvd(frames: Frames, out: Path) -> None:
-    """Write all frames as .vtm files, which name the .vtu of each block, in a folder beside a .pvd."""
+    """Write each frame as .vtu in a folder beside a .pvd, which lists them with their times."""
     folder = out.with_name(f"{out.stem}_frames")
     create_folder(folder)
-    listed = []
+    lines = []
     for number, time in enumerate(frames.times):
-        grids = make_grids(frames.blocks, number, float(time))
-        name = f"frame_{number:04d}"
-        blocks = []
-        for part, grid in zip(grids.keys(), grids):
-            _write_grid(grid, folder / f"{name}_{part}.vtu")
-            blocks.append(f'<DataSet name="{part}" file="{name}_{part}.vtu"/>')
-        _write_list(folder / f"{name}.vtm", "vtkMultiBlockDataSet", blocks)
-        listed.append(f'<DataSet timestep="{float(time)!r}" file="{folder.name}/{name}.vtm"/>')
-    _write_list(out, "Collection", listed)
-
-
-def _write_list(out: Path, kind: str, entries: list[str]) -> None:
-    """Write a file of VTK that lists other files."""
-    text = "\n".join(entries)
-    write_text(out, f'<VTKFile type="{kind}" version="1.0"><{kind}>\n{text}\n</{kind}></VTKFile>\n')
+        name = f"frame_{number:04d}.vtu"
+        _write_vtu(frames, folder / name, number)
+        lines.append(f'<DataSet timestep="{float(time)!r}" file="{folder.name}/{name}"/>')
+    text = "\n".join(lines)
+    write_text(out, f'<VTKFile type="Collection"><Collection>\n{text}\n</Collection></VTKFile>\n')
 
 
 def _write_csv(frames: Frames, out: Path, number: int) -> None:

@@ -14,7 +14,6 @@ from ...inputs import laboratory, records
 from ...inputs import universal as universal_files
 from ...inputs.units import CHANNEL_UNITS, SI_UNITS
 from ...scene.keys import quantities
-from ...scene.keys.removed import describe_removed
 from ...structure import universal as universal_modes
 from ..answer import JsonObject
 from . import universal
@@ -112,10 +111,7 @@ def _choose_form(out: Path, zero: bool, settings: EstimateOptions) -> str:
     endings = {".csv": "decay" if settings.decay else "table", ".toml": "modes"}
     form = endings.get(out.suffix.lower())
     if form is None:
-        removed = ""
-        if out.suffix.lower() in laboratory.UNIVERSAL_EXTENSIONS:
-            removed = f"; {describe_removed('import -o response.uff', 'a frequency response')}"
-        raise PatchfemError(f"{out}: records are written as .csv, modes as .toml{removed}")
+        raise PatchfemError(f"{out}: records are written as .csv, modes as .toml")
     if zero and form != "table":
         raise PatchfemError(
             "--zero can be used only when importing a table of records (-o table.csv), not with --decay"

@@ -28,7 +28,6 @@ REMOVED_NAMES = {
         "run the scene with its patch, or fit the law of a point to a loop that `run` and `export` wrote",
     ),
     "fit --amplitudes": ("1.2", "leave it out: it belonged to --from-patch"),
-    "import -o response.uff": ("2.0", "write the modes of the record as .toml"),
     "export --of": ("1.2", "leave it out: choose the field in ParaView"),
 }
 
