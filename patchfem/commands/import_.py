@@ -47,8 +47,8 @@ def import_(
     ],
     map_: repeated_option(
         'quantity and name of a channel of the file, such as "force=Load cell [lbf]", '
-        '"displacement=12:+x", "time=t [s]", "force=run.load(:,2) [N]"; or, for mode shapes, '
-        "slide=12:+x; may be repeated; without this option the labels of the channels are used",
+        '"displacement=12:+x", "time=t [s]", "force=run.load(:,2) [N]"; may be repeated; '
+        "without this option the labels of the channels are used",
         "--map",
     ) = (),
     zero: flag_option(
@@ -59,9 +59,8 @@ def import_(
 ):
     """Convert a laboratory file into a table or into the modes of a scene. The table can be used as `drive.file`, as
     `slide.file` and with `fit --to`. The laboratory file may be .uff (datasets 58, with the units of dataset 164),
-    .mat, or .csv with units in its header. Modes are computed from an input and a response, from a free decay, from
-    mode shapes (dataset 55) or from frequency responses. With --decay the table gives frequency and damping ratio of
-    the decay against its amplitude, with 95 % intervals.
+    .mat, or .csv with units in its header. Modes are computed from an input and a response, or from a free decay. With
+    --decay the table gives frequency and damping ratio of the decay against its amplitude, with 95 % intervals.
 
     Example: patchfem import bench.uff --map "force=Load cell [lbf]" --map displacement=12:+x -o loop.csv
     """

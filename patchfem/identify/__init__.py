@@ -15,12 +15,9 @@ PUBLIC = {
         "Search",
     ),
     "measured_modes": (
-        "SHAPE_QUANTITIES",
         "compute_decay_curve",
-        "estimate_record",
         "identify_decay_modes",
         "identify_driven_modes",
-        "list_shape_modes",
     ),
     "fit_sentences": ("describe_fit",),
     "advice": ("advise_test",),

@@ -1,4 +1,4 @@
-"""Modes of a scene from a driven record, a free decay or measured mode shapes."""
+"""Modes of a scene from a driven record or a free decay."""
 
 from dataclasses import dataclass, field
 from typing import NamedTuple
@@ -7,16 +7,12 @@ import numpy as np
 
 from ..core import PatchfemError
 from ..response.decay_curve import HalfCycles, fit_decay_curve, fit_slopes
-from ..structure import places as structure_places
-from ..structure.places import MeasuredModes
 from .decay import fit_decay
 from .driven_modes import DERIVATIVE_ORDERS, MAX_FITTED_SAMPLES, DrivenModes, fit_driven_modes
 from .frequency_response import FrequencyResponse, estimate_response, find_time_step
 from .half_cycles import describe_missing_samples_at_end, find_half_cycles
 
 INPUT_QUANTITIES = ("force", "base_acceleration")  # possible inputs of a record
-# Components of a mode whose node and direction in a file of mode shapes a user can give (--map).
-SHAPE_QUANTITIES = ("slide", "output", "base", "normal", "pitch")
 # Largest half-width of the interval of a damping ratio, relative to the damping ratio.
 MAX_ERROR_RATIO = 2.0
 # Largest misfit of a driven response for which no note is issued.
@@ -342,51 +338,3 @@ def identify_decay_modes(values: dict, begin: float | None = None) -> ListedMode
     motion[np.argmax(decay.amplitude)] = 1.0
     rows = {"slide": motion, "output": motion}
     return ListedModes(decay.frequency, decay.damping, rows, None, descriptions, notes)
-
-
-def list_shape_modes(shapes: MeasuredModes, places: dict) -> ListedModes:
-    """Convert measured mode shapes to the modes of a scene and their modal mass.
-
-    The modal mass is 1 / sum phi^2 at the sliding point, or at the point `base`. A larger mass would exceed
-    the mass that the modes represent there.
-
-    Parameters
-    ----------
-    shapes : MeasuredModes
-    places : dict
-        Node and direction such as ``"12:+x"`` for some of `SHAPE_QUANTITIES`; `slide` is required unless
-        the file has only one node and direction.
-
-    Returns
-    -------
-    ListedModes
-    """
-    if "slide" not in places:
-        node, axis = next(iter(shapes.motion))
-        slide = f"{node}:+{structure_places.DIRECTION_NAMES[axis]}"
-        if len(shapes.motion) != 1:
-            raise PatchfemError(
-                f"the file has {len(shapes.motion)} nodes and directions; give the node and direction "
-                f"that slide, such as --map slide={slide}"
-            )
-        places = {"slide": slide, **places}
-    motion = {key: shapes.motion_at(text, key) for key, text in places.items()}
-    inverse_mass = float(np.sum(motion.get("base", motion["slide"]) ** 2))
-    if not inverse_mass > 0:
-        raise PatchfemError("no mode moves the node that slides")
-    order = np.argsort(shapes.frequency, kind="stable")
-    rows = {key: row[order] / np.sqrt(inverse_mass) for key, row in motion.items()}
-    rows.setdefault("output", rows["slide"])
-    rows.setdefault("base", rows["slide"])
-    note = (
-        f"moving_mass is set to {1 / inverse_mass:.5g} kg, the mass that these modes contain at the node that slides; with "
-        "a larger value, part of the mass would belong to no mode"
-    )
-    return ListedModes(
-        frequency=shapes.frequency[order],
-        damping=shapes.zeta[order],
-        rows=rows,
-        mass=1 / inverse_mass,
-        descriptions=[""] * order.size,
-        notes=[*shapes.notes, note],
-    )

@@ -50,10 +50,7 @@ PUBLIC = {
         "read_columns",
         "read_text",
     ),
-    "units": (
-        "CHANNEL_UNITS",
-        "SI_UNITS",
-    ),
+    "units": ("SI_UNITS",),
     "universal": (
         "FunctionType",
         "OrdinateType",

@@ -74,7 +74,7 @@ def _read_universal(path: Path, requests: list, exported_names: Mapping) -> Reco
     if not channels:
         raise PatchfemError(
             f"{path}: contains no record over time (dataset 58, function type 1), only modes or "
-            "frequency responses; write these as the modes of a scene with -o modes.toml"
+            "frequency responses; name the file in the scene as structure.file"
         )
     return select_channels(path, channels, requests, notes)
 

@@ -28,7 +28,6 @@ PUBLIC = {
     "drives": ("make_release",),
     "places": (
         "DIRECTION_NAMES",
-        "MeasuredModes",
         "note_missing_mass",
     ),
     "reduced": (

@@ -113,44 +113,27 @@ def test_exact_modes_of_free_decay(tmp_path):
     assert modes.zeta == pytest.approx(ZETA, rel=1e-7)
 
 
-def test_exact_mode_shapes_are_scaled_to_local_mass(tmp_path):
-    """The mode shapes of two masses (dataset 55) are scaled to the local mass of 3 kg.
-
-    This mass is 1 / sum phi^2; the file has six digits.
-    """
-    # rows are places, columns are modes, orthonormal with respect to the masses
-    phi = np.array([[0.6, 0.8], [0.8, -0.6]]) / np.sqrt([[1.0], [3.0]])
-    sets = [
-        {
-            "type": 55,
-            "analysis_type": 2,
-            "data_ch": 2,
-            "spec_data_type": 8,
-            "load_case": 1,
-            "mode_n": k + 1,
-            "node_nums": [11, 12],
-            "r1": phi[:, k],
-            "r2": np.zeros(2),
-            "r3": np.zeros(2),
-            "modal_m": 1.0,
-            "freq": HERTZ[k],
-            "modal_damp_vis": ZETA[k],
-            "modal_damp_his": 0.0,
-        }
-        for k in range(2)
-    ]
-    path = write_universal(tmp_path / "shapes.uff", [SI, *sets])
+def test_refuses_mode_shapes(tmp_path):
+    """A file of mode shapes (dataset 55) is refused with the key of the scene that reads it."""
+    shape = {
+        "type": 55,
+        "analysis_type": 2,
+        "data_ch": 2,
+        "spec_data_type": 8,
+        "load_case": 1,
+        "mode_n": 1,
+        "node_nums": [11, 12],
+        "r1": np.ones(2),
+        "r2": np.zeros(2),
+        "r3": np.zeros(2),
+        "modal_m": 1.0,
+        "freq": HERTZ[0],
+        "modal_damp_vis": ZETA[0],
+        "modal_damp_his": 0.0,
+    }
+    path = write_universal(tmp_path / "shapes.uff", [SI, shape])
     answer = run_cli("import", path, "-o", tmp_path / "modes.toml")
-    assert answer.code == 2
-    assert "give the node and direction that slide, such as --map slide=11:+x" in answer.err
-    answer = run_cli(
-        "import", path, "-o", tmp_path / "modes.toml", "--map", "slide=12:+x,output=11:+x"
-    )
-    assert answer.code == 0, answer.err
-    modes = build(SHAKEN + (tmp_path / "modes.toml").read_text()).rig.modes
-    assert modes.mass == pytest.approx(3, rel=1e-5)  # dataset 55 has six digits
-    assert modes.slide == pytest.approx(phi[1] * np.sqrt(3), rel=1e-5)
-    assert modes.output == pytest.approx(phi[0] * np.sqrt(3), rel=1e-5)
+    assert answer.code == 2 and "name the file in the scene as structure.file" in answer.err
 
 
 @pytest.mark.parametrize(

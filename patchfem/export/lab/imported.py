@@ -11,10 +11,8 @@ from ...core import PatchfemError
 from ...disk.atomic_write import write_text
 from ...identify import measured_modes
 from ...inputs import laboratory, records
-from ...inputs import universal as universal_files
-from ...inputs.units import CHANNEL_UNITS, SI_UNITS
+from ...inputs.units import SI_UNITS
 from ...scene.keys import quantities
-from ...structure import universal as universal_modes
 from ..answer import JsonObject
 from . import universal
 from .universal import Column
@@ -88,10 +86,8 @@ def convert_file(
     form = _choose_form(out, zero, settings)
     if form == "table":
         return _write_table(file, out, requests, zero)
-    if form == "modes" and (shapes := _read_shapes(file, requests, settings)):
-        return _write_modes(shapes, out, file.name, [])
 
-    # all other forms are estimated from records
+    # decays and modes are estimated from records of known quantities
     values, notes = _read_records(file, requests)
     begin = _parse_quantity(settings.begin, "time", "--begin")
     if form == "decay":
@@ -220,26 +216,6 @@ def _read_records(file: Path, requests: Iterable[str]) -> tuple[Records, list[st
             f"{next(iter(responses))}=CHANNEL among {found.channel_list}"
         )
     return found.values, found.notes
-
-
-def _read_shapes(
-    file: Path, requests: Iterable[str], settings: EstimateOptions
-) -> measured_modes.ListedModes | None:
-    """Return the modes of mode shapes or frequency responses in a universal file; None for a file of records."""
-    names = {text.partition("=")[0].strip() for text in requests}
-    is_universal = file.suffix.lower() in laboratory.UNIVERSAL_EXTENSIONS
-    if not is_universal or settings != EstimateOptions() or names & set(CHANNEL_UNITS):
-        return None
-    datasets = universal_files.read_datasets(file)
-    if not any(one["type"] == 55 or int(one.get("func_type", 0)) == 4 for one in datasets):
-        return None
-    try:
-        shapes = universal_modes.read_universal(file)
-    except PatchfemError as error:
-        raise type(error)(str(error).removeprefix("structure.file: ")) from None
-    places = records.parse_requests(requests, measured_modes.SHAPE_QUANTITIES)
-    sources = {request.quantity: request.source for request in places}
-    return measured_modes.list_shape_modes(shapes, sources)
 
 
 def _parse_quantity(text: str, kind: str, option: str) -> float | None:
