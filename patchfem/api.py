@@ -831,12 +831,15 @@ def fit(
     data = keywords.get("to", data)
     data_path = "" if isinstance(data, str) and not data else str(_require_path(data, "fit: to"))
     listener = fit_requests.Listener(_print_to_stderr if say is None else say)
-    with TemporaryDirectory() as temporary_folder:
-        target = Path(temporary_folder) / "fit" if out is None else Path(out)
-        answer = fits.fit_into(
-            loaded, data_path, ranges, options, target, listener, with_page=out is not None
-        )
-        return answer.details
+    arguments = (loaded, data_path, ranges, options, listener)
+    if out is None:
+        with TemporaryDirectory() as temporary_folder:
+            return fits.compute_answer(*arguments, Path(temporary_folder)).details
+    with Folder(Path(out), options.resume) as folder:
+        answer = fits.compute_answer(*arguments, folder.path)
+        store.write(answer, folder.path)
+        page.write_page(folder.path)
+    return answer.details
 
 
 def _check_fit_options(options: Any, changes: dict) -> FitOptions:

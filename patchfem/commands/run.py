@@ -46,6 +46,8 @@ def run(
             "run --resume: only a run with [wear] on a patch or a run that is integrated in time saves its "
             "state; run the scene again without --resume"
         )
+
+    # a run that is complete has no state, so that nothing is left to resume
     output = output_options.make_output(run_plan.model.source.path.stem, is_verbose=verbose)
     target = output.target
     if resume and run_folder.is_complete(run_plan, target):

@@ -165,7 +165,7 @@ def _print_plan(plan_data: dict[str, Any], is_solved: bool, verbose: bool) -> No
 
     # without a solved patch a plan has only an upper bound of the shear stiffness of the pieces
     is_upper_estimate = not is_solved and _has_pieces(plan_data["stiffness_chain"])
-    _print_chain(plan_data, is_upper_estimate)
+    _print_chain(plan_data, is_upper_estimate=is_upper_estimate)
     for name, value in plan_data["groups"].items():
         print(f"group    {_format_group(value, name)}")
     if verbose:
@@ -182,7 +182,7 @@ def _has_pieces(chain: dict[str, float | str]) -> bool:
     )
 
 
-def _print_chain(plan_data: dict[str, Any], is_upper_estimate: bool) -> None:
+def _print_chain(plan_data: dict[str, Any], *, is_upper_estimate: bool) -> None:
     """Print the stiffnesses in series, and the frequencies of the modes without contact and while it sticks."""
     bonded = any(
         law_has_trait(one["effect"].partition("law=")[2], "bonds") for one in plan_data["effects"]

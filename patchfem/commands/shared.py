@@ -115,15 +115,27 @@ OutputGroup = Annotated[OutputOptions, Parameter(name="*")]
 DEFAULT_OUTPUT = OutputOptions()
 
 
-def save(make_answer: Callable[[Path], "Answer"], output: Output) -> "Answer":
+def save(
+    make_answer: Callable[[Path], "Answer"], output: Output, *, resume: bool = False
+) -> "Answer":
     """Make an answer, write it with its page into its folder, print it and return it.
 
-    make_answer: function that takes the folder, which is locked meanwhile.
+    Parameters
+    ----------
+    make_answer : callable
+        Function that takes the folder, which is locked meanwhile, and returns the Answer.
+    output : Output
+        Where and how the answer is written and printed.
+    resume : bool
+        Whether saved states in the folder are kept.
     """
-    with folders.Folder(output.target) as folder:
+    with folders.Folder(output.target, resume) as folder:
+        if folder.dropped and output.report:
+            output.report(folder.dropped)
         answer = make_answer(folder.path)
-        known = {"command": describe_command(), "versions": runs.list_versions()}
-        answer = replace(answer, origin=known | answer.origin)
+        versions = {"versions": runs.list_versions()}
+        origin = versions | answer.origin | {"command": describe_command()}
+        answer = replace(answer, origin=origin)
         store.write(answer, folder.path)
         if output.has_page:
             page.write_page(folder.path)

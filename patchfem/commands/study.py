@@ -22,11 +22,9 @@ from .shared import (
     Sets,
     UsageError,
     Verbose,
-    describe_command,
     flag_option,
     load_model,
     load_scene,
-    present,
     print_message,
     repeated_option,
     save,
@@ -122,7 +120,7 @@ def backbone(
 
     def compute_curves(_):
         """Compute the curves of all methods and values of the key."""
-        return backbones.compute_answer(build_model, request, report, describe_command())
+        return backbones.compute_answer(build_model, request, report)
 
     answer = save(compute_curves, output)
     cases = answer.details.get("cases", [answer.details])
@@ -206,17 +204,10 @@ def fit(
         listener = fit_requests.Listener(
             report, progress, lambda name: f"--{name.replace('_', '-')}"
         )
-        answer = fits.fit_into(
-            loaded_scene,
-            to,
-            free,
-            options,
-            output.target,
-            listener,
-            with_page=output.has_page,
-            command=describe_command(),
+        answer = save(
+            lambda folder: fits.compute_answer(loaded_scene, to, free, options, listener, folder),
+            output,
+            resume=options.resume,
         )
-
-    present(answer, output)
     if answer.details["outcome"] == "not_converged":
         raise CommandExit(NOT_CONVERGED)

@@ -1,7 +1,6 @@
 """The answer of `backbone`: frequency, damping ratio and force of a mode against its amplitude."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -46,7 +45,6 @@ def compute_answer(
     build: Callable[..., Model],
     request: BackboneRequest,
     progress: Callable[[str], None] | None = None,
-    command: str = "",
 ) -> Answer:
     """Compute the backbones that a request asks for, and return them as an answer.
 
@@ -58,15 +56,11 @@ def compute_answer(
         Mode, amplitudes or forces, method, and the key that is varied.
     progress : callable, optional
         Function that takes the name of the curve that is computed next.
-    command : str
-        Command line that repeats it.
     """
     cases = compute_cases(build, request, progress)
     if cases.axis is None:
-        answer = make_answer(cases.backbones[0], cases.source)
-    else:
-        answer = _make_cases_answer(cases)
-    return replace(answer, origin=answer.origin | ({"command": command} if command else {}))
+        return make_answer(cases.backbones[0], cases.source)
+    return _make_cases_answer(cases)
 
 
 def make_answer(backbone: Backbone, source: Source) -> Answer:

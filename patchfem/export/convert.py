@@ -54,7 +54,7 @@ def export_results(
             )
         grids.create_folder(out.parent)
         return write.export_histories(folder, out)
-    _refuse_field_format(out, frame, histories)
+    _refuse_field_format(out, frame, histories=histories)
     frames = read_frames(find_fields(folder))
     number = grids.find_frame(frames, frame)
     grids.create_folder(out.parent)
@@ -64,7 +64,7 @@ def export_results(
     return f"{out}: frame {number} of 0 to {len(frames.times) - 1}, {frames.times[number]:.6g} s"
 
 
-def _refuse_field_format(out: Path, frame: int | None, histories: bool) -> None:
+def _refuse_field_format(out: Path, frame: int | None, *, histories: bool) -> None:
     """Raise PatchfemError if a file of fields cannot have this suffix, or not with these options."""
     if histories:
         raise PatchfemError(

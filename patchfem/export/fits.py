@@ -4,7 +4,7 @@ A fit to a loop, to frequency and damping against amplitude, to rows of a rig or
 """
 
 from collections.abc import Sequence
-from dataclasses import asdict, replace
+from dataclasses import asdict
 from pathlib import Path
 from typing import NamedTuple
 
@@ -22,7 +22,6 @@ from ..identify.least_squares import Fit
 from ..model.model import build, write_resolved
 from ..scene.assignments import Range
 from ..scene.scene import Scene, add_sets, move_scene
-from . import page, store
 from .answer import (
     Answer,
     JsonObject,
@@ -33,7 +32,7 @@ from .answer import (
     encode,
     make_columns,
 )
-from .folder import STARTS, Folder
+from .folder import STARTS
 from .quantities import format_quantity
 from .runs import make_origin
 
@@ -53,17 +52,15 @@ WEAR_UNIT = "m2 N-1"
 AnyFit = FittedLoop | FittedCurve | FittedRows | FittedCoefficient
 
 
-def fit_into(
+def compute_answer(
     scene: Scene,
     to: str,
     free: Sequence[str],
     options: FitOptions,
-    target: Path,
     listener: Listener,
-    with_page: bool = True,
-    command: str = "",
+    folder: Path,
 ) -> Answer:
-    """Fit keys of a scene to a measurement, and write the results folder.
+    """Fit keys of a scene to a measurement; starts of the search and the fitted scene are written into a folder.
 
     Parameters
     ----------
@@ -75,36 +72,19 @@ def fit_into(
         Keys to fit with their ranges, such as "friction.static=0.1..0.6".
     options : FitOptions
         Rows that are held out, offsets of the record, and settings of the search.
-    target : Path
-        Results folder, which is claimed before the work.
     listener : Listener
         Functions that take a line of text and the completed fraction.
-    with_page : bool
-        Whether report.html is written.
-    command : str
-        Command that repeats the fit; "" in Python.
-
-    Returns
-    -------
-    Answer
+    folder : Path
+        Existing folder of the results.
 
     Raises
     ------
     SceneError, PatchfemError
         For input that cannot be used, before anything is computed.
     """
-    with Folder(target, options.resume) as folder:
-        if folder.dropped and listener.say is not None:
-            listener.say(folder.dropped)
-        fit = fit_measurement(scene, to, free, options, listener, folder.path / STARTS)
-        answer = make_answer(fit, scene)
-        if command:
-            answer = replace(answer, origin=answer.origin | {"command": command})
-        store.write(answer, folder.path)
-        text = format_fitted_scene(fit, scene, answer.verdict, folder.target)
-        write_text(folder.path / FITTED_SCENE, text)
-        if with_page:
-            page.write_page(folder.path)
+    fit = fit_measurement(scene, to, free, options, listener, folder / STARTS)
+    answer = make_answer(fit, scene)
+    write_text(folder / FITTED_SCENE, format_fitted_scene(fit, scene, answer.verdict, folder))
     return answer
 
 

@@ -57,9 +57,18 @@ def write_netcdf(answer: Answer, path: Path) -> None:
 
 
 def write_arrays(data: Variables, attributes: Attributes, path: Path) -> None:
-    """Write variables, and the attributes of the file, as a netCDF4 file, which replaces an older one when it is complete.
+    """Write variables as a netCDF4 file, which replaces an older one when it is complete.
 
     HDF5 writes through `open_lossy`, because it would crash on a full disk; the error is raised when the file is closed.
+
+    Parameters
+    ----------
+    data : dict of str to Variable
+        Arrays of the file.
+    attributes : dict
+        Attributes of the file.
+    path : Path
+        File to write.
     """
     with (
         write_atomically(path) as partial,

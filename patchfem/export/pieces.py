@@ -223,9 +223,20 @@ def draw_result(result, onto=None):
 
 
 def write_picture(frames: Frames, number: int, title: str, magnify: float | None, out: Path) -> str:
-    """Write a picture of one frame into a file, and return a line on it.
+    """Write a picture of one frame, and return a line on it.
 
-    magnify: factor of the motion; None for one that makes it visible.
+    Parameters
+    ----------
+    frames : Frames
+        Fields of both pieces.
+    number : int
+        Number of the frame.
+    title : str
+        First words of the title.
+    magnify : float or None
+        Factor of the motion; None for one that makes it visible.
+    out : Path
+        File to write.
     """
     with write_atomically(out) as partial:
         draw_pieces(frames, np.array([number]), title, magnify)[0].savefig(partial, dpi=1.5 * DPI)
@@ -244,7 +255,16 @@ def _make_page(player: str, title: str) -> str:
 def write_film(frames: Frames, title: str, magnify: float | None, out: Path) -> str:
     """Write the last cycle as .gif or .mp4, or as a page with a slider, and return a line on it.
 
-    magnify: factor of the motion; None for one that makes it visible.
+    Parameters
+    ----------
+    frames : Frames
+        Fields of both pieces.
+    title : str
+        First words of the title.
+    magnify : float or None
+        Factor of the motion; None for one that makes it visible.
+    out : Path
+        File to write.
 
     Raises
     ------

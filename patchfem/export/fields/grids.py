@@ -88,7 +88,17 @@ def make_result_grids(result: Result, numbers: Iterable[int]) -> list[MultiBlock
 
 
 def export_frames(frames: Frames, out: Path, number: int) -> None:
-    """Write fields as .vtu or .csv of the frame `number`, or as .pvd or .vtkhdf of all frames."""
+    """Write fields as .vtu or .csv of one frame, or as .pvd or .vtkhdf of all frames.
+
+    Parameters
+    ----------
+    frames : Frames
+        Fields of a run.
+    out : Path
+        File whose suffix chooses the format.
+    number : int
+        Number of the frame of a .vtu or .csv.
+    """
     if out.suffix == ".vtkhdf":
         write_blocks(out, frames.blocks, frames.times)
     elif out.suffix == ".pvd":
@@ -108,6 +118,7 @@ def _write_vtu(frames: Frames, out: Path, number: int) -> None:
     grids = make_grids(frames.blocks, number, float(frames.times[number]))
     for code, name in enumerate(PARTS):
         grids[name].cell_data["part"] = np.full(grids[name].n_cells, code, np.int8)
+    # one mesh has one list of fields, so that every part needs all of them
     for kind in ("point_data", "cell_data"):
         samples = {name: values for grid in grids for name, values in getattr(grid, kind).items()}
         for grid in grids:

@@ -47,7 +47,17 @@ def write_fields(result, path: Path) -> None:
 
 
 def write_blocks(path: Path, blocks: dict[str, Block], times: np.ndarray) -> None:
-    """Write blocks at times (f,) [s] as a VTKHDF file, which gets its name when it is complete."""
+    """Write blocks as a VTKHDF file, which gets its name when it is complete.
+
+    Parameters
+    ----------
+    path : Path
+        File to write.
+    blocks : dict of str to Block
+        Parts and their fields.
+    times : (f,) array
+        Times of the frames [s].
+    """
     with (
         write_atomically(Path(path)) as partial,
         open_lossy(partial) as opened,

@@ -83,7 +83,7 @@ def convert_file(
     PatchfemError
         If options do not fit together.
     """
-    form = _choose_form(out, zero, settings)
+    form = _choose_form(out, settings, zero=zero)
     if form == "table":
         return _write_table(file, out, requests, zero)
 
@@ -102,7 +102,7 @@ def convert_file(
     return _write_modes(modes, out, file.name, notes)
 
 
-def _choose_form(out: Path, zero: bool, settings: EstimateOptions) -> str:
+def _choose_form(out: Path, settings: EstimateOptions, *, zero: bool) -> str:
     """Return "table", "decay" or "modes"; PatchfemError for another ending and for options that the form does not use."""
     endings = {".csv": "decay" if settings.decay else "table", ".toml": "modes"}
     form = endings.get(out.suffix.lower())

@@ -212,7 +212,19 @@ def compute_in_memory(
     executor,
     say: Callable[[str], None] | None = None,
 ) -> Answer:
-    """Compute the cases in memory only; `say` takes a line of text."""
+    """Compute the cases in memory only.
+
+    Parameters
+    ----------
+    sweep_scene : SweepScene
+        What all cases share.
+    cases : Cases
+        Values of the keys in each case.
+    executor : object
+        Computes chunks of cases, from `campaigns.sweeps.executors.make_executor`.
+    say : callable, optional
+        Takes a line of text.
+    """
     table = SweepTable.blank(cases, read_tolerance(sweep_scene, cases))
     work = WorkerData(sweep_scene, cases)
     for numbers, results, _ in iterate_chunks(work, range(len(cases)), executor, say):
@@ -223,7 +235,19 @@ def compute_in_memory(
 def collect_shards(
     sweep_scene: SweepScene, cases: Cases, target: Path, page: bool = True
 ) -> Answer:
-    """Write all tables of a sweep whose shards are complete, from its folder; Missing if cases have no result yet."""
+    """Write all tables of a sweep whose shards are complete, from its folder; Missing if cases have no result yet.
+
+    Parameters
+    ----------
+    sweep_scene : SweepScene
+        What all cases share.
+    cases : Cases
+        Values of the keys in each case.
+    target : Path
+        Folder of the sweep.
+    page : bool
+        Whether report.html is written.
+    """
     with Folder(target, cases.compute_hashes(sweep_scene)) as folder:
         answer = write_tables(sweep_scene, cases, folder, page, is_collected=True)
         folder.clean(removes_others=False)

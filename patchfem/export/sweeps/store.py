@@ -25,7 +25,17 @@ TABLE_TYPES = {"values": np.float64, "errors": np.float32, "floors": np.float32}
 
 
 def write_chunk(folder: Path, names: np.ndarray, results: CaseResults) -> Path:
-    """Write the results of cases with names (n,) into a file of a folder, and return it; WriteError without space."""
+    """Write the results of cases into a file of a folder, and return this file; WriteError without space.
+
+    Parameters
+    ----------
+    folder : Path
+        Folder of the chunks.
+    names : (n,) array of int
+        Names of the cases.
+    results : CaseResults
+        Measures and outcomes of the cases.
+    """
     data = {
         "name": Variable(("case",), np.asarray(names, np.uint64), ""),
         "outcome": encode("case", results.outcome),

@@ -32,7 +32,18 @@ def write_csv(cases: Cases, table: SweepTable, case_folders: Sequence[str], path
     """Write sweep.csv.
 
     A row has the swept keys as written, the outcome, every measure with its error in SI, the message
-    of a failed case, and the name of its folder, if cases have folders. A missing number is "".
+    of a failed case, and the name of its folder. A missing number is "".
+
+    Parameters
+    ----------
+    cases : Cases
+        Values of the keys in each case.
+    table : SweepTable
+        Measures and outcome of each case.
+    case_folders : sequence of str
+        Folders of the cases; empty if there are none.
+    path : Path
+        File to write.
     """
     names = sort_measures(table)
     heads = [axis.key for axis in cases.axes] + ["outcome"]
