@@ -130,8 +130,8 @@ def schema(*, out: out_option("file to write, such as scene.json; default: the s
 
 
 def doctor(*, json_: Json = False):
-    """Print what is installed: versions, size of the cache of compiled code, support for pictures, usable cores, and
-    optional packages with the command that installs each.
+    """Print what is installed: versions, size of the cache of compiled code, support for films, usable cores, and optional
+    packages with the command that installs each.
 
     Example: patchfem doctor
     """
