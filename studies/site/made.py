@@ -337,7 +337,8 @@ def refusing_sentences(name: str, other: str) -> list:
 
 def source(name: str) -> list:
     """Return the papers on which an effect is based."""
-    found = [entry for effects, (_, _, entry) in SOURCES if name in effects]
+    texts = [text for effects, text in SOURCES if name in effects.split()]
+    found = [dict(re.findall(r"^  (\w+) = \{(.*)\}", text, re.MULTILINE)) for text in texts]
     return (
         [
             "## Source",
