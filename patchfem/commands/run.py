@@ -3,6 +3,7 @@
 import json
 from pathlib import Path
 
+from .. import core
 from ..export import run_folder, store
 from ..runs import plan
 from .shared import (
@@ -103,7 +104,9 @@ def _report_missing_page(fault: BaseException, target: Path) -> None:
         reason = "interrupted while the page was drawn"
     elif isinstance(fault, MemoryError):
         reason = f"{target / store.PAGE}: out of memory"
-    else:
+    elif isinstance(fault, core.PatchfemError | OSError):
         reason = str(fault)
+    else:
+        raise fault
     print_message(f"{reason}; the results in {target} are complete except for report.html")
     raise CommandExit(130 if isinstance(fault, KeyboardInterrupt) else 4)

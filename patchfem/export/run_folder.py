@@ -90,7 +90,7 @@ def _draw_page(folder: Path) -> BaseException | None:
     """Write the page of a run, and return what prevents it: the results of a long run are kept without their page."""
     try:
         page.write_page(folder)
-    except (PatchfemError, OSError, MemoryError, KeyboardInterrupt) as fault:
+    except BaseException as fault:
         return fault
     return None
 
