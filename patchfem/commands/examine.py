@@ -48,10 +48,10 @@ class Finding(NamedTuple):
 def check_installation() -> list[Finding]:
     """Check everything that a run may need."""
     required = [_check_package(name, name, name, "") for name in REQUIRED_PACKAGES]
-    optional = [
-        _check_package(name, f"{name} ({purpose})", f'"patchfem[{extra}]"', ", optional")
-        for name, (extra, purpose) in OPTIONAL_PACKAGES.items()
-    ]
+    optional = []
+    for name, (extra, purpose) in OPTIONAL_PACKAGES.items():
+        source = f'"patchfem[{extra}]"'
+        optional.append(_check_package(name, f"{name} ({purpose})", source, ", optional"))
     python = Finding("python", sys.version_info >= (3, 11), sys.version.split()[0], "")
     program = Finding("patchfem", True, __version__, "")
     return [python, program, *required, _check_cache(), _count_threads(), _check_films(), *optional]

@@ -187,10 +187,10 @@ def _print_chain(plan_data: dict[str, Any], *, is_upper_estimate: bool) -> None:
     bonded = any(
         law_has_trait(one["effect"].partition("law=")[2], "bonds") for one in plan_data["effects"]
     )
-    links = [
-        f"{_format_link(name, bonded)} {link if isinstance(link, str) else format_quantity(link, 'N m-1', 4)}"
-        for name, link in plan_data["stiffness_chain"].items()
-    ]
+    links = []
+    for name, link in plan_data["stiffness_chain"].items():
+        text = link if isinstance(link, str) else format_quantity(link, "N m-1", 4)
+        links.append(f"{_format_link(name, bonded)} {text}")
     print("chain    " + " -> ".join(links))
     if is_upper_estimate:
         print(

@@ -338,21 +338,15 @@ def refusing_sentences(name: str, other: str) -> list:
 def source(name: str) -> list:
     """Return the papers on which an effect is based."""
     texts = [text for effects, text in SOURCES if name in effects.split()]
-    found = [dict(re.findall(r"^  (\w+) = \{(.*)\}", text, re.MULTILINE)) for text in texts]
-    return (
-        [
-            "## Source",
-            *(
-                f"{one['author'].replace(' and ', ', ')}: {one['title']}. {one['journal']} {one['volume']}, "
-                f"{one['pages']} ({one['year']}).".translate(
-                    str.maketrans("", "", '{}\\"')
-                ).replace("--", "-")
-                for one in found
-            ),
-        ]
-        if found
-        else []
-    )
+    lines = []
+    for text in texts:
+        one = dict(re.findall(r"^  (\w+) = \{(.*)\}", text, re.MULTILINE))
+        line = (
+            f"{one['author'].replace(' and ', ', ')}: {one['title']}. {one['journal']} {one['volume']}, "
+            f"{one['pages']} ({one['year']})."
+        )
+        lines.append(re.sub(r'[{}\\"]', "", line).replace("--", "-"))
+    return ["## Source", *lines] if lines else []
 
 
 # --- glossary, commands, Python, code
