@@ -21,7 +21,7 @@ def format_curves(answer: Answer) -> dict[str, str]:
     is an empty cell.
     """
     texts = {}
-    for file in CSV_FILES.get(answer.kind, ()):
+    for name, file in CSV_FILES.get(answer.kind, {}).items():
         columns = parse_columns(file.columns)
         if not file.source:
             lists = _list_variables(answer.data, columns)
@@ -33,7 +33,7 @@ def format_curves(answer: Answer) -> dict[str, str]:
             rows = {key: one for key, one in answer.data.items() if one.dims == (file.source,)}
             lists = {key: list_cells(one) for key, one in rows.items()}
         if lists:
-            texts[file.name] = format_csv(lists)
+            texts[name] = format_csv(lists)
     return texts
 
 

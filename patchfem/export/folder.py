@@ -26,7 +26,7 @@ FILES = frozenset(
         "result.nc",
         *store.DATA_FILES.values(),
         *store.DETAIL_FILES.values(),
-        *(file.name for files in CSV_FILES.values() for file in files),
+        *(name for files in CSV_FILES.values() for name in files),
         "interfaces",
         "fields.pvd",
         "fields_frames",

@@ -42,7 +42,7 @@ def test_exact_heading_line():
 def test_always_heading_lines_have_names_and_known_styles():
     """Each column of the tables has a name, and a style that the page knows."""
     tables = [one.columns for tables in page.TABLES.values() for one in tables]
-    files = [file.columns for files in columns.CSV_FILES.values() for file in files]
+    files = [file.columns for files in columns.CSV_FILES.values() for file in files.values()]
     for line in tables + [line for line in files if line]:
         for column in columns.parse_columns(line):
             assert column.name and " " not in column.name, line

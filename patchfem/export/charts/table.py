@@ -6,7 +6,7 @@ The columns of CSV files and tables are written as their heading line: "HEADING 
 
 import re
 from dataclasses import dataclass
-from typing import NamedTuple, TypeVar
+from typing import NamedTuple
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,6 +54,19 @@ class Chart:
     caption: str = ""
 
 
+def parse_charts(table: str) -> tuple[Chart, ...]:
+    """Return the charts of a table: the title, and below it the fields, which are indented.
+
+    A long field goes on in lines that are indented further. TypeError for a field that a chart has not.
+    """
+    charts = []
+    for row in re.split(r"\n(?=\S)", table.strip()):
+        title, *parts = re.split(r"\n    (?=\S)", row)
+        pairs = (" ".join(part.split()).split(" = ", 1) for part in parts)
+        charts.append(Chart(title, **dict(pairs)))
+    return tuple(charts)
+
+
 class Column(NamedTuple):
     """Column of a CSV file or of a table.
 
@@ -68,11 +81,10 @@ class Column(NamedTuple):
 
 
 def parse_columns(line: str) -> list[Column]:
-    """Return the columns of a heading line such as "x, height = before, at = value:quantity"; "= name" has no heading."""
+    """Return the columns of a heading line such as "x, height = before, at = value:quantity"."""
     columns = []
     for part in line.split(", "):
-        heading, _, source = f" {part}".partition(" = ")
-        heading = heading.strip()
+        heading, _, source = part.partition(" = ")
         name, _, style = (source or heading).partition(":")
         columns.append(Column(heading.partition(":")[0], name, style))
     return columns
@@ -81,14 +93,13 @@ def parse_columns(line: str) -> list[Column]:
 class CsvFile(NamedTuple):
     """CSV file of an answer.
 
-    name: of the file; columns: heading line, where a heading may end in a unit of CSV_UNITS; source: "" for variables, a
-    dimension for all of its variables, "curves" for the curves of a backbone below each other, or the key of a list of
-    objects in the details, whose texts the columns name; nested: key of the quantities in each of these objects, "" if they
-    are its own keys. A quantity has the columns NAME, NAME_low and NAME_high.
+    columns: heading line, where a heading may end in a unit of CSV_UNITS; source: "" for variables, a dimension for all of
+    its variables, "curves" for the curves of a backbone below each other, or the key of a list of objects in the details,
+    whose texts the columns name; nested: key of the quantities in each of these objects, "" if they are its own keys. A
+    quantity has the columns NAME, NAME_low and NAME_high.
     """
 
-    name: str
-    columns: str = ""
+    columns: str
     source: str = ""
     nested: str = ""
 
@@ -105,25 +116,7 @@ class Table(NamedTuple):
     columns: str
 
 
-Row = TypeVar("Row", Chart, CsvFile, Table)
-
-
-def parse_rows(kind: type[Row], table: str) -> tuple[Row, ...]:
-    """Return the rows of a table as records: the title or name, and below it the other fields, which are indented.
-
-    A long field goes on in lines that are indented further. TypeError for a field that the record has not.
-    """
-    rows = []
-    for row in re.split(r"\n(?=\S)", table.strip()):
-        title, *parts = re.split(r"\n    (?=\S)", row)
-        pairs = (" ".join(part.split()).split(" = ", 1) for part in parts)
-        rows.append(kind(title, **dict(pairs)))
-    return tuple(rows)
-
-
-RUN = parse_rows(
-    Chart,
-    """
+RUN = parse_charts("""
 Wear over the cycles
     x = wear_cycle
     y = wear_worn_depth_max
@@ -265,12 +258,9 @@ Accuracy against time
     x_label = CPU time
     y_label = error of the worst main measure
     caption = Estimated error of this run (right) and of the coarser runs, as the tolerance that it would meet.
-""",
-)
+""")
 
-SWEEP = parse_rows(
-    Chart,
-    """
+SWEEP = parse_charts("""
 Main measures relative to the first case
     y = relative_displacement_amplitude absolute_acceleration_peak slip_amplitude loop_area friction_force_peak
         friction_ratio_peak onset_level normal_stiffness tangential_stiffness contact_fraction pressure_peak
@@ -289,12 +279,9 @@ Shares of the variance
     style = shares
     caption = Fraction of the variance over the cases that a key contributes: alone (first-order Sobol index),
         and with its interactions (total index), with the interval of the latter.
-""",
-)
+""")
 # The first method with a curve is recommended.
-BACKBONE = parse_rows(
-    Chart,
-    """
+BACKBONE = parse_charts("""
 Frequency
     x = balance_amplitude quasi_static_amplitude
     y = balance_frequency@balance_amplitude quasi_static_frequency@quasi_static_amplitude
@@ -318,11 +305,8 @@ Force of the phase resonance
     y_label = force at the output
     caption = Amplitude of a sinusoidal force at the output, in phase with the velocity there, that holds the
         amplitude.
-""",
-)
-FIT = parse_rows(
-    Chart,
-    """
+""")
+FIT = parse_charts("""
 Measured and fitted loop
     x = slide
     y = force friction_ratio held_out
@@ -411,11 +395,8 @@ Worn depth against the coefficient
     x_label = wear coefficient
     y_label = worn depth
     caption = Measured depth at the fitted coefficient, and the computed depth beyond it.
-""",
-)
-COST = parse_rows(
-    Chart,
-    """
+""")
+COST = parse_charts("""
 Error against time
     x = seconds
     y = largest_error
@@ -435,11 +416,8 @@ Value against time
     x_label = CPU time
     y_label = *
     caption = The least accurate of the key measures in each run, with its numerical error.
-""",
-)
-COMPARE = parse_rows(
-    Chart,
-    """
+""")
+COMPARE = parse_charts("""
 Both traces
     x = x
     y = before after
@@ -513,11 +491,8 @@ Abbott curves
     y = abbott_before abbott_after
     y_label = height
     caption = Height that a given fraction of the surface exceeds.
-""",
-)
-PAIRS = parse_rows(
-    Chart,
-    """
+""")
+PAIRS = parse_charts("""
 Worn depth of the pairs
     x = line
     y = worn_depth_mean
@@ -532,11 +507,8 @@ Amplitude of the waves
     x_label = line in the table
     y_label = after / before
     caption = Amplitude of the waves from 60 to 110 um after wear divided by before, with 95 % intervals.
-""",
-)
-PROFILE = parse_rows(
-    Chart,
-    """
+""")
+PROFILE = parse_charts("""
 Primary profile
     x = x
     y = primary waviness@x_rough
@@ -566,8 +538,7 @@ Power spectral density
     y = density
     log = xy
     caption = One-sided spectral density of the primary profile over the wavelength.
-""",
-)
+""")
 
 CHARTS: dict[str, tuple[Chart, ...]] = {
     **dict.fromkeys(("patch", "bench", "rig", "linear"), RUN),
@@ -581,162 +552,111 @@ CHARTS: dict[str, tuple[Chart, ...]] = {
 }
 
 
-CSV_FILES: dict[str, tuple[CsvFile, ...]] = {
-    "compare": parse_rows(
-        CsvFile,
-        """
-depth.csv
-    columns = x, before, after, gap_before, gap_after, depth
-predicted.csv
-    columns = x_patch, measured = measured_depth, measured_low = measured_depth_low, measured_high =
-        measured_depth_high, computed = computed_depth, difference = depth_difference
-""",
-    ),
-    "pairs": parse_rows(
-        CsvFile,
-        """
-pairs.csv
-    columns = before, after, direction, labels, outcome, verdict, message
-    source = pairs
-""",
-    ),
-    "profile": parse_rows(
-        CsvFile,
-        """
-profile.csv
-    columns = file
-    source = profiles
-    nested = measures
-primary.csv
-    columns = x, z = primary
-roughness.csv
-    columns = x = x_rough, z = roughness
-""",
-    ),
-    "backbone": parse_rows(
-        CsvFile,
-        """
-backbone.csv
-    columns = amplitude [m] = amplitude, frequency [Hz] = frequency, frequency_error [Hz] = frequency_error,
-        damping, damping_error, force [N] = force, force_error [N] = force_error, force_frequency [Hz] =
-        force_frequency, frequency_low [Hz] = frequency_low, frequency_high [Hz] = frequency_high, damping_low,
-        damping_high
-    source = curves
-""",
-    ),
-    "fit": parse_rows(
-        CsvFile,
-        """
-fitted_curve.csv
-    columns = amplitude = curve_amplitude, frequency = curve_frequency, frequency_error = curve_frequency_error,
-        damping = curve_damping, damping_error = curve_damping_error
-fit.csv
-    columns = time, displacement = slide, force, friction_ratio, fitted, amplitude, frequency, frequency_error,
-        damping, damping_error, frequency_fitted, damping_fitted, input [g] = input, acceleration [g] =
-        acceleration, displacement [mil] = displacement, flag, computed acceleration [g] =
-        computed_acceleration, computed displacement [mil] = computed_displacement, held
-""",
-    ),
-    "cost": parse_rows(
-        CsvFile,
-        """
-cost.csv
-    source = run
-""",
-    ),
+CSV_FILES: dict[str, dict[str, CsvFile]] = {
+    "compare": {
+        "depth.csv": CsvFile("x, before, after, gap_before, gap_after, depth"),
+        "predicted.csv": CsvFile(
+            "x_patch, measured = measured_depth, measured_low = measured_depth_low, measured_high = measured_depth_high, "
+            "computed = computed_depth, difference = depth_difference"
+        ),
+    },
+    "pairs": {
+        "pairs.csv": CsvFile("before, after, direction, labels, outcome, verdict, message", "pairs")
+    },
+    "profile": {
+        "profile.csv": CsvFile("file", "profiles", "measures"),
+        "primary.csv": CsvFile("x, z = primary"),
+        "roughness.csv": CsvFile("x = x_rough, z = roughness"),
+    },
+    "backbone": {
+        "backbone.csv": CsvFile(
+            "amplitude [m] = amplitude, frequency [Hz] = frequency, frequency_error [Hz] = frequency_error, damping, "
+            "damping_error, force [N] = force, force_error [N] = force_error, force_frequency [Hz] = force_frequency, "
+            "frequency_low [Hz] = frequency_low, frequency_high [Hz] = frequency_high, damping_low, damping_high",
+            "curves",
+        )
+    },
+    "fit": {
+        "fitted_curve.csv": CsvFile(
+            "amplitude = curve_amplitude, frequency = curve_frequency, frequency_error = curve_frequency_error, "
+            "damping = curve_damping, damping_error = curve_damping_error"
+        ),
+        # of a loop, of a curve, and of rows
+        "fit.csv": CsvFile(
+            "time, displacement = slide, force, friction_ratio, fitted, "
+            "amplitude, frequency, frequency_error, damping, damping_error, frequency_fitted, "
+            "damping_fitted, input [g] = input, acceleration [g] = acceleration, displacement [mil] = displacement, flag, "
+            "computed acceleration [g] = computed_acceleration, "
+            "computed displacement [mil] = computed_displacement, held"
+        ),
+    },
+    "cost": {"cost.csv": CsvFile("", "run")},
 }
 CSV_UNITS = {"g": 1 / 9.80665, "mil": 1 / 25.4e-6}  # number of these units in one SI unit
 
 # tables that stand below the charts
-RUN_TABLES = parse_rows(
-    Table,
-    """
-Against the measurement
-    source = measured
-    columns = reading, measured, computed, computed / measured = ratio
-Levels of the drive
-    source = level
-    columns = drive = level_drive, amplitude = level_relative_displacement_amplitude, peak acceleration =
-        level_absolute_acceleration_peak, distortion = level_acceleration_distortion, outcome = level_outcome,
-        interface = level_stuck
-""",
+RUN_TABLES = (
+    Table(
+        "Against the measurement",
+        "measured",
+        "reading, measured, computed, computed / measured = ratio",
+    ),
+    Table(
+        "Levels of the drive",
+        "level",
+        "drive = level_drive, amplitude = level_relative_displacement_amplitude, "
+        "peak acceleration = level_absolute_acceleration_peak, distortion = level_acceleration_distortion, "
+        "outcome = level_outcome, interface = level_stuck",
+    ),
 )
+PAIR_COLUMNS = "worn_depth_mean, worn_volume, track_width, track_depth, amplitude_ratio"
+_BOTH_SIDES = " = name, before, after, after / before = ratio, cut-off = cutoff"
 TABLES: dict[str, tuple[Table, ...]] = {
     **dict.fromkeys(("patch", "bench", "rig", "linear"), RUN_TABLES),
-    "sweep": parse_rows(
-        Table,
-        """
-How far the key may go
-    source = limits
-    columns = measure:name, changes by = change:percent, at (between the cases) = value:quantity
-Peaks over the frequency
-    source = peaks
-    columns = measure:name, at = case, frequency = peak_frequency, height = peak_height, half-power width =
-        half_power_width
-Where 90 % of the cases lie
-    source = quantiles
-    columns = measure:name, 5 % are below = low, half are below = median, 95 % are below = high
-""",
+    "sweep": (
+        Table(
+            "How far the key may go",
+            "limits",
+            "measure:name, changes by = change:percent, at (between the cases) = value:quantity",
+        ),
+        Table(
+            "Peaks over the frequency",
+            "peaks",
+            "measure:name, at = case, frequency = peak_frequency, height = peak_height, half-power width = half_power_width",
+        ),
+        Table(
+            "Where 90 % of the cases lie",
+            "quantiles",
+            "measure:name, 5 % are below = low, half are below = median, 95 % are below = high",
+        ),
     ),
-    "backbone": parse_rows(
-        Table,
-        """
-Values of the key
-    source = table
-    columns = value, frequency with a sticking contact = stuck_frequency, largest damping ratio =
-        largest_damping, at = amplitude_of_largest_damping
-""",
+    "backbone": (
+        Table(
+            "Values of the key",
+            "table",
+            "value, frequency with a sticking contact = stuck_frequency, largest damping ratio = largest_damping, "
+            "at = amplitude_of_largest_damping",
+        ),
     ),
-    "compare": parse_rows(
-        Table,
-        """
-Roughness inside and outside of the track
-    source = track_roughness
-    columns =  = name, before, after, after / before = ratio, cut-off = cutoff
-Both runs
-    source = measures
-    columns =  = name, before, after, after / before = ratio, cut-off = cutoff
-Scene pressed with each of the two surfaces
-    source = pressed/measures
-    columns =  = name, before, after, after / before = ratio, cut-off = cutoff
-""",
+    "compare": (
+        Table("Roughness inside and outside of the track", "track_roughness", _BOTH_SIDES),
+        Table("Both runs", "measures", _BOTH_SIDES),
+        Table("Scene pressed with each of the two surfaces", "pressed/measures", _BOTH_SIDES),
     ),
-    "pairs": parse_rows(
-        Table,
-        """
-Means
-    source = means
-    columns = group, kind, direction, pairs, worn_depth_mean, worn_volume, track_width, track_depth,
-        amplitude_ratio
-Each pair
-    source = pairs
-    columns = before, after, verdict, message, worn_depth_mean, worn_volume, track_width, track_depth,
-        amplitude_ratio
-""",
+    "pairs": (
+        Table("Means", "means", f"group, kind, direction, pairs, {PAIR_COLUMNS}"),
+        Table("Each pair", "pairs", f"before, after, verdict, message, {PAIR_COLUMNS}"),
     ),
-    "profile": parse_rows(
-        Table,
-        """
-Each file
-    source = profiles
-    columns = file, Ra, Rq, Rz, RSm, Pa, Pq, Pt, Sa, Sq, Sz
-""",
+    "profile": (Table("Each file", "profiles", "file, Ra, Rq, Rz, RSm, Pa, Pq, Pt, Sa, Sq, Sz"),),
+    "fit": (
+        Table("Correlation of the fitted values", "pair", "values = pair, correlation:rounded"),
     ),
-    "fit": parse_rows(
-        Table,
-        """
-Correlation of the fitted values
-    source = pair
-    columns = values = pair, correlation:rounded
-""",
-    ),
-    "cost": parse_rows(
-        Table,
-        """
-Runs
-    source = run
-    columns = setting, interface nodes = nodes, steps per cycle = steps, CPU s = seconds:rounded, largest error
-        = largest_error:rounded, of = worst_measure, value = main_measure, result
-""",
+    "cost": (
+        Table(
+            "Runs",
+            "run",
+            "setting, interface nodes = nodes, steps per cycle = steps, CPU s = seconds:rounded, "
+            "largest error = largest_error:rounded, of = worst_measure, value = main_measure, result",
+        ),
     ),
 }
