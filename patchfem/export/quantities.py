@@ -46,7 +46,7 @@ KEY = tuple(
 # kinds of answers whose quantities are defined in `surfaces.definitions`
 SURFACE_KINDS = ("compare", "pairs", "profile")
 # NAME [SI unit], and the definition: of sweeps, backbones, fits (of keys of a scene, see FITTED_KEY) and costs
-_QUANTITY_ROWS = """
+_TABLE = """
 peak_height [1]
     largest response over the swept frequency
 half_power_width [Hz]
@@ -122,8 +122,7 @@ tolerance [1]
     tolerance of the scene, its key accuracy.tolerance
 """
 QUANTITIES = {
-    name: Definition(unit, text)
-    for name, unit, text in parse_table(_QUANTITY_ROWS, r"(\w+) \[(.*)\]")
+    name: Definition(unit, text) for name, unit, text in parse_table(_TABLE, r"(\w+) \[(.*)\]")
 }
 # a residual has few digits that mean something
 QUANTITIES["residual_rms"] = QUANTITIES["residual_rms"]._replace(digits=3)

@@ -48,7 +48,7 @@ class Row(NamedTuple):
 
 
 # NAME (dimensions) [SI unit] = places, and the description; ± marks a variable whose error is stored beside it
-_VARIABLE_ROWS = """
+_TABLE = """
 time (time) [s] = response.time
     time
 relative_displacement (time) [m] = response.output response.slide
@@ -139,7 +139,7 @@ wear_pressure_peak_at_edge (wear_cycle) [Pa] = extra.wear.pressure_peak_at_edge
 VARIABLES = {
     name: Row(dims, unit, text, places, bool(mark))
     for name, mark, dims, unit, places, text in parse_table(
-        _VARIABLE_ROWS, r"(\w+)( ±)? \((.*)\) \[(.*)\] = (.*)"
+        _TABLE, r"(\w+)( ±)? \((.*)\) \[(.*)\] = (.*)"
     )
 }
 # fields along the interface, by their names in `Result.fields`

@@ -9,7 +9,7 @@ from .answer import Definition, parse_table
 TRACK_NAMES = {"depth_mean": "track_depth"}
 
 # quantities that have the same meaning between two scans, two traces and two runs
-_SURFACE_ROWS = """
+_TABLE = """
 worn_volume [m3]
     volume lost in the part that both surfaces show
 worn_depth_mean [m]
@@ -35,9 +35,7 @@ band_amplitude [m]
 difference_rms [m]
     root mean square of measured less computed depth over the patch, with the fitted coefficient
 """
-_MEANINGS = {
-    name: (unit, text) for name, unit, text in parse_table(_SURFACE_ROWS, r"(\w+) \[(.*)\]")
-}
+_MEANINGS = {name: (unit, text) for name, unit, text in parse_table(_TABLE, r"(\w+) \[(.*)\]")}
 
 
 def name_in_track(name: str) -> str:
