@@ -3,39 +3,47 @@
 from ..surface.compare.records import DEFINITIONS
 from ..surface.roughness.areal import AREAL
 from ..surface.roughness.parameters import PROFILE
-from .answer import Definition, parse_table
+from .answer import Definition
 
 # names in a track -> names in compare.json and in the answer
 TRACK_NAMES = {"depth_mean": "track_depth"}
 
 # quantities that have the same meaning between two scans, two traces and two runs
-_TABLE = """
-worn_volume [m3]
-    volume lost in the part that both surfaces show
-worn_depth_mean [m]
-    mean depth of the lost material over the part that both surfaces show
-worn_depth_max [m]
-    largest depth of the lost material
-worn_area [m2]
-    lost area of the section, which is the lost volume per width
-worn_share [1]
-    fraction of the part that both surfaces show that is worn
-hidden_wear [m]
-    mean of an even or wedge-shaped wear, which measured surfaces show as an offset or tilt of the datum
-track_hidden_wear [m]
-    mean of the even or wedge-shaped wear of the worn part, which a trace of this part alone cannot show
-wear_coefficient [m2 N-1]
-    coefficient of Archard's law with which the computed depth of a run fits the measured depth
-patch_centre [m]
-    middle of the patch, in x of the second trace
-dominant_wavelength [m]
-    wavelength of the octave with the largest mean square height, of the levelled trace
-band_amplitude [m]
-    amplitude of a sine with the mean square of the waves from 60 to 110 um, of the levelled trace
-difference_rms [m]
-    root mean square of measured less computed depth over the patch, with the fitted coefficient
-"""
-_MEANINGS = {name: (unit, text) for name, unit, text in parse_table(_TABLE, r"(\w+) \[(.*)\]")}
+_MEANINGS = {
+    "worn_volume": ("m3", "volume lost in the part that both surfaces show"),
+    "worn_depth_mean": (
+        "m",
+        "mean depth of the lost material over the part that both surfaces show",
+    ),
+    "worn_depth_max": ("m", "largest depth of the lost material"),
+    "worn_area": ("m2", "lost area of the section, which is the lost volume per width"),
+    "worn_share": ("1", "fraction of the part that both surfaces show that is worn"),
+    "hidden_wear": (
+        "m",
+        "mean of an even or wedge-shaped wear, which measured surfaces show as an offset or tilt of the datum",
+    ),
+    "track_hidden_wear": (
+        "m",
+        "mean of the even or wedge-shaped wear of the worn part, which a trace of this part alone cannot show",
+    ),
+    "wear_coefficient": (
+        "m2 N-1",
+        "coefficient of Archard's law with which the computed depth of a run fits the measured depth",
+    ),
+    "patch_centre": ("m", "middle of the patch, in x of the second trace"),
+    "dominant_wavelength": (
+        "m",
+        "wavelength of the octave with the largest mean square height, of the levelled trace",
+    ),
+    "band_amplitude": (
+        "m",
+        "amplitude of a sine with the mean square of the waves from 60 to 110 um, of the levelled trace",
+    ),
+    "difference_rms": (
+        "m",
+        "root mean square of measured less computed depth over the patch, with the fitted coefficient",
+    ),
+}
 
 
 def name_in_track(name: str) -> str:
