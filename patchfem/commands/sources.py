@@ -4,177 +4,182 @@ from collections.abc import Iterable
 
 from .. import __version__
 
-REPORT = r"""
-@techreport{srinivasan1985,
-  author = {Srinivasan, A. V. and Cassenti, B. N. and Cutts, D. G.},
-  title = {Study of Characteristics of Dry Friction Damping},
-  institution = {United Technologies Research Center},
-  year = {1985}
-}
-"""
-# the version is inserted
-PROGRAM = r"""
-@software{patchfem,
-  author = {{The patchfem founders}},
-  title = {{patchfem}: finite-element contact patches, nonlocal friction and the dynamics of the joint that rubs},
-  version = {VERSION},
-  year = {2026}
-}
-"""
-# Effects, named as in `effects.EFFECTS` and separated by blanks, and their source; "friction.law=iwan" also
+# kind, key and fields of an entry of a bibliography
+Entry = tuple[str, str, dict[str, str]]
+REPORT = (
+    "techreport",
+    "srinivasan1985",
+    {
+        "author": "Srinivasan, A. V. and Cassenti, B. N. and Cutts, D. G.",
+        "title": "Study of Characteristics of Dry Friction Damping",
+        "institution": "United Technologies Research Center",
+        "year": "1985",
+    },
+)
+PROGRAM = (
+    "software",
+    "patchfem",
+    {
+        "author": "{The patchfem founders}",
+        "title": "{patchfem}: finite-element contact patches, nonlocal friction and the dynamics of the joint that rubs",
+        "version": __version__,
+        "year": "2026",
+    },
+)
+
+
+def _article(
+    key: str, author: str, title: str, journal: str, where: str, year: int, doi: str = ""
+) -> Entry:
+    """Return the bibliography entry of a journal article; `where` has the form "volume:pages"."""
+    volume, pages = where.split(":")
+    fields = {
+        "author": author,
+        "title": title,
+        "journal": journal,
+        "volume": volume,
+        "pages": pages,
+        "year": str(year),
+    }
+    return "article", key, fields | ({"doi": doi} if doi else {})
+
+
+APPLIED_MECHANICS = "Journal of Applied Mechanics"
+# Effects, named as in `effects.EFFECTS`, and their source; "friction.law=iwan" also
 # matches interfaces with this law.
 SOURCES = (
     (
-        "contact",
-        r"""
-@article{gustafsson2020,
-  author = {Gustafsson, T. and McBain, G. D.},
-  title = {scikit-fem: A {Python} package for finite element assembly},
-  journal = {Journal of Open Source Software},
-  volume = {5(52)},
-  pages = {2369},
-  year = {2020},
-  doi = {10.21105/joss.02369}
-}
-""",
+        ("contact",),
+        _article(
+            "gustafsson2020",
+            "Gustafsson, T. and McBain, G. D.",
+            "scikit-fem: A {Python} package for finite element assembly",
+            "Journal of Open Source Software",
+            "5(52):2369",
+            2020,
+            "10.21105/joss.02369",
+        ),
     ),
     (
-        "contact",
-        r"""
-@article{hueber2005,
-  author = {H{\"u}eber, S. and Wohlmuth, B. I.},
-  title = {A primal--dual active set strategy for non-linear multibody contact problems},
-  journal = {Computer Methods in Applied Mechanics and Engineering},
-  volume = {194},
-  pages = {3147--3166},
-  year = {2005},
-  doi = {10.1016/j.cma.2004.08.006}
-}
-""",
+        ("contact",),
+        _article(
+            "hueber2005",
+            'H{\\"u}eber, S. and Wohlmuth, B. I.',
+            "A primal--dual active set strategy for non-linear multibody contact problems",
+            "Computer Methods in Applied Mechanics and Engineering",
+            "194:3147--3166",
+            2005,
+            "10.1016/j.cma.2004.08.006",
+        ),
     ),
     (
-        "contact.asperities.law=hertz",
-        r"""
-@article{greenwood1966,
-  author = {Greenwood, J. A. and Williamson, J. B. P.},
-  title = {Contact of nominally flat surfaces},
-  journal = {Proceedings of the Royal Society A},
-  volume = {295},
-  pages = {300--319},
-  year = {1966},
-  doi = {10.1098/rspa.1966.0242}
-}
-""",
+        ("contact.asperities.law=hertz",),
+        _article(
+            "greenwood1966",
+            "Greenwood, J. A. and Williamson, J. B. P.",
+            "Contact of nominally flat surfaces",
+            "Proceedings of the Royal Society A",
+            "295:300--319",
+            1966,
+            "10.1098/rspa.1966.0242",
+        ),
     ),
     (
-        "contact.asperities.law=exponential",
-        r"""
-@article{persson2007,
-  author = {Persson, B. N. J.},
-  title = {Relation between interfacial separation and load: a general theory of contact mechanics},
-  journal = {Physical Review Letters},
-  volume = {99},
-  pages = {125502},
-  year = {2007},
-  doi = {10.1103/PhysRevLett.99.125502}
-}
-""",
+        ("contact.asperities.law=exponential",),
+        _article(
+            "persson2007",
+            "Persson, B. N. J.",
+            "Relation between interfacial separation and load: a general theory of "
+            "contact mechanics",
+            "Physical Review Letters",
+            "99:125502",
+            2007,
+            "10.1103/PhysRevLett.99.125502",
+        ),
     ),
     (
-        "contact.shear",
-        r"""
-@article{mindlin1949,
-  author = {Mindlin, R. D.},
-  title = {Compliance of elastic bodies in contact},
-  journal = {Journal of Applied Mechanics},
-  volume = {16},
-  pages = {259--268},
-  year = {1949}
-}
-""",
+        ("contact.shear",),
+        _article(
+            "mindlin1949",
+            "Mindlin, R. D.",
+            "Compliance of elastic bodies in contact",
+            APPLIED_MECHANICS,
+            "16:259--268",
+            1949,
+        ),
     ),
     (
-        "friction.law=nonlocal friction.law=convolution",
-        r"""
-@article{oden1983,
-  author = {Oden, J. T. and Pires, E. B.},
-  title = {Nonlocal and nonlinear friction laws and variational principles for contact problems in elasticity},
-  journal = {Journal of Applied Mechanics},
-  volume = {50},
-  pages = {67--76},
-  year = {1983},
-  doi = {10.1115/1.3167019}
-}
-""",
+        ("friction.law=nonlocal", "friction.law=convolution"),
+        _article(
+            "oden1983",
+            "Oden, J. T. and Pires, E. B.",
+            "Nonlocal and nonlinear friction laws and variational principles "
+            "for contact problems in elasticity",
+            APPLIED_MECHANICS,
+            "50:67--76",
+            1983,
+            "10.1115/1.3167019",
+        ),
     ),
     (
-        "friction.law=iwan",
-        r"""
-@article{segalman2005,
-  author = {Segalman, D. J.},
-  title = {A four-parameter {Iwan} model for lap-type joints},
-  journal = {Journal of Applied Mechanics},
-  volume = {72},
-  pages = {752--760},
-  year = {2005},
-  doi = {10.1115/1.1989354}
-}
-""",
+        ("friction.law=iwan",),
+        _article(
+            "segalman2005",
+            "Segalman, D. J.",
+            "A four-parameter {Iwan} model for lap-type joints",
+            APPLIED_MECHANICS,
+            "72:752--760",
+            2005,
+            "10.1115/1.1989354",
+        ),
     ),
     (
-        "friction.law=bouc-wen",
-        r"""
-@article{wen1976,
-  author = {Wen, Y.-K.},
-  title = {Method for random vibration of hysteretic systems},
-  journal = {Journal of the Engineering Mechanics Division},
-  volume = {102},
-  pages = {249--263},
-  year = {1976}
-}
-""",
+        ("friction.law=bouc-wen",),
+        _article(
+            "wen1976",
+            "Wen, Y.-K.",
+            "Method for random vibration of hysteretic systems",
+            "Journal of the Engineering Mechanics Division",
+            "102:249--263",
+            1976,
+        ),
     ),
     (
-        "friction.law=lugre",
-        r"""
-@article{canudas1995,
-  author = {Canudas de Wit, C. and Olsson, H. and {\AA}str{\"o}m, K. J. and Lischinsky, P.},
-  title = {A new model for control of systems with friction},
-  journal = {IEEE Transactions on Automatic Control},
-  volume = {40},
-  pages = {419--425},
-  year = {1995},
-  doi = {10.1109/9.376053}
-}
-""",
+        ("friction.law=lugre",),
+        _article(
+            "canudas1995",
+            'Canudas de Wit, C. and Olsson, H. and {\\AA}str{\\"o}m, K. J. and Lischinsky, P.',
+            "A new model for control of systems with friction",
+            "IEEE Transactions on Automatic Control",
+            "40:419--425",
+            1995,
+            "10.1109/9.376053",
+        ),
     ),
     (
-        "accuracy.method=harmonic",
-        r"""
-@article{cameron1989,
-  author = {Cameron, T. M. and Griffin, J. H.},
-  title = {An alternating frequency/time domain method for calculating the steady-state response of nonlinear dynamic systems},
-  journal = {Journal of Applied Mechanics},
-  volume = {56},
-  pages = {149--154},
-  year = {1989},
-  doi = {10.1115/1.3176036}
-}
-""",  # noqa: E501
+        ("accuracy.method=harmonic",),
+        _article(
+            "cameron1989",
+            "Cameron, T. M. and Griffin, J. H.",
+            "An alternating frequency/time domain method for "
+            "calculating the steady-state response of nonlinear dynamic systems",
+            APPLIED_MECHANICS,
+            "56:149--154",
+            1989,
+            "10.1115/1.3176036",
+        ),
     ),
     (
-        "wear",
-        r"""
-@article{archard1953,
-  author = {Archard, J. F.},
-  title = {Contact and rubbing of flat surfaces},
-  journal = {Journal of Applied Physics},
-  volume = {24},
-  pages = {981--988},
-  year = {1953},
-  doi = {10.1063/1.1721448}
-}
-""",
+        ("wear",),
+        _article(
+            "archard1953",
+            "Archard, J. F.",
+            "Contact and rubbing of flat surfaces",
+            "Journal of Applied Physics",
+            "24:981--988",
+            1953,
+            "10.1063/1.1721448",
+        ),
     ),
 )
 
@@ -182,6 +187,15 @@ SOURCES = (
 def bibtex(effect_names: Iterable[str] = ()) -> str:
     """Return BibTeX entries for the report, for this program and for the sources of the named effects."""
     names = {name.replace("structure.interface.", "friction.") for name in effect_names}
-    entries = [REPORT, PROGRAM.replace("VERSION", __version__)]
-    entries += [entry for effects, entry in SOURCES if names.intersection(effects.split())]
-    return "".join(entries).removeprefix("\n")
+    entries = [
+        REPORT,
+        PROGRAM,
+        *(entry for effects, entry in SOURCES if names.intersection(effects)),
+    ]
+    return "\n".join(_entry(*one) for one in entries)
+
+
+def _entry(kind: str, key: str, fields: dict[str, str]) -> str:
+    """Return a bibliography entry in BibTeX format."""
+    lines = ",\n".join(f"  {name} = {{{text}}}" for name, text in fields.items())
+    return f"@{kind}{{{key},\n{lines}\n}}\n"

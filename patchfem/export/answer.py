@@ -5,8 +5,6 @@ page, `charts` pictures and `show` the lines on the screen.
 """
 
 import math
-import re
-from collections.abc import Iterator
 from dataclasses import dataclass, field, fields, is_dataclass
 from typing import Any, NamedTuple
 
@@ -19,16 +17,6 @@ class Definition(NamedTuple):
     unit: str
     text: str
     digits: int = 4
-
-
-def parse_table(table: str, pattern: str) -> Iterator[tuple[str, ...]]:
-    """Yield the parts of each row of a table as the groups of a pattern in its first line, and the text of its other lines.
-
-    The other lines of a row are indented. AttributeError if a first line does not match.
-    """
-    for row in re.split(r"\n(?=\S)", table.strip()):
-        head, _, text = row.partition("\n")
-        yield (*re.fullmatch(pattern, head).groups(), " ".join(text.split()))
 
 
 @dataclass(frozen=True, slots=True)

@@ -326,8 +326,7 @@ def _compare_ends(cases: BackboneCases) -> tuple[tuple[str, ...], Quantities]:
     They hold at the amplitude with the largest change of frequency and damping.
     """
     axis = cases.axis
-    first = cases.backbones[0]
-    last = cases.backbones[-1]
+    first, last = cases.backbones[0], cases.backbones[-1]
     subject = f"{axis.key} from {axis.texts[0]} to {axis.texts[-1]}{_describe_change(axis.values)}"
     if first.best is None or last.best is None:
         missing = axis.texts[0] if first.best is None else axis.texts[-1]
@@ -337,8 +336,7 @@ def _compare_ends(cases: BackboneCases) -> tuple[tuple[str, ...], Quantities]:
         return (f"{subject}: the curves have no common amplitude.",), {}
 
     # differences at the common amplitudes, and the largest one
-    start = first.best.at(here)
-    end = last.best.at(there)
+    start, end = first.best.at(here), last.best.at(there)
     changes = {name: _find_change(start, end, name) for name in VALUES}
     place = _find_largest_change([changes[name] for name in NAMES])
     if place is None:
@@ -386,8 +384,7 @@ def _describe_step(name: str, step: Quantity, ends: list[float]) -> str:
 
 def _describe_change(values: Sequence[float | str]) -> str:
     """Return the relative change from the first to the last value, such as " (20 % more)"; "" without one."""
-    first = values[0]
-    last = values[-1]
+    first, last = values[0], values[-1]
     if not (isinstance(first, float) and isinstance(last, float) and first > 0):
         return ""
     change = last / first - 1

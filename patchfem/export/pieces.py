@@ -184,8 +184,7 @@ def draw_pieces(
     """
     from matplotlib.figure import Figure
 
-    low = frames.blocks["lower"].points.min(axis=0)
-    high = frames.blocks["upper"].points.max(axis=0)
+    low, high = frames.blocks["lower"].points.min(axis=0), frames.blocks["upper"].points.max(axis=0)
     windows = ((low[0], high[0], low[1], high[1]), contact_window(frames))
     figure = Figure(figsize=FIGURE_SIZE, dpi=DPI, layout="constrained")
     panels = figure.subplots(1, 2) if onto is None else [onto]

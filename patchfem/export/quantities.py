@@ -14,7 +14,7 @@ from ..formatting import (
 from ..response import rows
 from ..runs.results import patch_rows
 from . import surface_definitions
-from .answer import Definition, Quantities, Quantity, parse_table
+from .answer import Definition, Quantities, Quantity
 
 MAX_TILES = 10  # largest number of key quantities on a page and on the screen
 MEASURED_DIGITS = 4  # of quantities of measured surfaces without an error; traces have no more
@@ -45,87 +45,104 @@ KEY = tuple(
 
 # kinds of answers whose quantities are defined in `surfaces.definitions`
 SURFACE_KINDS = ("compare", "pairs", "profile")
-# NAME [SI unit], and the definition: of sweeps, backbones, fits (of keys of a scene, see FITTED_KEY) and costs
-_TABLE = """
-peak_height [1]
-    largest response over the swept frequency
-half_power_width [Hz]
-    width of the peak between the frequencies at which it falls to 1/sqrt(2)
-limit [1]
-    value of the swept key at which a measure has changed by 5 % (the peak pressure: by 100 %) from the first
-    case, with the cases between which it lies
-frequency_at_smallest_amplitude [Hz]
-    frequency of the mode at the smallest amplitude of the recommended curve
-frequency_at_largest_amplitude [Hz]
-    frequency of the mode at the largest amplitude of the recommended curve
-damping_at_smallest_amplitude [1]
-    damping ratio of structure and friction at the smallest amplitude
-damping_at_largest_amplitude [1]
-    damping ratio of structure and friction at the largest amplitude
-force_at_smallest_amplitude [N]
-    force at the output that holds the phase resonance at the smallest amplitude
-force_at_largest_amplitude [N]
-    force at the output that holds the phase resonance at the largest amplitude
-compared_amplitude [m]
-    amplitude at the output at which the change of the key has the largest effect
-frequency_change [Hz]
-    frequency for the last value of the key minus that for the first value
-damping_change [1]
-    damping ratio for the last value of the key minus that for the first value
-force_change [N]
-    force at the output for the last value of the key minus that for the first value
-largest_damping [1]
-    largest damping ratio among the amplitudes of the recommended curve
-amplitude_of_largest_damping [m]
-    amplitude at the output with the largest damping ratio
-free_frequency [Hz]
-    frequency of the mode without its contact; a bonded spring is included
-stuck_frequency [Hz]
-    frequency of the mode while the contact sticks with its own stiffness
-exponent_micro [1]
-    exponent of the energy loss per cycle over the amplitude in micro-slip
-exponent_gross [1]
-    exponent of the energy loss per cycle over the amplitude in gross slip; 1 in theory
-offset_force [N]
-    constant force that is fitted to the whole record
-offset_displacement [m]
-    fitted distance of the first row from the position without stress
-residual_rms [1]
-    root mean square of fitted minus measured values
-residual_fraction [1]
-    root mean square of fitted minus measured values, over the largest measured value
-held_out_rms [1]
-    root mean square of predicted minus measured values of the rows that are held out
-work_measured [J]
-    work of the measured force over the record
-work_fitted [J]
-    work of the fitted force over the record
-frequency_residual_rms [1]
-    root mean square of the relative deviation of the fitted frequency
-damping_residual_rms [1]
-    root mean square of the relative deviation of the fitted damping ratio
-score_fitted [1]
-    root mean square of ln(computed/measured) of the readings that were fitted
-score_held_out [1]
-    root mean square of ln(computed/measured) of the readings that were held out
-score_left_out [1]
-    root mean square of ln(computed/measured) of each reading in the fit without it
-fitted_depth [m]
-    worn depth computed with the fitted coefficient
-cpu_time [s]
-    CPU time of the scene as it is, with its error estimates
-elapsed_time [s]
-    elapsed time of the same run
-largest_error [1]
-    largest numerical error of a measure in this run, relative to its value and floor
-tolerance [1]
-    tolerance of the scene, its key accuracy.tolerance
-"""
-QUANTITIES = {
-    name: Definition(unit, text) for name, unit, text in parse_table(_TABLE, r"(\w+) \[(.*)\]")
+QUANTITIES: dict[str, Definition] = {
+    # sweep
+    "peak_height": Definition("1", "largest response over the swept frequency"),
+    "half_power_width": Definition(
+        "Hz", "width of the peak between the frequencies at which it falls to 1/sqrt(2)"
+    ),
+    "limit": Definition(
+        "1",
+        "value of the swept key at which a measure has changed by 5 % (the peak pressure: by 100 %) from the first case, "
+        "with the cases between which it lies",
+    ),
+    # backbone
+    "frequency_at_smallest_amplitude": Definition(
+        "Hz", "frequency of the mode at the smallest amplitude of the recommended curve"
+    ),
+    "frequency_at_largest_amplitude": Definition(
+        "Hz", "frequency of the mode at the largest amplitude of the recommended curve"
+    ),
+    "damping_at_smallest_amplitude": Definition(
+        "1", "damping ratio of structure and friction at the smallest amplitude"
+    ),
+    "damping_at_largest_amplitude": Definition(
+        "1", "damping ratio of structure and friction at the largest amplitude"
+    ),
+    "force_at_smallest_amplitude": Definition(
+        "N", "force at the output that holds the phase resonance at the smallest amplitude"
+    ),
+    "force_at_largest_amplitude": Definition(
+        "N", "force at the output that holds the phase resonance at the largest amplitude"
+    ),
+    "compared_amplitude": Definition(
+        "m", "amplitude at the output at which the change of the key has the largest effect"
+    ),
+    "frequency_change": Definition(
+        "Hz", "frequency for the last value of the key minus that for the first value"
+    ),
+    "damping_change": Definition(
+        "1", "damping ratio for the last value of the key minus that for the first value"
+    ),
+    "force_change": Definition(
+        "N", "force at the output for the last value of the key minus that for the first value"
+    ),
+    "largest_damping": Definition(
+        "1", "largest damping ratio among the amplitudes of the recommended curve"
+    ),
+    "amplitude_of_largest_damping": Definition(
+        "m", "amplitude at the output with the largest damping ratio"
+    ),
+    "free_frequency": Definition(
+        "Hz", "frequency of the mode without its contact; a bonded spring is included"
+    ),
+    "stuck_frequency": Definition(
+        "Hz", "frequency of the mode while the contact sticks with its own stiffness"
+    ),
+    "exponent_micro": Definition(
+        "1", "exponent of the energy loss per cycle over the amplitude in micro-slip"
+    ),
+    "exponent_gross": Definition(
+        "1", "exponent of the energy loss per cycle over the amplitude in gross slip; 1 in theory"
+    ),
+    # fit; of keys of a scene, see FITTED_KEY
+    "offset_force": Definition("N", "constant force that is fitted to the whole record"),
+    "offset_displacement": Definition(
+        "m", "fitted distance of the first row from the position without stress"
+    ),
+    "residual_rms": Definition("1", "root mean square of fitted minus measured values", 3),
+    "residual_fraction": Definition(
+        "1", "root mean square of fitted minus measured values, over the largest measured value"
+    ),
+    "held_out_rms": Definition(
+        "1", "root mean square of predicted minus measured values of the rows that are held out"
+    ),
+    "work_measured": Definition("J", "work of the measured force over the record"),
+    "work_fitted": Definition("J", "work of the fitted force over the record"),
+    "frequency_residual_rms": Definition(
+        "1", "root mean square of the relative deviation of the fitted frequency"
+    ),
+    "damping_residual_rms": Definition(
+        "1", "root mean square of the relative deviation of the fitted damping ratio"
+    ),
+    "score_fitted": Definition(
+        "1", "root mean square of ln(computed/measured) of the readings that were fitted"
+    ),
+    "score_held_out": Definition(
+        "1", "root mean square of ln(computed/measured) of the readings that were held out"
+    ),
+    "score_left_out": Definition(
+        "1", "root mean square of ln(computed/measured) of each reading in the fit without it"
+    ),
+    "fitted_depth": Definition("m", "worn depth computed with the fitted coefficient"),
+    # cost
+    "cpu_time": Definition("s", "CPU time of the scene as it is, with its error estimates"),
+    "elapsed_time": Definition("s", "elapsed time of the same run"),
+    "largest_error": Definition(
+        "1", "largest numerical error of a measure in this run, relative to its value and floor"
+    ),
+    "tolerance": Definition("1", "tolerance of the scene, its key accuracy.tolerance"),
 }
-# a residual has few digits that mean something
-QUANTITIES["residual_rms"] = QUANTITIES["residual_rms"]._replace(digits=3)
 FITTED_KEY = "value of this key of the scene that fits the measurement best, with its 95 % interval"
 
 

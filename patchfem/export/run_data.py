@@ -22,7 +22,7 @@ from ..response.rows import TABLE
 from ..runs.accuracy_curve import compute_accuracy_curve
 from ..runs.results.result import Result, patch_surface
 from ..structure import drive_sizes
-from .answer import Variable, Variables, encode, make_columns, parse_table
+from .answer import Variable, Variables, encode, make_columns
 
 # a measured row belongs to a run if its frequency differs by no more than this [Hz]
 SAME_FREQUENCY = 0.5
@@ -47,100 +47,179 @@ class Row(NamedTuple):
     has_error: bool = False
 
 
-# NAME (dimensions) [SI unit] = places, and the description; ± marks a variable whose error is stored beside it
-_TABLE = """
-time (time) [s] = response.time
-    time
-relative_displacement (time) [m] = response.output response.slide
-    displacement of the output relative to the base
-relative_velocity (time) [m s-1] = response.output_rate response.rate
-    velocity of the output relative to the base
-absolute_acceleration (time) [m s-2] = response.acceleration
-    acceleration at the output, base motion included
-base_acceleration (time) [m s-2] = response.base_acceleration
-    acceleration of the base
-interface (interface) [] = plan.model.rig.friction.names
-    the two masses of the interface; 0 is the base
-slide (interface time) [m] = response.extra.slides.T response.slide
-    relative displacement of the two surfaces of the interface
-slide_velocity (interface time) [m s-1] = response.extra.slide_rates.T
-    relative velocity of the two surfaces
-friction_force (interface time) [N] = response.extra.forces.T response.force
-    resultant friction force, positive when it opposes positive slip
-yaw_moment (time) [N m] = response.yaw_moment
-    moment about +z of the friction on the upper piece, sum of y f_x - x f_y
-friction_work (time) [J] = response.ledger.0 response.extra.ledger.0
-    work done against friction since the start
-energy_stored (time) [J] = response.ledger.1 response.extra.ledger.1
-    elastic energy of the interface
-energy_dissipated (time) [J] = response.ledger.2 response.extra.ledger.2
-    energy dissipated by friction since the start
-energy_created (time) [J] = response.ledger.3 response.extra.ledger.3
-    energy created since the start by a friction law that is not passive
-mode (mode) [] = plan.model.rig.modes.names
-    mode or coordinate of the structure
-period () [s] = extra.period
-    period of the drive
-strip_offset (strip) [m] = patch.strips.offsets
-    position of the strip across the width
-strip_normal_stress (strip x) [Pa] = patch.strips.pressure
-    normal stress of each strip, compression positive
-event_time (event) [s] = extra.events.time
-    time of the event
-event_interface (event) [1] = extra.events.interface
-    number of the interface or strip from 1; 0 for a change of the drive
-event_kind (event) [] = extra.events.kind
-    kind of event; `up` means towards positive slip
-event_slide (event) [m] = extra.events.slide
-    relative displacement at the event
-curve_frequency (curve_point) [Hz] = extra.curve.frequency
-    drive frequency
-curve_level (curve_point) [m s-2] = extra.curve.level
-    drive: acceleration of the base, or force divided by the modal mass
-curve_amplitude ± (curve_point) [m] = extra.curve.amplitude
-    half the peak-to-peak motion at the output
-curve_acceleration_peak ± (curve_point) [m s-2] = extra.curve.acceleration_peak
-    largest absolute acceleration
-curve_acceleration_fundamental ± (curve_point) [m s-2] = extra.curve.acceleration_fundamental
-    first harmonic of the absolute acceleration
-curve_acceleration_distortion ± (curve_point) [1] = extra.curve.acceleration_distortion
-    third over first harmonic of the absolute acceleration
-curve_multiplier (curve_point) [1] = extra.curve.multiplier
-    largest Floquet multiplier
-decay_time (decay_time) [s] = extra.decay.time
-    time at the middle of the evaluated cycle
-decay_amplitude (decay_time) [m] = extra.decay.amplitude
-    half the peak-to-peak motion of the output
-decay_frequency (decay_time) [Hz] = extra.decay.frequency
-    frequency of the decay
-decay_frequency_error (decay_time) [Hz] = extra.decay.frequency_error
-    half-width of the interval
-decay_damping (decay_time) [1] = extra.decay.damping
-    damping ratio of the decay
-decay_damping_error (decay_time) [1] = extra.decay.damping_error
-    half-width of the interval
-frequency (frequency) [Hz] = extra.spectra.frequency
-    frequency
-base_acceleration_spectrum (frequency) [m2 s-3] = extra.spectra.drive
-    one-sided spectral density of the base acceleration
-relative_displacement_spectrum (frequency) [m2 Hz-1] = extra.spectra.displacement
-    one-sided spectral density of the output
-absolute_acceleration_spectrum (frequency) [m2 s-3] = extra.spectra.acceleration
-    one-sided spectral density of the acceleration at the output
-coherence (frequency) [1] = extra.spectra.coherence
-    coherence of drive and output
-gain_peak () [Hz] = measures.response_frequency.value
-    frequency of the peak of H1
-wear_cycle (wear_cycle) [1] = extra.wear.cycle
-    cycles of wear so far
-wear_pressure_peak_at_edge (wear_cycle) [Pa] = extra.wear.pressure_peak_at_edge
-    excess of a pressure peak at the edge of the contact over all pressures inside; else 0
-"""
 VARIABLES = {
-    name: Row(dims, unit, text, places, bool(mark))
-    for name, mark, dims, unit, places, text in parse_table(
-        _TABLE, r"(\w+)( ±)? \((.*)\) \[(.*)\] = (.*)"
-    )
+    "time": Row("time", "s", "time", "response.time"),
+    "relative_displacement": Row(
+        "time",
+        "m",
+        "displacement of the output relative to the base",
+        "response.output response.slide",
+    ),
+    "relative_velocity": Row(
+        "time",
+        "m s-1",
+        "velocity of the output relative to the base",
+        "response.output_rate response.rate",
+    ),
+    "absolute_acceleration": Row(
+        "time", "m s-2", "acceleration at the output, base motion included", "response.acceleration"
+    ),
+    "base_acceleration": Row(
+        "time", "m s-2", "acceleration of the base", "response.base_acceleration"
+    ),
+    "interface": Row(
+        "interface",
+        "",
+        "the two masses of the interface; 0 is the base",
+        "plan.model.rig.friction.names",
+    ),
+    "slide": Row(
+        "interface time",
+        "m",
+        "relative displacement of the two surfaces of the interface",
+        "response.extra.slides.T response.slide",
+    ),
+    "slide_velocity": Row(
+        "interface time",
+        "m s-1",
+        "relative velocity of the two surfaces",
+        "response.extra.slide_rates.T",
+    ),
+    "friction_force": Row(
+        "interface time",
+        "N",
+        "resultant friction force, positive when it opposes positive slip",
+        "response.extra.forces.T response.force",
+    ),
+    "yaw_moment": Row(
+        "time",
+        "N m",
+        "moment about +z of the friction on the upper piece, sum of y f_x - x f_y",
+        "response.yaw_moment",
+    ),
+    "friction_work": Row(
+        "time",
+        "J",
+        "work done against friction since the start",
+        "response.ledger.0 response.extra.ledger.0",
+    ),
+    "energy_stored": Row(
+        "time", "J", "elastic energy of the interface", "response.ledger.1 response.extra.ledger.1"
+    ),
+    "energy_dissipated": Row(
+        "time",
+        "J",
+        "energy dissipated by friction since the start",
+        "response.ledger.2 response.extra.ledger.2",
+    ),
+    "energy_created": Row(
+        "time",
+        "J",
+        "energy created since the start by a friction law that is not passive",
+        "response.ledger.3 response.extra.ledger.3",
+    ),
+    "mode": Row("mode", "", "mode or coordinate of the structure", "plan.model.rig.modes.names"),
+    "period": Row("", "s", "period of the drive", "extra.period"),
+    "strip_offset": Row(
+        "strip", "m", "position of the strip across the width", "patch.strips.offsets"
+    ),
+    "strip_normal_stress": Row(
+        "strip x",
+        "Pa",
+        "normal stress of each strip, compression positive",
+        "patch.strips.pressure",
+    ),
+    "event_time": Row("event", "s", "time of the event", "extra.events.time"),
+    "event_interface": Row(
+        "event",
+        "1",
+        "number of the interface or strip from 1; 0 for a change of the drive",
+        "extra.events.interface",
+    ),
+    "event_kind": Row(
+        "event", "", "kind of event; `up` means towards positive slip", "extra.events.kind"
+    ),
+    "event_slide": Row("event", "m", "relative displacement at the event", "extra.events.slide"),
+    "curve_frequency": Row("curve_point", "Hz", "drive frequency", "extra.curve.frequency"),
+    "curve_level": Row(
+        "curve_point",
+        "m s-2",
+        "drive: acceleration of the base, or force divided by the modal mass",
+        "extra.curve.level",
+    ),
+    "curve_amplitude": Row(
+        "curve_point",
+        "m",
+        "half the peak-to-peak motion at the output",
+        "extra.curve.amplitude",
+        has_error=True,
+    ),
+    "curve_acceleration_peak": Row(
+        "curve_point",
+        "m s-2",
+        "largest absolute acceleration",
+        "extra.curve.acceleration_peak",
+        has_error=True,
+    ),
+    "curve_acceleration_fundamental": Row(
+        "curve_point",
+        "m s-2",
+        "first harmonic of the absolute acceleration",
+        "extra.curve.acceleration_fundamental",
+        has_error=True,
+    ),
+    "curve_acceleration_distortion": Row(
+        "curve_point",
+        "1",
+        "third over first harmonic of the absolute acceleration",
+        "extra.curve.acceleration_distortion",
+        has_error=True,
+    ),
+    "curve_multiplier": Row(
+        "curve_point", "1", "largest Floquet multiplier", "extra.curve.multiplier"
+    ),
+    "decay_time": Row(
+        "decay_time", "s", "time at the middle of the evaluated cycle", "extra.decay.time"
+    ),
+    "decay_amplitude": Row(
+        "decay_time", "m", "half the peak-to-peak motion of the output", "extra.decay.amplitude"
+    ),
+    "decay_frequency": Row("decay_time", "Hz", "frequency of the decay", "extra.decay.frequency"),
+    "decay_frequency_error": Row(
+        "decay_time", "Hz", "half-width of the interval", "extra.decay.frequency_error"
+    ),
+    "decay_damping": Row("decay_time", "1", "damping ratio of the decay", "extra.decay.damping"),
+    "decay_damping_error": Row(
+        "decay_time", "1", "half-width of the interval", "extra.decay.damping_error"
+    ),
+    "frequency": Row("frequency", "Hz", "frequency", "extra.spectra.frequency"),
+    "base_acceleration_spectrum": Row(
+        "frequency",
+        "m2 s-3",
+        "one-sided spectral density of the base acceleration",
+        "extra.spectra.drive",
+    ),
+    "relative_displacement_spectrum": Row(
+        "frequency",
+        "m2 Hz-1",
+        "one-sided spectral density of the output",
+        "extra.spectra.displacement",
+    ),
+    "absolute_acceleration_spectrum": Row(
+        "frequency",
+        "m2 s-3",
+        "one-sided spectral density of the acceleration at the output",
+        "extra.spectra.acceleration",
+    ),
+    "coherence": Row("frequency", "1", "coherence of drive and output", "extra.spectra.coherence"),
+    "gain_peak": Row("", "Hz", "frequency of the peak of H1", "measures.response_frequency.value"),
+    "wear_cycle": Row("wear_cycle", "1", "cycles of wear so far", "extra.wear.cycle"),
+    "wear_pressure_peak_at_edge": Row(
+        "wear_cycle",
+        "Pa",
+        "excess of a pressure peak at the edge of the contact over all pressures inside; else 0",
+        "extra.wear.pressure_peak_at_edge",
+    ),
 }
 # fields along the interface, by their names in `Result.fields`
 FIELDS = {

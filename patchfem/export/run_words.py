@@ -263,9 +263,7 @@ def _describe_place(contact: JsonObject | None, form: str = "In contact: {}.") -
     """Return where the contact is along x, such as "x = -6.35 to -3.56 mm"; "" if all of the length is in contact."""
     if not contact or not contact["stretches"]:
         return ""
-    first = contact["from"]
-    last = contact["to"]
-    stretches = contact["stretches"]
+    first, last, stretches = contact["from"], contact["to"], contact["stretches"]
     if len(stretches) == 1 and stretches[0][0] <= first and stretches[0][1] >= last:
         return ""
     unit, scale = choose_unit(UNIT_LADDERS["m"], max(abs(first), abs(last)))
@@ -379,8 +377,7 @@ def _describe_gain_peak(result: Result) -> str:
         scatter = result.measures.get(name + SCATTER)
         if value is None or scatter is None or None in (value.value, scatter.value):
             return ""
-        low = max(value.value - scatter.value, 0.0)
-        high = value.value + scatter.value
+        low, high = max(value.value - scatter.value, 0.0), value.value + scatter.value
         interval = Quantity(value.value, value.unit, None, low, high)
         parts.append(text.format(quantities.format_quantity(name, interval)))
     sentence = "; ".join(parts)

@@ -337,16 +337,21 @@ def refusing_sentences(name: str, other: str) -> list:
 
 def source(name: str) -> list:
     """Return the papers on which an effect is based."""
-    texts = [text for effects, text in SOURCES if name in effects.split()]
-    lines = []
-    for text in texts:
-        one = dict(re.findall(r"^  (\w+) = \{(.*)\}", text, re.MULTILINE))
-        line = (
-            f"{one['author'].replace(' and ', ', ')}: {one['title']}. {one['journal']} {one['volume']}, "
-            f"{one['pages']} ({one['year']})."
-        )
-        lines.append(re.sub(r'[{}\\"]', "", line).replace("--", "-"))
-    return ["## Source", *lines] if lines else []
+    found = [entry for effects, (_, _, entry) in SOURCES if name in effects]
+    return (
+        [
+            "## Source",
+            *(
+                f"{one['author'].replace(' and ', ', ')}: {one['title']}. {one['journal']} {one['volume']}, "
+                f"{one['pages']} ({one['year']}).".translate(
+                    str.maketrans("", "", '{}\\"')
+                ).replace("--", "-")
+                for one in found
+            ),
+        ]
+        if found
+        else []
+    )
 
 
 # --- glossary, commands, Python, code

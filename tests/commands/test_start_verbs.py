@@ -102,11 +102,10 @@ def test_exact_cite_lists_sources_of_effects(tmp_path):
     assert {"hueber2005", "archard1953"} <= set(
         keys(bibtex(load(read_template("wear")).effect_names()))
     )
-    assert {name for names, _ in SOURCES for name in names.split()} <= set(EFFECTS)
-    for _, text in SOURCES:  # A key is made of the first author's surname and the year.
-        author = re.search(r"author = \{(.*)\}", text)[1].lower()
-        surname = re.sub(r"[^a-z ,]", "", author).replace(",", " ").split()[0]
-        assert keys(text) == [surname + re.search(r"year = \{(\d+)\}", text)[1]]
+    assert {name for names, _ in SOURCES for name in names} <= set(EFFECTS)
+    for _, (_, key, fields) in SOURCES:  # A key is made of the first author's surname and the year.
+        surname = re.sub(r"[^a-z ,]", "", fields["author"].lower()).replace(",", " ").split()[0]
+        assert key == surname + fields["year"]
 
 
 @pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])

@@ -182,8 +182,7 @@ def read_frames(path: Path) -> Frames:
 def _read_block(group, count: int) -> Block:
     """Read the mesh of a block and its fields in `count` frames."""
     points = group["Points"][:].reshape(-1, 3)
-    first = group["Offsets"][:-1]
-    last = group["Offsets"][1:] - 1
+    first, last = group["Offsets"][:-1], group["Offsets"][1:] - 1
     n_corners = 2 if (last - first).max() == 1 else 4
     corners = np.minimum(first[:, None] + np.arange(n_corners), last[:, None])
     cells = group["Connectivity"][:][corners]
