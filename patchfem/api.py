@@ -16,7 +16,7 @@ import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import fields, replace
 from difflib import get_close_matches
-from functools import wraps
+from functools import partial, wraps
 from html import escape
 from numbers import Integral
 from pathlib import Path
@@ -451,15 +451,17 @@ def cost(
     curve = cost_curves.compute_setting_costs(model, setting, report)
     answer = costs.make_answer({setting: curve}, model)
     if out is not None:
-        _save(answer, Path(out))
+        _save(lambda _: answer, out)
     return answer.details
 
 
-def _save(answer: Any, folder: Path) -> None:
-    """Write an answer with its page into a results folder."""
-    with Folder(folder) as claimed:
-        store.write(answer, claimed.path)
-        page.write_page(claimed.path)
+def _save(make_answer: Callable[[Path], Any], out: str | Path, *, resume: bool = False) -> Any:
+    """Write the answer of a function of the results folder with its page into this folder, and return it."""
+    with Folder(Path(out), resume) as folder:
+        answer = make_answer(folder.path)
+        store.write(answer, folder.path)
+        page.write_page(folder.path)
+    return answer
 
 
 def backbone(
@@ -828,12 +830,11 @@ def fit(
     data = keywords.get("to", data)
     data_path = "" if isinstance(data, str) and not data else str(_require_path(data, "fit: to"))
     listener = fit_requests.Listener(_print_to_stderr if say is None else say)
+    compute = partial(fits.compute_answer, loaded, data_path, ranges, options, listener)
+    if out is not None:
+        return _save(compute, out, resume=options.resume).details
     with TemporaryDirectory() as temporary_folder:
-        target = Path(temporary_folder) / "fit" if out is None else Path(out)
-        answer = fits.fit_into(
-            loaded, data_path, ranges, options, target, listener, with_page=out is not None
-        )
-        return answer.details
+        return compute(Path(temporary_folder)).details
 
 
 def _check_fit_options(options: Any, changes: dict) -> FitOptions:

@@ -1,6 +1,7 @@
 """The command that compares two measured surfaces, before and after wear, or two runs."""
 
 from pathlib import Path
+from typing import Any
 
 from ..campaigns import compare as pressing
 from ..export.surfaces import compare as compared
@@ -81,6 +82,8 @@ def compare(
     options = Options(parse_units(units), direction, length, datum, keep_spikes)
     given = {"--scene": scene, "--predicted": predicted, "--piece": piece}
     files = [path for path in (before, after, *other) if path is not None]
+
+    # an option that the kind of comparison does not use is a mistake of the user
     if pairs is not None:
         _refuse_others({"another file": files, **given}, "a table of pairs")
         _compare_pairs(pairs, options, output_options.make_output(pairs.stem, is_verbose=verbose))
@@ -92,6 +95,7 @@ def compare(
         raise UsageError(
             f"compare: give two files BEFORE and AFTER, or a table of pairs with --pairs{removed}"
         )
+
     output = output_options.make_output(
         f"{before.resolve().stem}-{after.resolve().stem}", is_verbose=verbose
     )
@@ -106,7 +110,7 @@ def compare(
         save(lambda _: compared.answer_files(before, after, options, predicted, piece), output)
 
 
-def _refuse_others(given: dict, subject: str) -> None:
+def _refuse_others(given: dict[str, Any], subject: str) -> None:
     """Raise UsageError for the first option that has a value but does not apply to what is compared."""
     for name, value in given.items():
         if value:
@@ -125,7 +129,9 @@ def _compare_pairs(table: Path, options, output: Output) -> None:
         raise CommandExit(2 if len(failed) == len(rows) else NOT_CONVERGED)
 
 
-def _compare_in_scene(before: Path, after: Path, options, base: tuple, output: Output) -> None:
+def _compare_in_scene(
+    before: Path, after: Path, options, base: tuple[Path, tuple[str, ...]], output: Output
+) -> None:
     """Compare two traces, and run a scene with each of them as the profile of its patch."""
     scene, sets = base
     if load_scene(scene, sets).contact is None:

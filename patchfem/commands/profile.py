@@ -87,6 +87,7 @@ def profile(
             )
         _print_split(file, split, options["cutoff"], out, json_=json_)
         return
+
     options["form"] = forms.parse_form_option(form)
     paths = (file, *more)
     output = Output(out, json_, plot=plot, is_verbose=verbose)
@@ -108,35 +109,41 @@ def _print_split(
         raise UsageError(
             f"profile --split: {scene_path} has no [contact], so no patch has this trace"
         )
+
+    # the split depends on the mesh and the load of the scene
     scene_with_trace = require_files(
         scene.loads(text, target, [f"contact.profile.file={relative_path}"])
     )
     with locate_errors(scene_with_trace):
         divided = trace_split.split_trace(model.build(scene_with_trace).patch, cutoff)
     if out is not None:
-        remaining_text = SPLIT_TABLES.sub("", text).rstrip()
-        if {"profile", "asperities"} & tomllib.loads(remaining_text)["contact"].keys():
-            raise UsageError(
-                f"profile --split: {scene_path} has profile or asperities inside [contact]; write them as tables "
-                "[contact.profile] and [contact.asperities], or paste the tables that are printed without -o"
-            )
-        text = f"{remaining_text}\n\n{divided.tables}"
-        scene.loads(text, out)
-        write_text(out, text)
+        _write_split(text, divided.tables, scene_path, out)
     if json_:
         print(json.dumps({"patchfem": __version__, "split": asdict(divided)}, ensure_ascii=False))
         return
-    print(
-        f"{trace}: "
-        + divided.describe_split(
-            is_cutoff_given=cutoff is not None, is_scene_written=out is not None
-        )
-    )
-    if out is not None:
+
+    has_cutoff = cutoff is not None
+    is_written = out is not None
+    words = divided.describe_split(is_cutoff_given=has_cutoff, is_scene_written=is_written)
+    print(f"{trace}: {words}")
+    if is_written:
         print(f"scene: {out}")
 
 
-def _window(text: str) -> tuple:
+def _write_split(text: str, tables: str, scene_path: Path, out: Path) -> None:
+    """Write a scene with new tables of profile and asperities; UsageError if it has them inside [contact]."""
+    remaining_text = SPLIT_TABLES.sub("", text).rstrip()
+    if {"profile", "asperities"} & tomllib.loads(remaining_text)["contact"].keys():
+        raise UsageError(
+            f"profile --split: {scene_path} has profile or asperities inside [contact]; write them as tables "
+            "[contact.profile] and [contact.asperities], or paste the tables that are printed without -o"
+        )
+    new_text = f"{remaining_text}\n\n{tables}"
+    scene.loads(new_text, out)
+    write_text(out, new_text)
+
+
+def _window(text: str) -> tuple[float, ...]:
     """Read the positions of a window [m]; raise UsageError unless there are two or four."""
     positions = text.split(",")
     if len(positions) not in (2, 4) or not all(map(str.strip, positions)):

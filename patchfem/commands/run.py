@@ -3,7 +3,7 @@
 import json
 from pathlib import Path
 
-from ..disk import atomic_write
+from .. import core
 from ..export import run_folder, store
 from ..runs import plan
 from .shared import (
@@ -47,6 +47,8 @@ def run(
             "run --resume: only a run with [wear] on a patch or a run that is integrated in time saves its "
             "state; run the scene again without --resume"
         )
+
+    # a run that is complete has no state, so that nothing is left to resume
     output = output_options.make_output(run_plan.model.source.path.stem, is_verbose=verbose)
     target = output.target
     if resume and run_folder.is_complete(run_plan, target):
@@ -56,16 +58,17 @@ def run(
     report = None if output.is_quiet else print_message
     with Progress(output.is_quiet or output.as_json) as progress:
         written = run_folder.run_into(
-            run_plan, target, report, progress, fresh=fresh, resume=resume
+            run_plan,
+            target,
+            report,
+            progress,
+            fresh=fresh,
+            resume=resume,
+            has_page=output.has_page,
         )
-    try:
-        # the page comes after the results, so that an error in the page does not lose them
-        present(written.answer, output, lambda: output.has_page and _draw_page(written, target))
-    except KeyboardInterrupt:
-        print_message(
-            f"interrupted while the page was drawn; the results in {target} are complete except for report.html"
-        )
-        raise CommandExit(130) from None
+    present(written.answer, output)
+    if written.page_fault is not None:
+        _report_missing_page(written.page_fault, target)
     if verbose:
         seconds = written.answer.details["seconds"]
         print_message(
@@ -95,15 +98,15 @@ def _end_run(answer, is_quiet: bool) -> None:
     raise CommandExit(NOT_CONVERGED)
 
 
-def _draw_page(written, target: Path) -> None:
-    """Write the page of a run; exit code 4 if it cannot be written."""
-    try:
-        run_folder.write_run_page(written, target)
-    except atomic_write.WriteError as error:
-        reason = str(error)
-    except (OSError, MemoryError) as error:
-        reason = f"{target / store.PAGE}: {getattr(error, 'strerror', None) or 'out of memory'}"
+def _report_missing_page(fault: BaseException, target: Path) -> None:
+    """Say why a run has no page, and end with exit code 4; with 130 if the page was interrupted."""
+    if isinstance(fault, KeyboardInterrupt):
+        reason = "interrupted while the page was drawn"
+    elif isinstance(fault, MemoryError):
+        reason = f"{target / store.PAGE}: out of memory"
+    elif isinstance(fault, core.PatchfemError | OSError):
+        reason = str(fault)
     else:
-        return
-    print_message(f"{reason}; the results are complete except for the page")
-    raise CommandExit(4)
+        raise fault
+    print_message(f"{reason}; the results in {target} are complete except for report.html")
+    raise CommandExit(130 if isinstance(fault, KeyboardInterrupt) else 4)

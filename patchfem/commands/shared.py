@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from threading import Event, Thread
 from time import monotonic
-from typing import Annotated, NamedTuple
+from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 from cyclopts import Parameter
 
@@ -19,6 +19,9 @@ from ..model import model
 from ..scene import scene
 from ..scene.keys import quantities
 from .streams import make_printable
+
+if TYPE_CHECKING:
+    from ..export.answer import Answer
 
 NOT_CONVERGED = 3  # exit code if a numerical method did not converge, or if some cases failed
 
@@ -109,7 +112,9 @@ OutputGroup = Annotated[OutputOptions, Parameter(name="*")]
 DEFAULT_OUTPUT = OutputOptions()
 
 
-def save(make_answer: Callable, output: Output):
+def save(
+    make_answer: Callable[[Path], "Answer"], output: Output, *, resume: bool = False
+) -> "Answer":
     """Make an answer, write it with its page into its folder, print it and return it.
 
     Parameters
@@ -117,11 +122,17 @@ def save(make_answer: Callable, output: Output):
     make_answer : callable
         Function that takes the folder, which is locked meanwhile, and returns the Answer.
     output : Output
+        Where and how the answer is written and printed.
+    resume : bool
+        Whether saved states in the folder are kept.
     """
-    with folders.Folder(output.target) as folder:
+    with folders.Folder(output.target, resume) as folder:
+        if folder.dropped and output.report:
+            output.report(folder.dropped)
         answer = make_answer(folder.path)
-        known = {"command": describe_command(), "versions": runs.list_versions()}
-        answer = replace(answer, origin=known | answer.origin)
+        versions = {"versions": runs.list_versions()}
+        origin = versions | answer.origin | {"command": describe_command()}
+        answer = replace(answer, origin=origin)
         store.write(answer, folder.path)
         if output.has_page:
             page.write_page(folder.path)
@@ -141,17 +152,8 @@ def describe_command() -> str:
     )
 
 
-def present(answer, output: Output, draw_page: Callable[[], None] = lambda: None) -> None:
-    """Print an answer, draw its page and its picture, and print the names of its files.
-
-    Parameters
-    ----------
-    answer : Answer
-    output : Output
-        Where and how the answer is printed.
-    draw_page : callable
-        Function that is called after the numbers are printed, because they do not need the page.
-    """
+def present(answer: "Answer", output: Output) -> None:
+    """Print an answer, draw its picture, and print the names of its files."""
     if output.as_json:
         content = store.make_summary(answer) if answer.is_run else answer.details
         if answer.kind == "pairs":
@@ -163,7 +165,6 @@ def present(answer, output: Output, draw_page: Callable[[], None] = lambda: None
         sys.stdout.flush()
     if not output.is_quiet:
         print_remarks(answer)
-    draw_page()
     if output.plot is not None:
         axes.write_plot(answer, output.plot)
     if output.target is not None and not (output.as_json or output.is_quiet):
@@ -172,7 +173,7 @@ def present(answer, output: Output, draw_page: Callable[[], None] = lambda: None
         sys.stdout.flush()
 
 
-def print_remarks(answer) -> None:
+def print_remarks(answer: "Answer") -> None:
     """Print the warnings and notes of an answer on stderr."""
     for text in answer.remarks.warnings:
         # some remarks are followed by tables for the scene file
@@ -196,7 +197,7 @@ def parse_quantity(text: str, kind: str, option: str) -> float | None:
     text : str
         Value of the option.
     kind : str
-        Kind of quantity, as in `scene.keys.quantities`.
+        Kind of quantity, such as "length" or "frequency".
     option : str
         Name of the option, for the message.
 
@@ -248,6 +249,7 @@ def load_scene(path: Path, sets, faults=None, prepare=None):
     Parameters
     ----------
     path : Path
+        Scene file.
     sets : sequence of str
         ``table.key=value`` strings.
     faults : callable, optional

@@ -4,6 +4,8 @@ from collections.abc import Iterable
 
 from .. import __version__
 
+# kind, key and fields of an entry of a bibliography
+Entry = tuple[str, str, dict[str, str]]
 REPORT = (
     "techreport",
     "srinivasan1985",
@@ -28,7 +30,7 @@ PROGRAM = (
 
 def _article(
     key: str, author: str, title: str, journal: str, where: str, year: int, doi: str = ""
-) -> tuple:
+) -> Entry:
     """Return the bibliography entry of a journal article; `where` has the form "volume:pages"."""
     volume, pages = where.split(":")
     fields = {
@@ -193,7 +195,7 @@ def bibtex(effect_names: Iterable[str] = ()) -> str:
     return "\n".join(_entry(*one) for one in entries)
 
 
-def _entry(kind: str, key: str, fields: dict) -> str:
+def _entry(kind: str, key: str, fields: dict[str, str]) -> str:
     """Return a bibliography entry in BibTeX format."""
     lines = ",\n".join(f"  {name} = {{{text}}}" for name, text in fields.items())
     return f"@{kind}{{{key},\n{lines}\n}}\n"

@@ -86,6 +86,7 @@ def _ask(option: str, question: str, answers: dict[str, str]) -> str:
     option : str
         Option that answers the question without a terminal, for the message.
     question : str
+        Question as it is printed.
     answers : dict
         Word of an answer -> its meaning.
 
@@ -129,8 +130,8 @@ def schema(*, out: out_option("file to write, such as scene.json; default: the s
 
 
 def doctor(*, json_: Json = False):
-    """Print what is installed: versions, size of the cache of compiled code, support for pictures, usable cores, and
-    optional packages with the command that installs each.
+    """Print what is installed: versions, size of the cache of compiled code, support for films, usable cores, and optional
+    packages with the command that installs each.
 
     Example: patchfem doctor
     """

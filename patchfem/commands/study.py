@@ -21,11 +21,9 @@ from .shared import (
     Sets,
     UsageError,
     Verbose,
-    describe_command,
     flag_option,
     load_model,
     load_scene,
-    present,
     print_message,
     repeated_option,
     save,
@@ -121,7 +119,7 @@ def backbone(
 
     def compute_curves(_):
         """Compute the curves of all methods and values of the key."""
-        return backbones.compute_answer(build_model, request, report, describe_command())
+        return backbones.compute_answer(build_model, request, report)
 
     answer = save(compute_curves, output)
     cases = answer.details.get("cases", [answer.details])
@@ -176,16 +174,9 @@ def fit(
     with Progress(output.is_quiet or output.as_json or is_short) as progress:
         report = None if output.is_quiet else print_message
         listener = fit_requests.Listener(report, progress)
-        answer = fits.fit_into(
-            loaded_scene,
-            to,
-            free,
-            options,
-            output.target,
-            listener,
-            with_page=output.has_page,
-            command=describe_command(),
+        answer = save(
+            lambda folder: fits.compute_answer(loaded_scene, to, free, options, listener, folder),
+            output,
         )
-    present(answer, output)
     if answer.details["outcome"] == "not_converged":
         raise CommandExit(NOT_CONVERGED)

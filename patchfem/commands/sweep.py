@@ -107,7 +107,7 @@ class WorkerOptions:
         "run no case, only write the tables of a sweep whose cases are all done", "--collect"
     ) = False
 
-    def part(self) -> tuple | None:
+    def part(self) -> tuple[int, int] | None:
         """Return (i, n) of a shard, or None if there is no shard."""
         if not self.shard:
             return None
@@ -145,12 +145,15 @@ def sweep(
         raise UsageError(
             "sweep: --no-page and --keep pages contradict each other; use only one of them"
         )
+
     start_time = perf_counter()
     by = by or WorkerOptions()
     part = by.part()
     output = output_options.make_output(f"{scene.stem}-sweep", is_verbose=verbose)
     target = output.target
     sweep_scene, cases = parse_request.read_sweep(scene, set_, (what or CaseOptions()).request())
+
+    # a shard has no answer, because its tables would lack the cases of the others
     if by.collect:
         answer = run.collect_shards(sweep_scene, cases, target, output.has_page)
     else:

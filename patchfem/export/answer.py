@@ -6,7 +6,7 @@ page, `charts` pictures and `show` the lines on the screen.
 
 import math
 from dataclasses import dataclass, field, fields, is_dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -100,9 +100,11 @@ class Variable:
 # arrays of an answer by name, and its measures by name
 Variables = dict[str, Variable]
 Quantities = dict[str, Quantity]
+# object of a JSON file: numbers, texts, lists and objects by key
+JsonObject = dict[str, Any]
 
 
-def make_columns(dims: str, columns: dict[str, tuple]) -> Variables:
+def make_columns(dims: str, columns: dict[str, tuple[Any, ...]]) -> Variables:
     """Return variables over the same dimensions.
 
     Parameters
@@ -131,9 +133,11 @@ def encode(dimension: str, texts: list[str], description: str = "") -> Variable:
     Parameters
     ----------
     dimension : str
+        Name of the dimension.
     texts : list of str
         Text of each element; a code stands for each different one.
     description : str, optional
+        What the codes are; `long_name` in the netCDF file.
     """
     meanings, codes = np.unique(np.asarray(texts, str), return_inverse=True)
     # the smallest signed type that has all codes
@@ -173,6 +177,7 @@ class Answer:
     kind : str
         "patch", "bench", "rig" or "linear" for a run; "sweep", "backbone", "compare", "profile", "fit", "cost".
     title : str
+        Heading of the page and first line on the screen.
     verdict : tuple of str
         At most four sentences; the first one is the headline, with at most 30 words.
     quantities : dict of str to Quantity
@@ -194,8 +199,8 @@ class Answer:
     quantities: Quantities = field(default_factory=dict)
     data: Variables = field(default_factory=dict)
     remarks: Remarks = Remarks()
-    details: dict = field(default_factory=dict)
-    origin: dict = field(default_factory=dict)
+    details: JsonObject = field(default_factory=dict)
+    origin: JsonObject = field(default_factory=dict)
 
     def __post_init__(self):
         object.__setattr__(self, "details", to_plain(self.details))

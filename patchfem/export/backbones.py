@@ -1,7 +1,7 @@
 """The answer of `backbone`: frequency, damping ratio and force of a mode against its amplitude."""
 
-from collections.abc import Callable
-from dataclasses import replace
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
 
 import numpy as np
 
@@ -9,8 +9,19 @@ from ..campaigns.backbone.records import METHODS, VALUES, Backbone, Curve, match
 from ..campaigns.backbone.request import BackboneCases, BackboneRequest, compute_cases
 from ..core import PatchfemError
 from ..formatting import format_number, format_quantity
+from ..model.model import Model
+from ..model.source import Source
 from . import quantities
-from .answer import Answer, Quantities, Quantity, Remarks, Variable, Variables, make_columns
+from .answer import (
+    Answer,
+    JsonObject,
+    Quantities,
+    Quantity,
+    Remarks,
+    Variable,
+    Variables,
+    make_columns,
+)
 from .charts import axes
 from .netcdf import from_dataset
 from .runs import make_origin
@@ -24,39 +35,36 @@ BAND_COLUMNS = ("amplitude", "frequency_low", "frequency_high", "damping_low", "
 UNITS = {"amplitude": "m", "frequency": "Hz", "damping": "1", "force": "N"}
 NAMES = {"frequency": "frequency", "damping": "damping ratio"}
 DIGITS = {"frequency": 5, "damping": 3}  # significant digits of a value in a sentence on its change
+# quantities of each value of a key on the page
+TABLE_COLUMNS = ("stuck_frequency", "largest_damping", "amplitude_of_largest_damping")
 # Largest relative change of a key that is said in percent.
 MAX_PERCENT_CHANGE = 0.995
 
 
 def compute_answer(
-    build: Callable, request: BackboneRequest, progress: Callable | None = None, command: str = ""
+    build: Callable[..., Model],
+    request: BackboneRequest,
+    progress: Callable[[str], None] | None = None,
 ) -> Answer:
     """Compute the backbones that a request asks for, and return them as an answer.
 
     Parameters
     ----------
-    build, request, progress
-        As for `campaigns.backbone.request.compute_cases`.
-    command : str
-        Command line that repeats it.
+    build : callable
+        Function that builds the model of the scene with the tables of a backbone and further changed keys.
+    request : BackboneRequest
+        Mode, amplitudes or forces, method, and the key that is varied.
+    progress : callable, optional
+        Function that takes the name of the curve that is computed next.
     """
     cases = compute_cases(build, request, progress)
     if cases.axis is None:
-        answer = make_answer(cases.backbones[0], cases.source)
-    else:
-        answer = _make_cases_answer(cases)
-    return replace(answer, origin=answer.origin | ({"command": command} if command else {}))
+        return make_answer(cases.backbones[0], cases.source)
+    return _make_cases_answer(cases)
 
 
-def make_answer(backbone: Backbone, source) -> Answer:
-    """Return the answer of one backbone.
-
-    Parameters
-    ----------
-    backbone : Backbone
-    source : model.Source
-        Scene of the mode.
-    """
+def make_answer(backbone: Backbone, source: Source) -> Answer:
+    """Return the answer of one backbone of a mode of the scene `source`."""
     measures = _make_quantities(backbone)
     return Answer(
         kind="backbone",
@@ -115,6 +123,8 @@ def _make_quantities(backbone: Backbone) -> Quantities:
             out[f"{name}_at_largest_amplitude"] = _take(curve, name, -1)
         out["largest_damping"] = _take(curve, "damping", largest)
         out["amplitude_of_largest_damping"] = Quantity(curve.amplitude[largest], "m")
+
+    # a missing frequency is shown with its reason, other missing values are left out
     no_frequency = "" if frequencies.stuck is not None else "a rigid contact leaves no motion"
     out |= {
         "free_frequency": Quantity(frequencies.free, "Hz", frequencies.free_error or None),
@@ -202,7 +212,7 @@ def _find_unit(name: str) -> str:
     return UNITS["frequency" if name == "force_frequency" else name.partition("_")[0]]
 
 
-def _make_details(backbone: Backbone) -> dict:
+def _make_details(backbone: Backbone) -> JsonObject:
     """Return the content of backbone.json in SI units."""
     frequencies = backbone.frequencies
     band = backbone.band
@@ -231,43 +241,56 @@ def _make_details(backbone: Backbone) -> dict:
 def _make_cases_answer(cases: BackboneCases) -> Answer:
     """Return the answer of the backbones for several values of a key: all curves, and what the change does."""
     axis = cases.axis
-    first = cases.backbones[0]
-    known_notes = [one.notes for one in cases.backbones]
-    shared = [note for note in first.notes if all(note in notes for notes in known_notes)]
-    notes = [*map(_make_sentence, shared)]
-    for text, backbone in zip(axis.texts, cases.backbones):
-        own = [note for note in backbone.notes if note not in shared]
-        own += [f"method {name}: {reason}" for name, reason in backbone.missing.items()]
-        notes += [f"{axis.key} = {text}: {note.rstrip('.')}." for note in own]
     verdict, measures = _compare_ends(cases)
-    known = [_make_quantities(one) for one in cases.backbones]
-    shown = ("stuck_frequency", "largest_damping", "amplitude_of_largest_damping")
-    table = [
-        {"value": text}
-        | {
-            name: quantities.format_quantity(name, one[name])
-            for name in shown
-            if name in one and one[name].value is not None
-        }
-        for text, one in zip(axis.texts, known)
-    ]
-    details = {"key": axis.key, "values": list(axis.texts), "mode": first.mode, "table": table}
     return Answer(
         kind="backbone",
         title=cases.source.title,
         verdict=verdict,
         quantities=measures,
         data=_make_cases_data(cases),
-        remarks=Remarks(notes=tuple(notes)),
-        details=details | {"cases": [_make_details(one) for one in cases.backbones]},
+        remarks=Remarks(notes=tuple(_list_notes(cases))),
+        details={
+            "key": axis.key,
+            "values": list(axis.texts),
+            "mode": cases.backbones[0].mode,
+            "table": _list_values(cases),
+            "cases": [_make_details(one) for one in cases.backbones],
+        },
         origin=make_origin(cases.source, "backbone"),
     )
+
+
+def _list_notes(cases: BackboneCases) -> list[str]:
+    """Return the notes of all backbones, those that they do not share with the value of the key."""
+    axis = cases.axis
+    known = [one.notes for one in cases.backbones]
+    shared = [note for note in known[0] if all(note in notes for notes in known)]
+    notes = [*map(_make_sentence, shared)]
+    for text, backbone in zip(axis.texts, cases.backbones):
+        own = [note for note in backbone.notes if note not in shared]
+        own += [f"method {name}: {reason}" for name, reason in backbone.missing.items()]
+        notes += [f"{axis.key} = {text}: {note.rstrip('.')}." for note in own]
+    return notes
+
+
+def _list_values(cases: BackboneCases) -> list[dict[str, str]]:
+    """Return a row of the page for each value of the key: the value and its main quantities as text."""
+    rows = []
+    for text, backbone in zip(cases.axis.texts, cases.backbones):
+        known = _make_quantities(backbone)
+        row = {"value": text}
+        for name in TABLE_COLUMNS:
+            if name in known and known[name].value is not None:
+                row[name] = quantities.format_quantity(name, known[name])
+        rows.append(row)
+    return rows
 
 
 def _make_cases_data(cases: BackboneCases) -> Variables:
     """Return the recommended curves of all values of the key at common amplitudes; NaN where one has no motion."""
     data = {"case": Variable(("case",), np.array(cases.axis.texts), "", cases.axis.key)}
     for method in METHODS:
+        # a curve is drawn in the variables of the method that its backbone recommends
         curves = [
             one.best if one.band and one.band.method == method else None for one in cases.backbones
         ]
@@ -277,22 +300,30 @@ def _make_cases_data(cases: BackboneCases) -> Variables:
         prefix = method.replace("-", "_")
         amplitude = np.unique(np.concatenate([curve.amplitude for curve in known]))
         data |= make_columns(f"{prefix}_amplitude", {f"{prefix}_amplitude": (amplitude, "m")})
+
         for name in COLUMNS[1:] + BAND_COLUMNS[1:]:
             values = np.full((len(curves), amplitude.size), np.nan)
             for row, curve, backbone in zip(values, curves, cases.backbones):
                 if curve is not None:
                     record = backbone.band if name in BAND_COLUMNS else curve
                     row[np.searchsorted(amplitude, curve.amplitude)] = getattr(record, name)
-            unit = _find_unit(name)
             dims = ("case", f"{prefix}_amplitude")
-            data[f"{prefix}_{name}"] = Variable(dims, values, unit, name.replace("_", " "))
+            text = name.replace("_", " ")
+            data[f"{prefix}_{name}"] = Variable(dims, values, _find_unit(name), text)
     return data
+
+
+class Change(NamedTuple):
+    """Change `step` (k,) of a value between two curves at common amplitudes, and the sum `error` (k,) of both errors."""
+
+    step: np.ndarray
+    error: np.ndarray
 
 
 def _compare_ends(cases: BackboneCases) -> tuple[tuple[str, ...], Quantities]:
     """Return the sentences on what the change of the key from its first to its last value does, and the changes.
 
-    They hold at the amplitude with the largest sum of both changes beyond the numerical errors, each over its maximum.
+    They hold at the amplitude with the largest change of frequency and damping.
     """
     axis = cases.axis
     first, last = cases.backbones[0], cases.backbones[-1]
@@ -306,50 +337,52 @@ def _compare_ends(cases: BackboneCases) -> tuple[tuple[str, ...], Quantities]:
 
     # differences at the common amplitudes, and the largest one
     start, end = first.best.at(here), last.best.at(there)
-    changes = {}
-    score = np.zeros(here.size)
-    for name in VALUES:
-        step = getattr(end, name) - getattr(start, name)
-        error = getattr(end, f"{name}_error") + getattr(start, f"{name}_error")
-        changes[name] = (step, error)
-        if name in NAMES and (np.abs(step) > error).any():
-            score += np.where(np.abs(step) > error, np.abs(step) / np.abs(step).max(), 0.0)
-    if not score.any():
+    changes = {name: _find_change(start, end, name) for name in VALUES}
+    place = _find_largest_change([changes[name] for name in NAMES])
+    if place is None:
         sentence = "changes frequency and damping ratio by less than their numerical errors"
         return (f"{subject} {sentence}.", *last.advice[:1]), {}
-    place = int(np.argmax(score))
     amplitude = float(start.amplitude[place])
     measures = {"compared_amplitude": Quantity(amplitude, "m")}
     for name, (step, error) in changes.items():
         measures[f"{name}_change"] = Quantity(step[place], UNITS[name], error[place])
 
-    parts = []
-    for name, label in NAMES.items():
-        step = measures[f"{name}_change"]
-        ends = [
-            format_quantity(getattr(curve, name)[place], UNITS[name], DIGITS[name])
-            for curve in (start, end)
-        ]
-        if abs(step.value) <= step.error:
-            parts.append(f"keeps the {label} at {ends[0]}")
-            continue
-        verb = "raises" if step.value > 0 else "lowers"
-        size = ""
-        if name == "frequency":
-            digits = format_quantity(abs(step.value), step.unit, 2)
-            size = f" by {digits}"
-        parts.append(f"{verb} the {label}{size} from {ends[0]} to {ends[1]}")
-    place_text = format_quantity(amplitude, "m", 3)
-    headline = f"{subject}, at {place_text}, {parts[0]} and {parts[1]}."
-    forces = [_take(curve, "force", place) for curve in (start, end)]
-    more = ()
-    if None not in (forces[0].value, forces[1].value):
-        texts = [format_quantity(one.value, "N", 3) for one in forces]
-        more = (f"The force at the output there goes from {texts[0]} to {texts[1]}.",)
-    return (headline, *more, *last.advice[:1]), measures
+    ends = {name: [_take(curve, name, place).value for curve in (start, end)] for name in VALUES}
+    parts = [_describe_step(name, measures[f"{name}_change"], ends[name]) for name in NAMES]
+    sentences = [f"{subject}, at {format_quantity(amplitude, 'm', 3)}, {parts[0]} and {parts[1]}."]
+    if None not in ends["force"]:
+        texts = [format_quantity(force, "N", 3) for force in ends["force"]]
+        sentences.append(f"The force at the output there goes from {texts[0]} to {texts[1]}.")
+    return (*sentences, *last.advice[:1]), measures
 
 
-def _describe_change(values) -> str:
+def _find_change(start: Curve, end: Curve, name: str) -> Change:
+    """Return the change of a value from one curve to another at equal amplitudes."""
+    step = getattr(end, name) - getattr(start, name)
+    return Change(step, getattr(end, f"{name}_error") + getattr(start, f"{name}_error"))
+
+
+def _find_largest_change(changes: list[Change]) -> int | None:
+    """Return the point with the largest sum of the changes, each over its maximum; None if all are within their errors."""
+    score = 0.0
+    for step, error in changes:
+        is_known = np.abs(step) > error
+        if is_known.any():
+            score = score + np.where(is_known, np.abs(step) / np.abs(step).max(), 0.0)
+    return int(np.argmax(score)) if np.any(score) else None
+
+
+def _describe_step(name: str, step: Quantity, ends: list[float]) -> str:
+    """Return the change of the frequency or of the damping ratio between two values as a clause."""
+    texts = [format_quantity(value, UNITS[name], DIGITS[name]) for value in ends]
+    if abs(step.value) <= step.error:
+        return f"keeps the {NAMES[name]} at {texts[0]}"
+    verb = "raises" if step.value > 0 else "lowers"
+    size = f" by {format_quantity(abs(step.value), step.unit, 2)}" if name == "frequency" else ""
+    return f"{verb} the {NAMES[name]}{size} from {texts[0]} to {texts[1]}"
+
+
+def _describe_change(values: Sequence[float | str]) -> str:
     """Return the relative change from the first to the last value, such as " (20 % more)"; "" without one."""
     first, last = values[0], values[-1]
     if not (isinstance(first, float) and isinstance(last, float) and first > 0):

@@ -5,8 +5,13 @@ import io
 
 import numpy as np
 
-from .answer import Answer, Quantity, Variable, Variables
-from .charts.table import BACKBONE_METHODS, CSV_FILES, CSV_UNITS, Column, parse_columns
+from .answer import Answer, JsonObject, Quantity, Variable, Variables
+from .charts.table import CSV_FILES, CSV_UNITS, Column, parse_columns
+
+# cells of the columns of a CSV file by heading
+Lists = dict[str, list[str | float]]
+# cells of a row of a table by column
+Cells = dict[str, Quantity | str | float]
 
 
 def format_curves(answer: Answer) -> dict[str, str]:
@@ -20,8 +25,8 @@ def format_curves(answer: Answer) -> dict[str, str]:
         columns = parse_columns(file.columns)
         if not file.source:
             lists = _list_variables(answer.data, columns)
-        elif file.source == "methods":
-            lists = _stack_methods(answer.data, columns)
+        elif file.source == "curves":
+            lists = _stack_curves(answer.details, columns)
         elif file.source in answer.details:
             lists = _list_objects(answer.details[file.source], columns, file.nested)
         else:
@@ -32,7 +37,7 @@ def format_curves(answer: Answer) -> dict[str, str]:
     return texts
 
 
-def format_csv(lists: dict[str, list]) -> str:
+def format_csv(lists: Lists) -> str:
     """Return columns of equal length as CSV: heading -> cells."""
     output = io.StringIO()
     writer = csv.writer(output, lineterminator="\n")
@@ -41,7 +46,7 @@ def format_csv(lists: dict[str, list]) -> str:
     return output.getvalue()
 
 
-def list_cells(variable: Variable) -> list:
+def list_cells(variable: Variable) -> list[str | float]:
     """Return the cells of a column; "" for a missing number."""
     cells = np.asarray(variable.values).tolist()
     if variable.meanings:
@@ -54,7 +59,7 @@ def add_unit(name: str, unit: str) -> str:
     return f"{name} [{unit}]" if unit not in ("", "1") else name
 
 
-def _list_variables(data: Variables, columns: list[Column]) -> dict[str, list]:
+def _list_variables(data: Variables, columns: list[Column]) -> Lists:
     """Return columns of variables; {} if there are less than two."""
     lists = {}
     for column in columns:
@@ -70,7 +75,7 @@ def _list_variables(data: Variables, columns: list[Column]) -> dict[str, list]:
     return lists if len(lists) > 1 else {}
 
 
-def _list_objects(rows: list[dict], columns: list[Column], nested: str) -> dict[str, list]:
+def _list_objects(rows: list[JsonObject], columns: list[Column], nested: str) -> Lists:
     """Return columns of a list of objects: texts, and the value and the interval of each quantity."""
     lists = {}
     for name in (column.name for column in columns):
@@ -83,9 +88,8 @@ def _list_objects(rows: list[dict], columns: list[Column], nested: str) -> dict[
     units = {name: cell["unit"] for row in rows for name, cell in row.items() if _is_number(cell)}
     for name, unit in units.items():
         for key, suffix in (("value", ""), ("low", "_low"), ("high", "_high")):
-            numbers = [row.get(name, {}).get(key) for row in rows]
-            cells = ["" if number is None else number for number in numbers]
-            lists[add_unit(name + suffix, unit)] = cells
+            numbers = (row.get(name, {}).get(key) for row in rows)
+            lists[add_unit(name + suffix, unit)] = list(map(_write_number, numbers))
     return lists
 
 
@@ -94,32 +98,32 @@ def _is_number(cell) -> bool:
     return isinstance(cell, dict) and "value" in cell
 
 
-def _stack_methods(data: Variables, columns: list[Column]) -> dict[str, list]:
-    """Return columns with the variables of all methods, and of all cases, below each other."""
-    names = [column.name for column in columns]
-    methods = [method for method in BACKBONE_METHODS if f"{method}_{names[0]}" in data]
-    cases = data["case"].values if "case" in data else [""]
-    lists = {data["case"].text: []} if "case" in data else {}
+def _stack_curves(details: JsonObject, columns: list[Column]) -> Lists:
+    """Return columns with the curves of all methods, and of all values of a key, below each other."""
+    key = details.get("key", "")
+    lists = {key: []} if key else {}
     lists["method"] = []
-    for method in methods:
-        size = data[f"{method}_{names[0]}"].values.size
-        if "case" in data:
-            lists[data["case"].text] += np.repeat(cases, size).tolist()
-        lists["method"] += [method.replace("_", "-")] * (len(cases) * size)
-        for name in names:
-            known = [data[f"{one}_{name}"] for one in methods if f"{one}_{name}" in data]
-            if not known:
-                continue
-            # a variable without the dimension of the cases is the same in all of them
-            variable = data.get(f"{method}_{name}")
-            values = np.nan if variable is None else variable.values
-            values = np.broadcast_to(values, (len(cases), size)).ravel()
-            cells = lists.setdefault(add_unit(name, known[0].unit), [])
-            cells += list_cells(Variable(("row",), values))
+    cases = zip(details.get("values", [""]), details.get("cases", [details]), strict=True)
+    for value, case in cases:
+        for method, curve in case["curves"].items():
+            size = len(curve["amplitude"])
+            if key:
+                lists[key] += [value] * size
+            lists["method"] += [method] * size
+            # the band is that of the recommended curve
+            known = curve | case["band"] if method == case["method"] else curve
+            for column in columns:
+                cells = known.get(column.name, [None] * size)
+                lists.setdefault(column.heading, []).extend(map(_write_number, cells))
     return lists
 
 
-def list_rows(answer: Answer, source: str) -> list[dict[str, Quantity | str | float]]:
+def _write_number(number: float | None) -> float | str:
+    """Return a number as a cell of a CSV file; "" for a missing one."""
+    return "" if number is None else number
+
+
+def list_rows(answer: Answer, source: str) -> list[Cells]:
     """Return the rows of a table: a list or objects by name in the details, or the variables of a dimension.
 
     source: as in `Table`.

@@ -24,6 +24,7 @@ def export_results(
     Parameters
     ----------
     folder : Path
+        Results folder.
     out : Path
         File whose suffix chooses the format. A .csv contains the interface, or the histories if
         `histories` is set or the folder has no fields.
@@ -42,6 +43,7 @@ def export_results(
     PatchfemError
         If suffix, frame and histories do not fit together.
     """
+    # a .csv contains the fields if there are any
     has_fields = (folder / NAME).is_file() or not folder.is_dir()
     is_lab_format = out.suffix.lower() in lab.ENDINGS
     if is_lab_format and (out.suffix != ".csv" or histories or not has_fields):
@@ -52,6 +54,18 @@ def export_results(
             )
         grids.create_folder(out.parent)
         return write.export_histories(folder, out)
+    _refuse_field_format(out, frame, histories=histories)
+    frames = read_frames(find_fields(folder))
+    number = grids.find_frame(frames, frame)
+    grids.create_folder(out.parent)
+    grids.export_frames(frames, out, number)
+    if out.suffix in SERIES_FORMATS:
+        return f"{out}: {len(frames.times)} frames"
+    return f"{out}: frame {number} of 0 to {len(frames.times) - 1}, {frames.times[number]:.6g} s"
+
+
+def _refuse_field_format(out: Path, frame: int | None, *, histories: bool) -> None:
+    """Raise PatchfemError if a file of fields cannot have this suffix, or not with these options."""
     if histories:
         raise PatchfemError(
             f"--histories: histories are written as {', '.join(lab.ENDINGS)}, not as "
@@ -71,13 +85,6 @@ def export_results(
         raise PatchfemError(
             f"--frame: {out.suffix} contains all frames; use a .vtu or .csv for one frame"
         )
-    frames = read_frames(find_fields(folder))
-    number = grids.find_frame(frames, frame)
-    grids.create_folder(out.parent)
-    grids.export_frames(frames, out, number)
-    if out.suffix in SERIES_FORMATS:
-        return f"{out}: {len(frames.times)} frames"
-    return f"{out}: frame {number} of 0 to {len(frames.times) - 1}, {frames.times[number]:.6g} s"
 
 
 def view_results(
@@ -88,6 +95,7 @@ def view_results(
     Parameters
     ----------
     folder : Path
+        Results folder.
     out : Path or None
         File of a picture, film or page; None for a window.
     frame : int, optional
@@ -119,10 +127,12 @@ def view_results(
         raise PatchfemError(
             f"--frame: {out.suffix} shows all frames of the motion; use a .png for one frame"
         )
+
     frames = read_frames(find_fields(folder))
     number = grids.find_frame(frames, frame)
+    # the folder of an interface has fields alone
     has_summary = (folder / store.SUMMARY).is_file()
-    title = store.read_summary(folder)["title"] if has_summary else ""
+    title = store.read_summary(folder).title if has_summary else ""
     title = title or folder.resolve().name
     if out is None:
         _open_window(frames, number, title)

@@ -16,7 +16,17 @@ from ..campaigns.cost import (
 from ..formatting import format_number
 from ..model.model import Model
 from . import quantities
-from .answer import Answer, Quantities, Quantity, Remarks, Variables, encode, make_columns, to_plain
+from .answer import (
+    Answer,
+    JsonObject,
+    Quantities,
+    Quantity,
+    Remarks,
+    Variables,
+    encode,
+    make_columns,
+    to_plain,
+)
 from .runs import make_origin
 
 # columns of cost.csv that every run has: attribute -> heading and unit
@@ -52,9 +62,10 @@ def make_answer(curves: dict[str, list[Cost]], model: Model) -> Answer:
 
     Parameters
     ----------
-    curves : dict
+    curves : dict of str to list of Cost
         TOLERANCE or numerical setting -> its runs from coarse to fine.
     model : Model
+        Model of the scene as it is.
     """
     tolerance = model.accuracy.tolerance
     knob, runs = next(iter(curves.items()))
@@ -88,7 +99,7 @@ def make_answer(curves: dict[str, list[Cost]], model: Model) -> Answer:
     )
 
 
-def describe_runs(knob: str, runs: list[Cost], tolerance: float) -> dict:
+def describe_runs(knob: str, runs: list[Cost], tolerance: float) -> JsonObject:
     """Return the runs of a curve as an entry of cost.json, in SI units.
 
     `runs`: the attributes of each `Cost`, with `worst` {`measure`, `error`} and `meets_tolerance`. `sentence`: the cost of
@@ -99,6 +110,7 @@ def describe_runs(knob: str, runs: list[Cost], tolerance: float) -> dict:
     knob : str
         TOLERANCE or a numerical setting.
     runs : list of Cost
+        From coarse to fine.
     tolerance : float
         That of the scene.
     """

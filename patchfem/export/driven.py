@@ -7,6 +7,16 @@ from ..core import G_N
 from ..effects import SINE_WAVEFORM, WAVEFORMS
 from ..formatting import UNIT_LADDERS, choose_axis_unit
 
+# value of a scene file, and a table of them
+TomlTable = dict[str, str | float | list[str]]
+# drives of a bench by their kind
+SLIDE_PHRASES = {
+    "file": "the slide of {file}",
+    "sine": "a sine slide of ±{amplitude} at {frequency}",
+    "triangle": "a triangle slide of ±{amplitude} at {speed}",
+    "constant": "a slide of {distance} at {speed}",
+    "dwell": "a slide of {distance} at {speed}, held for {hold}",
+}
 DRIVE_UNITS = {
     "m/s^2": ("g", 1 / G_N),
     "m/s": ("mm/s", 1e3),
@@ -15,7 +25,7 @@ DRIVE_UNITS = {
 }
 
 
-def format_resolved(text) -> str:
+def format_resolved(text: str | float) -> str:
     """Format a quantity of a resolved scene in a usual unit, such as "5 g"."""
     value, _, unit = str(text).partition(" ")
     name = unit
@@ -27,63 +37,66 @@ def format_resolved(text) -> str:
     return f"{float(value) * scale:.4g} {name}".strip()
 
 
-def describe_drive(resolved: dict) -> str:
+def describe_drive(resolved: dict[str, TomlTable]) -> str:
     """Describe the drive signal of a run in a phrase, or return "" if it has none.
 
     resolved: the scene with all defaults, as nested tables.
     """
     if "drive" in resolved:
         return _describe_waveform(resolved["drive"])
-    return _describe_slide(resolved["slide"]) if "slide" in resolved else ""
+    if "slide" not in resolved:
+        return ""
+    slide = resolved["slide"]
+    return SLIDE_PHRASES[slide["kind"]].format_map(_format_values(slide))
 
 
-def _describe_waveform(keys: dict) -> str:
+def _describe_waveform(keys: TomlTable) -> str:
     """Describe the drive signal with the phrase for its waveform."""
-    if keys["kind"] == "free":
-        start = (
-            f" released {format_resolved(keys['displacement'])} from rest"
-            if "displacement" in keys
-            else ""
-        )
-        return f"free motion{start}"
-    waveform = WAVEFORMS[keys.get("waveform", SINE_WAVEFORM.name)]
     values = _format_drive_values(keys)
+    if keys["kind"] == "free":
+        start = " released {displacement} from rest" if "displacement" in keys else ""
+        return f"free motion{start}".format_map(values)
+    waveform = WAVEFORMS[keys.get("waveform", SINE_WAVEFORM.name)]
     try:
         return waveform.phrase.format_map(values) or _describe_by_level(waveform.name, values)
     except KeyError:  # the scene does not set a key that the phrase contains
         return _describe_by_level(waveform.name, values)
 
 
-def _format_drive_values(keys: dict) -> dict:
-    """Return the values that are inserted into the phrase for a waveform, as text."""
-    values = {key: _format_drive_value(key, value) for key, value in keys.items()}
-    values["seed"] = keys.get("seed", 0)
-    sized = next((name for name in ("displacement", "acceleration", "force") if name in keys), None)
-    if sized is not None:
-        values["level"] = values[sized]
+def _format_drive_values(keys: TomlTable) -> dict[str, str | int]:
+    """Return the values that are inserted into the phrase for a waveform."""
+    values = _format_values(keys)
+    sized = next((name for name in ("displacement", "acceleration", "force") if name in keys), "")
     is_force = keys["kind"] == "force"
-    values["what"] = "force" if is_force else f"base {sized or 'acceleration'}"
-    values["place"] = f" on mass {keys['mass']}" if is_force and "mass" in keys else ""
+    values |= {
+        "seed": keys.get("seed", 0),
+        "what": "force" if is_force else f"base {sized or 'acceleration'}",
+        "place": f" on mass {keys['mass']}" if is_force and "mass" in keys else "",
+    }
+    if sized:
+        values["level"] = values[sized]
     if "levels" in keys:
-        values |= {
-            "count": len(keys["levels"]),
-            "first": format_resolved(keys["levels"][0]),
-            "last": format_resolved(keys["levels"][-1]),
-        }
-    if "file" in keys or "spectrum" in keys:
-        density = (
-            f"with the spectrum of {values['file']}"
-            if "file" in keys
-            else f"of {values['spectrum']}"
-        )
-        values["density"] = density + "".join(
-            f" {end} {values[end]}" for end in ("from", "to") if end in keys
-        )
+        levels = list(map(format_resolved, keys["levels"]))
+        values |= {"count": len(levels), "first": levels[0], "last": levels[-1]}
+
+    # a random drive follows a file, or a constant density between two frequencies
+    if "file" in keys:
+        values["density"] = f"with the spectrum of {values['file']}"
+    elif "spectrum" in keys:
+        values["density"] = f"of {values['spectrum']}"
+    if "density" in values:
+        ends = (f" {end} {values[end]}" for end in ("from", "to") if end in keys)
+        values["density"] += "".join(ends)
     return values
 
 
-def _format_drive_value(key: str, value) -> str:
-    """Return the value of a key of [drive] in a usual unit."""
+def _format_values(keys: TomlTable) -> dict[str, str | int]:
+    """Return the values of all keys of a table in usual units."""
+    return {key: _format_drive_value(key, value) for key, value in keys.items()}
+
+
+def _format_drive_value(key: str, value: str | float | list[str]) -> str:
+    """Return the value of a key in a usual unit."""
     if key == "file":
         return Path(value).name
     if isinstance(value, (list, tuple)):
@@ -95,37 +108,17 @@ def _format_drive_value(key: str, value) -> str:
     )
 
 
-def _describe_by_level(name: str, values: dict) -> str:
+def _describe_by_level(name: str, values: dict[str, str | int]) -> str:
     """Describe a drive signal by its waveform, and by its amplitude and frequency if the scene sets them."""
     level = f" of {values['level']}" if "level" in values else ""
     frequency = f" at {values['frequency']}" if "frequency" in values else ""
     return f"{values['what']}{level}{frequency}{values['place']} (waveform '{name}')"
 
 
-def _describe_slide(keys: dict) -> str:
-    """Describe the displacement that is prescribed on a bench in a phrase."""
-    kind = keys["kind"]
-    if kind == "file":
-        return f"the slide of {Path(keys['file']).name}"
-    if kind == "sine":
-        return f"a sine slide of ±{format_resolved(keys['amplitude'])} at {format_resolved(keys['frequency'])}"
-    if kind == "triangle":
-        return f"a triangle slide of ±{format_resolved(keys['amplitude'])} at {format_resolved(keys['speed'])}"
-    hold_text = (
-        f", held for {format_resolved(keys['hold'])}" if kind == "dwell" and "hold" in keys else ""
-    )
-    return f"a slide of {format_resolved(keys['distance'])} at {format_resolved(keys['speed'])}{hold_text}"
-
-
-def format_changed_keys(sets: tuple) -> str:
+def format_changed_keys(sets: tuple[str, ...]) -> str:
     """Return the scene keys that the options --set have changed, with their values, such as "load = 4 kN".
 
     sets: ``table.key=value`` strings; a list of more than 160 characters is cut.
     """
-    return shorten(
-        ", ".join(
-            f"{key} = {value}"
-            for key, _, value in (assignment.partition("=") for assignment in sets)
-        ),
-        160,
-    )
+    pairs = (assignment.partition("=") for assignment in sets)
+    return shorten(", ".join(f"{key} = {value}" for key, _, value in pairs), 160)

@@ -4,7 +4,7 @@ A fit to a loop, to frequency and damping against amplitude, to rows of a rig or
 """
 
 from collections.abc import Sequence
-from dataclasses import asdict, replace
+from dataclasses import asdict
 from pathlib import Path
 from typing import NamedTuple
 
@@ -24,9 +24,16 @@ from ..identify.least_squares import Fit
 from ..model.model import build, write_resolved
 from ..scene.assignments import Range
 from ..scene.scene import Scene, add_sets, move_scene
-from . import page, store
-from .answer import Answer, Quantities, Quantity, Remarks, Variables, encode, make_columns
-from .folder import Folder
+from .answer import (
+    Answer,
+    JsonObject,
+    Quantities,
+    Quantity,
+    Remarks,
+    Variables,
+    encode,
+    make_columns,
+)
 from .quantities import format_quantity
 from .runs import make_origin
 
@@ -46,47 +53,39 @@ WEAR_UNIT = "m2 N-1"
 AnyFit = FittedLoop | FittedCurve | FittedRows | FittedCoefficient
 
 
-def fit_into(
+def compute_answer(
     scene: Scene,
     to: str,
     free: Sequence[str],
     options: FitOptions,
-    target: Path,
     listener: Listener,
-    with_page: bool = True,
-    command: str = "",
+    folder: Path,
 ) -> Answer:
-    """Fit keys of a scene to a measurement, and write the results folder.
+    """Fit keys of a scene to a measurement; starts of the search and the fitted scene are written into a folder.
 
     Parameters
     ----------
-    scene, to, free, options, listener
-        As for `campaigns.fits.request.fit_measurement`.
-    target : Path
-        Results folder, which is claimed before the work.
-    with_page : bool
-    command : str
-        Command that repeats the fit; "" in Python.
-
-    Returns
-    -------
-    Answer
+    scene : Scene
+        Scene whose keys are fitted.
+    to : str
+        File of the measurement, or a worn depth such as "worn_depth_max=2.5 um..3.5 um".
+    free : sequence of str
+        Keys to fit with their ranges, such as "friction.static=0.1..0.6".
+    options : FitOptions
+        Rows that are held out, and settings of the search.
+    listener : Listener
+        Functions that take a line of text and the completed fraction.
+    folder : Path
+        Existing folder of the results.
 
     Raises
     ------
     SceneError, PatchfemError
         For input that cannot be used, before anything is computed.
     """
-    with Folder(target) as folder:
-        fit = fit_measurement(scene, to, free, options, listener)
-        answer = make_answer(fit, scene)
-        if command:
-            answer = replace(answer, origin=answer.origin | {"command": command})
-        store.write(answer, folder.path)
-        text = format_fitted_scene(fit, scene, answer.verdict, folder.target)
-        write_text(folder.path / FITTED_SCENE, text)
-        if with_page:
-            page.write_page(folder.path)
+    fit = fit_measurement(scene, to, free, options, listener)
+    answer = make_answer(fit, scene)
+    write_text(folder / FITTED_SCENE, format_fitted_scene(fit, scene, answer.verdict, folder))
     return answer
 
 
@@ -98,7 +97,7 @@ class Parts(NamedTuple):
     """
 
     residual: str
-    details: dict
+    details: JsonObject
     scores: Quantities
     data: Variables
 
@@ -109,6 +108,7 @@ def make_answer(fit: AnyFit, scene: Scene) -> Answer:
     Parameters
     ----------
     fit : FittedLoop, FittedCurve, FittedRows or FittedCoefficient
+        Fitted values with their intervals, and the measurement.
     scene : Scene
         Scene before the fit.
     """
@@ -119,25 +119,13 @@ def make_answer(fit: AnyFit, scene: Scene) -> Answer:
         details |= _describe_search(fit)
     details |= parts.details
 
-    measures = {}
-    for name, entry in details["values"].items():
-        reason = "" if entry["interval"] else "the measurement does not determine an interval"
-        ends = {end: entry[end] for end in ("low", "high")}
-        measures[name] = Quantity(entry["value"], entry["unit"], **ends, reason=reason)
+    measures = _make_measures(details)
     pairs = _collect_pairs(details.get("correlation", []), list(measures))
-    verdict = [_make_headline(details, measures), parts.residual]
-    if pairs:
-        correlation = pairs["correlation"].values[0]
-        if abs(correlation) >= MIN_NAMED_CORRELATION:
-            names = pairs["pair"].values[0].replace(", ", " and ")
-            verdict.append(
-                f"{names} are correlated by {correlation:.2f}: the measurement determines a combination of them better than "
-                "each one."
-            )
+    sentences = (parts.residual, *_describe_correlation(pairs))
     return Answer(
         kind="fit",
         title=scene.title,
-        verdict=tuple(verdict),
+        verdict=(_make_headline(details, measures), *sentences),
         quantities=measures | parts.scores,
         data=parts.data | pairs,
         remarks=Remarks(tuple(details["warnings"]), tuple(details.get("notes", ()))),
@@ -146,7 +134,29 @@ def make_answer(fit: AnyFit, scene: Scene) -> Answer:
     )
 
 
-def _make_headline(details: dict, measures: Quantities) -> str:
+def _make_measures(details: JsonObject) -> Quantities:
+    """Return the fitted values with their intervals."""
+    measures = {}
+    for name, entry in details["values"].items():
+        reason = "" if entry["interval"] else "the measurement does not determine an interval"
+        measures[name] = Quantity(
+            entry["value"], entry["unit"], low=entry["low"], high=entry["high"], reason=reason
+        )
+    return measures
+
+
+def _describe_correlation(pairs: Variables) -> list[str]:
+    """Return a sentence on the most correlated pair of values; [] if no pair is strongly correlated."""
+    if not pairs or abs(pairs["correlation"].values[0]) < MIN_NAMED_CORRELATION:
+        return []
+    names = pairs["pair"].values[0].replace(", ", " and ")
+    return [
+        f"{names} are correlated by {pairs['correlation'].values[0]:.2f}: the measurement determines a combination of them "
+        "better than each one."
+    ]
+
+
+def _make_headline(details: JsonObject, measures: Quantities) -> str:
     """Return a sentence with the first fitted values and their intervals."""
     keys = list(details["values"])
     named = keys[:MAX_NAMED_VALUES]
@@ -172,7 +182,7 @@ def _collect_pairs(correlation: np.ndarray, names: list[str]) -> Variables:
     return make_columns("pair", {"pair": (texts, ""), "correlation": (values[order], "1")})
 
 
-def _describe_values(fit: AnyFit) -> dict[str, dict]:
+def _describe_values(fit: AnyFit) -> dict[str, JsonObject]:
     """Return all fitted values by scene key, as written in fit.json."""
     if isinstance(fit, FittedCoefficient):
         value = {"value": fit.value, "unit": WEAR_UNIT, "low": fit.low, "high": fit.high}
@@ -184,7 +194,7 @@ def _describe_values(fit: AnyFit) -> dict[str, dict]:
     }
 
 
-def _describe_value(bound: Range, fit: Fit, k: int) -> dict:
+def _describe_value(bound: Range, fit: Fit, k: int) -> JsonObject:
     """Return fitted value k with its confidence interval and range, as written in fit.json."""
     ends = fit.intervals.ends[k].tolist()
     interval = ends if np.isfinite(ends).all() else None
@@ -202,7 +212,7 @@ def _describe_value(bound: Range, fit: Fit, k: int) -> dict:
     }
 
 
-def _describe_search(fit: FittedLoop | FittedCurve | FittedRows) -> dict:
+def _describe_search(fit: FittedLoop | FittedCurve | FittedRows) -> JsonObject:
     """Return outcome, warnings and counts of a search, and what the data do not determine, as written in fit.json."""
     keys = fit.keys
     intervals = keys.fit.intervals
@@ -230,6 +240,7 @@ def describe_loop_fit(fit: FittedLoop) -> Parts:
         "residual_rms": Quantity(fit.rms, unit),
         "residual_fraction": Quantity(fit.rms / peak),
     }
+
     text = format_quantity("residual_rms", scores["residual_rms"])
     share = f"{100 * fit.rms / peak:.2g} %"
     residual = f"The residual of {n_rows} rows is {text} rms, {share} of the peak."
@@ -239,6 +250,7 @@ def describe_loop_fit(fit: FittedLoop) -> Parts:
         share = format_number(100 * works[1] / works[0], 4)
         residual += f" The fitted loop dissipates {share} % of the measured work."
 
+    # the chart shows the residual along the rows, where a pattern is an error of the model
     columns = {
         "slide": (loop.displacement, "m"),
         loop.quantity: (loop.reading, unit),
@@ -254,6 +266,7 @@ def describe_loop_fit(fit: FittedLoop) -> Parts:
         held = {"rows": fit.held_out.sum(), "rms": fit.held_out_rms}
         scores["held_out_rms"] = Quantity(fit.held_out_rms, unit)
         columns["held_out"] = (np.where(fit.held_out, loop.reading, np.nan), unit)
+
     details = {
         "measured": loop.path.name,
         "quantity": loop.quantity,
@@ -274,6 +287,8 @@ def describe_curve_fit(fit: FittedCurve) -> Parts:
     measured = fit.measured
     n_rows = measured.amplitude.size
     errors = 2 * measured.error  # half the width of a 95 % interval
+
+    # measured and fitted values, and the curve that extends beyond the measured amplitudes
     columns = {"amplitude": (measured.amplitude, "m")}
     curve = {"curve_amplitude": (fit.beyond[0], "m")}
     rms = {}
@@ -289,6 +304,7 @@ def describe_curve_fit(fit: FittedCurve) -> Parts:
         }
         curve[f"curve_{name}"] = (fit.beyond[k + 1], unit)
         curve[f"curve_{name}_error"] = (fit.beyond[k + 3], unit)
+
     percent = {name: f"{100 * value:.2g} %" for name, value in rms.items()}
     residual = (
         f"At {n_rows} amplitudes the residual is {percent['frequency']} rms of the frequency and "
@@ -296,6 +312,7 @@ def describe_curve_fit(fit: FittedCurve) -> Parts:
     )
     if measured.assumed.any():
         residual += " The errors of the measured values are their scatter around the fit."
+
     details = {
         "measured": fit.path.name,
         "quantity": "decay",
@@ -319,8 +336,48 @@ def describe_rows_fit(fit: FittedRows) -> Parts:
     scores = fit.compute_scores()
     totals = {name: score["all"] for name, score in scores.items() if score is not None}
     texts = [f"{name.replace('_', ' ')} {value:.3f}" for name, value in totals.items() if value]
+    residual = (
+        f"The rms of ln(computed/measured) is {', '.join(texts)}; {search.n_best} of {search.rms.size} starts led to within "
+        "1 % of the best."
+    )
+
+    rows, data = _collect_rows(fit)
+    details = {
+        "measured": fit.cells.path.name,
+        "quantity": "rows",
+        "scores": scores,
+        # without the rows that were unstable in the test
+        "scores_stable": fit.compute_scores(only_stable=True),
+        "reading": _describe_instrument(fit),
+        "readings": (~fit.held_out).sum(),
+        "held": fit.held_out.sum(),
+        "rms": fit.keys.fit.rms,
+        "starts": _list_starts(fit),
+        "rows": rows,
+        "motions": fit.n_motions,
+        "notes": [fit.advice] if fit.advice else [],
+    }
+    scores = {f"score_{name}": Quantity(value) for name, value in totals.items()}
+    return Parts(residual, details, scores, data)
+
+
+def _describe_instrument(fit: FittedRows) -> JsonObject:
+    """Return settings and gains of the sensors: those of the scene, fitted values, or defaults."""
+    instrument = {
+        name: getattr(fit.instrument, name, default) for name, default in INSTRUMENT.items()
+    }
+    for bound, value in zip(fit.keys.ranges, fit.keys.fit.values, strict=True):
+        table, _, key = bound.key.partition(".")
+        if table == "measured":
+            instrument[key] = value
+    return instrument
+
+
+def _list_starts(fit: FittedRows) -> list[JsonObject]:
+    """Return the values of the keys at each start and end of the search, with the rms; no end where it failed."""
+    search = fit.search
     names = [bound.key for bound in fit.keys.ranges]
-    starts = [
+    return [
         {
             "from": dict(zip(names, first, strict=True)),
             "to": dict(zip(names, last, strict=True)) if np.isfinite(rms) else None,
@@ -328,37 +385,9 @@ def describe_rows_fit(fit: FittedRows) -> Parts:
         }
         for first, last, rms in zip(search.starts, search.ends, search.rms, strict=True)
     ]
-    instrument = {
-        name: getattr(fit.instrument, name, default) for name, default in INSTRUMENT.items()
-    }
-    for name, value in zip(names, fit.keys.fit.values, strict=True):
-        table, _, key = name.partition(".")
-        if table == "measured":
-            instrument[key] = value
-    rows, data = _collect_rows(fit)
-    details = {
-        "measured": fit.cells.path.name,
-        "quantity": "rows",
-        "scores": scores,
-        "scores_stable": fit.compute_scores(only_stable=True),
-        "reading": instrument,
-        "readings": (~fit.held_out).sum(),
-        "held": fit.held_out.sum(),
-        "rms": fit.keys.fit.rms,
-        "starts": starts,
-        "rows": rows,
-        "motions": fit.n_motions,
-        "notes": [fit.advice] if fit.advice else [],
-    }
-    residual = (
-        f"The rms of ln(computed/measured) is {', '.join(texts)}; {search.n_best} of {search.rms.size} starts led to within "
-        "1 % of the best."
-    )
-    scores = {f"score_{name}": Quantity(value) for name, value in totals.items()}
-    return Parts(residual, details, scores, data)
 
 
-def _collect_rows(fit: FittedRows) -> tuple[list[dict], Variables]:
+def _collect_rows(fit: FittedRows) -> tuple[list[JsonObject], Variables]:
     """Return measured and computed readings of each row: as written in fit.json, and as arrays with their ratios."""
     cells = fit.cells
     entries = [asdict(row) for row in cells.rows]
@@ -369,6 +398,7 @@ def _collect_rows(fit: FittedRows) -> tuple[list[dict], Variables]:
         for name, unit in (("frequency", "Hz"), ("input", "m s-2"), ("flag", ""))
     }
     columns["held"] = (is_held.astype(np.int8), "")
+
     data = {}
     for part, (name, unit) in enumerate(KINDS.items()):
         # a row without a reading has no computed one
@@ -381,6 +411,7 @@ def _collect_rows(fit: FittedRows) -> tuple[list[dict], Variables]:
         measured = np.array([row[name] for row in entries], float)
         for row, number, is_held_out in zip(entries, computed, held, strict=True):
             row[name] = {"measured": row[name], "computed": number, "held": is_held_out}
+
         ratio = computed / np.where(measured > 0, measured, np.nan)
         columns |= {name: (measured, unit), f"computed_{name}": (computed, unit)}
         columns[f"{name}_ratio"] = (ratio, "1")
@@ -388,6 +419,8 @@ def _collect_rows(fit: FittedRows) -> tuple[list[dict], Variables]:
         known = np.concatenate([measured[measured > 0], computed[computed > 0]])
         ends = [known.min(), known.max()] if known.size else []
         data |= make_columns(f"equal_{name}", {f"equal_{name}": (ends, unit)})
+
+    # codes by which the charts colour the rows
     uses = [
         ("held out" if held else "fitted") + ", unstable in the test" * ("U" in row["flag"])
         for held, row in zip(is_held, entries, strict=True)
@@ -403,11 +436,14 @@ def describe_wear_fit(fit: FittedCoefficient) -> Parts:
     ends = {"value": measured.value, "low": measured.low, "high": measured.high}
     name = measured.name.replace("_", " ")
     text = format_quantity(measured.name, Quantity(unit="m", **ends))
+
     points = {"coefficient": ([fit.value], WEAR_UNIT)}
     for end, value in ends.items():
         points[f"depth_{end}".removesuffix("_value")] = ([value], "m")
+    # the computed curve is drawn a little beyond the interval of the coefficient
     coefficients, depths = fit.curve[:, fit.curve[0] <= EXTENT * fit.high]
     curve = {"curve_coefficient": (coefficients, WEAR_UNIT), "curve_depth": (depths, "m")}
+
     details = {
         "measured": Path(measured.source).name,
         "quantity": measured.name,
@@ -438,6 +474,7 @@ def format_fitted_scene(fit: AnyFit, scene: Scene, verdict: Sequence[str], folde
     Parameters
     ----------
     fit : FittedLoop, FittedCurve, FittedRows or FittedCoefficient
+        Fitted values.
     scene : Scene
         Scene before the fit.
     verdict : sequence of str

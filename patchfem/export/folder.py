@@ -53,6 +53,7 @@ class Folder:
     Parameters
     ----------
     target : Path
+        Folder as the user named it.
     resume : bool
         Whether saved states are kept.
 
@@ -85,26 +86,27 @@ class Folder:
         self._refuse_others()
         try:
             self.target.parent.mkdir(parents=True, exist_ok=True)
+            self._claim()
         except OSError as error:
             raise Missing(
                 f"{self.shown}: the results folder cannot be made ({explain_mkdir_error(error)})"
             ) from None
+        return self
+
+    def _claim(self) -> None:
+        """Lock the folder, and make the partial folder; without saved states unless they are resumed."""
         self.claim.acquire()
         try:
             restore_folder(self.target)
+            # another writer may have put its files there before the folder was locked
             self._refuse_others()
             if self.path.exists() and not self.resume:
                 self.dropped = self._dropped_note()
                 shutil.rmtree(self.path)
             self.path.mkdir(exist_ok=True)
-        except BaseException as error:
+        except BaseException:
             self.claim.release()
-            if isinstance(error, OSError):
-                raise Missing(
-                    f"{self.shown}: the results folder cannot be made ({explain_mkdir_error(error)})"
-                ) from None
             raise
-        return self
 
     def __exit__(self, kind, value, trace) -> None:
         with defer_signals():
@@ -172,6 +174,7 @@ def refuse_others(folder: Path, user_path, allowed, kind: str, dots: bool = Fals
     Parameters
     ----------
     folder : Path
+        The path, which may not exist.
     user_path : Path
         The path as the user named it.
     allowed : container of str
@@ -199,9 +202,3 @@ def refuse_others(folder: Path, user_path, allowed, kind: str, dots: bool = Fals
             f"{user_path}: {folder.name} contains files that are not {kind} "
             f"({', '.join(others[:3])}{', ...' if len(others) > 3 else ''}); choose another -o"
         )
-
-
-def identify_folder(folder: Path) -> tuple[int, int]:
-    """Return the device and inode numbers that identify a folder."""
-    status = os.stat(folder)
-    return status.st_dev, status.st_ino

@@ -14,10 +14,12 @@ import numpy as np
 from ..disk.atomic_write import open_lossy, write_atomically
 from .answer import Answer, Variable, Variables
 
+# attributes of a file or of a variable by name
+Attributes = dict[str, str | float | list[str] | np.ndarray]
 MIN_COMPRESSED_VALUES = 100  # arrays with fewer values are stored without compression
 
 
-def make_attributes(answer: Answer) -> dict[str, str | float | list[str]]:
+def make_attributes(answer: Answer) -> Attributes:
     """Return the attributes of the file: program, scene and result, without host and path."""
     origin = answer.origin
     attributes = {
@@ -39,7 +41,7 @@ def make_attributes(answer: Answer) -> dict[str, str | float | list[str]]:
     return attributes
 
 
-def make_variable_attributes(variable: Variable) -> dict:
+def make_variable_attributes(variable: Variable) -> Attributes:
     """Return the attributes of a variable: unit, description, and the names of codes."""
     attributes = {"long_name": variable.text} if variable.text else {}
     if variable.meanings:
@@ -54,17 +56,19 @@ def write_netcdf(answer: Answer, path: Path) -> None:
     write_arrays(answer.data, make_attributes(answer), path)
 
 
-def write_arrays(data: Variables, attributes: dict, path: Path) -> None:
-    """Write variables and attributes as a netCDF4 file, which replaces an older one when it is complete.
+def write_arrays(data: Variables, attributes: Attributes, path: Path) -> None:
+    """Write variables as a netCDF4 file, which replaces an older one when it is complete.
 
     HDF5 writes through `open_lossy`, because it would crash on a full disk; the error is raised when the file is closed.
 
     Parameters
     ----------
     data : dict of str to Variable
+        Arrays of the file.
     attributes : dict
         Attributes of the file.
     path : Path
+        File to write.
     """
     with (
         write_atomically(path) as partial,
@@ -94,23 +98,10 @@ def _write_variable(file: h5netcdf.File, name: str, variable: Variable) -> None:
     stored.attrs.update(make_variable_attributes(variable))
 
 
-def read_netcdf(path: Path) -> tuple[Variables, dict]:
+def read_netcdf(path: Path) -> tuple[Variables, Attributes]:
     """Read variables, in the order in which they were written, and attributes of a file of `write_arrays`.
 
-    Parameters
-    ----------
-    path : Path
-
-    Returns
-    -------
-    data : dict of str to Variable
-        Dimensions without a coordinate have no entry.
-    attributes : dict
-
-    Raises
-    ------
-    OSError
-        If the file cannot be read or is not a netCDF4 file.
+    Dimensions without a coordinate have no variable. OSError if the file cannot be read or is not a netCDF4 file.
     """
     data = {}
     # h5py reads the many small variables of a sweep three times as fast as h5netcdf

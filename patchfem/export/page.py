@@ -16,10 +16,10 @@ from ..core import PatchfemError
 from ..disk.atomic_write import explain_write_error, write_text
 from ..formatting import format_number
 from . import quantities, several, store
-from .answer import Answer, Answers, Quantity
+from .answer import Answer, Answers, JsonObject, Quantity
 from .charts import panels, plotly
 from .charts.table import CHARTS, TABLES, Column, parse_columns
-from .columns import list_rows, make_quantity
+from .columns import Cells, list_rows, make_quantity
 
 FILE_TEXTS = {
     "fields.vtkhdf": "fields of both pieces and their interface, frame by frame (ParaView 5.13 or newer)",
@@ -57,6 +57,7 @@ def write_report(folders: list[Path], out: Path | None = None) -> Path:
     Parameters
     ----------
     folders : list of Path
+        Results folders, of answers of the same kind.
     out : Path, optional
         The page; by default report.html in a single folder, else in the current folder.
 
@@ -80,34 +81,21 @@ def write_report(folders: list[Path], out: Path | None = None) -> Path:
 def make_page(folders: list[Path]) -> str:
     """Return the page of an answer, or of several answers of the same kind side by side.
 
-    Parameters
-    ----------
-    folders : list of Path
-
-    Raises
-    ------
-    PatchfemError
-        If a folder has no complete result, or if the answers are of different kinds.
+    PatchfemError if a folder has no complete result, or if the answers are of different kinds.
     """
     answers = _read_all(folders)
-    first = next(iter(answers.values()))
-    figures = [
-        plotly.draw(panel)
-        | {"wide": panel.style in WIDE_STYLES, "tall": panel.style in TALL_STYLES}
-        for panel in panels.make_panels(answers, CHARTS[first.kind])
-    ]
+    figures = _draw_charts(answers)
+    content = _describe_measures(answers)
     if len(folders) == 1:
         figures += _draw_films(folders[0])
-    captions = first.details.get("captions", {}) if len(folders) == 1 else {}
+        _add_captions(figures, answers[""].details.get("captions", {}))
+        content |= _describe_answer(answers[""]) | {"files": _list_files(folders[0], answers[""])}
+    else:
+        content |= _describe_several(answers)
+
     for number, figure in enumerate(figures):
         figure["anchor"] = f"chart{number}"
-        figure["caption"] += f" {captions[figure['title']]}" if figure["title"] in captions else ""
-    content = _describe(answers)
     content |= {
-        "tables": make_tables(first)
-        if len(answers) == 1
-        else several.list_scene_differences(answers),
-        "files": _list_files(folders[0], first.kind) if len(folders) == 1 else [],
         "figures": figures,
         "data": pack_figures([_strip(figure) for figure in figures]),
         "library": read_library() if figures else "",
@@ -129,25 +117,37 @@ def _read_all(folders: list[Path]) -> Answers:
         name = ", ".join(f"{key.rpartition('.')[2]} {value}" for key, value in (case or {}).items())
         name = name or folder.resolve().name
         answers[f"{name} ({len(answers) + 1})" if name in answers else name] = answer
+
     if len({"run" if answer.is_run else answer.kind for answer in answers.values()}) > 1:
         kinds = ", ".join(f"{name}: {answer.kind}" for name, answer in answers.items())
         raise PatchfemError(f"report: the folders have results of different kinds ({kinds})")
     return answers
 
 
-def _describe(answers: Answers) -> dict:
-    """Return the parts of a page that are text: title, verdict, tiles, measures, notes and origin."""
-    is_single = len(answers) == 1
-    first = next(iter(answers.values()))
-    names = dict.fromkeys(name for answer in answers.values() for name in answer.quantities)
-    zeros = [
-        name
-        for name in names
-        if all(
-            name in answer.quantities and quantities.is_zero(name, answer.quantities[name])
-            for answer in answers.values()
-        )
+def _draw_charts(answers: Answers) -> list[plotly.Figure]:
+    """Return the figures of all charts for which the answers have data."""
+    charts = CHARTS[next(iter(answers.values())).kind]
+    return [
+        plotly.draw(panel)
+        | {"wide": panel.style in WIDE_STYLES, "tall": panel.style in TALL_STYLES}
+        for panel in panels.make_panels(answers, charts)
     ]
+
+
+def _add_captions(figures: list[plotly.Figure], captions: dict[str, str]) -> None:
+    """Add the sentences with the numbers of an answer to the captions of its figures, which their titles name."""
+    for figure in figures:
+        if figure["title"] in captions:
+            figure["caption"] += f" {captions[figure['title']]}"
+
+
+def _describe_measures(answers: Answers) -> JsonObject:
+    """Return warnings and measures of all answers as parts of a page; measures that are zero in all of them apart."""
+    names = dict.fromkeys(name for answer in answers.values() for name in answer.quantities)
+    zeros = [name for name in names if _is_zero_in_all(name, answers)]
+
+    # every answer is compared with the first one
+    first = next(iter(answers.values()))
     measures = [
         {
             "name": f"measure-{name}",
@@ -158,36 +158,54 @@ def _describe(answers: Answers) -> dict:
         for name in names
         if name not in zeros
     ]
-    verdict = list(first.verdict)
-    if not is_single:
-        headlines = _label_all(answers, lambda answer: answer.verdict[:1])
-        verdict = headlines + several.compare_measures(answers)
-    content = {
-        "title": first.title or f"patchfem {first.kind}" if is_single else ", ".join(answers),
-        "subtitle": _subtitle(first) if is_single else f"{first.kind} · {len(answers)} results",
-        "verdict": verdict,
+    return {
         "warnings": _label_all(answers, lambda answer: answer.remarks.warnings),
         "measures": measures,
         "has_errors": any("±" in text for row in measures for text in row["texts"]),
         "zeros": [name.replace("_", " ") for name in zeros],
     }
-    if not is_single:
-        return content | {"heading": list(answers)}
 
-    origin = first.origin
+
+def _is_zero_in_all(name: str, answers: Answers) -> bool:
+    """Return whether all answers have a measure and display it as 0."""
+    known = [answer.quantities.get(name) for answer in answers.values()]
+    return all(one is not None and quantities.is_zero(name, one) for one in known)
+
+
+def _describe_several(answers: Answers) -> JsonObject:
+    """Return title, verdict and tables of a page on several answers."""
+    headlines = _label_all(answers, lambda answer: answer.verdict[:1])
+    kind = next(iter(answers.values())).kind
+    return {
+        "title": ", ".join(answers),
+        "subtitle": f"{kind} · {len(answers)} results",
+        "verdict": headlines + several.compare_measures(answers),
+        "heading": list(answers),
+        "tables": several.list_scene_differences(answers),
+    }
+
+
+def _describe_answer(answer: Answer) -> JsonObject:
+    """Return title, verdict, tiles, tables, notes and origin of a page on one answer."""
+    origin = answer.origin
     versions = ", ".join(f"{name} {text}" for name, text in origin.get("versions", {}).items())
-    texts = [
-        ("Scene", origin.get("scene", "")),
-        ("Scene in SI with all defaults", origin.get("resolved", "")),
-        ("Versions", versions),
-    ]
-    return content | {
-        "notes": first.remarks.notes,
-        "tiles": make_tiles(first),
+    # texts that a reader has to unfold
+    texts = {
+        "Scene": origin.get("scene"),
+        "Scene in SI with all defaults": origin.get("resolved"),
+        "Versions": versions,
+    }
+    return {
+        "title": answer.title or f"patchfem {answer.kind}",
+        "subtitle": _subtitle(answer),
+        "verdict": answer.verdict,
+        "tiles": make_tiles(answer),
+        "tables": make_tables(answer),
+        "notes": answer.remarks.notes,
         "command": origin.get("command", ""),
-        "sources": "files" if first.kind in quantities.SURFACE_KINDS else "scene",
-        "effects": first.details.get("effects", []),
-        "texts": [part for part in texts if part[1]],
+        "sources": "files" if answer.kind in quantities.SURFACE_KINDS else "scene",
+        "effects": answer.details.get("effects", []),
+        "texts": [(name, text) for name, text in texts.items() if text],
     }
 
 
@@ -243,7 +261,7 @@ def _explain(name: str, answers: Answers) -> str:
     )
 
 
-def make_tables(answer: Answer) -> list[dict]:
+def make_tables(answer: Answer) -> list[several.Table]:
     """Return the tables of an answer that have rows: `title`, `headings` and `rows` of strings."""
     tables = _list_cases(answer) if answer.kind == "sweep" else []
     for table in TABLES.get(answer.kind, ()):
@@ -255,12 +273,12 @@ def make_tables(answer: Answer) -> list[dict]:
     return [table for table in tables if table["rows"]]
 
 
-def _has_cells(rows: list[dict], name: str) -> bool:
+def _has_cells(rows: list[Cells], name: str) -> bool:
     """Return whether a row of a table has a cell with this name."""
     return any(name in row for row in rows)
 
 
-def _make_table(title: str, rows: list[dict], columns: list[Column]) -> dict:
+def _make_table(title: str, rows: list[Cells], columns: list[Column]) -> several.Table:
     """Return a table as `title`, `headings` and `rows` of strings."""
     return {
         "title": title,
@@ -269,7 +287,7 @@ def _make_table(title: str, rows: list[dict], columns: list[Column]) -> dict:
     }
 
 
-def _list_cases(answer: Answer) -> list[dict]:
+def _list_cases(answer: Answer) -> list[several.Table]:
     """Return a table of the main measures of each case, for a sweep of few cases over one key; else no table."""
     dims = {variable.dims for variable in answer.data.values() if variable.dims}
     key = next(iter(dims))[0] if len(dims) == 1 else ""
@@ -285,7 +303,7 @@ def _list_cases(answer: Answer) -> list[dict]:
     return [_make_table("Cases", rows, [Column(name, name) for name in names])]
 
 
-def _format_cell(row: dict, column: Column) -> str:
+def _format_cell(row: Cells, column: Column) -> str:
     """Return a cell of a table as text; a missing value is a dash."""
     cell = row.get(column.name)
     if cell is not None and column.style == "quantity":
@@ -302,7 +320,7 @@ def _format_cell(row: dict, column: Column) -> str:
     return str(cell).replace("_", " ") if column.style == "name" else str(cell)
 
 
-def _draw_films(folder: Path) -> list[dict]:
+def _draw_films(folder: Path) -> list[plotly.Figure]:
     """Return the figure of the stress in both pieces with a slider over the frames, if the folder has the fields."""
     path = folder / store.FIELDS
     if not path.is_file():
@@ -321,9 +339,9 @@ def make_stress_panel(path: Path) -> panels.Panel | None:
     return panels.make_film(frames, "von Mises stress in both pieces", "Pa")
 
 
-def _list_files(folder: Path, kind: str) -> list[tuple[str, str]]:
-    """Return name and description of the files beside the page of a kind of answer."""
-    texts = FILE_TEXTS | (SURFACE_FILE_TEXTS if kind in quantities.SURFACE_KINDS else {})
+def _list_files(folder: Path, answer: Answer) -> list[tuple[str, str]]:
+    """Return name and description of the files beside the page of an answer."""
+    texts = FILE_TEXTS | (SURFACE_FILE_TEXTS if answer.kind in quantities.SURFACE_KINDS else {})
     names = sorted(path.name for path in folder.iterdir() if not path.name.startswith("."))
     csv_text = "columns of this curve (spreadsheet)"
     known = [
@@ -339,12 +357,12 @@ def _list_files(folder: Path, kind: str) -> list[tuple[str, str]]:
     return known + details
 
 
-def _strip(figure: dict) -> dict:
+def _strip(figure: plotly.Figure) -> plotly.Figure:
     """Return the entries of a figure that the script of the page reads."""
     return {key: figure[key] for key in ("anchor", "data", "layout", "frames") if key in figure}
 
 
-def pack_figures(content: list) -> str:
+def pack_figures(content: list[plotly.Figure]) -> str:
     """Return an object as compressed JSON in base64; equal objects give equal strings."""
     text = json.dumps(content, separators=(",", ":"), allow_nan=False)
     return base64.b64encode(gzip.compress(text.encode(), COMPRESSION, mtime=0)).decode()

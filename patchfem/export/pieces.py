@@ -31,6 +31,10 @@ COLOURED_FRACTION = 0.998
 MM = 1e3  # mm per m
 
 
+# left, right, bottom and top of a picture [m]
+Window = tuple[float, float, float, float]
+
+
 class DrawnPieces(NamedTuple):
     """Both pieces with magnified motion in a window, ready to be drawn.
 
@@ -41,7 +45,7 @@ class DrawnPieces(NamedTuple):
     - captions: magnification of motion and slide in each frame.
     """
 
-    window: tuple[float, float, float, float]
+    window: Window
     places: np.ndarray
     cells: np.ndarray
     is_inside: np.ndarray
@@ -49,7 +53,7 @@ class DrawnPieces(NamedTuple):
 
 
 def magnify_pieces(
-    frames: Frames, numbers, window: tuple, magnify: float | None = None
+    frames: Frames, numbers: np.ndarray, window: Window, magnify: float | None = None
 ) -> DrawnPieces:
     """Return both pieces with the same magnification in several frames.
 
@@ -60,7 +64,9 @@ def magnify_pieces(
     Parameters
     ----------
     frames : Frames
+        Fields of both pieces.
     numbers : (f,) array of int
+        Frames that are drawn.
     window : tuple of float
         Left, right, bottom and top [m].
     magnify : float, optional
@@ -74,6 +80,7 @@ def magnify_pieces(
     slide = line.point_data["holder_slide"][numbers, 0].astype(float)
     motion[..., 0] -= slide[:, None]
 
+    # the face moves to where the gap above the lower piece ends; inside the piece this part fades towards its far face
     x, y = upper.points[:, :2].T
     height = y.max()
     face = np.flatnonzero(y < 1e-9 * height)
@@ -89,6 +96,7 @@ def magnify_pieces(
     centres = points[cells].mean(axis=1)
     is_inside = ((centres >= low) & (centres <= high)).all(axis=1)
 
+    # magnification from the motion that is seen in the window
     all_motion = np.concatenate([low_motion, motion], axis=1)
     width, depth = high - low
     if magnify is None:
@@ -117,8 +125,11 @@ def draw_cells(axes, drawn: DrawnPieces, stress: np.ndarray, **style):
     Parameters
     ----------
     axes : matplotlib Axes
+        Receives cells, limits, labels and a title.
     drawn : DrawnPieces
+        Both pieces in f frames.
     stress : (f, c) array
+        Value of each cell in each frame, which chooses its colour.
     style : dict
         Options of the PolyCollection, such as `cmap` and `clim`.
 
@@ -147,15 +158,19 @@ def draw_cells(axes, drawn: DrawnPieces, stress: np.ndarray, **style):
     return cells, show
 
 
-def draw_pieces(frames: Frames, numbers, title: str = "", magnify: float | None = None, onto=None):
+def draw_pieces(
+    frames: Frames, numbers: np.ndarray, title: str = "", magnify: float | None = None, onto=None
+):
     """Draw the von Mises stress in both pieces, as a whole and around their contact.
 
     Parameters
     ----------
     frames : Frames
+        Fields of both pieces.
     numbers : (f,) array of int
         Frames that share windows, colours and magnification; the last one is drawn.
     title : str
+        First words of the title, before the time.
     magnify : float, optional
         Factor of the motion.
     onto : matplotlib Axes, optional
@@ -208,22 +223,20 @@ def draw_result(result, onto=None):
 
 
 def write_picture(frames: Frames, number: int, title: str, magnify: float | None, out: Path) -> str:
-    """Write a picture of one frame.
+    """Write a picture of one frame, and return a line on it.
 
     Parameters
     ----------
     frames : Frames
+        Fields of both pieces.
     number : int
         Number of the frame.
     title : str
+        First words of the title.
     magnify : float or None
-        Magnification of the displacements; None for one that shows them.
+        Factor of the motion; None for one that makes it visible.
     out : Path
-
-    Returns
-    -------
-    str
-        Line on the picture.
+        File to write.
     """
     with write_atomically(out) as partial:
         draw_pieces(frames, np.array([number]), title, magnify)[0].savefig(partial, dpi=1.5 * DPI)
@@ -240,20 +253,18 @@ def _make_page(player: str, title: str) -> str:
 
 
 def write_film(frames: Frames, title: str, magnify: float | None, out: Path) -> str:
-    """Write the last cycle as .gif or .mp4, or as a page with a slider.
+    """Write the last cycle as .gif or .mp4, or as a page with a slider, and return a line on it.
 
     Parameters
     ----------
     frames : Frames
+        Fields of both pieces.
     title : str
+        First words of the title.
     magnify : float or None
-        Magnification of the displacements; None for one that shows them.
+        Factor of the motion; None for one that makes it visible.
     out : Path
-
-    Returns
-    -------
-    str
-        Line on the film.
+        File to write.
 
     Raises
     ------

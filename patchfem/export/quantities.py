@@ -260,8 +260,8 @@ def _format_interval(value: float, quantity: Quantity, unit: str, scale: float) 
 
     # both ends and the value have two digits of the width of the interval
     half_width = (ends[1] - ends[0]) / 2
-    texts = [round_to_error(number, half_width)[0] for number in (value, *ends)]
-    return f"{texts[0]} {unit} ({texts[1]} to {texts[2]})".replace("  ", " ")
+    text, low, high = (round_to_error(number, half_width)[0] for number in (value, *ends))
+    return f"{text} {unit} ({low} to {high})".replace("  ", " ")
 
 
 def _zero_limit(name: str, quantity: Quantity) -> float:

@@ -4,6 +4,8 @@ In: a `Result` of `runs`. Out: {name: Variable}. A row of VARIABLES says where a
 new row. What has to be computed or selected first has a function of its own.
 """
 
+from __future__ import annotations
+
 import tomllib
 from dataclasses import replace
 from typing import NamedTuple
@@ -284,18 +286,21 @@ def _collect_motion(result: Result) -> Variables:
     if result.plan.kind == "bench":
         loads = response.load
     else:
+        # the coordinates of a rig of masses are the motions of its masses
         rig = result.plan.model.rig
         motions = structure.compute_named_motions(rig.modes, response.modal)
         columns = {"modal_coordinate": (motions, "m", "modal coordinate")}
         data = make_columns("time mode", columns)
         if result.plan.kind != "rig":
             return data
+
         count = response.time.size
         if rig.friction.names:
             loads = np.repeat([[one.load] for one in rig.friction.interfaces], count, axis=1)
         else:
             constant = np.full(count, result.measures["normal_load"].value)
             loads = response.extra.get("normal_load", constant)
+
     columns = {"normal_load": (loads, "N", "normal load on the interface")}
     return data | make_columns("interface time", columns)
 
@@ -310,11 +315,14 @@ def _collect_loop(result: Result) -> Variables:
     if result.plan.model.rig is not None and "slides" in window.extra:
         slide = window.extra["slides"].T
         force = window.extra["forces"].T
+
+    # the window may have several cycles
     period = result.extra.get("period")
     if period and result.plan.kind != "bench":
         keep = window.time >= window.time[-1] - period * (1 + 1e-9)
         slide = slide[..., keep]
         force = force[..., keep]
+
     if result.plan.model.sticks_rigidly and slide.ndim == 1:
         # the force of a sample acts from this sample on, so it jumps at the slide of the sample before
         before = np.flatnonzero(np.diff(np.sign(force)))
@@ -370,7 +378,7 @@ def _collect_patch(result: Result) -> Variables:
     return data | _collect_frames(fields, surface)
 
 
-def _collect_frames(fields: dict, surface, frame: str = "frame") -> Variables:
+def _collect_frames(fields: dict[str, np.ndarray], surface, frame: str = "frame") -> Variables:
     """Return positions and areas of the nodes, and the fields along x in all frames."""
     area = "area of the interface that belongs to a node, summed over all pairs of pieces"
     nodes = {
@@ -490,7 +498,9 @@ def _collect_readings(result: Result) -> Variables:
     return make_columns("measured_row", measured_columns) | make_columns("computed", columns)
 
 
-def find_readings(result: Result) -> tuple[list, dict] | None:
+def find_readings(
+    result: Result,
+) -> tuple[list[measured.MeasuredRow], dict[str, tuple[float, float | None]]] | None:
     """Return the measured rows at the drive frequency, and the computed readings of the sensors.
 
     Returns
@@ -509,6 +519,7 @@ def find_readings(result: Result) -> tuple[list, dict] | None:
     if not rows:
         return None
 
+    # computed readings are the measures times the gains of the sensors; an instrument that filters or averages reads less
     names = ("absolute_acceleration_peak", "relative_displacement_amplitude")
     measures = dict(zip(READINGS, map(result.measures.get, names), strict=True))
     factors = dict(zip(READINGS, gains))
@@ -517,6 +528,7 @@ def find_readings(result: Result) -> tuple[list, dict] | None:
     if kind != "peak" and isinstance(signal, SineDrive) and peak is not None and peak.value:
         reading = spectrum.read_instrument(result.window, signal, peak.value, kind, cutoff)
         factors["acceleration"] *= reading / peak.value
+
     computed = {}
     for name, measure in measures.items():
         if measure is not None and measure.value is not None:

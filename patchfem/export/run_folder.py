@@ -1,18 +1,21 @@
-"""A run that writes its results folder: the run, its answer and its fields first, then its page."""
+"""A run that writes its results folder: fields, answer and page; a page that fails does not lose the results."""
 
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from time import perf_counter
 from typing import NamedTuple
 
 from .. import __version__
-from ..core import Missing, NotConverged, PatchfemError
+from ..core import NotConverged, PatchfemError
+from ..runs.plan import Plan
+from ..runs.results.interfaces import Face
 from ..runs.results.result import Result, shorten_file_names
 from ..runs.run import StateFile, is_march, run
 from . import page, store
 from .answer import Answer
 from .fields import vtkhdf
-from .folder import STATE, Folder, identify_folder, is_state
+from .folder import STATE, Folder, is_state
 from .runs import make_answer
 
 MAX_INTERFACES = 6  # largest number of interfaces whose fields are written
@@ -22,18 +25,25 @@ INTERFACES_FOLDER = "interfaces"
 class WrittenRun(NamedTuple):
     """Finished run whose results are on disk.
 
-    answer, result: of the run; folder_id: device and inode of the folder, which identify it after it has been renamed.
+    answer, result: of the run; page_fault: why the page was not drawn, or None.
     """
 
     answer: Answer
     result: Result
-    folder_id: tuple[int, int]
+    page_fault: BaseException | None = None
 
 
 def run_into(
-    run_plan, target: Path, report=None, progress=None, *, fresh: bool = False, resume: bool = False
+    run_plan: Plan,
+    target: Path,
+    report: Callable[[str], None] | None = None,
+    progress: Callable[[float], None] | None = None,
+    *,
+    fresh: bool = False,
+    resume: bool = False,
+    has_page: bool = True,
 ) -> WrittenRun:
-    """Run a plan and write its results into a folder, without the page.
+    """Run a plan and write its results into a folder.
 
     The folder is locked first. An older results folder is replaced only when the new one is complete, and a folder with
     other files is refused before anything runs. If the motion does not converge, the patch that was pressed before is
@@ -42,6 +52,7 @@ def run_into(
     Parameters
     ----------
     run_plan : Plan
+        What the run computes.
     target : Path
         Results folder.
     report, progress : callable, optional
@@ -50,6 +61,8 @@ def run_into(
         Whether the pieces are condensed again instead of being read from the cache.
     resume : bool
         Whether to continue from the saved state.
+    has_page : bool
+        Whether report.html is written.
 
     Raises
     ------
@@ -68,7 +81,18 @@ def run_into(
             result = run(run_plan, report, progress, fresh=fresh, state_file=state_file)
         except NotConverged as error:
             result = _partial_result(error)
-        return write_results(result, folder.path)
+        answer = write_results(result, folder.path)
+        fault = _draw_page(folder.path) if has_page else None
+    return WrittenRun(answer, result, fault)
+
+
+def _draw_page(folder: Path) -> BaseException | None:
+    """Write the page of a run, and return what prevents it: the results of a long run are kept without their page."""
+    try:
+        page.write_page(folder)
+    except BaseException as fault:
+        return fault
+    return None
 
 
 def _partial_result(error: NotConverged) -> Result:
@@ -82,13 +106,13 @@ def _partial_result(error: NotConverged) -> Result:
     return replace(result, warnings=[*reason, *result.warnings])
 
 
-def saves_state(run_plan) -> bool:
+def saves_state(run_plan: Plan) -> bool:
     """Return whether the run of a plan saves its state for a later resume."""
     wears = run_plan.model.wear is not None and run_plan.model.patch is not None
     return wears or is_march(run_plan)
 
 
-def is_complete(run_plan, target: Path) -> bool:
+def is_complete(run_plan: Plan, target: Path) -> bool:
     """Return whether a folder contains the complete run of a plan.
 
     It is False for a folder with the state of an interrupted run. PatchfemError if the folder contains the complete run of
@@ -98,7 +122,7 @@ def is_complete(run_plan, target: Path) -> bool:
     if state.is_dir() and any(is_state(path.name) for path in state.iterdir()):
         return False
     try:
-        version = store.read_summary(target)["patchfem"]
+        version = store.read_summary(target).patchfem
         text = (target / store.SCENE).read_text("utf-8")
     except (OSError, PatchfemError):
         return False
@@ -110,14 +134,16 @@ def is_complete(run_plan, target: Path) -> bool:
     )
 
 
-def write_results(result: Result, folder: Path, case: dict[str, str] | None = None) -> WrittenRun:
-    """Write all files of a run, except its page, into an existing folder.
+def write_results(result: Result, folder: Path, case: dict[str, str] | None = None) -> Answer:
+    """Write all files of a run, except its page, into an existing folder, and return its answer.
 
     Parameters
     ----------
     result : Result
+        Finished run; notes on its files are added to it.
     folder : Path
-    case : dict, optional
+        Existing folder.
+    case : dict of str to str, optional
         Swept keys with their values as written, if the run is a case of a sweep.
     """
     start_time = perf_counter()
@@ -125,38 +151,33 @@ def write_results(result: Result, folder: Path, case: dict[str, str] | None = No
     if result.patch is not None:
         vtkhdf.write_fields(result, folder / store.FIELDS)
     for face in result.faces[:MAX_INTERFACES]:
-        face_folder = folder / INTERFACES_FOLDER / face.folder
-        face_folder.mkdir(parents=True, exist_ok=True)
-        face_result = replace(
-            result,
-            plan=replace(result.plan, model=face.model),
-            patch=face.patch,
-            fields=face.fields,
-            extra={"notes": []},
-        )
-        vtkhdf.write_fields(face_result, face_folder / store.FIELDS)
-        notes += [f"interface {face.name}: {note}" for note in face_result.extra["notes"]]
+        face_notes = _write_face(result, face, folder / INTERFACES_FOLDER / face.folder)
+        notes += [f"interface {face.name}: {note}" for note in face_notes]
     result.seconds["files"] = perf_counter() - start_time
     answer = make_answer(result)
     if case is not None:
         answer = replace(answer, details=answer.details | {"case": case})
     store.write(answer, folder)
-    return WrittenRun(answer, result, identify_folder(folder))
+    return answer
 
 
-def write_run_page(written: WrittenRun, folder: Path) -> Path:
-    """Write the page of a run into its complete results folder, and return the path of the page.
-
-    Missing if another run has replaced the folder in the meantime.
-    """
-    if not Path(folder).is_dir() or identify_folder(folder) != written.folder_id:
-        raise Missing(f"{folder}: replaced by another run while the page was drawn")
-    return page.write_page(folder)
+def _write_face(result: Result, face: Face, folder: Path) -> list[str]:
+    """Write the fields of one interface of a run into a folder of its own, and return notes on them."""
+    folder.mkdir(parents=True, exist_ok=True)
+    face_result = replace(
+        result,
+        plan=replace(result.plan, model=face.model),
+        patch=face.patch,
+        fields=face.fields,
+        extra={"notes": []},
+    )
+    vtkhdf.write_fields(face_result, folder / store.FIELDS)
+    return face_result.extra["notes"]
 
 
 def save_run(result: Result, folder: Path) -> Answer:
     """Write the results folder of a finished run with its page; an older results folder is replaced."""
     with Folder(folder) as claimed:
-        written = write_results(result, claimed.path)
-    write_run_page(written, claimed.target)
-    return written.answer
+        answer = write_results(result, claimed.path)
+        page.write_page(claimed.path)
+    return answer

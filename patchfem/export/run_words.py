@@ -4,6 +4,7 @@ In: a `Result` and its quantities. Out: sentences. Every number in them is a qua
 """
 
 from collections.abc import Iterable
+from itertools import product
 
 import numpy as np
 
@@ -22,7 +23,7 @@ from ..runs.results.patch_rows import find_unknown_measures
 from ..runs.results.result import Result
 from ..structure import drive_sizes
 from . import quantities
-from .answer import Quantities, Quantity
+from .answer import JsonObject, Quantities, Quantity
 from .run_data import READINGS, find_readings
 
 CHECKS = ("energy_balance", "work_check")  # measures that only check a run
@@ -37,6 +38,9 @@ MIN_DECAY_AMPLITUDES = (
     5  # smallest number of amplitudes of a decay for which its damping is printed
 )
 SCATTER = "_scatter"  # end of the name of a measure that states the scatter between random records
+SAME_INPUT_FRACTION = (
+    0.01  # largest relative difference of the measured input from the drive of the run
+)
 CYCLE_ROUND_OFF = 1e-6  # largest part of a cycle that is missing through round-off
 
 # parts of a headline: (measure, text); a run shows the first MAX_PARTS that it has
@@ -72,13 +76,15 @@ HEADLINES = {
 MAX_PARTS = 3
 
 
-def make_verdict(result: Result, measures: Quantities, details: dict) -> tuple[str, ...]:
+def make_verdict(result: Result, measures: Quantities, details: JsonObject) -> tuple[str, ...]:
     """Return the sentences about a run, the headline first.
 
     Parameters
     ----------
     result : Result
+        Finished run.
     measures : dict of str to Quantity
+        Its measures.
     details : dict
         Further keys of summary.json: `cycles`, `contact`, `loop`, `measured` and `run_away`, as far as they exist.
     """
@@ -94,14 +100,14 @@ def make_verdict(result: Result, measures: Quantities, details: dict) -> tuple[s
     return tuple([sentence for sentence in sentences if sentence][:4])
 
 
-def _make_headline(result: Result, measures: Quantities, details: dict) -> str:
+def _make_headline(result: Result, measures: Quantities, details: JsonObject) -> str:
     """Return the sentence with the key numbers of a run; "" if it has none."""
     kind = _choose_headline(result, measures)
     parts = []
     for name, text in HEADLINES[kind]:
         if name == "loop_area":
             parts += _describe_interfaces(result, measures, text)
-        elif _is_known(measures, name) and not quantities.is_zero(name, measures[name]):
+        elif _is_shown(measures, name):
             part = text.format(_format(name, measures))
             if (kind, name) == ("patch", "contact_fraction"):
                 part += _describe_place(details.get("contact"), " ({})")
@@ -124,18 +130,20 @@ def _choose_headline(result: Result, measures: Quantities) -> str:
     return {"patch": "patch", "bench": "bench"}.get(result.plan.kind, "rig")
 
 
-def _is_known(measures: Quantities, name: str) -> bool:
-    """Return whether a measure has a value."""
-    return name in measures and measures[name].value is not None
+def _is_shown(measures: Quantities, name: str) -> bool:
+    """Return whether a measure has a value that is not displayed as 0."""
+    measure = measures.get(name)
+    return (
+        measure is not None and measure.value is not None and not quantities.is_zero(name, measure)
+    )
 
 
 def _describe_interfaces(result: Result, measures: Quantities, text: str) -> list[str]:
     """Return the dissipated energy of the interface, or of each of a few interfaces."""
-    names = [name for name in measures if remove_interface_number(name) == "loop_area"]
     names = [
         name
-        for name in names
-        if _is_known(measures, name) and not quantities.is_zero(name, measures[name])
+        for name in measures
+        if remove_interface_number(name) == "loop_area" and _is_shown(measures, name)
     ]
     if not names:
         return []
@@ -146,26 +154,19 @@ def _describe_interfaces(result: Result, measures: Quantities, text: str) -> lis
     has_strips = any(name == "contact.strips" for name in result.plan.effects)
     if len(names) == 1 or has_strips or len(names) > MAX_LISTED:
         where = "" if len(names) == 1 or has_strips else f" at interface 1 of {len(names)}"
-        return [text.format(quantities.format_quantity(names[0], measures[names[0]])) + where]
+        return [text.format(_format(names[0], measures)) + where]
     values = [_format(name, measures) for name in names]
     return [text.format(f"{', '.join(values[:-1])} and {values[-1]}") + " at the interfaces"]
 
 
-def describe_outcome(result: Result, measures: Quantities, details: dict) -> str:
+def describe_outcome(result: Result, measures: Quantities, details: JsonObject) -> str:
     """Return the sentence on how a run ended.
 
     `stuck` refers to the interface as a whole: if its last cycles dissipate or slip more than their error, a part slips.
     """
     outcome = result.outcome
     if outcome is Outcome.NOT_CONVERGED and (unknown := find_unknown_measures(result.measures)):
-        *first, last = unknown
-        names = f"{', '.join(first)} and {last}" if first else last
-        error = (
-            "errors of {} are as large as the values"
-            if first
-            else "error of {} is as large as the value"
-        )
-        return f"The {error.format(names)}; use the other measures with their errors."
+        return _describe_unknown(unknown)
     if result.plan.kind == "bench" and outcome is Outcome.DONE:
         return _describe_bench_outcome(measures, details)
     if run_away := details.get("run_away"):
@@ -175,20 +176,36 @@ def describe_outcome(result: Result, measures: Quantities, details: dict) -> str
         return "The run ended before the motion came to rest; raise drive.cycles to see more of it."
     if outcome is Outcome.STUCK and {"loop_area", "slip_amplitude"} & measures.keys():
         return _describe_stuck_outcome(result, measures)
+    return _describe_stability(result)
+
+
+def _describe_unknown(names: list[str]) -> str:
+    """Return the sentence on measures of which nothing is known, because the run did not converge."""
+    *first, last = names
+    if not first:
+        error = f"error of {last} is as large as the value"
+    else:
+        error = f"errors of {', '.join(first)} and {last} are as large as the values"
+    return f"The {error}; use the other measures with their errors."
+
+
+def _describe_stability(result: Result) -> str:
+    """Return the outcome; for a steady motion by harmonic balance with its regime and what becomes of a disturbance."""
+    sentence = result.outcome.sentence
     regime = result.extra.get("regime")
     if regime is None:
-        return outcome.sentence
+        return sentence
     multiplier = float(np.abs(np.asarray(result.extra["multipliers"])).max(initial=0.0))
-    stability = "decays" if multiplier < 1 else "grows or persists"
     if regime in ("stuck", "unbounded") or multiplier == 0:
-        return f"{outcome.sentence[:-1]} (regime: {regime})."
+        return f"{sentence[:-1]} (regime: {regime})."
+    stability = "decays" if multiplier < 1 else "grows or persists"
     return (
-        f"{outcome.sentence[:-1]} (regime: {regime}); a disturbance {stability} "
+        f"{sentence[:-1]} (regime: {regime}); a disturbance {stability} "
         f"(largest Floquet multiplier {multiplier:.4g})."
     )
 
 
-def _describe_bench_outcome(measures: Quantities, details: dict) -> str:
+def _describe_bench_outcome(measures: Quantities, details: JsonObject) -> str:
     """Return the sentence on slip and loss factor of a bench."""
     slip = measures.get("slip_amplitude")
     if (
@@ -242,7 +259,7 @@ def _describe_stuck_outcome(result: Result, measures: Quantities) -> str:
     return _describe_no_slip(has_patch, "cycles")
 
 
-def _describe_place(contact: dict | None, form: str = "In contact: {}.") -> str:
+def _describe_place(contact: JsonObject | None, form: str = "In contact: {}.") -> str:
     """Return where the contact is along x, such as "x = -6.35 to -3.56 mm"; "" if all of the length is in contact."""
     if not contact or not contact["stretches"]:
         return ""
@@ -250,31 +267,31 @@ def _describe_place(contact: dict | None, form: str = "In contact: {}.") -> str:
     if len(stretches) == 1 and stretches[0][0] <= first and stretches[0][1] >= last:
         return ""
     unit, scale = choose_unit(UNIT_LADDERS["m"], max(abs(first), abs(last)))
+    count = ""
+    if len(stretches) > MAX_LISTED:
+        count = f"{len(stretches)} regions from "
+        stretches = [(stretches[0][0], stretches[-1][1])]
     texts = [
         f"{format_number(start * scale, 4)} to {format_number(end * scale, 4)}"
-        for start, end in stretches[:MAX_LISTED]
+        for start, end in stretches
     ]
-    if len(stretches) > MAX_LISTED:
-        whole = f"{format_number(stretches[0][0] * scale, 4)} to {format_number(stretches[-1][1] * scale, 4)}"
-        return form.format(f"{len(stretches)} regions from x = {whole} {unit}")
-    return form.format(f"x = {' and '.join(texts)} {unit}")
+    return form.format(f"{count}x = {' and '.join(texts)} {unit}")
 
 
-def _describe_readings(readings: Iterable[dict]) -> str:
+def _describe_readings(readings: Iterable[JsonObject]) -> str:
     """Return a sentence on the computed readings over the measured ones; "" without a measurement.
 
     readings: as `list_readings` returns them; those of repeat runs are left out.
     """
-    parts = [
+    text = " and ".join(
         f"the {row['reading']} is {format_number(row['ratio'], 3)} times the measured one"
         for row in readings
         if "repeat" not in row["reading"]
-    ]
-    text = " and ".join(parts)
-    return f"{text[0].upper()}{text[1:]}." if parts else ""
+    )
+    return f"{text[0].upper()}{text[1:]}." if text else ""
 
 
-def list_readings(result: Result) -> list[dict]:
+def list_readings(result: Result) -> list[JsonObject]:
     """Return the measured readings at the drive of the run beside the computed ones.
 
     Returns
@@ -288,21 +305,23 @@ def list_readings(result: Result) -> list[dict]:
         return []
     rows, computed = readings
     level = drive_sizes.find_max_acceleration(result.plan.model.rig.drive.signal)
+
+    # a row of another input belongs to another run
+    rows = [row for row in rows if abs(row.input - level) <= SAME_INPUT_FRACTION * row.input]
     listed = []
-    for row in rows:
-        for name, unit in READINGS.items():
-            value = getattr(row, name)
-            if abs(row.input - level) > 0.01 * row.input or not value or name not in computed:
-                continue
-            reading, error = computed[name]
-            listed.append(
-                {
-                    "reading": f"{name} (repeat run)" if "R" in row.flag else name,
-                    "measured": {"value": value, "unit": unit},
-                    "computed": {"value": reading, "unit": unit, "error": error},
-                    "ratio": reading / value,
-                }
-            )
+    for row, (name, unit) in product(rows, READINGS.items()):
+        value = getattr(row, name)
+        if not value or name not in computed:
+            continue
+        reading, error = computed[name]
+        listed.append(
+            {
+                "reading": f"{name} (repeat run)" if "R" in row.flag else name,
+                "measured": {"value": value, "unit": unit},
+                "computed": {"value": reading, "unit": unit, "error": error},
+                "ratio": reading / value,
+            }
+        )
     return listed
 
 
@@ -371,6 +390,7 @@ def describe_accuracy(result: Result, measures: Quantities) -> str:
     if result.outcome is Outcome.GROWS and result.response is not None:
         end = format_quantity(float(result.response.time[-1]), "s", 3)
         return f"The motion still grows after {end}: the measures are those of the last cycles, without errors."
+
     ratios = {
         name: measure.error_ratio(tolerance)
         for name, measure in result.measures.items()
@@ -378,6 +398,7 @@ def describe_accuracy(result: Result, measures: Quantities) -> str:
     }
     if not ratios or max(ratios.values()) > 1:
         return ""
+
     # errors that are too small to be displayed say nothing, and those of checks of a run concern no answer
     visible = {
         name: ratio
@@ -451,6 +472,7 @@ def describe_swing(time, output, error: float = 0.0, amplitude: float | None = N
     if not np.isfinite(distance).all() or not distance.max() > 0:
         return f"{start_text} does not move"
 
+    # reversals beyond the distance at which the output counts as being at rest
     rest_limit = max(error, REST_FRACTION * abs(end), ZERO_FRACTION * largest)
     steps = np.diff(output)
     moving = np.flatnonzero(np.abs(steps) > 1e-13 * largest)
@@ -467,6 +489,8 @@ def describe_swing(time, output, error: float = 0.0, amplitude: float | None = N
         end_time = format_quantity(float(time[-1]), "s", 3)
         size = format_length(float(last), 3)
         return f"{start_text} {goal} and after {end_time} still moves with an amplitude of {size}"
+
+    # it rests from the sample after the last one that is far from the end
     far = np.flatnonzero(distance > rest_limit)
     rest = min(int(far[-1]) if far.size else 0, time.size - 2)
     rest_time = format_quantity(float(time[rest + 1]), "s", 3)

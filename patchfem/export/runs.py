@@ -13,7 +13,7 @@ from ..effects import EFFECTS
 from ..runs.patch import values
 from ..runs.results.result import Result, collect_used_settings, engine_by_measure
 from ..runs.rig import plan as rig_plan
-from .answer import Answer, Quantities, Quantity, Remarks
+from .answer import Answer, JsonObject, Quantities, Quantity, Remarks
 from .driven import describe_drive, format_changed_keys
 from .run_data import collect_data
 from .run_words import list_readings, make_captions, make_verdict
@@ -55,7 +55,7 @@ def make_quantities(measures: dict[str, Measure]) -> Quantities:
     return quantities
 
 
-def make_origin(source, verb: str) -> dict:
+def make_origin(source, verb: str) -> JsonObject:
     """Return where an answer comes from.
 
     Parameters
@@ -87,6 +87,7 @@ def make_command(verb: str, path: Path, sets: tuple[str, ...]) -> str:
     Parameters
     ----------
     verb : str
+        Command, such as "run".
     path : Path
         Scene file; it is named without its folder.
     sets : tuple of str
@@ -106,7 +107,7 @@ def list_versions() -> dict[str, str]:
     return {"python": python} | {name: installed[name] for name in PACKAGES if name in installed}
 
 
-def make_details(result: Result) -> dict:
+def make_details(result: Result) -> JsonObject:
     """Return the further keys of summary.json for a run."""
     details = {
         "outcome": str(result.outcome),
@@ -136,33 +137,28 @@ def count_cycles(result: Result) -> float | None:
     return tomllib.loads(result.plan.model.source.resolved).get("slide", {}).get("cycles")
 
 
-def _list_effects(result: Result) -> list[dict]:
+def _list_effects(result: Result) -> list[JsonObject]:
     """Return `effect`, `equations` and `seconds` of each computed effect.
 
     Law and modes share one loop, whose time is that of the law.
     """
     patch_seconds = {} if result.patch is None else result.patch.seconds
     loop_seconds = result.seconds.get("march", result.seconds.get("bench", 0.0))
+    known = {f"contact.{name}": seconds for name, seconds in patch_seconds.items()}
+    known["contact"] = patch_seconds.get("condense", 0.0) + patch_seconds.get("press", 0.0)
+    known["contact.shear"] = result.seconds.get("reduce", 0.0)
+    if result.plan.kind == "linear":
+        known["structure"] = loop_seconds
+
     entries = []
     for name in result.plan.effects:
-        seconds = patch_seconds.get(name.removeprefix("contact."), 0.0)
-        if name == "contact":
-            seconds = patch_seconds.get("condense", 0.0) + patch_seconds.get("press", 0.0)
-        elif name == "contact.shear":
-            seconds = result.seconds.get("reduce", 0.0)
-        elif name.startswith("friction.law=") or (name, result.plan.kind) == (
-            "structure",
-            "linear",
-        ):
-            seconds = loop_seconds
-        equations = EFFECTS[name].equations
-        entries.append(
-            {"effect": name, "equations": equations, "seconds": round(float(seconds), 6)}
-        )
+        is_law = name.startswith("friction.law=")
+        seconds = round(float(loop_seconds if is_law else known.get(name, 0.0)), 6)
+        entries.append({"effect": name, "equations": EFFECTS[name].equations, "seconds": seconds})
     return entries
 
 
-def _find_contact(result: Result) -> dict:
+def _find_contact(result: Result) -> JsonObject:
     """Return the ends of the interface and of each part in contact [m], for a solved patch without strips."""
     patch = result.patch
     if patch is None or patch.strips is not None or not patch.active.any():
@@ -175,7 +171,7 @@ def _find_contact(result: Result) -> dict:
     return ends | {"stretches": intervals.tolist()}
 
 
-def _find_run_away(result: Result) -> dict:
+def _find_run_away(result: Result) -> JsonObject:
     """Return the drive of an unsettled motion and the largest one that friction can limit [m s-2], if it is larger."""
     if result.outcome not in (Outcome.TRANSIENT, Outcome.GROWS):
         return {}
@@ -183,7 +179,7 @@ def _find_run_away(result: Result) -> dict:
     return found if found and found["drive"] > found["knee"] else {}
 
 
-def _find_loss_factor(result: Result) -> dict:
+def _find_loss_factor(result: Result) -> JsonObject:
     """Return slide amplitude [m] and loss factor of a bench in periodic motion.
 
     The loss factor is the work of a cycle over 2 pi times the largest elastic energy, W/(pi k A^2) with the equivalent

@@ -8,8 +8,12 @@ from ..formatting import format_number
 from .answer import Answers, Quantity
 from .quantities import KEY, format_quantity
 
-MAX_SENTENCES = 5  # largest number of measures that are compared in words
+MAX_COMPARED_MEASURES = 5  # largest number of measures that are compared in words
 MIN_FACTOR = 10.0  # smallest ratio to the first value that is written as a factor
+# value in a scene file
+TomlValue = str | float | list[Any] | dict[str, Any]
+# table of a page: `title`, `headings`, and `rows` of strings
+Table = dict[str, str | list[str] | list[list[str]]]
 MAX_CELL_LENGTH = 80  # largest number of characters of a value of a scene
 
 
@@ -63,20 +67,23 @@ def compare_measures(answers: Answers) -> list[str]:
     ]
     if not changed:
         return ["No measure differs by more than its error."]
+
     sentences = []
-    for name in changed[:MAX_SENTENCES]:
+    for name in changed[:MAX_COMPARED_MEASURES]:
         parts = []
         for label, answer in answers.items():
             text = format_entry(name, answer.quantities.get(name), first[name])
-            if text:
+            if text:  # the answer has this measure
                 parts.append(f"{text} in {label}")
         sentences.append(f"{name[0].upper()}{name[1:].replace('_', ' ')}: {', '.join(parts)}.")
-    if len(changed) > MAX_SENTENCES:
-        sentences.append(f"{len(changed) - MAX_SENTENCES} more measures differ; see the table.")
+    if len(changed) > MAX_COMPARED_MEASURES:
+        sentences.append(
+            f"{len(changed) - MAX_COMPARED_MEASURES} more measures differ; see the table."
+        )
     return sentences
 
 
-def list_scene_differences(answers: Answers) -> list[dict]:
+def list_scene_differences(answers: Answers) -> list[Table]:
     """Return a table of the keys in which the resolved scenes differ, as `page.make_tables` does; [] without any."""
     scenes = {
         name: _flatten(tomllib.loads(answer.origin.get("resolved", "")))
@@ -92,7 +99,7 @@ def list_scene_differences(answers: Answers) -> list[dict]:
     return [{"title": "Where the scenes differ", "headings": ["key", *answers], "rows": rows}]
 
 
-def _flatten(table: Any, prefix: str = "") -> dict[str, Any]:
+def _flatten(table: TomlValue, prefix: str = "") -> dict[str, TomlValue]:
     """Return nested tables of a scene as dotted keys; tables of a list are named by their name or number."""
     if isinstance(table, dict):
         pairs = table.items()

@@ -10,11 +10,7 @@ from .answer import Answer, Quantities
 def make_lines(answer: Answer, is_verbose: bool = False) -> list[str]:
     """Return the lines of an answer for the standard output, without warnings and notes.
 
-    Parameters
-    ----------
-    answer : Answer
-    is_verbose : bool
-        Whether all quantities are shown instead of the key quantities.
+    is_verbose: whether all quantities are shown instead of the key quantities.
     """
     lines = [answer.title] if answer.title else []
     lines += answer.verdict

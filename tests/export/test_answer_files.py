@@ -189,9 +189,9 @@ def test_exact_codes_of_many_texts_are_read_back(tmp_path, count, kind):
 @pytest.mark.parametrize(
     "damage, reason",
     [
-        ("byte in summary", "invalid start byte"),
-        ("number in verdict", "verdict has an entry that is not a text"),
-        ("huge number", "measures.loop_area.value is missing or of a wrong type"),
+        ("byte in summary", "Invalid JSON"),
+        ("number in verdict", "verdict.0: Input should be a valid string"),
+        ("huge number", "measures.loop_area.value: Input should be a valid number"),
         ("summary of 1.1", "patchfem before 2.0 wrote it"),
     ],
 )

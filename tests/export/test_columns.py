@@ -43,19 +43,42 @@ def test_exact_csv_of_fit_has_units_of_its_headings():
     assert [float(line[1]) for line in lines[1:]] == pytest.approx([2.0, 1.0], rel=1e-15)
 
 
-def test_exact_csv_of_methods_repeats_rows_for_each_case():
-    """A CSV of backbones for values of a key has a column with this key; what all cases share is repeated."""
-    data = {"case": answer.Variable(("case",), np.array(["1 N", "2 N"]), "", "normal.load")}
-    data |= answer.make_columns("balance_amplitude", {"balance_amplitude": ([1e-6, 2e-6], "m")})
-    forces = np.array([[3.0, np.nan], [5.0, 6.0]])
-    data |= answer.make_columns("case balance_amplitude", {"balance_force": (forces, "N")})
-    text = columns.format_curves(answer.Answer("backbone", "", (), data=data))["backbone.csv"]
-    assert text.splitlines() == [
-        "normal.load,method,amplitude [m],force [N]",
-        "1 N,balance,1e-06,3.0",
-        "1 N,balance,2e-06,",
-        "2 N,balance,1e-06,5.0",
-        "2 N,balance,2e-06,6.0",
+BALANCE = {"amplitude": [1e-6, 2e-6], "force": [3.0, None]}
+QUASI_STATIC = {"amplitude": [5e-6]}
+
+
+def read_curves(**details) -> list[list[str]]:
+    """Return key or method, method or amplitude, and the force and the band of each row of backbone.csv."""
+    text = columns.format_curves(answer.Answer("backbone", "", (), details=details))["backbone.csv"]
+    places = [0, 1, 2] if "key" in details else [0, 1]
+    rows = list(csv.reader(text.splitlines()))
+    places += [rows[0].index(name) for name in ("force [N]", "damping_low")]
+    return [[row[place] for place in places] for row in rows]
+
+
+def test_exact_csv_of_curves_stands_below_each_other():
+    """A CSV of a backbone has the rows of all methods; a column that one of them lacks is empty there."""
+    curves = {"balance": BALANCE, "quasi-static": QUASI_STATIC}
+    band = {"damping_low": [0.1, 0.2]}
+    assert read_curves(curves=curves, method="balance", band=band) == [
+        ["method", "amplitude [m]", "force [N]", "damping_low"],
+        ["balance", "1e-06", "3.0", "0.1"],
+        ["balance", "2e-06", "", "0.2"],
+        ["quasi-static", "5e-06", "", ""],
+    ]
+
+
+def test_exact_csv_of_curves_names_the_value_of_a_key():
+    """A CSV of backbones for values of a key has a column with this key."""
+    cases = [
+        {"curves": {"balance": BALANCE}, "method": "balance", "band": {"damping_low": [0.1, 0.2]}},
+        {"curves": {"quasi-static": QUASI_STATIC}, "method": "balance", "band": {}},
+    ]
+    assert read_curves(key="normal.load", values=["1 N", "2 N"], cases=cases) == [
+        ["normal.load", "method", "amplitude [m]", "force [N]", "damping_low"],
+        ["1 N", "balance", "1e-06", "3.0", "0.1"],
+        ["1 N", "balance", "2e-06", "", "0.2"],
+        ["2 N", "quasi-static", "5e-06", "", ""],
     ]
 
 

@@ -1,13 +1,14 @@
 """A failure of the page never damages the results of a run."""
 
-import io
 import json
-import signal
 
 import pytest
 import xarray as xr
-from command_line import CommandResult, run_cli
+from command_line import run_cli
 from scene_texts import BENCH
+
+from patchfem.core import Missing
+from patchfem.export import page
 
 RESULT_FILES = {"summary.json", "result.nc", "scene.resolved.toml"}
 
@@ -34,50 +35,28 @@ def test_exact_page_is_added_to_results(scene_file, tmp_path):
     assert {path.name for path in (tmp_path / "out").iterdir()} == RESULT_FILES
 
 
-class ActingStream(io.StringIO):
-    """Standard output that calls a function once, while the numbers are printed."""
+@pytest.mark.parametrize(
+    "fault, code, words",
+    [
+        (KeyboardInterrupt(), 130, "interrupted while the page was drawn"),
+        (MemoryError(), 4, "report.html: out of memory"),
+        (Missing("report.html: no space"), 4, "report.html: no space"),
+    ],
+)
+def test_always_failing_page_leaves_results(scene_file, tmp_path, monkeypatch, fault, code, words):
+    """A page that is interrupted or cannot be written leaves complete results, and the exit code tells."""
 
-    def __init__(self, act):
-        """Keep the function that is called later."""
-        super().__init__()
-        self.act = act
-        self.has_acted = False
+    def fail(folder):
+        """Fail in place of writing a page."""
+        raise fault
 
-    def write(self, text: str) -> int:
-        """Write the text, then call the function if the numbers of the run begin."""
-        count = super().write(text)
-        if "  friction_force_peak" in self.getvalue() and not self.has_acted:
-            self.has_acted = True
-            self.act()
-        return count
-
-
-def run_with_action(scene, out, action) -> CommandResult:
-    """Run a scene on the command line and call a function between the results and the page."""
-    stream = ActingStream(action)
-    answer = run_cli("run", scene, "-o", out, stdout=stream)
-    assert stream.has_acted
-    return answer
-
-
-def check_results_without_page(out) -> None:
-    """Check that the results are complete and no part of a page remains."""
+    monkeypatch.setattr(page, "write_page", fail)
+    out = tmp_path / "out"
+    answer = run_cli("run", scene_file, "-o", out)
+    assert answer.code == code and words in answer.err
+    assert "are complete except for report.html" in answer.err
+    assert "friction_force_peak" in answer.out
     assert {path.name for path in out.iterdir()} == RESULT_FILES
     assert json.loads((out / "summary.json").read_text("utf-8"))["outcome"] == "done"
     with xr.open_dataset(out / "result.nc", engine="h5netcdf") as data:
         assert data.friction_force.size == data.time.size > 0
-
-
-def test_always_interrupt_before_page_leaves_results(scene_file, tmp_path):
-    # a background process may have inherited that the signal is ignored
-    """An interrupt while the page is drawn leaves complete results and ends with code 130."""
-    inherited = signal.signal(signal.SIGINT, signal.default_int_handler)
-    try:
-        answer = run_with_action(
-            scene_file, tmp_path / "out", lambda: signal.raise_signal(signal.SIGINT)
-        )
-    finally:
-        signal.signal(signal.SIGINT, inherited)
-    assert answer.code == 130 and "interrupted while the page was drawn" in answer.err
-    assert "are complete except for report.html" in answer.err
-    check_results_without_page(tmp_path / "out")

@@ -71,13 +71,7 @@ def _draw_curve(curve: Curve, style: str, colour: str, axes) -> None:
         if style == "dots":
             axes.plot(curve.x, curve.y, color=colour, lw=1)
         axes.errorbar(curve.x, curve.y, interval, fmt="none", ecolor=colour)
-        symbols = np.full(curve.x.size, "circle") if curve.symbols is None else curve.symbols
-        # the first symbol has the entry of the legend, and is drawn above the others
-        for zorder, (symbol, (marker, face)) in zip((4, 3, 3), MARKERS.items()):
-            is_drawn = symbols == symbol
-            label = curve.name if symbol == "circle" else None
-            options = {"color": colour, "mfc": face or colour, "label": label, "zorder": zorder}
-            axes.plot(curve.x[is_drawn], curve.y[is_drawn], marker, **options)
+        _draw_points(curve, colour, axes)
     else:
         dash = LINE_STYLES[curve.dash % len(LINE_STYLES)]
         axes.plot(curve.x, curve.y, color=colour, label=curve.name, ls=dash)
@@ -86,6 +80,17 @@ def _draw_curve(curve: Curve, style: str, colour: str, axes) -> None:
             axes.fill_between(curve.x, curve.low, curve.high, **filling)
         if style == "area":
             axes.fill_between(curve.x, curve.y, **filling)
+
+
+def _draw_points(curve: Curve, colour: str, axes) -> None:
+    """Draw the points of a curve with their symbols."""
+    symbols = np.full(curve.x.size, "circle") if curve.symbols is None else curve.symbols
+    # the first symbol has the entry of the legend, and is drawn above the others
+    for zorder, (symbol, (marker, face)) in zip((4, 3, 3), MARKERS.items()):
+        is_drawn = symbols == symbol
+        label = curve.name if symbol == "circle" else None
+        options = {"color": colour, "mfc": face or colour, "label": label, "zorder": zorder}
+        axes.plot(curve.x[is_drawn], curve.y[is_drawn], marker, **options)
 
 
 def _draw_map(panel: Panel, axes) -> None:
@@ -169,6 +174,7 @@ def draw_charts(answer: Answer, titles: tuple[str, ...], axes, caller: str):
     Parameters
     ----------
     answer : Answer
+        Answer of any verb.
     titles : tuple of str
         Titles in the table of charts; () for all charts.
     axes : matplotlib Axes or None

@@ -114,6 +114,7 @@ def make_axis(name: str, unit: str, values: np.ndarray, is_log: bool = False) ->
     values : array
         [SI]
     is_log : bool, optional
+        Whether the axis is logarithmic.
     """
     label = name.replace("_", " ")
     size = np.abs(values[np.isfinite(values)]).max(initial=0.0)

@@ -24,6 +24,7 @@ def make_panels(answers: Answers, charts: tuple[Chart, ...]) -> list[Panel]:
     answers : dict of str to Answer
         Answers by their name in the legend; one answer may have the name "".
     charts : tuple of Chart
+        Rows of the table of charts, in the order of the page.
     """
     panels = []
     for chart in charts:
@@ -66,16 +67,17 @@ def make_panel(answers: Answers, chart: Chart) -> Panel | None:
     if not selected or (chart.style == "map" and len(selected) > 1):  # maps cannot share a chart
         return None
     first = next(iter(selected.values()))
-    x_axis, y_axis = axes = _make_axes(list(selected.values()), chart)
+    axes = _make_axes(list(selected.values()), chart)
+    if chart.style == "map":
+        return _make_map(first, chart, axes)
 
     curves = []
     for number, (label, data) in enumerate(selected.items()):
-        own_curves = []
-        for name in chart.y.split():
-            own_curves += _make_curves(data, chart, name, axes)
-        for name in chart.lines.split():
-            curve_lines = _make_curves(data, replace(chart, by=""), name, axes)
-            own_curves += [replace(curve, is_line=True) for curve in curve_lines]
+        own_curves = [
+            curve
+            for name in f"{chart.y} {chart.lines}".split()
+            for curve in _make_curves(data, chart, name, axes)
+        ]
         if len(own_curves) == 1:
             own_curves = [replace(own_curves[0], name="")]
         if has_several:  # a colour for each answer, and a dash for each of its curves
@@ -87,17 +89,30 @@ def make_panel(answers: Answers, chart: Chart) -> Panel | None:
     if not curves:
         return None
     marks = [
-        float(value) * x_axis.scale
+        float(value) * axes[0].scale
         for name in chart.marks.split()
         if name in first
         for value in np.atleast_1d(first[name].values)
         if np.isfinite(value)
     ]
-    panel = Panel(chart.title, chart.style, x_axis, y_axis, curves, chart.caption, marks)
-    if chart.style != "map":
-        return panel
-    rows_axis = _find_map_rows(first, _reduce_strips(first[chart.y]), x_axis)[0]
-    return replace(panel, y=rows_axis, colour_label=y_axis.label)
+    return Panel(chart.title, chart.style, *axes, curves, chart.caption, marks)
+
+
+def _make_map(data: Variables, chart: Chart, axes: tuple[Axis, Axis]) -> Panel | None:
+    """Return the panel of a variable over x and its first dimension; `axes` are those of x and of the variable."""
+    variable = _reduce_strips(data[chart.y])
+    if not np.isfinite(_as_floats(variable)).any():
+        return None
+    x_axis, colours = axes
+    y_axis, rows = _find_map_rows(data, variable, x_axis)
+    x = _as_floats(data[_find_x(data, chart)]) * x_axis.scale
+    step = -(-x.size // MAX_MAP_COLUMNS)
+    # codes keep their numbers
+    scale = 1 if variable.meanings else colours.scale
+    values = np.atleast_2d(variable.values)[:, ::step] * scale
+    curve = Curve("", x[::step], values, rows=rows, meanings=variable.meanings)
+    label = colours.label
+    return Panel(chart.title, "map", x_axis, y_axis, [curve], chart.caption, colour_label=label)
 
 
 def _make_axes(selected: list[Variables], chart: Chart) -> tuple[Axis, Axis]:
@@ -116,7 +131,7 @@ def _make_axes(selected: list[Variables], chart: Chart) -> tuple[Axis, Axis]:
     )
 
 
-def _make_axis(name: str, unit: str, arrays: list, log: str, letter: str) -> Axis:
+def _make_axis(name: str, unit: str, arrays: list[np.ndarray], log: str, letter: str) -> Axis:
     """Return the axis for some arrays [SI]; `log` as in Chart, `letter` is "x" or "y"."""
     values = np.concatenate([np.asarray(values, float).ravel() for values in arrays])
     is_log = letter in log or ("auto" in log and needs_log_scale(values))
@@ -204,31 +219,27 @@ def _make_curves(
     x_axis, y_axis = axes
     x_values = _as_floats(data[own_x]) * x_axis.scale
     variable = _reduce_strips(data[name])
-    if chart.style == "map":
-        step = -(-x_values.size // MAX_MAP_COLUMNS)
-        scale = 1 if variable.meanings else y_axis.scale  # codes keep their numbers
-        values = np.atleast_2d(variable.values)[:, ::step] * scale
-        rows = _find_map_rows(data, variable, x_axis)[1]
-        return [Curve("", x_values[::step], values, rows=rows, meanings=variable.meanings)]
-
     values = _as_floats(variable)
-    band = _find_band(data, name)
+    ends_of_band = _find_band(data, name)
     labels = [name.replace("_", " ")]
     first = variable.dims[0] if values.ndim == 2 else ""
     if first in ("interface", "case") or (first and chart.style == "overlay"):
         labels = _name_elements(data, first, labels[0])
     elif first:
         values = values[-1:]  # the last frame
+
     curves = []
+    is_line = source in chart.lines.split()
     for number, (label, row) in enumerate(zip(labels, np.atleast_2d(values), strict=True)):
         # every case has points of its own
         keep = np.flatnonzero(np.isfinite(row)) if first == "case" else thin(row)
-        ends = [np.atleast_2d(end)[number] for end in band if first in ("case", "")]
+        ends = [np.atleast_2d(end)[number] for end in ends_of_band if first in ("case", "")]
         y, *ends = (one[keep] * y_axis.scale for one in (row, *ends))
         x_row = x_values[number] if x_values.ndim == 2 else x_values
         colour = number if first == "case" else -1
-        curves.append(Curve(label, x_row[keep], y, *(ends or (None, None)), colour=colour))
-        if chart.by in data and not first:
+        band = ends or (None, None)
+        curves.append(Curve(label, x_row[keep], y, *band, is_line=is_line, colour=colour))
+        if chart.by in data and not (first or is_line):
             return _split_by_code(curves[0], data[chart.by], keep, chart.style != "points")
     return [curve for curve in curves if curve.x.size]
 
@@ -309,6 +320,7 @@ def make_film(frames: dict[str, np.ndarray], title: str, unit: str) -> Panel:
     frames : dict
         `x` (k,) and `y` (j,) [m], `times` (f,) [s], `values` (f, j, k).
     title : str
+        Title of the chart, and name of the values.
     unit : str
         SI unit of the values.
     """

@@ -1,6 +1,7 @@
 """Panels as JSON of plotly.js figures; sliders and menus are part of this JSON, so that pages need no code of their own."""
 
 import base64
+from typing import Any
 
 import numpy as np
 
@@ -16,6 +17,8 @@ DASHES = ("solid", "dash", "dot", "dashdot")
 SYMBOLS = ("circle", "diamond", "square", "x")
 BAND_OPACITY = 0.18
 FRAME_MILLISECONDS = 120  # duration of a frame of a film
+# figure of plotly.js, or a part of it, as an object of its JSON
+Figure = dict[str, Any]
 # Position of a menu, above its chart.
 MENU_PLACE = {
     "x": 0,
@@ -25,7 +28,7 @@ MENU_PLACE = {
 }
 
 
-def draw(panel: Panel) -> dict:
+def draw(panel: Panel) -> Figure:
     """Return the figure of a panel: `title`, `data`, `layout`, `caption`, `description`, and `frames` of a film."""
     figure = {"title": panel.title, "caption": panel.caption, "description": panel.description}
     figure |= {"data": _make_traces(panel), "layout": _make_layout(panel)}
@@ -36,7 +39,7 @@ def draw(panel: Panel) -> dict:
     return figure
 
 
-def _make_layout(panel: Panel) -> dict:
+def _make_layout(panel: Panel) -> Figure:
     """Return the layout of a panel: its axes, vertical lines, and whether it has a legend."""
     is_film = panel.style == "film"
     layout = {
@@ -53,19 +56,19 @@ def _make_layout(panel: Panel) -> dict:
     return layout
 
 
-def _make_axis_layout(axis) -> dict:
+def _make_axis_layout(axis) -> Figure:
     """Return the layout of an axis."""
     return {"title": {"text": axis.label}, "type": "log" if axis.is_log else "-"}
 
 
-def _make_vertical_line(position: float) -> dict:
+def _make_vertical_line(position: float) -> Figure:
     """Return a dotted vertical line over the whole height."""
     line = {"color": "#8a8f98", "width": 1, "dash": "dot"}
     ends = {"x0": position, "x1": position, "y0": 0, "y1": 1}
     return {"type": "line", "yref": "paper", "line": line} | ends
 
 
-def _make_traces(panel: Panel) -> list[dict]:
+def _make_traces(panel: Panel) -> list[Figure]:
     """Return the traces of a panel; those of a film have the same range of colours."""
     if panel.style in ("map", "film"):
         traces = [_make_map_trace(curve, panel.colour_label) for curve in panel.curves]
@@ -92,7 +95,7 @@ def choose_colour(curve: Curve, number: int) -> str:
     return COLOURS[(number if curve.colour < 0 else curve.colour) % len(COLOURS)]
 
 
-def _make_curve_traces(curve: Curve, style: str, colour: str) -> list[dict]:
+def _make_curve_traces(curve: Curve, style: str, colour: str) -> list[Figure]:
     """Return the trace of a curve, and that of its error band if it is drawn as a line."""
     dash = DASHES[curve.dash % len(DASHES)]
     symbol = SYMBOLS[curve.dash % len(SYMBOLS)]
@@ -131,7 +134,7 @@ def _make_curve_traces(curve: Curve, style: str, colour: str) -> list[dict]:
     return [band, trace]
 
 
-def _make_error_bars(curve: Curve) -> dict:
+def _make_error_bars(curve: Curve) -> Figure:
     """Return the distances of the ends of an interval from the values; {} without an interval."""
     if curve.low is None:
         return {}
@@ -139,7 +142,7 @@ def _make_error_bars(curve: Curve) -> dict:
     return ends | {"symmetric": False, "thickness": 1.2}
 
 
-def _make_bar_trace(curve: Curve, colour: str) -> dict:
+def _make_bar_trace(curve: Curve, colour: str) -> Figure:
     """Return horizontal bars with their intervals; `x` has the names of the bars."""
     trace = {"type": "bar", "orientation": "h", "x": pack(curve.y), "y": list(map(str, curve.x))}
     bars = _make_error_bars(curve)
@@ -147,7 +150,7 @@ def _make_bar_trace(curve: Curve, colour: str) -> dict:
     return trace | ({"error_x": bars} if bars else {})
 
 
-def _make_map_trace(curve: Curve, label: str) -> dict:
+def _make_map_trace(curve: Curve, label: str) -> Figure:
     """Return a heat map; codes have one colour each, other values a scale that is symmetric if they change their sign."""
     trace = {"type": "heatmap", "x": pack(curve.x), "y": pack(curve.rows), "z": pack(curve.y)}
     if curve.meanings:
@@ -166,7 +169,7 @@ def _make_map_trace(curve: Curve, label: str) -> dict:
     return trace | {"zmin": ends[0], "zmax": ends[1], "colorscale": scale, "colorbar": bar}
 
 
-def _add_menu(figure: dict, choices: list[Panel]) -> None:
+def _add_menu(figure: Figure, choices: list[Panel]) -> None:
     """Add a menu that shows one of several panels at a time."""
     groups = [_make_traces(choice) for choice in choices]
     buttons = []
@@ -188,7 +191,7 @@ def _add_menu(figure: dict, choices: list[Panel]) -> None:
     }
 
 
-def _add_slider(figure: dict, names: list[str]) -> None:
+def _add_slider(figure: Figure, names: list[str]) -> None:
     """Turn the traces of a figure into frames with names, with a slider and a button."""
     traces = figure["data"]
     figure["data"] = traces[:1]
@@ -210,7 +213,7 @@ def _add_slider(figure: dict, names: list[str]) -> None:
     figure["layout"] |= {"sliders": [slider], "updatemenus": [menu]}
 
 
-def pack(values: np.ndarray) -> dict | list:
+def pack(values: np.ndarray) -> Figure | list[str]:
     """Return an array in the binary form that plotly.js reads; strings and short arrays as a list."""
     values = np.asarray(values)
     if values.dtype.kind in "UO":

@@ -14,7 +14,7 @@ import numpy as np
 from ...campaigns.sweeps.changes import MAIN_MEASURES
 from ...campaigns.sweeps.limits import NEGLIGIBLE_CHANGE
 from ...campaigns.sweeps.sweep_table import FINAL_OUTCOMES, MeasureColumn
-from ..answer import Answer, Answers, Variables
+from ..answer import Answer, Answers, JsonObject, Variables
 from ..quantities import format_value
 from .panel import Axis, Curve, Panel, join_names, make_axis, thin
 from .table import Chart
@@ -34,7 +34,9 @@ class SweepView(NamedTuple):
     Attributes
     ----------
     data : dict of str to Variable
+        Variables of sweep.nc.
     details : dict
+        Content of sweep.json.
     axis : str
         Variable of the key on the axis.
     others : list of str
@@ -42,7 +44,7 @@ class SweepView(NamedTuple):
     """
 
     data: Variables
-    details: dict
+    details: JsonObject
     axis: str
     others: list[str]
 
@@ -190,9 +192,12 @@ def make_measure_panel(answers: Answers, name: str) -> Panel:
             view = view_sweep(answer, re.sub(r"\W", "_", shares[0]["key"]))
         x_axis, x = view.scale(view.axis)
         axes = axes or (x_axis, view.scale(name, MIN_MEASURE_RATIO)[0])
+
+        # settled, over the tolerance and not settled cases have symbols of their own
         values = view.split_lines(name) * axes[1].scale
         errors = np.broadcast_to(view.split_lines(f"{name}_error") * axes[1].scale, values.shape)
         symbols = np.broadcast_to(view.find_symbols(name), values.shape)
+
         texts = view.name_lines()
         lines = spread_indices(len(values), MAX_LINES)
         for line in lines:

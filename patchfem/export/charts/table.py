@@ -80,7 +80,7 @@ class CsvFile(NamedTuple):
     """CSV file of an answer.
 
     columns: heading line, where a heading may end in a unit of CSV_UNITS; source: "" for variables, a dimension for all of
-    its variables, "methods" for the curves of all methods below each other, or the key of a list of objects in the details,
+    its variables, "curves" for the curves of a backbone below each other, or the key of a list of objects in the details,
     whose texts the columns name; nested: key of the quantities in each of these objects, "" if they are its own keys. A
     quantity has the columns NAME, NAME_low and NAME_high.
     """
@@ -654,9 +654,10 @@ CSV_FILES: dict[str, dict[str, CsvFile]] = {
     },
     "backbone": {
         "backbone.csv": CsvFile(
-            "amplitude, frequency, frequency_error, damping, damping_error, force, force_error, force_frequency, "
-            "frequency_low, frequency_high, damping_low, damping_high",
-            "methods",
+            "amplitude [m] = amplitude, frequency [Hz] = frequency, frequency_error [Hz] = frequency_error, damping, "
+            "damping_error, force [N] = force, force_error [N] = force_error, force_frequency [Hz] = force_frequency, "
+            "frequency_low [Hz] = frequency_low, frequency_high [Hz] = frequency_high, damping_low, damping_high",
+            "curves",
         )
     },
     "fit": {

@@ -105,7 +105,7 @@ def _pad(values: np.ndarray, count: int) -> np.ndarray:
     return np.pad(values, [*[(0, 0)] * (values.ndim - 1), missing])
 
 
-def _store(data: dict) -> dict[str, np.ndarray]:
+def _store(data: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
     """Return fields as they are stored: codes, or numbers in single precision.
 
     The pressure and the areas of the points stay as they are, so that their sum is the load.

@@ -1,6 +1,10 @@
 """Fields as grids of PyVista, and from them as .vtu, .pvd and .csv."""
 
+from __future__ import annotations
+
+from collections.abc import Iterable
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -10,16 +14,22 @@ from ...runs.pieces import compute_pieces
 from .blocks import FIELDS, PARTS, Block, make_blocks
 from .vtkhdf import Frames, write_blocks
 
+if TYPE_CHECKING:
+    from pyvista import MultiBlock
+
+    from ...runs.results.result import Result
+
 # Field of each part that PyVista colours by default.
 ACTIVE_FIELDS = {"lower": "von_mises", "upper": "von_mises", "interface": "normal_stress"}
 
 
-def make_grids(blocks: dict[str, Block], number: int, time: float):
+def make_grids(blocks: dict[str, Block], number: int, time: float) -> MultiBlock:
     """Return one frame of blocks as a pyvista.MultiBlock of named grids, in SI.
 
     Parameters
     ----------
-    blocks : dict of Block
+    blocks : dict of str to Block
+        Parts and their fields.
     number : int
         Number of the frame.
     time : float
@@ -54,7 +64,7 @@ def _label_units(grid) -> None:
             information.Set(vtkDataArray.UNITS_LABEL(), FIELDS[name].unit)
 
 
-def make_result_grids(result, numbers) -> list:
+def make_result_grids(result: Result, numbers: Iterable[int]) -> list[MultiBlock]:
     """Return frames of a run with a patch as pyvista.MultiBlock objects with stresses in MPa.
 
     The field array `units` of every grid lists the unit of each array.
@@ -83,7 +93,9 @@ def export_frames(frames: Frames, out: Path, number: int) -> None:
     Parameters
     ----------
     frames : Frames
+        Fields of a run.
     out : Path
+        File whose suffix chooses the format.
     number : int
         Number of the frame of a .vtu or .csv.
     """
@@ -97,10 +109,16 @@ def export_frames(frames: Frames, out: Path, number: int) -> None:
 
 
 def _write_vtu(frames: Frames, out: Path, number: int) -> None:
-    """Write a frame as one mesh with the array `part`; fields that a part lacks are NaN or -1 there."""
+    """Write a frame as one mesh with the array `part`; fields that a part lacks are NaN or -1 there.
+
+    VTK makes the text in memory, because it ends the process where it cannot write a file.
+    """
+    from vtkmodules.vtkIOXML import vtkXMLUnstructuredGridWriter
+
     grids = make_grids(frames.blocks, number, float(frames.times[number]))
     for code, name in enumerate(PARTS):
         grids[name].cell_data["part"] = np.full(grids[name].n_cells, code, np.int8)
+    # one mesh has one list of fields, so that every part needs all of them
     for kind in ("point_data", "cell_data"):
         samples = {name: values for grid in grids for name, values in getattr(grid, kind).items()}
         for grid in grids:
@@ -109,21 +127,12 @@ def _write_vtu(frames: Frames, out: Path, number: int) -> None:
             for name in samples.keys() - set(data.keys()):
                 hole = np.nan if samples[name].dtype.kind == "f" else -1
                 data[name] = np.full((count, *samples[name].shape[1:]), hole, samples[name].dtype)
+
     merged = grids.combine()
     merged.field_data["TimeValue"] = [frames.times[number]]
     _label_units(merged)
-    _write_grid(merged, out)
-
-
-def _write_grid(grid, out: Path) -> None:
-    """Write a grid as .vtu.
-
-    VTK makes the text in memory, because it ends the process where it cannot write a file.
-    """
-    from vtkmodules.vtkIOXML import vtkXMLUnstructuredGridWriter
-
     writer = vtkXMLUnstructuredGridWriter()
-    writer.SetInputData(grid)
+    writer.SetInputData(merged)
     writer.SetDataModeToBinary()
     writer.SetWriteToOutputString(True)
     writer.Write()
@@ -131,26 +140,16 @@ def _write_grid(grid, out: Path) -> None:
 
 
 def _write_pvd(frames: Frames, out: Path) -> None:
-    """Write all frames as .vtm files, which name the .vtu of each block, in a folder beside a .pvd."""
+    """Write each frame as .vtu in a folder beside a .pvd, which lists them with their times."""
     folder = out.with_name(f"{out.stem}_frames")
     create_folder(folder)
-    listed = []
+    lines = []
     for number, time in enumerate(frames.times):
-        grids = make_grids(frames.blocks, number, float(time))
-        name = f"frame_{number:04d}"
-        blocks = []
-        for part, grid in zip(grids.keys(), grids):
-            _write_grid(grid, folder / f"{name}_{part}.vtu")
-            blocks.append(f'<DataSet name="{part}" file="{name}_{part}.vtu"/>')
-        _write_list(folder / f"{name}.vtm", "vtkMultiBlockDataSet", blocks)
-        listed.append(f'<DataSet timestep="{float(time)!r}" file="{folder.name}/{name}.vtm"/>')
-    _write_list(out, "Collection", listed)
-
-
-def _write_list(out: Path, kind: str, entries: list[str]) -> None:
-    """Write a file of VTK that lists other files."""
-    text = "\n".join(entries)
-    write_text(out, f'<VTKFile type="{kind}" version="1.0"><{kind}>\n{text}\n</{kind}></VTKFile>\n')
+        name = f"frame_{number:04d}.vtu"
+        _write_vtu(frames, folder / name, number)
+        lines.append(f'<DataSet timestep="{float(time)!r}" file="{folder.name}/{name}"/>')
+    text = "\n".join(lines)
+    write_text(out, f'<VTKFile type="Collection"><Collection>\n{text}\n</Collection></VTKFile>\n')
 
 
 def _write_csv(frames: Frames, out: Path, number: int) -> None:

@@ -40,28 +40,23 @@ class Frames(NamedTuple):
 
 
 def write_fields(result, path: Path) -> None:
-    """Write the fields of both pieces and their interface, and add notes on yielding to a result.
-
-    Parameters
-    ----------
-    result : Result
-        A run with a solved patch.
-    path : Path
-    """
+    """Write the fields of both pieces and their interface of a run, and add notes on yielding to this result."""
     pieces = compute_pieces(result)
     add_yielding_notes(result, pieces)
     write_blocks(path, make_blocks(pieces), pieces.time)
 
 
-def write_blocks(path: Path, blocks: dict[str, Block], times) -> None:
+def write_blocks(path: Path, blocks: dict[str, Block], times: np.ndarray) -> None:
     """Write blocks as a VTKHDF file, which gets its name when it is complete.
 
     Parameters
     ----------
     path : Path
-    blocks : dict of Block
+        File to write.
+    blocks : dict of str to Block
+        Parts and their fields.
     times : (f,) array
-        [s]
+        Times of the frames [s].
     """
     with (
         write_atomically(Path(path)) as partial,
@@ -164,21 +159,7 @@ def find_fields(folder: Path) -> Path:
 
 
 def read_frames(path: Path) -> Frames:
-    """Read a file of fields.
-
-    Parameters
-    ----------
-    path : Path
-
-    Returns
-    -------
-    Frames
-
-    Raises
-    ------
-    PatchfemError
-        If the file is damaged, or was written by an older version.
-    """
+    """Read a file of fields; PatchfemError if it is damaged, or was written by an older version."""
     try:
         with h5py.File(path, "r") as file:
             root = file["VTKHDF"]

@@ -15,15 +15,17 @@ from ...inputs import universal as universal_files
 from ...inputs.units import SI_UNITS
 from ...scene.keys import quantities
 from ...scene.keys.removed import describe_removed
+from ..answer import JsonObject
 from . import universal
 from .universal import Column
 from .write import format_columns
 
 # columns of an exported file that can be its displacement, in order of preference; 1.x wrote the first one
 EXPORTED_NAMES = {"displacement": ("output_displacement", "relative_displacement", "slide")}
-# form of a file by its ending, and the options that each form uses
-FORMS = {".csv": "table", ".toml": "modes"}
+# options that each form of a file uses
 USED = {"table": (), "decay": ("decay", "begin"), "modes": ("band", "decay", "begin")}
+# records [SI] by quantity
+Records = dict[str, np.ndarray]
 DECAY_UNITS = {"time": "s", "amplitude": "m", "frequency": "Hz", "damping": "1"}
 
 
@@ -47,18 +49,21 @@ class EstimateOptions(NamedTuple):
 
 def convert_file(
     file: Path, out: Path, requests: Iterable[str], zero: bool, settings: EstimateOptions
-) -> dict:
-    """Convert a laboratory file to records (.csv) or modes (.toml).
+) -> JsonObject:
+    """Convert a laboratory file to records or a decay (.csv), or to modes (.toml).
 
     Parameters
     ----------
     file : Path
+        Universal file, .mat or table with units.
     out : Path
+        File to write, whose ending chooses the form.
     requests : iterable of str
-        Channels as in `patchfem import --map`.
+        Quantities and their channels, such as "force=Load cell [lbf]".
     zero : bool
         Whether time and displacement are measured from their first row.
     settings : EstimateOptions
+        How modes are estimated.
 
     Returns
     -------
@@ -70,29 +75,15 @@ def convert_file(
     PatchfemError
         If options do not fit together.
     """
-    form = FORMS.get(out.suffix.lower())
-    if form is None:
-        removed = describe_removed(f"import -o {out.suffix}", "writing a frequency response")
-        raise PatchfemError(f"{out}: {removed or 'records are written as .csv, modes as .toml'}")
-    if form == "table" and settings.decay:
-        form = "decay"
-    if zero and form != "table":
-        raise PatchfemError(
-            "--zero can be used only when importing a table of records (-o table.csv), not with --decay"
-        )
-    given = [name for name, value in settings._asdict().items() if value]
-    unused = [f"--{name}" for name in given if name not in USED[form]]
-    if unused:
-        raise PatchfemError(
-            f"{out}: {', '.join(unused)} can be used only for modes (-o modes.toml), --begin with --decay also for "
-            "a table of the decay"
-        )
+    form = _choose_form(out, settings, zero=zero)
     if form == "table":
         return _write_table(file, out, requests, zero)
     if form == "modes" and _has_mode_shapes(file):
         raise PatchfemError(
             describe_removed("import of mode shapes", f"{file}: the import of mode shapes")
         )
+
+    # decays and modes are estimated from records of known quantities
     values, notes = _read_records(file, requests)
     begin = _parse_quantity(settings.begin, "time", "--begin")
     if form == "decay":
@@ -103,6 +94,29 @@ def convert_file(
         band = _parse_band(settings.band)
         modes = measured_modes.identify_driven_modes(values, band)
     return _write_modes(modes, out, file.name, notes)
+
+
+def _choose_form(out: Path, settings: EstimateOptions, *, zero: bool) -> str:
+    """Return "table", "decay" or "modes"; PatchfemError for another ending and for options that the form does not use."""
+    endings = {".csv": "decay" if settings.decay else "table", ".toml": "modes"}
+    form = endings.get(out.suffix.lower())
+    if form is None:
+        removed = describe_removed(f"import -o {out.suffix}", "writing a frequency response")
+        raise PatchfemError(f"{out}: {removed or 'records are written as .csv, modes as .toml'}")
+    if zero and form != "table":
+        raise PatchfemError(
+            "--zero can be used only when importing a table of records (-o table.csv), not with --decay"
+        )
+
+    # an option without an effect is a mistake of the user
+    given = [name for name, value in settings._asdict().items() if value]
+    unused = [f"--{name}" for name in given if name not in USED[form]]
+    if unused:
+        raise PatchfemError(
+            f"{out}: {', '.join(unused)} can be used only for modes (-o modes.toml), --begin with --decay also for "
+            "a table of the decay"
+        )
+    return form
 
 
 def _write_table(file: Path, out: Path, requests: Iterable[str], zero: bool) -> dict:
@@ -185,7 +199,7 @@ def format_structure(modes: measured_modes.ListedModes, source: str) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _read_records(file: Path, requests) -> tuple[dict[str, np.ndarray], list[str]]:
+def _read_records(file: Path, requests: Iterable[str]) -> tuple[Records, list[str]]:
     """Return measured records by quantity with notes; PatchfemError if none of them is a response."""
     found = laboratory.read_records(file, records.parse_requests(requests), EXPORTED_NAMES)
     responses = measured_modes.DERIVATIVE_ORDERS

@@ -53,6 +53,8 @@ def export_structure(model: Model, out: Path) -> str:
             else ""
         )
         raise PatchfemError(f"{out}: a structure is exported as .mat{removed}")
+
+    # a refusal names the line of the scene
     with locate_errors(model.source):
         if model.rig is None:
             raise PatchfemError(
@@ -62,6 +64,7 @@ def export_structure(model: Model, out: Path) -> str:
         _refuse_unsupported(model)
         basis = _find_coordinates(model)
         arrays = make_matrices(model, basis) | make_elements(model, basis)
+
     with write_atomically(out) as partial, open(partial, "wb") as file:
         savemat(file, arrays, oned_as="column", long_field_names=True)
     counts = {"coordinate": len(basis), "friction element": arrays["limit"].size}
@@ -108,6 +111,7 @@ def make_matrices(model: Model, basis: np.ndarray) -> dict[str, np.ndarray | flo
     Parameters
     ----------
     model : Model
+        Model with a rig.
     basis : (n, n) ndarray
         Exported coordinates to modal coordinates.
     """
@@ -161,6 +165,7 @@ def make_elements(model: Model, basis: np.ndarray) -> dict[str, np.ndarray | str
     Parameters
     ----------
     model : Model
+        Model with a rig.
     basis : (n, n) ndarray
         Exported coordinates to modal coordinates.
     """
@@ -170,6 +175,8 @@ def make_elements(model: Model, basis: np.ndarray) -> dict[str, np.ndarray | str
     if not interfaces:
         return elements | {"direction": np.zeros((0, len(basis)))}
     rows = model.rig.modes.interfaces @ basis
+
+    # under these laws the force is a function of the speed, so that no element stretches
     if _is_speed_only(model.rig):
         loads = [model.nominal_load if one.load is None else one.load for one in interfaces]
         limits = [one.numbers.static * load for one, load in zip(interfaces, loads, strict=True)]
@@ -182,6 +189,8 @@ def make_elements(model: Model, basis: np.ndarray) -> dict[str, np.ndarray | str
         patch = mesh_levels.solve_with_coarser(model.patch, model.accuracy.tolerance)[0]
         if patch.pressure.outcome is Outcome.NO_CONTACT:
             raise PatchfemError("the pieces do not touch, so no friction acts", "contact")
+
+    # as many elements as the first run would use, which merges neighbours in pairs
     settings = numerics.choose_numerics(model)
     groups = [_sort_elements(*one) for one in hybrid_laws.list_elements(model, settings, patch)]
     for _ in range(costs.count_cell_merges(model)):

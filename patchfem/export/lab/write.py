@@ -38,11 +38,13 @@ def export_histories(folder: Path, out: Path) -> str:
         raise Missing(f"{folder}: no such results folder")
     answer = store.read(folder)
     columns = list_columns(answer)
+    # a fitted loop may have no time
     histories = [column for column in columns if column.name != "time"]
     if not histories:
         raise PatchfemError(
             f"{folder}: these results have no history; fields are exported as .pvd, .vtu, .vtkhdf, or .csv of the interface"
         )
+
     tail = ""
     if out.suffix.lower() == ".csv":
         write_text(out, format_columns(columns))
@@ -57,6 +59,7 @@ def export_histories(folder: Path, out: Path) -> str:
         ]
         universal.write_histories(out, columns, loops, answer.title)
         tail = f"; {len(loops)} loops"
+
     names = ", ".join(dict.fromkeys(column.name for column in histories))
     size = histories[0].values.size
     return f"{out}: {size} rows of {names}{_note_thinning(answer)}{tail}"

@@ -25,6 +25,7 @@ def draw_sweep(dataset, measure: str, axes=None):
     dataset : xarray.Dataset
         From `to_dataset`, or the content of sweep.nc.
     measure : str
+        Name of a variable that has an error.
     axes : matplotlib.axes.Axes, optional
         By default those of a new figure.
 

@@ -24,7 +24,7 @@ from ...effects import EFFECTS
 from ...model.model import Model
 from ...runs.batch.case_results import CaseResults
 from .. import store as answers
-from ..answer import Answer, Quantity, Remarks
+from ..answer import Answer, JsonObject, Quantities, Quantity, Remarks
 from ..folder import LOCK, refuse_others
 from .store import CHUNKS, Chunks, case_folder_name, write_chunk
 
@@ -39,13 +39,15 @@ class Writer:
     Attributes
     ----------
     cases : Cases
+        Values of the keys in each case.
     target : Path
+        The folder.
     shown : Path
         The folder as the user named it.
     names : (n,) array of uint64
         Names of the cases.
     keep : str
-        As in `run.SweepTarget`.
+        What is stored of each case: "none", "summaries", "results" or "pages".
     """
 
     cases: Cases
@@ -64,42 +66,38 @@ class Writer:
         number : int
             Number of the case in the sweep.
         model : Model or PatchfemError
+            Model of the case, or why it has none.
         results : CaseResults
+            Measures of the cases of a chunk.
         case : int
             Index of the case in `results`.
         """
-        quantities = {
-            name: Quantity(
-                results.values[name][case],
-                unit,
-                results.errors[name][case],
-                floor=float(results.floors[name][case]),
-                reason=results.reasons.get(name, {}).get(case, ""),
-            )
-            for name, unit in results.units.items()
-            if results.has(name, case)
-        }
+        kind = "linear"
+        title = ""
+        effects = []
+        not_in_scene = []
+        if isinstance(model, Model):
+            kind = model.kind
+            title = model.source.title
+            effects = [
+                {"effect": name, "equations": EFFECTS[name].equations}
+                for name in model.source.effects
+            ]
+            not_in_scene = list(model.absent)
+
+        # the keys are those of a single run; effects have no CPU time, because cases are computed together
         details = {
             "outcome": str(results.outcome[case]),
-            "effects": [],
-            "not_in_scene": [],
+            "effects": effects,
+            "not_in_scene": not_in_scene,
             "seconds": {"total": float(results.seconds[case])},
             "numerics": results.numerics.get(case, {}),
             "case": self._name_case(number),
         }
-        kind = "linear"
-        title = ""
-        if isinstance(model, Model):
-            kind = model.kind
-            title = model.source.title
-            details["effects"] = [
-                {"effect": name, "equations": EFFECTS[name].equations}
-                for name in model.source.effects
-            ]
-            details["not_in_scene"] = list(model.absent)
         if case in results.messages:
             details["message"] = results.messages[case]
         remarks = Remarks(results.warnings.get(case, ()), results.notes.get(case, ()))
+        quantities = _make_quantities(results, case)
         answer = Answer(kind, title, (), quantities, remarks=remarks, details=details)
         return json.dumps(answers.make_summary(answer), allow_nan=False, ensure_ascii=False) + "\n"
 
@@ -110,13 +108,14 @@ class Writer:
     def write_results(self, number: int, result) -> None:
         """Write the results folder of a case after its run."""
         # Only these sweeps need the modules that write the fields of a run.
+        from .. import page
         from ..folder import Folder as ResultsFolder
-        from ..run_folder import write_results, write_run_page
+        from ..run_folder import write_results
 
         with ResultsFolder(self.target / CASES / case_folder_name(self.names[number])) as folder:
-            written = write_results(result, folder.path, self._name_case(number))
-        if self.keep == "pages":
-            write_run_page(written, folder.target)
+            write_results(result, folder.path, self._name_case(number))
+            if self.keep == "pages":
+                page.write_page(folder.path)
 
     def put(self, numbers: Sequence[int], results: CaseResults, texts: Sequence[str]) -> None:
         """Write the summaries of cases, then their chunk.
@@ -126,6 +125,7 @@ class Writer:
         numbers : sequence of int
             Numbers of the cases in the sweep.
         results : CaseResults
+            Their measures.
         texts : sequence of str
             Content of summary.json of each case.
 
@@ -150,12 +150,28 @@ class Writer:
             ) from None
 
 
+def _make_quantities(results: CaseResults, case: int) -> Quantities:
+    """Return the measures of a case."""
+    quantities = {}
+    for name, unit in results.units.items():
+        if results.has(name, case):
+            quantities[name] = Quantity(
+                results.values[name][case],
+                unit,
+                results.errors[name][case],
+                floor=float(results.floors[name][case]),
+                reason=results.reasons.get(name, {}).get(case, ""),
+            )
+    return quantities
+
+
 class Folder:
     """Folder of a sweep, which is locked while it is open, unless shards share it.
 
     Parameters
     ----------
     target : Path
+        Folder as the user named it.
     names : (n,) array of uint64
         Names of the cases.
     is_shared : bool
@@ -206,7 +222,7 @@ class Folder:
             with suppress(OSError):  # a folder with results is kept
                 folder.rmdir()
 
-    def read_details(self) -> dict:
+    def read_details(self) -> JsonObject:
         """Return the contents of sweep.json, or {} if it cannot be read."""
         try:
             details = json.loads((self.target / "sweep.json").read_bytes())
@@ -214,7 +230,7 @@ class Folder:
         except (OSError, ValueError, AttributeError):
             return {}
 
-    def refuse_other_sweep(self, identity: dict) -> None:
+    def refuse_other_sweep(self, identity: JsonObject) -> None:
         """Raise PatchfemError if the tables in the folder are those of another scene or of other keys.
 
         identity: `of` in sweep.json, from `answer.identify_sweep`.

@@ -35,6 +35,7 @@ class SweepTarget:
     Attributes
     ----------
     target : Path
+        Folder as the user named it.
     resume : bool
         Whether existing results are used.
     keep : str
@@ -70,10 +71,13 @@ def sweep_into(
     Parameters
     ----------
     sweep_scene : SweepScene
+        What all cases share.
     cases : Cases
+        Values of the keys in each case.
     place : SweepTarget
+        Where and how the sweep is stored.
     executor : object
-        From `campaigns.sweeps.executors`.
+        Computes chunks of cases, from `campaigns.sweeps.executors.make_executor`.
     say : callable, optional
         Takes a line of text.
     report_progress : callable, optional
@@ -94,14 +98,11 @@ def sweep_into(
         requested = np.arange((i - 1) * len(cases) // n, i * len(cases) // n)
         is_stored = folder.find_stored_cases(keep)[requested]
         if not (place.resume or is_shard):
-            is_interrupted = folder.read_details().get("cases", {}).get("unfinished") != 0
-            if say is not None and is_stored.any() and is_interrupted:
-                say(
-                    f"note: {is_stored.sum()} of {len(cases)} cases already have an answer from an interrupted "
-                    "sweep but are run again; use --resume to keep such answers"
-                )
+            if say is not None:
+                _note_stored_cases(folder, int(is_stored.sum()), len(cases), say)
             is_stored[:] = False
 
+        # cases that are not stored are tried again by a resumed sweep
         abandoned = []
         write = partial(write_tables, sweep_scene, cases, folder, place.page, abandoned)
         writer = Writer(cases, folder.target, folder.shown, folder.chunks.names, keep)
@@ -113,13 +114,10 @@ def sweep_into(
         )
         n_done = int(is_stored.sum())
         report_progress(n_done, requested.size)
+        missing = requested[~is_stored].tolist()
         try:
-            for chunk, results, texts in iterate_chunks(
-                work, requested[~is_stored].tolist(), executor, say
-            ):
-                if (
-                    texts is None
-                ):  # these cases are not stored, so that a resumed sweep tries them again
+            for chunk, results, texts in iterate_chunks(work, missing, executor, say):
+                if texts is None:
                     abandoned.append((chunk, results))
                 else:
                     writer.put(chunk, results, texts)
@@ -131,11 +129,23 @@ def sweep_into(
                 with suppress(PatchfemError):
                     write()
             raise
+
+        # the tables of a shard would lack the cases of the others
         if is_shard:
             return None
         answer = write()
         folder.clean(removes_others=not place.resume, keep=keep)
     return answer
+
+
+def _note_stored_cases(folder: Folder, count: int, total: int, say: Callable[[str], None]) -> None:
+    """Say that an interrupted sweep in the folder has some of the cases, which are computed again."""
+    is_interrupted = folder.read_details().get("cases", {}).get("unfinished") != 0
+    if count and is_interrupted:
+        say(
+            f"note: {count} of {total} cases already have an answer from an interrupted sweep but are run again; use "
+            "--resume to keep such answers"
+        )
 
 
 def write_tables(
@@ -151,8 +161,11 @@ def write_tables(
     Parameters
     ----------
     sweep_scene : SweepScene
+        What all cases share.
     cases : Cases
+        Values of the keys in each case.
     folder : Folder
+        Open folder of the sweep.
     page : bool
         Whether report.html is written.
     abandoned : sequence
@@ -204,9 +217,11 @@ def compute_in_memory(
     Parameters
     ----------
     sweep_scene : SweepScene
+        What all cases share.
     cases : Cases
+        Values of the keys in each case.
     executor : object
-        From `campaigns.sweeps.executors`.
+        Computes chunks of cases, from `campaigns.sweeps.executors.make_executor`.
     say : callable, optional
         Takes a line of text.
     """
@@ -220,20 +235,18 @@ def compute_in_memory(
 def collect_shards(
     sweep_scene: SweepScene, cases: Cases, target: Path, page: bool = True
 ) -> Answer:
-    """Write all tables of a sweep whose shards are complete, from its folder.
+    """Write all tables of a sweep whose shards are complete, from its folder; Missing if cases have no result yet.
 
     Parameters
     ----------
     sweep_scene : SweepScene
+        What all cases share.
     cases : Cases
+        Values of the keys in each case.
     target : Path
+        Folder of the sweep.
     page : bool
         Whether report.html is written.
-
-    Raises
-    ------
-    Missing
-        If cases have no result yet.
     """
     with Folder(target, cases.compute_hashes(sweep_scene)) as folder:
         answer = write_tables(sweep_scene, cases, folder, page, is_collected=True)

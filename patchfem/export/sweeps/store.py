@@ -25,19 +25,16 @@ TABLE_TYPES = {"values": np.float64, "errors": np.float32, "floors": np.float32}
 
 
 def write_chunk(folder: Path, names: np.ndarray, results: CaseResults) -> Path:
-    """Write the results of cases into a file of a folder, and return the file.
+    """Write the results of cases into a file of a folder, and return this file; WriteError without space.
 
     Parameters
     ----------
     folder : Path
+        Folder of the chunks.
     names : (n,) array of int
         Names of the cases.
     results : CaseResults
-
-    Raises
-    ------
-    OSError or WriteError
-        If there is no space.
+        Measures and outcomes of the cases.
     """
     data = {
         "name": Variable(("case",), np.asarray(names, np.uint64), ""),

@@ -37,10 +37,13 @@ def write_csv(cases: Cases, table: SweepTable, case_folders: Sequence[str], path
     Parameters
     ----------
     cases : Cases
+        Values of the keys in each case.
     table : SweepTable
+        Measures and outcome of each case.
     case_folders : sequence of str
         Folders of the cases; empty if there are none.
     path : Path
+        File to write.
     """
     names = sort_measures(table)
     heads = [axis.key for axis in cases.axes] + ["outcome"]

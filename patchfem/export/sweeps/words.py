@@ -84,15 +84,16 @@ def _describe_limit(limits: list[KeyLimit]) -> str:
     # limits of a motion come before those of its patch, which change before the motion does
     moving = [limit for limit in open_ended if limit.measure in rows.TABLE]
     first = min(moving or open_ended, key=lambda limit: np.nan_to_num(limit.value, nan=limit.low))
-    ends = [format_value(end, first.unit, 3) for end in (first.low, first.high, first.value)]
+    numbers = (first.low, first.high, first.value)
+    low, high, value = (format_value(number, first.unit, 3) for number in numbers)
     if not np.isfinite(first.value):
         return (
-            f"{first.key} may reach at least {ends[0]} before {_label(first.measure)} changes by 5 %; "
+            f"{first.key} may reach at least {low} before {_label(first.measure)} changes by 5 %; "
             "more cases are needed to find this limit."
         )
     return (
-        f"{first.key} may reach {ends[2]} before {_label(first.measure)} changes by 5 % "
-        f"(between the cases at {ends[0]} and {ends[1]})."
+        f"{first.key} may reach {value} before {_label(first.measure)} changes by 5 % "
+        f"(between the cases at {low} and {high})."
     )
 
 

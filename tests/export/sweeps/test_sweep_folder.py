@@ -131,9 +131,9 @@ def test_exact_files_of_cases_follow_keep(scene_file, tmp_path):
             continue
         assert {path.name for path in (folder / "cases" / done["case"]).iterdir()} == expected
         summary = store.read_summary(folder / "cases" / done["case"])
-        assert float(done["loop_area"]) == summary["measures"]["loop_area"]["value"]
-        assert summary["case"] == {"friction.static": "0.1"}
-        message = store.read_summary(folder / "cases" / failed["case"])["message"]
+        assert float(done["loop_area"]) == summary.measures["loop_area"].value
+        assert summary.case == {"friction.static": "0.1"}
+        message = store.read_summary(folder / "cases" / failed["case"]).message
         assert message == failed["message"] and "friction.static" in message
 
 
