@@ -59,6 +59,7 @@ PUBLIC = {
     "bonds.spread": ("carried_fraction",),
     "bonds.temperature": ("surface_temperature_rise",),
     "grooves": ("Grooves",),
+    "laws.bouc_wen_kernels": ("follow_path",),
     "laws.coulomb": ("Coulomb",),
     "laws.elastic_plastic": (
         "masing_loop",
@@ -66,6 +67,10 @@ PUBLIC = {
     ),
     "laws.iwan": ("max_yield_displacement",),
     "laws.lugre": ("LuGre",),
+    "laws.lugre_kernels": (
+        "rate_equation",
+        "relaxation_length",
+    ),
     "laws.stretch": ("points_element",),
     "laws.stretch_kernels": ("relax_stretch",),
     "path_work": (
