@@ -58,6 +58,7 @@ PUBLIC = {
     "bonds.points_kernels": ("point_list",),
     "bonds.spread": ("carried_fraction",),
     "grooves": ("Grooves",),
+    "laws.bouc_wen_kernels": ("follow_path",),
     "laws.coulomb": ("Coulomb",),
     "laws.elastic_plastic": (
         "masing_loop",
@@ -65,6 +66,10 @@ PUBLIC = {
     ),
     "laws.iwan": ("max_yield_displacement",),
     "laws.lugre": ("LuGre",),
+    "laws.lugre_kernels": (
+        "rate_equation",
+        "relaxation_length",
+    ),
     "laws.stretch": ("points_element",),
     "laws.stretch_kernels": ("relax_stretch",),
     "path_work": (

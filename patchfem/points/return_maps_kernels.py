@@ -43,16 +43,12 @@ from ..friction.bonds.point_kernels import (
     short_bond_mean,
     short_bond_step,
 )
+from ..friction.laws.bouc_wen_kernels import follow_path
+from ..friction.laws.lugre_kernels import rate_equation, relaxation_length
 from .law_rows import Law, Masing
 
 SMALL_RATE = 1e-4  # rate times step below which series replace exponentials
-LIMIT_FRACTION = 1e-9  # smallest Stribeck limit relative to the static one, because z divides by it
-# Longest piece of a path in relaxation lengths that the Bouc-Wen law integrates at once.
-PIECE = 0.03125
-NEARLY_SATURATED = (
-    1e-3  # distance of z from 1 below which any exponent of the Bouc-Wen law has a closed form
-)
-SATURATED = 1e-14  # distance of |z| from 1 that is round-off
+MIN_DISTANCE = 1e-9  # smallest distance of a stretch from its limit, relative to it
 DIFFERENCE = 1e-6  # relative increment of the numerical tangent of the LuGre law
 
 
@@ -231,9 +227,9 @@ def _mean_lugre(numbers, stretch, j, load, step):
     first = step.start_velocity
     last = step.end_velocity
     middle = 1.5 * dq / duration - 0.25 * (first + last)
-    begin = _stribeck_limit(numbers, j, first) / numbers[1, j]
-    centre = _stribeck_limit(numbers, j, middle) / numbers[1, j]
-    end = _stribeck_limit(numbers, j, last) / numbers[1, j]
+    begin = relaxation_length(numbers[:, j], first)[0]
+    centre = relaxation_length(numbers[:, j], middle)[0]
+    end = relaxation_length(numbers[:, j], last)[0]
     path = duration / 6 * (abs(first) / begin + 4 * abs(middle) / centre + abs(last) / end)
     shapes = shape_functions(path)
     start = direction * begin
@@ -247,17 +243,8 @@ def _mean_lugre(numbers, stretch, j, load, step):
 @njit(**NJIT_CALL)
 def _lugre_force(numbers, j, load, stretch, velocity):
     """Return the force of the LuGre law at a stretch and a velocity."""
-    limit = _stribeck_limit(numbers, j, velocity)
-    rate = velocity - abs(velocity) * stretch * numbers[1, j] / limit
-    return load * (numbers[1, j] * stretch + numbers[5, j] * rate + numbers[6, j] * velocity)
-
-
-@njit(**NJIT_KERNEL)
-def _stribeck_limit(numbers, j, velocity):
-    """Return the steady force of the LuGre law per load at a velocity."""
-    ratio = velocity / numbers[4, j]
-    rise = (numbers[3, j] - numbers[2, j]) * exp(-min(ratio * ratio, 700.0))
-    return max(numbers[2, j] + rise, LIMIT_FRACTION * numbers[3, j])
+    direction = 1.0 if velocity > 0 else -1.0
+    return load * rate_equation(numbers[:, j], stretch, velocity, direction).force
 
 
 @njit(**NJIT_CALL)
@@ -277,65 +264,13 @@ def _mean_spring(numbers, slide, j, dq):
     return force, (numbers[1, j] / turn * sin(turn * end) - force) / dq
 
 
-@njit(**NJIT_CALL)
+@njit(**NJIT_KERNEL)
 def _walk_bouc_wen(numbers, z, j, load, dq):
-    """Return force and path-mean force of the Bouc-Wen law, whose z is advanced by Runge-Kutta steps.
-
-    With y = z sgn(dq) and the path x in lengths, dy/dx = 1 - y^n for y > 0 and 1 - (1 - 2 s)|y|^n below.
-    """
+    """Return force and path-mean force of the Bouc-Wen law."""
     direction = 1.0 if dq > 0 else -1.0
-    power = numbers[3, j]
-    unloading = 1 - 2 * numbers[4, j]
-    left = abs(dq) / numbers[2, j]
-    whole = left
-    longest = PIECE / max(1.0, power)
-    nearly = 1.0 if power == 1.0 or power == 2.0 else NEARLY_SATURATED
-    y = direction * z
-    area = 0.0
-    while left > 0:
-        if 1 - y <= nearly:
-            rest = _saturate(1 - y, power, left)
-            area += left - left * rest.mean
-            y = 1 - rest.end
-            break
-        # A piece ends where loading begins, at y = 0.
-        piece = min(left, longest)
-        if y < 0:
-            piece = min(piece, max(-y, 1e-12))
-        first = _bouc_wen_rate(y, power, unloading)
-        second = _bouc_wen_rate(y + 0.5 * piece * first, power, unloading)
-        third = _bouc_wen_rate(y + 0.5 * piece * second, power, unloading)
-        fourth = _bouc_wen_rate(y + piece * third, power, unloading)
-        area += piece * (y + piece * (first + second + third) / 6)
-        y += piece * (first + 2 * second + 2 * third + fourth) / 6
-        left -= piece
+    path = follow_path(direction * z, abs(dq) / numbers[2, j], numbers[3, j], numbers[4, j])
     limit = direction * numbers[1, j] * load
-    return Relaxed(limit * y, limit * area / whole if whole > 0 else limit * y)
-
-
-@njit(**NJIT_KERNEL)
-def _saturate(distance, power, path):
-    """Return the distance e of z from 1 after a path in lengths, and its mean over the path.
-
-    To order e^3, de/dx = -n e + n (n - 1) e^2/2, which is Bernoulli's equation; it is exact for n = 1 and 2.
-    """
-    bend = 0.5 * (power - 1)
-    if distance < SATURATED:
-        return Relaxed(0.0, 0.0)
-    decay = exp(-power * path)
-    end = distance * decay / (1 - bend * distance * (1 - decay))
-    # The integral is ln((1 - bend e_end)/(1 - bend e))/(n bend).
-    fall = (distance - end) / (1 - bend * distance)
-    x = bend * fall
-    ratio = log1p(x) / x if x > SMALL_RATE else 1 - 0.5 * x
-    return Relaxed(end, fall / power * ratio / path)
-
-
-@njit(**NJIT_KERNEL)
-def _bouc_wen_rate(y, power, unloading):
-    """Return dy/dx of the Bouc-Wen law."""
-    size = y * y if power == 2.0 else abs(y) ** power
-    return 1 - size if y > 0 else 1 - unloading * size
+    return Relaxed(limit * path.end, limit * path.mean)
 
 
 @njit(**NJIT_KERNEL)
@@ -583,10 +518,10 @@ def slip_since_zero(numbers, memory, j, load, velocity):
         longest = memory[1, j] * memory[0, j] / load
     elif law == Law.LUGRE:
         stretch = memory[0, j]
-        longest = _stribeck_limit(numbers, j, velocity) / numbers[1, j]
+        longest = relaxation_length(numbers[:, j], velocity)[0]
     else:
         return 0.0
-    x = min(abs(stretch) / longest, 1 - LIMIT_FRACTION)
+    x = min(abs(stretch) / longest, 1 - MIN_DISTANCE)
     slip = longest * (-log1p(-x) - x)
     return slip if stretch > 0 else -slip
 

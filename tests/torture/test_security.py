@@ -35,10 +35,6 @@ WORDS = re.compile(
 )
 # uses that were reviewed; `shell` is the name of the shell whose completions are written
 HARMLESS = {
-    (
-        "compiled.cache_files",
-        "pickle",
-    ),  # numba's format of machine code, in a folder of the user
     ("compiled", "compile()"),
     ("compiled", "exec()"),  # a loop of the package in which its friction law is inserted
     ("__main__", "shell=shell"),

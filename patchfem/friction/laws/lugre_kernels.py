@@ -29,8 +29,16 @@ class LuGreNumber(IntEnum):
 
 
 @njit(error_model="numpy", forceinline=True, **NJIT_NO_REFCOUNT)
-def _relaxation_length(numbers, velocity):
-    """Return the length g/stiffness [m] over which z relaxes, and its velocity derivative [s]."""
+def relaxation_length(numbers, velocity):
+    """Return the length g/stiffness [m] over which z relaxes, and its velocity derivative [s].
+
+    Parameters
+    ----------
+    numbers : (k,) array
+        Numbers of the law.
+    velocity : float
+        Velocity [m/s].
+    """
     stiffness = numbers[LuGreNumber.STIFFNESS]
     kinetic = numbers[LuGreNumber.KINETIC]
     static = numbers[LuGreNumber.STATIC]
@@ -56,7 +64,7 @@ def rate_equation(numbers, stretch, velocity, direction):
     stiffness = numbers[LuGreNumber.STIFFNESS]
     micro_damping = numbers[LuGreNumber.MICRO_DAMPING]
     viscous = numbers[LuGreNumber.VISCOUS]
-    length, length_derivative = _relaxation_length(numbers, velocity)
+    length, length_derivative = relaxation_length(numbers, velocity)
     stretch_rate = 1 - direction * stretch / length
     length_term = direction * stretch * velocity * length_derivative / (length * length)
     return Rates(
@@ -82,7 +90,7 @@ def relax_stretch(numbers, stretch, increment, dt):
     length = limit / numbers[LuGreNumber.STIFFNESS]
     length_by_path = 0.0  # derivative of the length with respect to the path
     if dt > 0:
-        length, length_by_velocity = _relaxation_length(numbers, path / dt)
+        length, length_by_velocity = relaxation_length(numbers, path / dt)
         length_by_path = length_by_velocity / dt
     x = path / length
     decay = exp(-x)
