@@ -9,7 +9,7 @@ single trace in each direction is too short to decide whether the report is righ
 The surface is made, so that its larger swings are the report's 13 to 18 um, and worn as in studies/wear/bands.py: 6 um
 off each piece at a stroke of 6.4 um, both assumed. Its traces are 1 mm long, as those of the print, before and after at
 different lines, as a stylus set down twice would run. Twice the amplitude that `profile` reads for the waves of 60 to
-110 um is 8 to 15 um before and 4 to 10 um after. At a stroke of 12.8 um, where waves wear to 0.42 and 0.62, the counts
+110 um is 6 to 18 um before and 3 to 12 um after. At a stroke of 12.8 um, where waves wear to 0.42 and 0.62, the counts
 are 18, 11 and 5. Before the tests 1 set is called lower along x. The intervals, 95 %, hold the ratios of the whole
 areas in 37 and 37 of 40 cases. No set gives a worn depth: with 6 um off, valleys are worn too, and the traces have no
 common place to count from.

@@ -170,6 +170,5 @@ def advise_split(patch_model, element: float) -> list[str]:
     except PatchfemError:
         return []
     spectrum = wave_spectrum(_level_trace(patch_model, element), is_tapered=True)
-    if spectrum.lost_fraction(ELEMENTS_PER_CURVE * element) <= NEGLIGIBLE_LOST:
-        return []
-    return [split.describe_split()]
+    lost = spectrum.lost_fraction(ELEMENTS_PER_CURVE * element)
+    return [split.describe_split()] if lost > NEGLIGIBLE_LOST else []

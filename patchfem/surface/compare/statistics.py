@@ -140,7 +140,17 @@ def find_box(mask) -> tuple[slice, ...]:
 
 
 def subtract_plane(z, columns, use=None) -> np.ndarray:
-    """Subtract the least-squares combination of columns (k, ...) from heights z (...); use: mask of those that it fits."""
+    """Subtract a least-squares combination of columns from heights.
+
+    Parameters
+    ----------
+    z : (n,) or (m, n) array [m]
+        Heights.
+    columns : (k, n) or (k, m, n) array
+        Functions that are combined.
+    use : array of bool, optional
+        Mask of the heights that the combination fits; all of them by default.
+    """
     use = np.ones(z.shape, bool) if use is None else use
     factors = np.linalg.lstsq(columns[:, use].T, z[use], rcond=None)[0]
     return z - np.tensordot(factors, columns, 1)

@@ -113,7 +113,9 @@ def make_surface(table: Table, units: tuple[str, str] | None = None) -> Profile 
         table, places = _undo_rounding(table, role, places)
         _require_increase(table, role, places)
         axes.append(frozen_array(places))
-    unit_source = "the file format" if table.are_units_fixed else "--units" if units else ""
+    unit_source = "--units" if units else ""
+    if table.are_units_fixed:
+        unit_source = "the file format"
     notes = _check_span(table.path, max(map(np.ptp, axes)), z, unit_source)
     surface = Profile if z.ndim == 1 else Areal
     return surface(*reversed(axes), frozen_array(z), str(table.path), table.notes + notes)
@@ -225,11 +227,9 @@ def _undo_rounding(table: Table, role: str, x) -> tuple[Table, np.ndarray]:
     # The printed digit is the smallest difference of two steps.
     gaps = np.diff(np.sort(np.diff(x)))
     gaps = gaps[gaps > EVEN_TOL * np.ptp(x) / x.size]
-    digit = (
-        max(float(gaps.min(initial=np.ptp(x))), MIN_PRINTED_DIGIT)
-        if gaps.size
-        else MIN_PRINTED_DIGIT
-    )
+    digit = MIN_PRINTED_DIGIT
+    if gaps.size:
+        digit = max(digit, float(gaps.min()))
 
     count = np.arange(x.size) - (x.size - 1) / 2
     evens = [x.mean() + float(count @ x / (count @ count)) * count]
