@@ -1,7 +1,7 @@
 """Computation of the measures of a run: values with names, units and errors.
 
 In: histories of a run, and measures that its engine integrated over the last cycles
-(`dynamics.integrated`). Out: measures by name with errors from coarse runs, the outcome, the
+(`dynamics.integrated`). Out: measures by name with errors from coarse runs, the outcome,
 and the stick-slip events. Read `rows` first: each row of its table evaluates a
 `LastCycles`. A value that the engine integrated replaces the value from samples. `measures` has the
 functions that evaluate samples.
