@@ -69,22 +69,6 @@ FACE = "structure.interface.0.contact."
 REFUSALS = [
     # ---- bonds and laws
     (
-        BENCH,
-        BONDS
-        + "friction.order=2; accuracy.quadrature=direct; slide.cycles=400; accuracy.steps_per_cycle=4000",
-        r"more than the limit of \d+ s; lower accuracy.steps_per_cycle",
-    ),
-    (
-        TILTED + COULOMB + SLIDE,
-        BONDS + "friction.order=2; accuracy.quadrature=merged; contact.tilt.on=lower",
-        "'merged' with a shape on the lower piece",
-    ),
-    (
-        BONDED_RIG,
-        "friction.reading=report; drive.cycles=10000000",
-        "list of bonds .*; lower drive.cycles",
-    ),
-    (
         BONDED_RIG,
         "friction.reading=report; structure.moving_mass=6.5 mg; accuracy.tolerance=1e-5",
         "the vibration of the block on its bonds, at .* Hz",
