@@ -17,7 +17,7 @@ from ...scene.backbone_scene import ASSUMED_MASS, BackboneTables, GivenMode, par
 ASSUMED_JOINT_FRACTION = 0.1
 MAX_JOINT_FRACTION = 0.5  # Largest sum of these fractions over all modes.
 IGNORED_TABLE_NOTE = (
-    "{table} is ignored: a backbone is the motion of a mode at every amplitude, without a drive"
+    "[{table}] is ignored: a backbone is the motion of a mode at every amplitude, without a drive"
 )
 ASSUMED_SIGNS_NOTE = (
     "every assumed `slide` is positive, so these modes are assumed to move the contact in the same direction when they "
