@@ -192,6 +192,14 @@ REMEDIES = {  # refused text, message, text after the remedy, and given units
         "# Width: 4000 um\n# Height: 3000 um\n# Value units: nm\n" + ROWS,
         None,
     ),
+    "axes": (
+        "# Width: 4 um\n# Height: 4 um\n# Value units: nm\n0 0 1 2 3\n0 3 1 4 1\n1 5 9 2 6\n2 5 3 5 8\n"
+        "3 9 7 9 3\n",
+        "the first row and the first column of the matrix grow evenly, like coordinates and not "
+        "heights; leave out this row",
+        "# Width: 4 um\n# Height: 4 um\n# Value units: nm\n3 1 4 1\n5 9 2 6\n5 3 5 8\n9 7 9 3\n",
+        None,
+    ),
     "two scans": (
         "# Width: 4 um\n# Height: 3 um\n# Value units: nm\n" + ROWS + "# Channel: Phase\n" + ROWS,
         ":7: '# Channel: Phase' ends the scan or begins another one; keep only one scan per file",
