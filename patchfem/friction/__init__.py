@@ -51,10 +51,6 @@ PUBLIC = {
         "short_bond_mean",
         "short_bond_step",
     ),
-    "bonds.points": (
-        "FirstOrderBonds",
-        "ListedBonds",
-    ),
     "bonds.points_kernels": ("point_list",),
     "bonds.spread": ("carried_fraction",),
     "grooves": ("Grooves",),

@@ -11,7 +11,8 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "friction_ladder"))
 import ladder_cycles as ladder
 import today
 
-from patchfem.friction import FirstOrderBonds, ListedBonds, Step
+from patchfem.friction import Step
+from patchfem.friction.bonds.points import FirstOrderBonds, ListedBonds
 from patchfem.friction.laws.elastic_plastic import ElasticPlastic
 
 LENGTH = ladder.LENGTH  # [m] bond length

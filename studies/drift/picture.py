@@ -16,7 +16,7 @@ from drift_laws import LENGTH, PERIOD, ladder
 from force_control import OutOfReach, drift
 from friction_forms import dither_drift, stretch_loop
 
-from patchfem.friction import FirstOrderBonds
+from patchfem.friction.bonds.points import FirstOrderBonds
 
 FOLDER = Path(__file__).parent
 MARCHED_SWINGS = (0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.35, 0.4)

@@ -14,7 +14,8 @@ from scipy.optimize import brentq
 from scipy.special import gammainc
 
 from patchfem.core import InitialState, Missing, Outcome, SineDrive
-from patchfem.friction import Bonds, FirstOrderBonds
+from patchfem.friction import Bonds
+from patchfem.friction.bonds.points import FirstOrderBonds
 from patchfem.points import time_march as engine
 from patchfem.points.contacts import BondSum, make_bond_contact, make_pressed_contact
 from patchfem.points.time_march import march

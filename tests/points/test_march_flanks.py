@@ -12,7 +12,8 @@ from modal_bases import make_modal_basis
 import patchfem as pf
 from patchfem import load
 from patchfem.core import Outcome, SineDrive
-from patchfem.friction import Bonds, FirstOrderBonds, Grooves
+from patchfem.friction import Bonds, Grooves
+from patchfem.friction.bonds.points import FirstOrderBonds
 from patchfem.friction.laws.elastic_plastic import ElasticPlastic
 from patchfem.points.contacts import (
     make_bond_contact,

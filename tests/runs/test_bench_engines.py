@@ -6,7 +6,8 @@ import pytest
 from friction_paths import march_path
 
 from patchfem import build
-from patchfem.friction import Coulomb, FirstOrderBonds, steady_loop
+from patchfem.friction import Coulomb, steady_loop
+from patchfem.friction.bonds.points import FirstOrderBonds
 from patchfem.friction.record import make_law
 from patchfem.points.slides import BLOCK
 from patchfem.runs.bench import bench

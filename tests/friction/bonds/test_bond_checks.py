@@ -11,8 +11,9 @@ from friction_paths import march_path, upper_pressure
 from hypothesis import given
 from hypothesis import strategies as st
 
-from patchfem.friction import Bonds, FirstOrderBonds, ListedBonds, growth_numbers
+from patchfem.friction import Bonds, growth_numbers
 from patchfem.friction.bonds.point_kernels import grow
+from patchfem.friction.bonds.points import FirstOrderBonds, ListedBonds
 
 UNIT_PRESSURE = upper_pressure([1.0])
 UNEVEN_PATH = np.array([0.0, 0.02, 0.5, 0.7, 1.0, 1.9, 2.0, 3.3, 4.0])

@@ -13,7 +13,8 @@ from friction_paths import (
 from list_paths import STATUS, march_list
 from scipy.special import gammainc
 
-from patchfem.friction import Bonds, FirstOrderBonds
+from patchfem.friction import Bonds
+from patchfem.friction.bonds.points import FirstOrderBonds
 
 UNIT_PRESSURE = upper_pressure([1.0])
 GROWTH = {"ratio": 0.6, "rest_growth": 0.3, "slip_growth": 0.4, "rest_speed": 1e-2}

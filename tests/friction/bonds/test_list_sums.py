@@ -10,7 +10,8 @@ from friction_paths import (
     upper_pressure,
 )
 
-from patchfem.friction import STATUS, Bonds, ListedBonds
+from patchfem.friction import STATUS, Bonds
+from patchfem.friction.bonds.points import ListedBonds
 
 TWO_PRESSURES = upper_pressure([1.0, 0.25])
 GROWTH = {"ratio": 0.6, "rest_growth": 0.3, "slip_growth": 0.4, "rest_speed": 1e-2}

@@ -17,8 +17,9 @@ from vibration_forms import sliding_amplitude
 
 from patchfem import build
 from patchfem.core import SineDrive
-from patchfem.friction import Bonds, FirstOrderBonds, ListedBonds
+from patchfem.friction import Bonds
 from patchfem.friction.bonds.list_numbers import cutoff_age
+from patchfem.friction.bonds.points import FirstOrderBonds, ListedBonds
 from patchfem.points.contacts import make_bond_contact
 from patchfem.points.time_march import march
 from patchfem.response import energy_balance

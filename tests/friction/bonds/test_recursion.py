@@ -12,8 +12,9 @@ from friction_paths import (
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from patchfem.friction import Bonds, FirstOrderBonds, ListedBonds
+from patchfem.friction import Bonds
 from patchfem.friction.bonds.point_kernels import bond_mean
+from patchfem.friction.bonds.points import FirstOrderBonds, ListedBonds
 
 GROWTH = [{}, {"ratio": 0.5, "rest_growth": 0.4, "slip_growth": 0.3, "rest_speed": 1e-2}]
 X = np.linspace(-3, 3, 7)

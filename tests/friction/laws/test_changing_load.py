@@ -8,7 +8,8 @@ from scipy.special import gammainc
 
 from patchfem import build, plan
 from patchfem.core import Missing
-from patchfem.friction import Bonds, Coulomb, FirstOrderBonds, ListedBonds
+from patchfem.friction import Bonds, Coulomb
+from patchfem.friction.bonds.points import FirstOrderBonds, ListedBonds
 from patchfem.friction.laws.elastic_plastic import ElasticPlastic
 from patchfem.friction.laws.tanh import TanhLaw
 from patchfem.runs.bench import bench as law_bench

@@ -13,7 +13,8 @@ from scipy.special import gamma
 
 from patchfem import SceneError, build, plan
 from patchfem.core import PatchfemError
-from patchfem.friction import Bonds, Coulomb, FirstOrderBonds, ListedBonds
+from patchfem.friction import Bonds, Coulomb
+from patchfem.friction.bonds.points import FirstOrderBonds, ListedBonds
 from patchfem.friction.laws.convolution import Convolution, average_pressure, sliding_limits
 from patchfem.runs import solve_with_coarser
 from patchfem.runs.bench import bench
