@@ -182,6 +182,7 @@ def measure_last_cycle_amplitude(time, position, speed, period: float) -> float 
     reversal_positions = []
     direction = 0
     farthest = float(position[-1])
+
     for reversal in locate_reversals(time, position, speed)[1][::-1].tolist():
         if direction == 0:
             if abs(reversal - farthest) > MAX_RIPPLE * last_range:
@@ -193,6 +194,7 @@ def measure_last_cycle_amplitude(time, position, speed, period: float) -> float 
             reversal_positions.append(farthest)
             farthest = reversal
             direction = -direction
+
         if len(reversal_positions) == 3:
             return (
                 max(
@@ -201,6 +203,7 @@ def measure_last_cycle_amplitude(time, position, speed, period: float) -> float 
                 )
                 / 2
             )
+
     return None
 
 
@@ -238,17 +241,23 @@ def fit_decay_curve(half_cycles: HalfCycles) -> DecayCurve:
     """
     if half_cycles.size.size < 3:
         return DecayCurve(*np.empty((6, 0)))
+
+    # The slopes of ln S_k and of t_k give decrement and half period (module docstring).
     log_sizes = np.log(half_cycles.size)
     decrements = fit_slopes(
         log_sizes, _limit_noise(half_cycles.size_noise / half_cycles.size, log_sizes)
     )
     noise = _limit_noise(half_cycles.middle_noise, half_cycles.middle)
     half_periods = fit_slopes(half_cycles.middle, noise)
+
+    # Points of noisy curves with the same data in their spans would repeat one another.
     selected = np.arange(half_periods.span.size)
     if noise.any():
         selected = _select_overlapping_spans(np.minimum(half_periods.span, decrements.span))
     half_periods = half_periods.select(selected)
     decrements = decrements.select(selected)
+
+    # With delta = -d ln S/dk: zeta = delta/(pi^2 + delta^2)^(1/2), and its derivative is pi^2/(pi^2 + delta^2)^(3/2).
     decay_per_radian = np.hypot(np.pi, decrements.slope)
     curve = DecayCurve(
         time=half_cycles.middle[1 + selected],
@@ -258,6 +267,7 @@ def fit_decay_curve(half_cycles: HalfCycles) -> DecayCurve:
         damping=-decrements.slope / decay_per_radian,
         damping_error=decrements.error * np.pi**2 / decay_per_radian**3,
     )
+
     return _add_damping_error(curve) if curve.time.size > 1 else curve
 
 
@@ -324,20 +334,27 @@ def fit_slopes(values, noise) -> Slopes:
     span = np.zeros(count, int)
     is_growing = np.ones(count, bool)
     shorter_fits: list = []
+
     for m in SPAN_LENGTHS:
         if 2 * m >= values.size or not is_growing.any():
             break
+
+        # Slope of the least-squares line over 2 m + 1 values, and its standard deviation.
         weight = np.arange(-m, m + 1) / np.sum(np.arange(-m, m + 1) ** 2)
         inside = slice(m - 1, count - m + 1)
         candidate, candidate_noise = np.full((2, count), np.nan)
         candidate[inside] = np.correlate(values, weight, "valid")
         candidate_noise[inside] = np.sqrt(np.correlate(noise**2, weight**2, "valid"))
+
+        # The noise of a difference of two nested fits has the difference of their variances.
         exists = is_growing & ~np.isnan(candidate)
         is_consistent = exists.copy()
         for shorter_slope, shorter_noise in shorter_fits:
             excess = np.sqrt(np.maximum(shorter_noise**2 - candidate_noise**2, 0.0))
             limit = MAX_SLOPE_DIFFERENCE * excess + VALUE_ROUND_OFF * np.abs(shorter_slope)
             is_consistent &= ~(np.abs(candidate - shorter_slope) > limit)
+
+        # A span that is too long shows the bias b m^2 of the longest accepted one.
         change = np.abs(candidate - slope)
         stops = exists & ~is_consistent
         bias[stops] = change[stops]
@@ -345,11 +362,13 @@ def fit_slopes(values, noise) -> Slopes:
         shorter_change[is_longer] = np.maximum(change - spread, 0.0)[is_longer]
         is_noisy = stops & (spread > 0)
         bias[is_noisy] /= (m / span[is_noisy]) ** 2 - 1
+
         slope[is_consistent] = candidate[is_consistent]
         spread[is_consistent] = candidate_noise[is_consistent]
         span[is_consistent] = m
         is_growing = is_consistent
         shorter_fits.append((candidate, candidate_noise))
+
     lacks_longer_span = np.isnan(bias)
     bias[lacks_longer_span] = shorter_change[lacks_longer_span]
     # At the first and the last inner point, only the shortest span exists. There, the bias of values without

@@ -27,12 +27,15 @@ def estimate_window_error(window: Response, period: float, offset: float) -> dic
     """
     if abs(offset) < 1e-9 or window.time.size < 4:
         return {}
+
     offset = abs(offset)
     span = window.time[-1] - window.time[0]
     cycles = span / period
     slips, slides = slips_and_displacements(window)
     forces = window.extra.get("forces", window.force[:, None])
     step_works = (forces[1:] + forces[:-1]) / 2 * np.diff(slides, axis=0)
+
+    # A shift by one step adds the last step and, in a window of fixed length, removes the first one.
     changes = {
         "relative_displacement_amplitude": _change_of_maximum_at_end(window.output) / 2
         + _change_of_maximum_at_end(-window.output) / 2,
@@ -41,6 +44,7 @@ def estimate_window_error(window: Response, period: float, offset: float) -> dic
         "friction_work": abs(float(step_works[-1].sum())),
     }
     changes["energy_dissipated"] = changes["friction_work"]
+
     for k in range(slides.shape[1]):
         suffix = f"_{k + 1}" if k else ""
         changes |= {
@@ -50,6 +54,7 @@ def estimate_window_error(window: Response, period: float, offset: float) -> dic
             + _change_of_maximum_at_end(-slips[:, k]) / 2,
             f"stick_fraction{suffix}": 1 / (window.time.size - 1),
         }
+
     return {name: offset * change for name, change in changes.items()}
 
 

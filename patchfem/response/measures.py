@@ -132,11 +132,13 @@ def compute_slip_measures(window: Response, drive, steps_per_cycle: int) -> dict
     if largest_distance(window.slide) <= MIN_SLIDE_RANGE:
         # The slip of a law without stiffness changes with its traction, even at constant displacement.
         return {"slip_amplitude": 0.0, "stick_fraction": 1.0}
+
     slip = window.slip
     measures = {"slip_amplitude": largest_distance(slip) / 2}
     # A single sample, or a slip within round-off, counts as stick.
     if slip.size < 2 or 2 * measures["slip_amplitude"] <= slip_round_off(window):
         return measures | {"stick_fraction": 1.0}
+
     cycles = max(1, (slip.size - 1) // steps_per_cycle)
     last_cycles = (
         slice(-cycles * steps_per_cycle - 1, None) if slip.size > steps_per_cycle else slice(None)
@@ -146,6 +148,8 @@ def compute_slip_measures(window: Response, drive, steps_per_cycle: int) -> dict
     time = window.time[last_cycles]
     is_at_rest = slide_steps <= COORDINATE_ROUND_OFF * np.abs(window.slide).max(initial=0.0)
     excess = compute_slip_excess(slip_steps, slide_steps, is_at_rest)
+
+    # The excess is known at the midpoints of the steps and linear in between.
     before = excess[:-1]
     after = excess[1:]
     rise = np.abs(after - before)
@@ -154,6 +158,7 @@ def compute_slip_measures(window: Response, drive, steps_per_cycle: int) -> dict
     measures["stick_fraction"] = (
         float(np.average(below, weights=np.diff(middles))) if below.size else float(excess[0] < 0)
     )
+
     onsets = np.flatnonzero((before < 0) & (after >= 0))
     if onsets.size:
         onset_times = middles[onsets] - before[onsets] / rise[onsets] * np.diff(middles)[onsets]
@@ -319,6 +324,7 @@ def peak_sampling_errors(window: Response) -> dict:
     errors = {
         "absolute_acceleration_peak": interpolate_peaks(np.abs(window.acceleration)[:, None])[1][0]
     }
+
     for name, sampling_errors in (
         ("friction_force_peak", interpolate_peaks(forces)[1]),
         ("slip_amplitude", interpolate_ranges(slips)[1] / 2),
@@ -326,6 +332,8 @@ def peak_sampling_errors(window: Response) -> dict:
         for k, error in enumerate(sampling_errors):
             errors[f"{name}_{k + 1}" if k else name] = error
     errors = {name: float(error) for name, error in errors.items() if error > 0}
+
+    # A parabola through three samples of distance h exceeds the middle one by at most an eighth of h^2 y''.
     load = window.extra.get("normal_load")
     if load is not None and len(load) > 2:
         for name, index in (

@@ -85,15 +85,18 @@ def judge_outcome(
         and is_still_loading(solution.window, drive.period, tolerance)
     ):
         return Outcome.TRANSIENT, {}
+
     limits = (tolerance, min_decay_rate)
     is_ringing = not level_cycles and find_ringing(solution, measures, limits, drive) > 0
     if solution.outcome is not None and not is_ringing:
         return solution.outcome, {}
+
     if hasattr(drive, "band"):
         is_stationary = stationary.is_stationary(solution.window, drive)
         return Outcome.DONE if is_stationary else Outcome.TRANSIENT, {}
     if not drive.segments and drive_sizes.count_repeat_cycles(drive) is None:
         return Outcome.TRANSIENT, {}
+
     # for several tones, each window contains whole beats
     floor = (
         AMPLITUDE_ROUND_OFF
@@ -102,12 +105,16 @@ def judge_outcome(
     )
     if not drive.segments and not drive_sizes.is_periodic(drive):
         return classify(solution.amplitudes, tolerance, floor), {}
+
     amplitudes = solution.amplitudes
     extremes = solution.extremes
     window = max(1, round((solution.window.time[-1] - solution.window.time[0]) / drive.period))
+
+    # The levels before the last one have other amplitudes.
     if level_cycles:
         amplitudes = amplitudes[-max(1, int(level_cycles / window)) :]
         extremes = None if extremes is None else extremes[-int(level_cycles) :]
+
     if not drive_sizes.is_periodic(drive):
         outcome = Outcome.STEADY
         if amplitudes[-1] > max(floor, measures[AMPLITUDE].floor):
@@ -117,6 +124,7 @@ def judge_outcome(
         if outcome is Outcome.GROWS and not drive.segments[-1].constant and min_decay_rate >= 0:
             outcome = Outcome.TRANSIENT
         return outcome, {}
+
     number, steady, error = (
         one[0]
         for one in classify_periodic(
@@ -128,11 +136,13 @@ def judge_outcome(
             solution.bounded,
         )
     )
+
     outcome = _reject_drifting(CLASSES[number], measures, tolerance)
     if is_ringing:
         outcome = Outcome.TRANSIENT
     if outcome is Outcome.GROWS or np.isnan(steady):
         return outcome, {}
+
     base = measures[AMPLITUDE]
     if outcome is not Outcome.TRANSIENT and not is_still_changing(
         steady, error, base.value, tolerance

@@ -172,6 +172,7 @@ class LastCycles:
         extra = self.window.extra
         if self.load is None or self.is_single_interface or "slides" not in extra:
             return []
+
         slips = extra.get("slips", extra["slides"])
         count = extra["slides"].shape[1]
         interfaces = []
@@ -183,6 +184,8 @@ class LastCycles:
                 force=extra["forces"][:, k],
                 slip=slips[:, k],
             )
+
+            # The area is the only measure of the loops of further interfaces, so that they need no harmonics.
             work = float(np.trapezoid(window.force, window.slide))
             interfaces.append(
                 replace(
@@ -193,6 +196,7 @@ class LastCycles:
                     loop=(0j, 0j, work * self.drive.period / max(self.span, 1e-300)),
                 )
             )
+
         return interfaces
 
     def evaluate_load(self, function: Callable) -> float | None:
@@ -220,29 +224,30 @@ def _drift_scale(values: dict):
 
 def _random_rows(
     name: str, unit: str, floor: float, definition: str, group: str = "motion"
-) -> tuple:
+) -> tuple[MeasureDefinition, MeasureDefinition]:
     """Return the rows of a measure under a random drive and of its statistical scatter."""
     scatter = f"{name}_scatter"
-    return (
-        MeasureDefinition(
-            name,
-            unit,
-            floor,
-            definition,
-            lambda s: s.random_response_measures.get(name),
-            group=group,
-        ),
-        MeasureDefinition(
-            scatter,
-            unit,
-            floor,
-            f"half-width of the 95 % interval of {name}: the scatter between "
-            "random drives of the same length with different seeds",
-            lambda s: s.random_response_measures.get(scatter),
-            group=group,
-            larger_term=(name, lambda values: np.abs(values.get(name, 0.0))),
-        ),
+    value_row = MeasureDefinition(
+        name,
+        unit,
+        floor,
+        definition,
+        lambda s: s.random_response_measures.get(name),
+        group=group,
     )
+
+    # The tolerance of a scatter refers to its measure, because the scatter itself may be near 0.
+    scatter_row = MeasureDefinition(
+        scatter,
+        unit,
+        floor,
+        f"half-width of the 95 % interval of {name}: the scatter between "
+        "random drives of the same length with different seeds",
+        lambda s: s.random_response_measures.get(scatter),
+        group=group,
+        larger_term=(name, lambda values: np.abs(values.get(name, 0.0))),
+    )
+    return value_row, scatter_row
 
 
 AMPLITUDE = "relative_displacement_amplitude"  # measure on which a run is refined

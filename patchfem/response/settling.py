@@ -128,9 +128,12 @@ def extrapolate_steady_amplitudes(amplitudes, phasors) -> tuple:
     count, n_windows = amplitudes.shape
     if n_windows < 5:
         return np.full(count, np.nan), np.full(count, np.nan)
+
     magnitude = np.abs(phasors)
     is_moving = np.all(magnitude[:, -5:] > 0, axis=1)
     waveform = amplitudes[:, -2:] / np.where(magnitude[:, -2:] > 0, magnitude[:, -2:], 1.0)
+
+    # Limits by Aitken's method from the last windows, and from those one and two windows earlier.
     aitken_limits = np.stack(
         [
             np.abs(
@@ -141,6 +144,8 @@ def extrapolate_steady_amplitudes(amplitudes, phasors) -> tuple:
         ],
         axis=1,
     )
+
+    # The ratio of amplitude to |phasor| approaches its limit as the phasors do.
     previous_change = np.abs(phasors[:, -2] - phasors[:, -3])
     change = np.abs(phasors[:, -1] - phasors[:, -2])
     decay_factor = np.minimum(
@@ -148,6 +153,7 @@ def extrapolate_steady_amplitudes(amplitudes, phasors) -> tuple:
         0.9995,
     )
     waveform_change = (waveform[:, -1] - waveform[:, -2]) * decay_factor / (1 - decay_factor)
+
     map_limits = np.stack(
         [
             np.abs(
@@ -158,6 +164,7 @@ def extrapolate_steady_amplitudes(amplitudes, phasors) -> tuple:
         ],
         axis=1,
     )
+
     has_map_limit = ~np.isnan(map_limits).any(axis=1)
     limit = np.where(has_map_limit, map_limits[:, 0], aitken_limits[:, 0])
     spread = np.where(
@@ -166,6 +173,8 @@ def extrapolate_steady_amplitudes(amplitudes, phasors) -> tuple:
         + np.abs(map_limits[:, 0] - aitken_limits[:, 0]),
         6 * (aitken_limits.max(axis=1) - aitken_limits.min(axis=1)),
     )
+
+    # With w = amplitude/|phasor|: value = limit w, error = spread w + 2 |dw| limit.
     value = limit * (waveform[:, -1] + waveform_change)
     error = spread * waveform[:, -1] + 2 * np.abs(waveform_change) * limit + 1e-9 * value
     extrapolated_change = np.abs(value - amplitudes[:, -1])
@@ -174,6 +183,7 @@ def extrapolate_steady_amplitudes(amplitudes, phasors) -> tuple:
         & (error < np.maximum(extrapolated_change, 1e-6 * value))
         & (value < 20 * amplitudes[:, -1])
     )
+
     return np.where(is_known, value, np.nan), np.where(is_known, error, np.nan)
 
 
@@ -252,7 +262,10 @@ def remaining_free_motion(extremes, window: int, decay=0.0):
     count = amplitude.shape[-1]
     if count < MIN_WINDOWS:
         return np.zeros(amplitude.shape[:-1])[()]
+
     n_third = max(1, count // 3)
+
+    # A beat within a window: its excess is free motion unless it persists while the modes decay.
     excess = amplitude - mean
     previous_excess = excess[..., -2 * n_third : -n_third].max(axis=-1)
     last_excess = excess[..., -n_third:].max(axis=-1)
@@ -260,6 +273,8 @@ def remaining_free_motion(extremes, window: int, decay=0.0):
     persists = (decayed_fraction > PERIODIC_TOL) & (
         last_excess > (1 - decayed_fraction / 2) * previous_excess
     )
+
+    # A beat over several windows: the last difference times its ratio to the one before.
     differences = np.abs(amplitude[..., :-1] - amplitude[..., -1:])
     previous_difference = differences[..., -2 * n_third : -n_third].max(axis=-1, initial=0.0)
     last_difference = differences[..., -n_third:].max(axis=-1)
@@ -273,6 +288,7 @@ def remaining_free_motion(extremes, window: int, decay=0.0):
         ),
     )
     ratio = np.maximum(ratio, 1 - decayed_fraction)
+
     return (last_difference * ratio + np.where(persists, 0.0, excess[..., -1]))[()]
 
 

@@ -226,12 +226,16 @@ def fit_peak(record: Record, band: tuple) -> tuple | None:
     """
     if record.displacement.size < 2 * MIN_SEGMENT_SAMPLES:
         return None
+
+    # A Hann window mixes lines within a distance of two, so that the ends of the band are left out.
     frequency, (drive_transforms, displacement_transforms, _) = transform_record(record)
     span = 1 / (frequency[1])
     line = frequency[1]
     inside = np.flatnonzero((frequency >= band[0] + 2 * line) & (frequency <= band[1] - 2 * line))
     if inside.size < 5 or len(drive_transforms) < N_GROUPS:
         return None
+
+    # H1 = G_ax/G_aa, averaged over the segments.
     drive_powers = (np.abs(drive_transforms) ** 2)[:, inside]
     cross = (drive_transforms.conj() * displacement_transforms)[:, inside]
     f = frequency[inside]
@@ -239,11 +243,14 @@ def fit_peak(record: Record, band: tuple) -> tuple | None:
     peak = int(np.argmax(np.abs(gain)))
     if peak in (0, f.size - 1) or not np.abs(gain[peak]) > 0:
         return None
+
+    # The initial damping follows from the half-power width 2 zeta f.
     outside_peak = np.flatnonzero(np.abs(gain) < np.abs(gain[peak]) / np.sqrt(2))
     left = outside_peak[outside_peak < peak].max(initial=0)
     right = outside_peak[outside_peak > peak].min(initial=f.size - 1)
     width = float(f[right] - f[left])
     theta = np.log([2 * np.pi * f[peak], max(0.3 * width, 0.05 * line) / (2 * f[peak])])
+
     for _ in range(3):  # the fitted band is adapted to the width of the peak
         frequency_fit = np.exp(theta[0]) / (2 * np.pi)
         half_width = np.exp(theta.sum()) / (2 * np.pi)
@@ -255,6 +262,8 @@ def fit_peak(record: Record, band: tuple) -> tuple | None:
         or theta[1] > 0
     ):
         return None
+
+    # Jackknife: the fit is repeated without each group, and var = (g - 1)/g sum (theta_i - mean)^2.
     group_of_segment = np.arange(len(drive_transforms)) * N_GROUPS // len(drive_transforms)
     estimates = []
     for group in range(N_GROUPS):
@@ -263,6 +272,7 @@ def fit_peak(record: Record, band: tuple) -> tuple | None:
             :, in_fit_band
         ].sum(axis=0)
         estimates.append(np.exp(_fit_mode(f[in_fit_band], partial_gain, span, theta)))
+
     scale = np.array([1 / (2 * np.pi), 1.0])
     half_widths = np.sqrt((N_GROUPS - 1) * np.var(estimates, axis=0)) * stdtrit(N_GROUPS - 1, 0.975)
     return np.exp(theta) * scale, half_widths * scale

@@ -244,9 +244,12 @@ def estimate_decay_mesh_errors(model, patch, coarse, amplitudes, find_mode, stif
     zero_errors = np.zeros((2, len(amplitudes)))
     if not (model.partial_slip or rig.friction.has_partial_slip):
         return zero_errors, ""
+
     moves = (model.grooves is not None, rig.friction.load_varies, rig.friction.strips_slide_apart)
     if any(moves):
         return zero_errors, UNSUPPORTED_CONTACTS[moves.index(True)]
+
+    # Static loops on both meshes differ by what the mesh resolves, unlike decays (module docstring).
     try:
         fine = make_laws_on_mesh(model, patch)
         mode_index = find_mode(fine)
@@ -261,6 +264,7 @@ def estimate_decay_mesh_errors(model, patch, coarse, amplitudes, find_mode, stif
         return zero_errors, str(reason)
     except PatchfemError:
         return zero_errors, NO_LOOP_REASON
+
     known = np.isfinite(error).all(axis=0)
     if not known.any():
         return zero_errors, NO_STATIC_CURVE_REASON

@@ -108,6 +108,8 @@ class RunEvaluator:
         }
         if self.has_friction:
             fields |= {"reversal_rule": reversal_force_rule(model), "ledger": ledger}
+
+        # What the engine knows better replaces what follows from samples.
         fields |= self.collect_cycle_data(run, drive, stuck=stuck)
         window = fields["window"]
         n_cycles = min(self.numerics.window, len(run.extremes))
@@ -119,7 +121,10 @@ class RunEvaluator:
             is_sine=is_sinusoidal(drive),
             **fields,
         )
+
         values = compute_measures(last_cycles)
+
+        # The amplitude of a decay is that of a cycle, not of the whole window.
         if model.rig.drive.kind == "free":
             values[AMPLITUDE] = find_release_amplitude(window, drive.period, values[AMPLITUDE])
         return values
@@ -171,6 +176,7 @@ class RunEvaluator:
         n_cycles = self.numerics.window
         stuck = self.is_stuck(run)
         values = self.evaluate_measures(run, drive, run.response.extra.get("ledger"), stuck=stuck)
+
         ends = window_end_values(run.extremes, run.phasors, n_cycles)
         fields = {
             "message": getattr(run, "message", ""),
@@ -179,6 +185,8 @@ class RunEvaluator:
             "steady": estimate_steady(drive, *ends),
         }
         fields |= self.collect_solution_fields(run, drive)
+
+        # Without an early end, the outcome stays open until the errors are known.
         return Solution(
             values=values,
             response=run.response,

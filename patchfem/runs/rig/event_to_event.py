@@ -152,6 +152,8 @@ def run_from_event_to_event(
         """Integrate the motion under a drive from the end of another run, None for the start of the rig."""
         state = None if before is None else before.end
         run = evaluator.integrate(drive, cycles, state, frames if is_last else 0)
+
+        # Measures of the whole run add up from level to level.
         for name in select_names("run"):
             if before is not None and name in before.values:
                 run.values[name] += before.values[name]
@@ -260,6 +262,8 @@ class LumpedEvaluator(RunEvaluator):
         end = cycles * period
         window_start = max(0.0, end - self.numerics.window * period)
         first = max(0.0, min(window_start, end - MIN_SAMPLED_CYCLES * period))
+
+        # Before the last cycles the distances are equal, unless the run omits this part.
         even = choose_samples_per_cycle(drive, cycles)
         count = even or max(1, min(EARLY_SAMPLES_PER_CYCLE, MAX_EARLY_SAMPLES // max(cycles, 1)))
         if not self.numerics.whole:
@@ -268,12 +272,16 @@ class LumpedEvaluator(RunEvaluator):
         early = np.zeros(0)
         if count:
             early = np.arange(0.0, first - 1e-9 * period, period / count)
+
+        # Each of the last cycles has SAMPLES_PER_CYCLE samples.
         late = [
             _divide(begin, stop, period, minimum)
             for begin, stop, minimum in ((first, window_start, 2), (window_start, end, MIN_SAMPLES))
             if stop > begin
         ]
         late = np.unique(np.concatenate(late))
+
+        # A snapshot is taken at a sample, where all histories have a value.
         begin = max(0.0, end - period)
         at = begin + (end - begin) * (1 + np.arange(frames)) / max(frames, 1)
         nearest = np.abs(late[:, None] - at).argmin(axis=0)
@@ -293,11 +301,13 @@ class LumpedEvaluator(RunEvaluator):
             is_late = np.diff(time) > SAME_TIME_TOL * drive.period
             is_late |= motion.rows[1:, -1] == Margin.AFTER
             is_kept = np.append(is_late, True)
+
         motion = replace(motion, rows=motion.rows[is_kept])
         response = motion.make_response(self.model.rig.modes, drive)
         if self.model.grooves is not None and self.model.grooves.lifted_mass:
             response = self._add_vertical_force(response, drive)
         window = response.select(response.time >= times[3] * (1 - 1e-15))
+
         run = LumpedRun(
             values=dict(motion.values),
             response=response,
@@ -316,6 +326,8 @@ class LumpedEvaluator(RunEvaluator):
         )
         if not self.strips_slide_apart:
             return run
+
+        # The histories of independent strips are averages, weighted by their loads.
         loads = strips.compute_strip_loads(self.patch)
         offsets = self.patch.strips.offsets
         return replace(
@@ -368,8 +380,11 @@ class LumpedEvaluator(RunEvaluator):
         """
         if not len(times) or self.is_rigid or not self.joints.elements:
             return []
+
         slides = response.extra.get("slides", response.slide[:, None])
         at = np.searchsorted(response.time, times)
+
+        # Between two reversals all elements move alike, so that the reversals determine their stretches.
         stretches = []
         for i, (_, limit) in enumerate(self.joints.elements):
             reversals = motion.list_reversals(i)

@@ -62,9 +62,11 @@ def make_joints(model: Model, numerics: Numerics, patch) -> Joints:
     rig = model.rig
     if model.friction is None:
         return Joints()
+
     speed = rig.speed_scale
     listed = joints.list_joints(model, patch, numerics.meshed)
     is_soft = bool(model.partial_slip or rig.friction.has_partial_slip)
+
     if not (is_soft or rig.friction.names or rig.friction.strips_slide_apart):
         laws = [_make_whole_law(model, patch)]
     else:

@@ -154,21 +154,27 @@ def _make_varying_contact(model: Model, numerics: Numerics, patch, row) -> conta
         if needs_bond_list(f):
             choice = choose_bond_summation(model, numerics)
             bond_sum = contacts.BondSum(law, choice.reach(f.order), choice.merge)
+
+    # A single point follows the load of the scene and has no contact set.
     if patch is None:
         preload = float(model.point.evaluate(np.zeros(1))[0])
         return contacts.make_pressed_contact(
             law, preload, row, bond_sum=bond_sum, load=model.point.evaluate
         )
+
+    # Heave and pitch of the upper piece change the contact set of a patch.
     sets = make_contact_sets(patch, model.patch.loading.rotational_stiffness)
     weight = patch.pieces.interface.weight
     force = patch.pressure.sigma_n * weight
     mean = force.sum() * weight / weight.sum()
     measure = force + mean * MIN_PRESSURE_FRACTION
+
     modes_of_pieces = None
     if model.partial_slip:
         modes_of_pieces = choose_shear_modes(
             model, patch, law, force, measure, numerics.shear_modes
         )
+
     still = np.zeros(modes.omega.size)
     return contacts.make_pressed_contact(
         law,

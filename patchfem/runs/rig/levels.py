@@ -172,6 +172,8 @@ def run_levels(evaluator, integrate, state, find_end_state, progress=None) -> tu
     rig = evaluator.model.rig
     omega = find_drive_omega(rig.drive.signal)
     moving = rig.drive.signal.moving
+
+    # Level k starts from states[k], and a further level after it from states[k + 1].
     states = [state]
     runs = []
     level_results = []
@@ -195,6 +197,7 @@ def run_levels(evaluator, integrate, state, find_end_state, progress=None) -> tu
         states.append(find_end_state(run))
         if run.outcome is not None:
             break
+
     joined = join_runs(runs, rig.drive.levels.cycles * rig.drive.signal.period)
     return joined, {"levels": tuple(level_results), "run_level": run_level}
 

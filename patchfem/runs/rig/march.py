@@ -196,6 +196,7 @@ class MarchEvaluator(RunEvaluator):
         window = run.window
         omega = find_drive_omega(drive)
         rig = self.model.rig
+
         work = getattr(run, "window_work", None)
         work = run.work if work is None else work
         # The friction of strips that yaw does more work than follows from the mean displacement.
@@ -203,8 +204,11 @@ class MarchEvaluator(RunEvaluator):
         # The friction work of this interface excludes other interfaces and impacts at stops.
         if len(rig.friction.names) > 1 or together:
             work = float(run.step_force @ np.diff(window.slide))
+
         span = window.time[-1] - window.time[0]
         work *= drive.period / span if span > 0 else 0.0
+
+        # The equation of motion gives the force from the motion only if no other force acts.
         alone = len(rig.modes.interfaces) == 1 and not (
             (rig.friction.load_varies and not self.model.load_varies)
             or rig.friction.strips_slide_apart
@@ -213,6 +217,7 @@ class MarchEvaluator(RunEvaluator):
         if alone and is_sinusoidal(drive) and has_full_cycle(span, drive):
             slide = motion_harmonic(window.time, window.slide, window.slide_rate, omega)
             return CycleLoop(slide, friction_harmonic(window, rig.modes, drive), work)
+
         force = 0j
         if span > 0:
             force = compute_step_harmonic(window.time, run.step_force, omega)

@@ -47,6 +47,7 @@ def collect_warnings(run) -> list:
     steps = solution.extra.get("steps_per_cycle")
     if "steps_per_cycle" in ENGINES[run.numerics.engine].summary_numbers:
         steps = run.numerics.steps
+
     warnings = [
         *model.rig.structure.notes,
         *_warn_of_single_point(model, patch, run.numerics),
@@ -55,6 +56,8 @@ def collect_warnings(run) -> list:
         speed = float(np.abs(solution.window.slide_rate).max())
         warnings += warn_of_bonds(model, speed, measures, run.outcome)
     warnings += warn_of_created_energy(model, book.get("created", 0.0), book.get("passed", 0.0))
+
+    # The shear modes of a patch replace its nodes if its load varies, or on grooves.
     if (
         patch is not None
         and model.rig.friction.load_varies
@@ -68,11 +71,14 @@ def collect_warnings(run) -> list:
         warnings += note_on_shear_modes(
             model, solution.contact.reduction.stiffness.size, solution.contact.reduction.points.size
         )
+
     warnings += [
         *warn_of_work_check(measures, steps, harmonics),
         *note_on_changing_drive(run.outcome, run.drive),
         *solution.notes,
     ]
+
+    # A stuck interface dissipates nothing, so that free vibration of the structure may remain.
     if not model.rig.drive.levels.amplitudes:
         tolerance = model.accuracy.tolerance
         rate = find_min_decay_rate(model.rig.modes)
@@ -81,6 +87,8 @@ def collect_warnings(run) -> list:
             limits = (tolerance, rate * run.drive.period)
             ratio = ringing / measures[AMPLITUDE].value
             warnings.append(describe_ringing(ratio, limits, run.numerics.cycles))
+
+    # An end at the grooves is reported by a note.
     if solution.message and solution.outcome is not Outcome.LEAVES_GROOVES:
         warnings.append(solution.message)
     warnings += _warn_of_peak_at_sweep_end(run)
@@ -121,14 +129,18 @@ def collect_notes(run) -> list:
     model = run.model
     solution = run.solution
     rig = run.model.rig
+
+    # An end at the grooves follows from the model; it is no defect of the run.
     end_notes = _note_on_lateral_motion(run)
     if solution.message and solution.outcome is Outcome.LEAVES_GROOVES:
         end_notes.append(solution.message)
+
     if run.patch is not None and run.patch.strips is not None and model.partial_slip:
         return [
             "strips that slip part by part have no common shear stress, so the fields contain only the pressure",
             *end_notes,
         ]
+
     notes = [
         *_note_on_bond_growth(model, run.patch, solution),
         *note_on_groove_slope(model, run.patch),

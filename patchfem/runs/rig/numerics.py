@@ -89,17 +89,20 @@ def choose_numerics(model: Model) -> Numerics:
     drive = rig.drive
     cycles = drive.cycles
     engine = choose_engine(model)
+
     window = int(max(1, min(10, (cycles + WHOLE_CYCLE_TOL) // 10)))
     # Under a random drive, the window is the whole record without its initial transient.
     if drive.waveform.is_random:
         rate = find_min_decay_rate(rig.modes) * drive.signal.period
         start = min(cycles / 4, N_DECAY_TIMES / rate if rate else np.inf)
         window = int(max(1, cycles - start + WHOLE_CYCLE_TOL))
+
     beat_cycles = count_repeat_cycles(drive.signal) or 0.0
     if 1 < beat_cycles <= cycles:  # The window contains complete periods of the beat.
         window = int(beat_cycles * max(1, min(10, cycles // (10 * beat_cycles))) + WHOLE_CYCLE_TOL)
     if drive.levels.amplitudes:
         window = min(window, int(drive.levels.cycles + WHOLE_CYCLE_TOL))
+
     steps = steps_per_cycle(model)
     if not is_sinusoidal(drive.signal) and accuracy.steps_per_cycle is None:
         steps = max(steps, int(np.ceil(MIN_SAMPLES / cycles)))
@@ -113,6 +116,7 @@ def choose_numerics(model: Model) -> Numerics:
         model.side == "lower",
         frozenset(pinned),
     )
+
     if engine is HYBRID:
         # A linear rig needs few steps.
         is_exact = accuracy.method == "exact" or model.friction is None

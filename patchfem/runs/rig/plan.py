@@ -141,16 +141,21 @@ def compute_dimensionless_groups(model: Model) -> dict:
     limits = [law.friction_limits(find_interface_load(model, law)) for law in laws]
     limit = sum(static for static, _ in limits)
     kinetic = sum(sliding for _, sliding in limits)
+
+    # D of (2.3): both forces as they act on the first mode.
     drive_force = drive.force or rig.first_mode.mass * find_max_acceleration(drive.signal)
     participation = _find_participation_ratio(rig)
     if drive_force > 0:
         sizes["D"] = participation * limit / drive_force
         if kinetic != limit:
             sizes["D_kinetic"] = participation * kinetic / drive_force
+
+    # At resonance, friction balances a drive up to 4/pi F, the first harmonic of its square wave.
     ratio = rig.first_mode.frequency * drive.signal.period if drive.frequency else inf
     if abs(ratio - 1) < 0.2:
         bound = 4 / pi * kinetic * participation
         sizes |= {"knee_force": bound} if drive.force else {"knee": bound / rig.first_mode.mass}
+
     if f is not None and f.bond_length and f.stiffness is None and drive.signal.moving:
         sizes["drive_amplitude_over_bond_length"] = (
             find_max_acceleration(drive.signal)
@@ -218,9 +223,11 @@ def describe_stick(rig, sizes: dict, chain: dict) -> list:
         or rig.drive.kind == "free"
     ):
         return []
+
     limit = MIN_STIFF_LINK_RATIO * rig.first_mode.stiffness
     links = {name: link for name, link in chain.items() if not isinstance(link, str)}
     compliant_links = [name for name, link in links.items() if name != "mode" and link < limit]
+
     if friction_ratio >= 1 and compliant_links:
         return [
             f"D = {friction_ratio:.3g} >= 1, but the block still moves, because the interface is elastic: its stiffness "
@@ -229,6 +236,7 @@ def describe_stick(rig, sizes: dict, chain: dict) -> list:
         ]
     if friction_ratio >= 1:
         return [f"D = {friction_ratio:.3g} >= 1: friction should hold the block, so that it sticks"]
+
     if "D_kinetic" in sizes:  # The kinetic friction limit acts while the block slides.
         sliding = sizes["D_kinetic"]
         return [

@@ -95,11 +95,13 @@ def add_outcome_and_errors(run: CoupledRun) -> CoupledRun:
         message = solution.message or text
         solution = replace(solution, outcome=Outcome.NOT_CONVERGED, message=message)
         run = replace(run, solution=solution)
+
     rig = run.model.rig
     end_errors = solution.extra.get("late", {})
     measures = add_run_error_estimates(run.measures, solution.run_errors, end_errors)
     if not run.has_errors:
         measures = remove_errors(measures)
+
     outcome, steady = judge_outcome(
         solution,
         measures,
@@ -108,6 +110,7 @@ def add_outcome_and_errors(run: CoupledRun) -> CoupledRun:
         rig.drive.levels.cycles,
         find_decay_rate(rig.modes),
     )
+
     # Without a stop in the scene, the motion has not hit anything: it exceeded the limit of the
     # program.
     if outcome is Outcome.EXCEEDS_TRAVEL and rig.springs.travel == MAX_TRAVEL:
@@ -144,6 +147,8 @@ def add_decay_curve(run: CoupledRun) -> CoupledRun:
     has_partial_slip = model.partial_slip or model.rig.friction.has_partial_slip
     if run.decay is None or not has_partial_slip:
         return run
+
+    # Below the slip of the first node, two meshes have the same decay, so that static loops give the mesh error.
     decay = run.decay
     coarse = run.inputs.coarse[0]
     stiffer = run.inputs.stiffer
@@ -154,6 +159,7 @@ def add_decay_curve(run: CoupledRun) -> CoupledRun:
         frequency_error=np.fmax(decay.frequency_error, errors[0]),
         damping_error=np.fmax(decay.damping_error, errors[1]),
     )
+
     if not reason:
         return replace(run, decay=decay)
     engine = ENGINES[run.numerics.engine]
@@ -198,6 +204,7 @@ def collect_summary_data(run: CoupledRun, measures: dict, notes: list) -> dict:
     extra = {"engine": numerics.engine, "cycles": numerics.cycles}
     extra |= solution.extra | {"window": numerics.window}
     extra |= {name: numbers[name] for name in ENGINES[numerics.engine].summary_numbers}
+
     if solution.levels:
         extra["levels"] = levels.convert_to_scene_units(rig, solution.levels)
     snapshots = solution.snapshots
@@ -205,14 +212,18 @@ def collect_summary_data(run: CoupledRun, measures: dict, notes: list) -> dict:
         extra["shots"] = snapshots
     if solution.log is not None:
         extra["events"] = solution.log
+
+    # A patch that slips part by part is a set of elements, or of shear modes if its load varies.
     reduced = getattr(solution.contact, "reduction", None)
     if reduced is not None:
         name = "elements" if hasattr(reduced, "yield_displacement") else "shear_modes"
         extra[name] = int(np.size(reduced.stiffness))
+
     if solution.bond_summation is not None:
         extra["quadrature"] = solution.bond_summation.engine
     if rig.drive.waveform.is_random:
         extra["spectra"] = stationary.compute_spectra(solution.window, rig.drive.signal)
         notes = [*notes, *stationary.warn_if_short(measures, solution.window)]
+
     extra |= {"book": solution.book, "period": run.drive.period, "notes": notes}
     return extra if run.decay is None else extra | {"decay": run.decay}

@@ -175,6 +175,7 @@ class BalanceFinder:
             self.modes, drive, self.group, self.harmonics, self.tolerance, start=guess
         )
         motion, stability, notes = self._find_stable_motion(drive, motion)
+
         values, response, book = self._compute_measures(motion, drive)
         errors = self._estimate_errors(
             values,
@@ -182,11 +183,14 @@ class BalanceFinder:
             drive,
             lambda motion, sine: self._compute_measures(motion, sine, 2 * SAMPLES_PER_CYCLE).values,
         )
+
+        # The instants of slip have at least the error of a sample, and a phase at most that of half a cycle.
         if "slip_start_phase" in errors:
             errors["slip_start_phase"] = max(
                 min(errors["slip_start_phase"], np.pi / 2), 2 * np.pi / SAMPLES_PER_CYCLE
             )
             errors["stick_fraction"] = max(errors.get("stick_fraction", 0.0), 4 / SAMPLES_PER_CYCLE)
+
         name = balanced_regime(motion)
         is_stuck = name == "stuck"
         extra = {
@@ -194,12 +198,14 @@ class BalanceFinder:
             "multipliers": stability.multipliers,
             "harmonics": motion.harmonics,
         }
+
         amplitude = np.array([values[AMPLITUDE]])
         outcome = Outcome.STUCK if is_stuck else Outcome.STEADY
         message = ""
         if not stability.stable:
             outcome = Outcome.NOT_CONVERGED
             message = describe_instability(stability.multipliers)
+
         return Solution(
             values,
             response,
@@ -245,13 +251,17 @@ class BalanceFinder:
         stability = add_stability(motion, self.modes)
         if stability.stable:
             return StableMotion(motion, stability)
+
+        # An unstable motion is not seen in a test, so that all motions under this drive are compared.
         motions = branches.find_branches(self.modes, drive, self.group, self.tolerance)
         stable_motions = [branch for branch in motions if branch.stable]
         if not stable_motions:
             return StableMotion(motion, stability)
+
         motion = periodic_point(
             self.modes, drive, self.group, self.harmonics, self.tolerance, start=stable_motions[0]
         )
+
         output = self.modes.output
         sizes = ", ".join(format_length(branch.amplitude(output), 3) for branch in motions)
         note = (
@@ -263,6 +273,7 @@ class BalanceFinder:
                 "; the stable motion of smallest amplitude is shown; accuracy.method = "
                 '"march" gives the motion that is reached from rest'
             )
+
         return StableMotion(motion, add_stability(motion, self.modes), (note,))
 
     def observe(self, drive, guess=None, *, needs_histories: bool = True) -> ObservedMotion:

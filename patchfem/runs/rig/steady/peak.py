@@ -71,6 +71,7 @@ def refine_peak(points: list, finder, tolerance: float) -> RefinedPeak:
         s = np.cumsum([0.0, *(finder.measure_curve_distance(a, b) for a, b in pairwise(points))])
         y = _collect_amplitudes(points)
         is_stable = np.array([point.stable for point in points])
+
         best = find_largest_point(points)
         bounds, fractions = bound_concave_curve(s, y)
         if not y[best] > 0 or not bounds.size:
@@ -80,8 +81,10 @@ def refine_peak(points: list, finder, tolerance: float) -> RefinedPeak:
             fractions[is_stable[:-1] != is_stable[1:]] = (
                 0.5  # The limit of stability between two points is found by bisection.
             )
+
         if not np.isfinite(y[max(best - 1, 0) : best + 2]).all():
             return RefinedPeak(points, best, np.inf)
+
         above = max(float(bounds.max()) - y[best], 0.0)
         bounds[np.diff(s) <= IDENTICAL_POINT_TOL * s[-1]] = 0.0
         interval = int(np.argmax(bounds))
@@ -91,6 +94,7 @@ def refine_peak(points: list, finder, tolerance: float) -> RefinedPeak:
             interval = -1
             if added is not None:
                 interval, fractions[interval] = added
+
         if not remaining or interval < 0:
             return RefinedPeak(points, best, above)
         try:
@@ -213,6 +217,7 @@ def solve_peak(curve: ResponseCurve, finder) -> Solution:
         extra=solution.extra | {"curve": tabulate_curve(points, curve.folds)},
         drive=peak_point.drive,
     )
+
     height = peak_point.values.get(AMPLITUDE, 0.0)
     y = _collect_amplitudes(points)
     if not height > 0 or AMPLITUDE not in solution.values:
@@ -220,6 +225,8 @@ def solve_peak(curve: ResponseCurve, finder) -> Solution:
     # The curve point was computed with fewer samples, which adds this error.
     missed = abs(replace_output_by_gauge(finder.model, solution).values[AMPLITUDE] - height)
     error = min(missed + errors.get(AMPLITUDE, 0.0), height)
+
+    # The position is uncertain by the distance within which the error of the height hides the fall of the curve.
     frequencies = np.array([point.drive.omega for point in points]) / (2 * np.pi)
     max_position_error = 0.0
     position_errors = dict.fromkeys(solution.values, 0.0)
@@ -232,6 +239,7 @@ def solve_peak(curve: ResponseCurve, finder) -> Solution:
         low = ~(heights >= height - min(above, height) - 2 * error)
         number = int(np.argmax(low)) if low.any() else heights.size - 1
         far = float(distances[: number + 1].max())
+
         position_error = min(
             far,
             float(distances[1])
@@ -244,6 +252,7 @@ def solve_peak(curve: ResponseCurve, finder) -> Solution:
             position_errors[name] = max(
                 position_errors[name], difference * position_error / far if far else difference
             )
+
     position_errors[AMPLITUDE] = min(above, solution.values[AMPLITUDE]) + missed
     errors = {name: error + position_errors.get(name, 0.0) for name, error in errors.items()}
     return replace(solution, errors=errors, peak_error=float(max_position_error))

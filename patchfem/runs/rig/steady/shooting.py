@@ -206,6 +206,8 @@ class ShootingFinder(TracedCurve):
         if self._leave_grooves(drive) is not None:
             regime = "leaves its grooves"
             return CurvePoint(drive, {}, {}, regime, np.nan, False, Outcome.LEAVES_GROOVES)
+
+        # A neighbour beyond a jump of the curve may be too far away as a start.
         try:
             motion = self.find_periodic_motion(drive, guess)
         except NotConverged:
