@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
-from .measures import find_reversal_steps
+from .measures import ArrayPair, find_reversal_steps
 
 # Candidate spans of a fit: number of half cycles on either side of a point.
 SPAN_LENGTHS = (
@@ -131,7 +131,7 @@ class DecayCurve(NamedTuple):
         )
 
 
-def locate_reversals(time, position, speed) -> tuple:
+def locate_reversals(time, position, speed) -> ArrayPair:
     """Return the times (k,) [s] and positions (k,) [m] of the reversals of a motion.
 
     They are computed on the cubics through the samples on both sides.
@@ -164,7 +164,7 @@ def measure_last_cycle_amplitude(time, position, speed, period: float) -> float 
     Parameters
     ----------
     time, position, speed : (n,)
-        Samples, as in `locate_reversals`.
+        Samples of time [s], position [m] and speed [m/s] at any spacing.
     period : float
         Period [s].
 
@@ -196,13 +196,7 @@ def measure_last_cycle_amplitude(time, position, speed, period: float) -> float 
             direction = -direction
 
         if len(reversal_positions) == 3:
-            return (
-                max(
-                    abs(reversal_positions[0] - reversal_positions[1]),
-                    abs(reversal_positions[1] - reversal_positions[2]),
-                )
-                / 2
-            )
+            return float(np.abs(np.diff(reversal_positions)).max()) / 2
 
     return None
 
@@ -333,14 +327,15 @@ def fit_slopes(values, noise) -> Slopes:
     shorter_change = np.full(count, np.nan)
     span = np.zeros(count, int)
     is_growing = np.ones(count, bool)
-    shorter_fits: list = []
+    shorter_fits: list[ArrayPair] = []
 
     for m in SPAN_LENGTHS:
         if 2 * m >= values.size or not is_growing.any():
             break
 
         # Slope of the least-squares line over 2 m + 1 values, and its standard deviation.
-        weight = np.arange(-m, m + 1) / np.sum(np.arange(-m, m + 1) ** 2)
+        offsets = np.arange(-m, m + 1)
+        weight = offsets / np.sum(offsets**2)
         inside = slice(m - 1, count - m + 1)
         candidate, candidate_noise = np.full((2, count), np.nan)
         candidate[inside] = np.correlate(values, weight, "valid")

@@ -9,9 +9,10 @@ import numpy as np
 
 from ..core import Response
 from .events import slips_and_displacements
+from .measures import Values
 
 
-def estimate_window_error(window: Response, period: float, offset: float) -> dict:
+def estimate_window_error(window: Response, period: float, offset: float) -> Values:
     """Return the changes of the measures if the window is shifted by a number of time steps.
 
     The peak of a measure changes only if it lies at an end of the window.
@@ -29,8 +30,7 @@ def estimate_window_error(window: Response, period: float, offset: float) -> dic
         return {}
 
     offset = abs(offset)
-    span = window.time[-1] - window.time[0]
-    cycles = span / period
+    cycles = (window.time[-1] - window.time[0]) / period
     slips, slides = slips_and_displacements(window)
     forces = window.extra.get("forces", window.force[:, None])
     step_works = (forces[1:] + forces[:-1]) / 2 * np.diff(slides, axis=0)

@@ -25,6 +25,8 @@ from .loops import (
 )
 from .measures import (
     MIN_SLIDE_RANGE,
+    Measures,
+    Values,
     compute_ledger_measures,
     compute_peak,
     compute_slip_measures,
@@ -58,7 +60,7 @@ class LastCycles:
     window: Response
     drive: object
     extremes: np.ndarray
-    run_energies: dict
+    run_energies: Values
     load: float | None
     stiffness: float
     is_sine: bool
@@ -80,7 +82,7 @@ class LastCycles:
         return drive_sizes.has_full_cycle(self.span, self.drive)
 
     @cached_property
-    def slip_measures(self) -> dict:
+    def slip_measures(self) -> Values:
         """Slip amplitude [m], stick fraction [1] and phase of slip onset [rad] as a dict."""
         if self.load is None:
             return {}
@@ -96,7 +98,7 @@ class LastCycles:
         return values
 
     @cached_property
-    def reversals(self) -> list:
+    def reversals(self) -> list[tuple[Reversal, ...]]:
         """Smallest and largest `Reversal` of the displacement in each complete cycle."""
         if self.integrated.reversals:
             return [tuple(Reversal(*end) for end in pair) for pair in self.integrated.reversals]
@@ -121,7 +123,7 @@ class LastCycles:
         )
 
     @cached_property
-    def loop_measures(self) -> dict:
+    def loop_measures(self) -> Values:
         """Measures of the friction loop as a dict; empty without friction or a complete cycle.
 
         loop_area [J]; under sinusoidal drive also equivalent_stiffness and secant_stiffness [N/m]
@@ -140,7 +142,7 @@ class LastCycles:
         return measures | {"secant_stiffness": secant_stiffness(self.reversals)}
 
     @cached_property
-    def acceleration_measures(self) -> dict:
+    def acceleration_measures(self) -> Values:
         """Harmonic measures of the acceleration as a dict; empty unless the drive ends as a sinusoid.
 
         absolute_acceleration_fundamental [m s-2] and, if there is an acceleration,
@@ -151,12 +153,12 @@ class LastCycles:
         return make_acceleration_measures(*find_acceleration_harmonics(self.window, self.drive))
 
     @cached_property
-    def final_energies(self) -> dict:
+    def final_energies(self) -> Values:
         """Friction work and energies [J] at the end of the run by name; empty if not recorded."""
         return {} if self.ledger is None else compute_ledger_measures(self.ledger)
 
     @cached_property
-    def random_response_measures(self) -> dict:
+    def random_response_measures(self) -> Values:
         """Measures of the response to a stationary random drive as a dict."""
         if not hasattr(self.drive, "band"):
             return {}
@@ -167,7 +169,7 @@ class LastCycles:
                 del measures[name]
         return measures
 
-    def further_interfaces(self) -> list:
+    def further_interfaces(self) -> "list[LastCycles]":
         """Return the last cycles of each interface after the first one."""
         extra = self.window.extra
         if self.load is None or self.is_single_interface or "slides" not in extra:
@@ -199,7 +201,7 @@ class LastCycles:
 
         return interfaces
 
-    def evaluate_load(self, function: Callable) -> float | None:
+    def evaluate_load(self, function: Callable[[np.ndarray], float]) -> float | None:
         """Return the value of a function of the normal load (k,) [N]; None for a constant load.
 
         function: function that is applied to the load history in the window.
@@ -208,7 +210,7 @@ class LastCycles:
         return None if load is None or self.load is None else float(function(load))
 
 
-def _drift_scale(values: dict):
+def _drift_scale(values: Values):
     """Return the amplitude [m] with which the drift of an interface is compared.
 
     The scale is the slip amplitude, or without slip the amplitude of the motion.
@@ -616,7 +618,7 @@ INTERFACE_MEASURES = select_names("interface")
 MAX_DISPLACEMENT_FLOOR = 1e-5
 
 
-def compute_measures(last_cycles: LastCycles) -> dict:
+def compute_measures(last_cycles: LastCycles) -> Values:
     """Compute the measures of a run from its last cycles as a dict, in SI units.
 
     Measures without a value are omitted. The INTERFACE_MEASURES of further interfaces have the number of the
@@ -662,6 +664,7 @@ def error_floor(name: str, size=np.inf):
     Parameters
     ----------
     name : str
+        Name of the measure, with the number of an interface.
     size : float or (n,)
         Displacement caused by the drive alone [m]; 0 or inf without a drive.
     """
@@ -674,12 +677,13 @@ def error_floor(name: str, size=np.inf):
     )
 
 
-def larger_term(name: str, values: dict):
+def larger_term(name: str, values: Values):
     """Return the size of the terms if a measure is a difference, in the unit of the measure.
 
     Parameters
     ----------
     name : str
+        Name of the measure, with the number of an interface.
     values : dict
         Values by name of one run, or (n,) of n runs; those of the same interface are used.
 
@@ -699,7 +703,7 @@ def larger_term(name: str, values: dict):
     return row.larger_term[1](own_values)
 
 
-def set_final_floors(measures: dict, tolerance: float) -> dict:
+def set_final_floors(measures: Measures, tolerance: float) -> Measures:
     """Return measures with error floors of at least `tolerance` times the terms of a difference.
 
     The INTERNAL_VALUES among the measures are used and left out.

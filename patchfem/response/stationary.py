@@ -18,6 +18,7 @@ from scipy.interpolate import CubicHermiteSpline
 from scipy.optimize import least_squares
 from scipy.special import stdtrit
 
+from .measures import Measures, Values
 from .welch import CrossDensities, Segments, average_segments, transform_segments
 
 SEGMENTS_PER_RECORD = 16  # Ratio of the record length to the segment length.
@@ -78,7 +79,7 @@ def make_record(window, drive) -> Record:
     )
 
 
-def random_response_measures(window, drive) -> dict:
+def random_response_measures(window, drive) -> Values:
     """Return the measures of the response to a stationary random drive, by name."""
     record = make_record(window, drive)
     measures = {}
@@ -99,7 +100,7 @@ def random_response_measures(window, drive) -> dict:
     return {name: float(value) for name, value in measures.items() if np.isfinite(value)}
 
 
-def warn_if_short(measures: dict, window) -> list:
+def warn_if_short(measures: Measures, window) -> list[str]:
     """Return a list with a warning if the record is short relative to the decay time of the mode.
 
     Parameters
@@ -107,6 +108,7 @@ def warn_if_short(measures: dict, window) -> list:
     measures : dict
         Measure by name.
     window : Response
+        Record without its initial transient.
     """
     names = "response_frequency", "response_damping"
     if any(name not in measures or not measures[name].value for name in names):
@@ -151,7 +153,7 @@ def rms_scatter(values) -> float:
     return float(np.sqrt(mean) * np.expm1(relative_half_width / 2))
 
 
-def mean_power(time, work) -> tuple:
+def mean_power(time, work) -> tuple[float, float]:
     """Return the mean power [W] and its confidence half-width [W] from the cumulative work.
 
     The half-width comes from the means over N_GROUPS parts of equal length.
@@ -209,12 +211,13 @@ def compute_spectra(window, drive) -> Spectra:
     )
 
 
-def fit_peak(record: Record, band: tuple) -> tuple | None:
+def fit_peak(record: Record, band: tuple[float, float]) -> tuple | None:
     """Fit natural frequency [Hz] and damping ratio to the largest peak of H1, with half-widths.
 
     Parameters
     ----------
     record : Record
+        Equally spaced samples of drive and output.
     band : tuple
         Lowest and highest frequency of the drive [Hz].
 
@@ -229,8 +232,8 @@ def fit_peak(record: Record, band: tuple) -> tuple | None:
 
     # A Hann window mixes lines within a distance of two, so that the ends of the band are left out.
     frequency, (drive_transforms, displacement_transforms, _) = transform_record(record)
-    span = 1 / (frequency[1])
     line = frequency[1]
+    span = 1 / line
     inside = np.flatnonzero((frequency >= band[0] + 2 * line) & (frequency <= band[1] - 2 * line))
     if inside.size < 5 or len(drive_transforms) < N_GROUPS:
         return None

@@ -162,7 +162,9 @@ def is_bond_list_too_long(model: Model, numerics: Numerics, counters: dict) -> b
     Parameters
     ----------
     model : Model
+        Model with bonds.
     numerics : Numerics
+        Cycles and steps per cycle of the run.
     counters : dict
         Counters of the run, including "strips".
     """

@@ -204,6 +204,7 @@ def _estimate_stiff_fraction(model: Model, limit: float) -> float:
     Parameters
     ----------
     model : Model
+        Drive and modes; friction must depend on speed.
     limit : float
         Largest friction force [N].
     """

@@ -97,6 +97,7 @@ def make_laws_on_mesh(model, patch, meshed: tuple = ()):
     Parameters
     ----------
     model : Model
+        Rig with its interfaces.
     patch : Patch or None
         Patch of [contact].
     meshed : tuple
@@ -129,6 +130,7 @@ def make_laws_on_coarse_meshes(model, coarse, stiffer=None) -> list:
     Parameters
     ----------
     model : Model
+        Rig with its interfaces.
     coarse : Patch or None
         Patch of [contact] on a coarser mesh.
     stiffer : joint.FreeRig, optional
@@ -155,6 +157,7 @@ def compute_static_curve(modes, laws, mode_index: int, amplitudes, samples: int)
     modes
         Modal basis.
     laws : LawGroup
+        Friction laws of the interfaces.
     mode_index : int
         Index of the mode.
     amplitudes : (k,)
@@ -224,6 +227,7 @@ def estimate_decay_mesh_errors(model, patch, coarse, amplitudes, find_mode, stif
     Parameters
     ----------
     model : Model
+        Rig with its interfaces.
     patch, coarse : Patch or None
         Patch of [contact], and the same on a coarser mesh.
     amplitudes : (k,)
@@ -290,6 +294,7 @@ def estimate_stuck_mode_mesh_errors(
     frequency : float
         [Hz].
     model : Model
+        Rig with its interfaces.
     patch, coarse : Patch or None
         Patch of [contact], and the same on a coarser mesh.
     stiffer : joint.FreeRig, optional

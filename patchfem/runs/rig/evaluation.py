@@ -80,8 +80,12 @@ class RunEvaluator:
 
         Parameters
         ----------
-        run, drive, stuck
-            See `compute_integrated_measures`.
+        run
+            Run of the engine, or its mark at the end of a drive level.
+        drive
+            Drive of the run.
+        stuck : bool
+            Whether the interface is stuck during the last cycles.
         """
         return {}
 
@@ -95,7 +99,7 @@ class RunEvaluator:
         drive : optional
             Drive of the run; default: that of the model.
         ledger : (4, k), optional
-            See `LastCycles`.
+            Friction work and energies over time [J].
         stuck : bool
             Whether the interface is stuck during the last cycles.
         """

@@ -128,7 +128,9 @@ def run_from_event_to_event(
     Parameters
     ----------
     model : Model
+        Rig, drive and friction laws.
     numerics : Numerics
+        Step tolerance, cycles and window.
     patch : Patch or None
         None under [normal] or between masses.
     frames : int
@@ -191,7 +193,9 @@ class LumpedEvaluator(RunEvaluator):
         Parameters
         ----------
         drive
+            Acceleration of the base or force over the modal mass, over time.
         cycles : float
+            Number of cycles of the drive.
         state : State or None
             End of another run from which the motion goes on; None for the start of the rig.
         frames : int
@@ -411,8 +415,12 @@ class LumpedEvaluator(RunEvaluator):
 
         Parameters
         ----------
-        run, drive, stuck
-            See `RunEvaluator.compute_integrated_measures`.
+        run
+            Run of the engine, or its mark at the end of a drive level.
+        drive
+            Drive of the run.
+        stuck : bool
+            Whether the interface is stuck during the last cycles.
         """
         values = {
             name: None if np.isnan(value) else float(value) for name, value in run.values.items()
@@ -448,8 +456,12 @@ class LumpedEvaluator(RunEvaluator):
 
         Parameters
         ----------
-        run, drive, stuck
-            See `RunEvaluator.collect_cycle_data`.
+        run
+            Run of the engine, or its mark at the end of a drive level.
+        drive
+            Drive of the run.
+        stuck : bool
+            Whether the interface is stuck during the last cycles.
         """
         return {"is_single_interface": self.strips_slide_apart}
 
@@ -481,8 +493,12 @@ class LumpedEvaluator(RunEvaluator):
 
         Parameters
         ----------
-        run, drive, values
-            See `RunEvaluator.estimate_run_errors`.
+        run
+            Run of the engine.
+        drive
+            Drive of the run.
+        values : dict of float
+            Measures by name.
         """
         if not hasattr(drive, "band"):
             return {}
@@ -520,6 +536,7 @@ def may_still_change(extremes, window: int, tolerance: float, decay: float) -> b
     window : int
         Number of cycles in a window.
     tolerance : float
+        Relative tolerance of the scene.
     decay : float
         Exponent of the decay of the slowest free motion per cycle [1].
     """

@@ -27,9 +27,13 @@ def collect_interface_fields(model, numerics, patch, solution) -> dict:
     Parameters
     ----------
     model : Model
+        Friction law and partial slip of the interface.
     numerics : Numerics
+        Window, and whether every node has its own bonds.
     patch : Patch
+        Patch of [contact], whose nodes have the fields.
     solution : Solution
+        Snapshots of the last cycle, or the window of a motion of one point.
     """
     sigma = patch.pressure.sigma_n
     f = model.friction

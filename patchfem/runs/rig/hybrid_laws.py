@@ -55,7 +55,9 @@ def make_joints(model: Model, numerics: Numerics, patch) -> Joints:
     Parameters
     ----------
     model : Model
+        Rig with its interfaces.
     numerics : Numerics
+        Names the interfaces with a coarser mesh.
     patch : Patch or None
         None without [contact].
     """
@@ -119,6 +121,7 @@ def list_elements(model: Model, numerics: Numerics, patch) -> list[tuple[np.ndar
     Parameters
     ----------
     model : Model
+        Rig with its interfaces.
     numerics : Numerics
         Names the interfaces with a coarser mesh.
     patch : Patch or None

@@ -35,7 +35,9 @@ def make_contact(model: Model, numerics: Numerics, patch) -> contacts.Contact:
     Parameters
     ----------
     model : Model
+        Rig, springs and friction laws.
     numerics : Numerics
+        Numbers of shear modes, method of bond summation and coarser meshes.
     patch : Patch or None
         None under [normal].
     """
@@ -83,7 +85,9 @@ def make_single_law(model: Model, numerics: Numerics, patch) -> Element | None:
     Parameters
     ----------
     model : Model
+        Friction law and load of the interface.
     numerics : Numerics
+        Method of bond summation and coarser meshes.
     patch : Patch or None
         None under [normal].
     """
@@ -197,6 +201,7 @@ def make_contact_sets(patch, spring: float = 0.0) -> "contact_sets.ContactSets":
     Parameters
     ----------
     patch : Patch
+        Patch with its static solution.
     spring : float
         Rotational stiffness of the holder [N m/rad], 0 for a rigid one.
     """
@@ -218,8 +223,11 @@ def choose_shear_modes(model: Model, patch, law, force, measure, count: int | No
     Parameters
     ----------
     model : Model
+        Its tolerance sets the number of modes.
     patch : Patch
+        Patch with the shear compliance of its pieces.
     law : Bonds, or the keys of an elastic-plastic law
+        Static friction, and the length over which the force grows.
     force, measure : (m,) array
         Nodal forces of the preload [N], without and with the fraction of the mean pressure.
     count : int or None

@@ -34,7 +34,9 @@ def add_level_errors(levels, coarser_runs: list, solutions: dict) -> tuple:
     Parameters
     ----------
     levels : sequence of Level
+        Levels of the run, in chronological order.
     coarser_runs : list of CoarserRuns
+        Settings of the coarse runs by source of error.
     solutions : dict
         Solution of each coarse run by its Numerics.
     """
@@ -71,12 +73,14 @@ def find_onset(levels, run_level, tolerance: float, is_past_onset) -> tuple | No
     Parameters
     ----------
     levels : sequence of Level
+        Levels of the run, in chronological order.
     run_level : callable
         Function (index, level) -> Level that runs a level [m s-2] from the final state of the level
         with this index, or from rest for the index -1.
     tolerance : float
+        Largest width of the bracket relative to the level.
     is_past_onset : callable
-        Function of a Level that returns whether the onset is reached, see `make_onset_test`.
+        Function of a Level that returns whether the onset is reached.
 
     Returns
     -------
@@ -111,6 +115,7 @@ def measure_onset_level(rig, solution, tolerance: float) -> Measure:
     solution : Solution
         The difference of the onset levels of its coarse runs is added to the error.
     tolerance : float
+        Largest width of the bracket relative to the level.
     """
     unit = _find_level_unit(rig)
     is_past_onset = make_onset_test(*rig.drive.levels.onset)
@@ -156,6 +161,7 @@ def run_levels(evaluator, integrate, state, find_end_state, progress=None) -> tu
     Parameters
     ----------
     evaluator : RunEvaluator
+        Evaluates each level; its model has the levels of the drive.
     integrate : callable
         Function (sine, state, watch, is_last) that returns a run.
     state
@@ -163,6 +169,7 @@ def run_levels(evaluator, integrate, state, find_end_state, progress=None) -> tu
     find_end_state : callable
         Function of a run that returns its final state.
     progress : callable, optional
+        Callback for the completed fraction of all levels.
 
     Returns
     -------

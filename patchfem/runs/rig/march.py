@@ -48,8 +48,11 @@ def march_in_time(model, numerics, patch, frames: int = 0, say=None, progress=No
     Parameters
     ----------
     model : Model
+        Rig, drive and friction laws.
     numerics : Numerics
+        Steps per cycle, cycles and window.
     patch : Patch or None
+        None under [normal] and between masses.
     frames : int
         Number of snapshots of the interface in the last cycle.
     say, progress : callable, optional
@@ -130,8 +133,12 @@ class MarchEvaluator(RunEvaluator):
 
         Parameters
         ----------
-        run, drive, values
-            See `RunEvaluator.estimate_run_errors`.
+        run
+            Run of the engine.
+        drive
+            Drive of the run.
+        values : dict of float
+            Measures by name.
         """
         return peak_sampling_errors(run.window)
 
@@ -147,8 +154,12 @@ class MarchEvaluator(RunEvaluator):
 
         Parameters
         ----------
-        run, drive, stuck
-            See `RunEvaluator.compute_integrated_measures`.
+        run
+            Run of the engine, or its mark at the end of a drive level.
+        drive
+            Drive of the run.
+        stuck : bool
+            Whether the interface is stuck during the last cycles.
         """
         if not self.has_friction:
             return IntegratedMeasures()
@@ -175,8 +186,12 @@ class MarchEvaluator(RunEvaluator):
 
         Parameters
         ----------
-        run, drive, stuck
-            See `RunEvaluator.collect_cycle_data`.
+        run
+            Run of the engine, or its mark at the end of a drive level.
+        drive
+            Drive of the run.
+        stuck : bool
+            Whether the interface is stuck during the last cycles.
         """
         if not self.has_friction:
             return {}

@@ -276,6 +276,7 @@ def note_on_shear_modes(model, n_modes: int, n_nodes: int) -> list:
     Parameters
     ----------
     model : Model
+        Its `partial_slip` begins the sentence.
     n_modes, n_nodes : int
         Number of shear modes, and number of nodes of the patch.
     """

@@ -78,6 +78,7 @@ def choose_numerics(model: Model) -> Numerics:
     Parameters
     ----------
     model : Model
+        Its table [accuracy] sets what is not chosen here.
 
     Raises
     ------

@@ -209,6 +209,7 @@ def describe_stick(rig, sizes: dict, chain: dict) -> list:
     Parameters
     ----------
     rig : Rig
+        Modes and drive.
     sizes : dict
         Groups of `compute_dimensionless_groups`.
     chain : dict

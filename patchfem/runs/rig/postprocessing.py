@@ -192,6 +192,7 @@ def collect_summary_data(run: CoupledRun, measures: dict, notes: list) -> dict:
     Parameters
     ----------
     run : CoupledRun
+        Completed run.
     measures : dict
         Final measures by name.
     notes : list

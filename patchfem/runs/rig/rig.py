@@ -47,6 +47,7 @@ def run_rig(inputs: RunInputs) -> Result:
     Parameters
     ----------
     inputs : RunInputs
+        Plan, Patch with its coarser mesh, and callbacks of the run.
 
     Raises
     ------
@@ -117,6 +118,7 @@ def run_refined(inputs: RunInputs, numerics: Numerics) -> CoupledRun:
     Parameters
     ----------
     inputs : RunInputs
+        Plan, Patch with its coarser mesh, and callbacks of the run.
     numerics : Numerics
         Numerical settings of the first run.
     """
@@ -241,6 +243,7 @@ def _meets_tolerance(run: CoupledRun, excesses: list) -> bool:
     Parameters
     ----------
     run : CoupledRun
+        Run with the errors from its coarse runs.
     excesses : list
         Result of `_find_step_excess` of the coarser runs; that of the run is added.
     """
@@ -271,6 +274,7 @@ def _is_finest(run: CoupledRun, displacement_errors: list) -> bool:
     Parameters
     ----------
     run : CoupledRun
+        Run with its numerical settings.
     displacement_errors : list
         Errors of the displacement [m] of all runs up to this one.
     """
@@ -295,7 +299,9 @@ def _add_level_errors(solution: Solution, coarser_runs: list, solutions: dict) -
     Parameters
     ----------
     solution : Solution
+        Solution of the finest run.
     coarser_runs : list of CoarserRuns
+        Settings of the coarse runs by source of error.
     solutions : dict
         Solution of each coarse run by its Numerics.
     """

@@ -53,6 +53,7 @@ class Runner:
         Parameters
         ----------
         numerics : Numerics
+            Settings of this run.
         coarser_model : Model, optional
             Model of a coarse run, which needs no fields; default: the model of the run itself.
         """
@@ -97,6 +98,7 @@ class Runner:
         numerics : Numerics
             Settings of the run.
         solution : Solution
+            Solution of the run.
         coarser_runs : list of CoarserRuns
             Coarse runs, which are already solved; those with fewer steps come first.
 

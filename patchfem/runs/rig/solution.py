@@ -163,6 +163,7 @@ def find_release_amplitude(window, period: float, window_amplitude: float) -> fl
     Parameters
     ----------
     window : Response
+        Last cycles of the motion.
     period : float
         Period of the drive [s].
     window_amplitude : float
@@ -198,7 +199,9 @@ def compute_sampled_loop(
     Parameters
     ----------
     window : Response
+        Equally spaced samples of the last cycles.
     drive
+        Drive, whose frequency is that of the harmonics.
     work : float
         Friction work per cycle [J].
     force : complex, optional
@@ -228,6 +231,7 @@ def compute_peak_frequency(solution: Solution, coarser=()) -> dict:
     Parameters
     ----------
     solution : Solution
+        Solution at the peak, with its drive and the error of its frequency.
     coarser : sequence of Solution
         Coarse runs; the shift of their peaks is part of the error.
 

@@ -15,9 +15,11 @@ def solve_rig(model, numerics, patch, frames: int = 0, say=None, progress=None) 
     Parameters
     ----------
     model : Model
+        Rig, drive and friction laws.
     numerics : Numerics
         Numerical settings, including the name of the engine.
     patch : Patch or None
+        None under [normal] and between masses.
     frames : int
         Number of snapshots of the interface in the last cycle.
     say, progress : callable, optional

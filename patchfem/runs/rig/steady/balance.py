@@ -81,8 +81,12 @@ class BalanceEvaluator(RunEvaluator):
 
         Parameters
         ----------
-        run, drive, stuck
-            See `RunEvaluator.compute_integrated_measures`.
+        run
+            Run of the engine, or its mark at the end of a drive level.
+        drive
+            Drive of the run.
+        stuck : bool
+            Whether the interface is stuck during the last cycles.
         """
         values = {"drift_per_cycle": 0.0}
         if not self.has_friction:
@@ -103,8 +107,12 @@ class BalanceEvaluator(RunEvaluator):
 
         Parameters
         ----------
-        run, drive, stuck
-            See `RunEvaluator.collect_cycle_data`.
+        run
+            Run of the engine, or its mark at the end of a drive level.
+        drive
+            Drive of the run.
+        stuck : bool
+            Whether the interface is stuck during the last cycles.
         """
         return {"loop": compute_sampled_loop(run.window, drive, run.ledger["friction"])}
 
@@ -167,6 +175,7 @@ class BalanceFinder:
         Parameters
         ----------
         drive : SineDrive
+            Amplitude [m s-2] and angular frequency [rad/s].
         guess : SteadyMotion, optional
             Initial guess from the response curve, for use if several motions exist.
         """
@@ -232,7 +241,9 @@ class BalanceFinder:
         values : dict
             Measures by name.
         motion : SteadyMotion
+            Solution of the balance, with the error of its truncation.
         drive : SineDrive
+            Drive of the motion.
         compute_measures : callable
             Function (SteadyMotion, drive) that returns measures by name.
         """
@@ -282,6 +293,7 @@ class BalanceFinder:
         Parameters
         ----------
         drive : SineDrive
+            Amplitude [m s-2] and angular frequency [rad/s].
         guess : SteadyMotion, optional
             Steady motion under a similar drive.
         needs_histories : bool
@@ -383,6 +395,7 @@ class BalanceFinder:
         Parameters
         ----------
         first, second : CurvePoint
+            Neighbouring points of a branch.
         fraction : float
             Fraction of the arc length between the points, from the first one.
         """

@@ -125,7 +125,9 @@ def make_curve_point(drive, solution, guess=None) -> CurvePoint:
     Parameters
     ----------
     drive : SineDrive
+        Drive of the motion.
     solution : Solution
+        Its `extra` has the regime and the Floquet multipliers.
     guess : optional
         Initial guess for the motion at a neighbouring drive.
     """
@@ -168,6 +170,7 @@ class TracedCurve:
         Parameters
         ----------
         first, second : CurvePoint
+            Neighbouring points of the curve.
         fraction : float
             Fraction of the distance between the points, from the first one.
         """
@@ -186,6 +189,7 @@ def compute_response_curve(modes, drive, find_point) -> list:
     modes
         Modal basis.
     drive : SweepDrive
+        Range of the frequency [Hz] and acceleration [m s-2].
     find_point : callable
         Function (sine, guess) that returns a CurvePoint, where guess is the initial guess from the
         previous point or None.

@@ -60,6 +60,7 @@ def refine_peak(points: list, finder, tolerance: float) -> RefinedPeak:
         `peak_tolerances`, the ratios of the remaining errors of the peak to the tolerance: that of the
         amplitude, and that of the position relative to the width.
     tolerance : float
+        Relative tolerance of the scene.
 
     Returns
     -------
@@ -204,8 +205,9 @@ def solve_peak(curve: ResponseCurve, finder) -> Solution:
     Parameters
     ----------
     curve : ResponseCurve
+        Points in order along the curve, its folds and notes.
     finder
-        See `refine_peak`.
+        Solver for steady motions that has traced the curve.
     """
     points, best, above = refine_peak(curve.points, finder, finder.model.accuracy.tolerance)
     peak_point = points[best]

@@ -66,6 +66,7 @@ class ShootingFinder(TracedCurve):
         Parameters
         ----------
         drive : SineDrive
+            Amplitude [m s-2] and angular frequency [rad/s].
         guess : hybrid.records.State, optional
             State of a similar motion at phase 0 of the drive.
 
@@ -248,6 +249,7 @@ class ShootingFinder(TracedCurve):
         Parameters
         ----------
         drive : SineDrive
+            Amplitude [m s-2] and angular frequency [rad/s].
         guess : hybrid.records.State, optional
             State of a similar motion at phase 0 of the drive.
         needs_histories : bool
