@@ -35,6 +35,9 @@ class CoarserRuns(NamedTuple):
     source: str = "own"
 
 
+ComparisonRuns = list[CoarserRuns]  # one for each source of error
+
+
 class StepRun(NamedTuple):
     """Run with a given number of time steps per cycle.
 

@@ -19,24 +19,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 from .measures import ArrayPair, find_reversal_steps
 
 # Candidate spans of a fit: number of half cycles on either side of a point.
-SPAN_LENGTHS = (
-    1,
-    2,
-    3,
-    4,
-    6,
-    8,
-    12,
-    16,
-    24,
-    32,
-    48,
-    64,
-    96,
-    128,
-    192,
-    256,
-)
+SPAN_LENGTHS = (1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64, 96, 128, 192, 256)
 # Largest difference between the slopes fitted over two spans, in standard deviations.
 MAX_SLOPE_DIFFERENCE = 2.0
 # Half-width of a 95 % interval in standard deviations; above 1.96, because the span of the fit is

@@ -157,7 +157,6 @@ def compute_slip_measures(window: Response, drive, steps_per_cycle: int) -> Valu
     # The excess is known at the midpoints of the steps and linear in between.
     before = excess[:-1]
     after = excess[1:]
-    rise = np.abs(after - before)
     below = compute_negative_fraction(before, after)
     middles = (time[1:] + time[:-1]) / 2
     measures["stick_fraction"] = (
@@ -166,7 +165,8 @@ def compute_slip_measures(window: Response, drive, steps_per_cycle: int) -> Valu
 
     onsets = np.flatnonzero((before < 0) & (after >= 0))
     if onsets.size:
-        onset_times = middles[onsets] - before[onsets] / rise[onsets] * np.diff(middles)[onsets]
+        rise = (after - before)[onsets]
+        onset_times = middles[onsets] - before[onsets] / rise * np.diff(middles)[onsets]
         measures |= slip_start_measure(2 * np.pi / drive.period * onset_times)
     return measures
 

@@ -111,7 +111,7 @@ def judge_outcome(
 
     amplitudes = solution.amplitudes
     extremes = solution.extremes
-    window = max(1, round((solution.window.time[-1] - solution.window.time[0]) / drive.period))
+    window = _count_window_cycles(solution, drive)
 
     # The levels before the last one have other amplitudes.
     if level_cycles:
@@ -154,6 +154,12 @@ def judge_outcome(
     total = steady_estimate_error(steady, error, base.value, base.error or 0.0)
     measure = Measure(float(steady), "m", float(total), base.floor)
     return outcome, {STEADY_AMPLITUDE: measure}
+
+
+def _count_window_cycles(solution, drive) -> int:
+    """Return the number of cycles in the window of a run."""
+    time = solution.window.time
+    return max(1, round((time[-1] - time[0]) / drive.period))
 
 
 def is_drifting(drift, error, amplitude, tolerance, floor) -> np.ndarray:
@@ -377,7 +383,7 @@ def find_ringing(solution, measures: Measures, limits: tuple[float, float], driv
         return 0.0
     if not drive_sizes.is_periodic(drive) or not amplitude.value:
         return 0.0
-    window = max(1, round((solution.window.time[-1] - solution.window.time[0]) / drive.period))
+    window = _count_window_cycles(solution, drive)
     decay = min_decay_rate * drive.period
     ringing = float(remaining_ringing(np.asarray(solution.extremes), window, decay))
     sizes = (amplitude.value, amplitude.error or 0.0, amplitude.floor)

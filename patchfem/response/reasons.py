@@ -74,8 +74,11 @@ def find_missing(
         )
     if has_loaded_interface:
         reasons["slip_start_phase"] = _reason_for_missing_phase(values, drive)
-    names = [name for name in reasons if name not in values]
-    return {name: _make_missing_measure(name, reasons[name]) for name in names}
+    return {
+        name: _make_missing_measure(name, reason)
+        for name, reason in reasons.items()
+        if name not in values
+    }
 
 
 def find_missing_secant(values) -> Measures:

@@ -88,8 +88,10 @@ class LastCycles:
             return {}
         if self.integrated.loops:
             loop = self.integrated.loops[0]
-            values = {"slip_amplitude": loop.slip_range / 2}
-            return values | {"stick_fraction": stick_fraction(loop.stuck_time, self.span)}
+            return {
+                "slip_amplitude": loop.slip_range / 2,
+                "stick_fraction": stick_fraction(loop.stuck_time, self.span),
+            }
         window = self.window
         steps = max(1, round((window.time.size - 1) * self.drive.period / self.span))
         values = compute_slip_measures(window, self.drive, steps)

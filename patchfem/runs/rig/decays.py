@@ -261,7 +261,7 @@ def estimate_decay_mesh_errors(model, patch, coarse, amplitudes, find_mode, stif
             fine,
             make_laws_on_coarse_meshes(model, coarse, stiffer),
             lambda laws: compute_static_curve(
-                laws.modes, laws, mode_index, amplitudes, balance.SAMPLES_PER_CYCLE
+                laws.modes, laws, mode_index, amplitudes, balance.BALANCE_SAMPLES_PER_CYCLE
             )[1:3],
         )
     except NotConverged as reason:

@@ -13,6 +13,7 @@ from ...response.events import is_all_stuck
 from ...response.levels import LEVEL_MEASURES, Level
 from ...response.loops import reversal_force_rule
 from ...response.measures import (
+    Values,
     relative_gap,
     window_amplitudes,
     window_end_values,
@@ -20,7 +21,13 @@ from ...response.measures import (
 from ...response.outcome import estimate_steady
 from ...response.rows import AMPLITUDE, LastCycles, compute_measures
 from ...structure.drive_sizes import is_sinusoidal
-from .solution import Solution, find_release_amplitude, first_interface_load, first_mode_stiffness
+from .solution import (
+    Fields,
+    Solution,
+    find_release_amplitude,
+    first_interface_load,
+    first_mode_stiffness,
+)
 
 
 class RunEvaluator:
@@ -75,7 +82,7 @@ class RunEvaluator:
         """
         return IntegratedMeasures()
 
-    def collect_cycle_data(self, run, drive, *, stuck: bool) -> dict:
+    def collect_cycle_data(self, run, drive, *, stuck: bool) -> Fields:
         """Return fields of `LastCycles` that the engine computes more accurately than from samples.
 
         Parameters
@@ -89,7 +96,7 @@ class RunEvaluator:
         """
         return {}
 
-    def evaluate_measures(self, run, drive=None, ledger=None, *, stuck: bool = False) -> dict:
+    def evaluate_measures(self, run, drive=None, ledger=None, *, stuck: bool = False) -> Values:
         """Compute the measures of a run from its last cycles.
 
         Parameters
@@ -139,7 +146,7 @@ class RunEvaluator:
             return False
         return is_all_stuck(run.window, self.stick_tolerance)
 
-    def estimate_run_errors(self, run, drive, values: dict) -> dict:
+    def estimate_run_errors(self, run, drive, values: Values) -> Values:
         """Estimate the errors of the measures without coarse runs.
 
         Parameters
@@ -153,7 +160,7 @@ class RunEvaluator:
         """
         return {}
 
-    def collect_solution_fields(self, run, drive) -> dict:
+    def collect_solution_fields(self, run, drive) -> Fields:
         """Return fields of the Solution that only this engine provides."""
         return {}
 
@@ -240,7 +247,7 @@ def thin_samples(window):
     return window.select(is_retained)
 
 
-def compute_sampled_work(response) -> dict:
+def compute_sampled_work(response) -> Values:
     """Return a dict with the friction work and the integral of its absolute value [J].
 
     Both follow from the samples of all interfaces by the trapezoidal rule.
@@ -252,7 +259,7 @@ def compute_sampled_work(response) -> dict:
     return {"sampled": sampled, "passed": sum(float(abs(part).sum()) for part in parts)}
 
 
-def compute_work_check(energies: dict) -> float:
+def compute_work_check(energies: Values) -> float:
     """Return the relative difference of the friction work from samples and from the energy balance.
 
     Parameters

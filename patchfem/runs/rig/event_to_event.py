@@ -32,8 +32,8 @@ from ...response.events import (
     find_segment_borders,
     sort_events,
 )
-from ...response.measures import MIN_SLIDE_RANGE, compute_harmonic
-from ...response.ringing import compute_stuck_vibration, select_strongest
+from ...response.measures import MIN_SLIDE_RANGE, Values, compute_harmonic
+from ...response.ringing import VibratingMode, compute_stuck_vibration, select_strongest
 from ...response.rows import AMPLITUDE, find_definition, select_names
 from ...structure.drive_sizes import (
     choose_samples_per_cycle,
@@ -47,10 +47,10 @@ from . import strips
 from .evaluation import RunEvaluator, compute_sampled_work, compute_work_check, thin_samples
 from .hybrid_laws import Joints, make_joints
 from .levels import remove_incomplete_cycle, run_levels
-from .solution import Solution, describe_escape, find_travel, first_mode_stiffness
+from .solution import Fields, Solution, describe_escape, find_travel, first_mode_stiffness
 
-SAMPLES_PER_CYCLE = 400  # samples of each of the last cycles
-MIN_SAMPLES = 101  # samples of the last cycles of a run shorter than a cycle
+LATE_SAMPLES_PER_CYCLE = 400  # samples of each of the last cycles
+MIN_WINDOW_SAMPLES = 101  # samples of the last cycles of a run shorter than a cycle
 MAX_EARLY_SAMPLES = 8_000  # samples of equal distances before the last cycles
 EARLY_SAMPLES_PER_CYCLE = 40
 SAME_TIME_TOL = 1e-9  # distance of samples that are one, in cycles
@@ -87,6 +87,19 @@ class ElementSnapshot(NamedTuple):
     faces: list
 
 
+class SampleTimes(NamedTuple):
+    """Times of the samples of a run [s].
+
+    - samples (k,): all of them.
+    - snapshots (f,): those at which the elements are stored, in the last cycle.
+    - window_start: start of the window.
+    """
+
+    samples: np.ndarray
+    snapshots: np.ndarray
+    window_start: float
+
+
 @dataclass(frozen=True, eq=False, slots=True)
 class LumpedRun:
     """Run of the engine with histories.
@@ -104,19 +117,19 @@ class LumpedRun:
     - repeats: whether the motion repeats after each cycle.
     """
 
-    values: dict
+    values: Values
     response: Response
     window: Response
     extremes: np.ndarray
     phasors: np.ndarray
-    ledger: dict
+    ledger: Values
     outcome: Outcome | None
     message: str
     end: State
     cycles_done: float
     events: int
     log: Events | None = None
-    snapshots: list = field(default_factory=list)
+    snapshots: list[ElementSnapshot] = field(default_factory=list)
     repeats: bool = False
 
 
@@ -181,7 +194,7 @@ class LumpedEvaluator(RunEvaluator):
 
     def __init__(self, model, numerics, patch, joints: Joints):
         super().__init__(
-            model, numerics, patch, joints.contact, joints.stick_tolerance, SAMPLES_PER_CYCLE
+            model, numerics, patch, joints.contact, joints.stick_tolerance, LATE_SAMPLES_PER_CYCLE
         )
         self.joints = joints
         self.is_rigid = bool(joints.laws) and all(is_rigid(law.law) for law, _ in joints.laws)
@@ -203,7 +216,7 @@ class LumpedEvaluator(RunEvaluator):
         """
         travel = find_travel(self.model.rig)
         times = self._choose_times(drive, cycles, frames)
-        motion = self._run(drive, cycles, np.concatenate(times[:2]), travel, state)
+        motion = self._run(drive, cycles, times.samples, travel, state)
         outcome = EARLY_ENDS.get(motion.status)
         message = self._explain_end(motion, travel) if outcome is not None else ""
         if motion.status not in (Status.DONE, *EARLY_ENDS):
@@ -212,7 +225,7 @@ class LumpedEvaluator(RunEvaluator):
             # Only a run with a known end has the measures and samples of its last cycles.
             cycles = motion.time / drive.period
             times = self._choose_times(drive, cycles, 0)
-            motion = self._run(drive, cycles, np.concatenate(times[:2]), np.inf, state)
+            motion = self._run(drive, cycles, times.samples, np.inf, state)
         run = self._make_run(motion, drive, cycles, times, state)
         return replace(run, outcome=outcome, message=message)
 
@@ -260,8 +273,8 @@ class LumpedEvaluator(RunEvaluator):
         )
         return find_stable_amplitude(motion)
 
-    def _choose_times(self, drive, cycles: float, frames: int) -> tuple:
-        """Return the times [s] of samples before the last cycles, in the last cycles, and of snapshots."""
+    def _choose_times(self, drive, cycles: float, frames: int) -> SampleTimes:
+        """Choose the times of the samples and of `frames` snapshots."""
         period = drive.period
         end = cycles * period
         window_start = max(0.0, end - self.numerics.window * period)
@@ -277,10 +290,13 @@ class LumpedEvaluator(RunEvaluator):
         if count:
             early = np.arange(0.0, first - 1e-9 * period, period / count)
 
-        # Each of the last cycles has SAMPLES_PER_CYCLE samples.
+        # Each of the last cycles has LATE_SAMPLES_PER_CYCLE samples.
         late = [
             _divide(begin, stop, period, minimum)
-            for begin, stop, minimum in ((first, window_start, 2), (window_start, end, MIN_SAMPLES))
+            for begin, stop, minimum in (
+                (first, window_start, 2),
+                (window_start, end, MIN_WINDOW_SAMPLES),
+            )
             if stop > begin
         ]
         late = np.unique(np.concatenate(late))
@@ -289,16 +305,16 @@ class LumpedEvaluator(RunEvaluator):
         begin = max(0.0, end - period)
         at = begin + (end - begin) * (1 + np.arange(frames)) / max(frames, 1)
         nearest = np.abs(late[:, None] - at).argmin(axis=0)
-        return early, late, late[nearest], window_start
+        return SampleTimes(np.append(early, late), late[nearest], window_start)
 
     def _make_run(
-        self, motion, drive, cycles: float, times: tuple, start: State | None
+        self, motion, drive, cycles: float, times: SampleTimes, start: State | None
     ) -> LumpedRun:
         """Return the histories, energies and events of a motion."""
         time = motion.rows[:, 0]
         if hasattr(drive, "band"):
             # Spectra need samples of equal distances.
-            is_kept = np.isin(time, np.concatenate(times[:2]))
+            is_kept = np.isin(time, times.samples)
         else:
             # Differences of samples at nearly the same time are round-off, except at a jump of the force; the last sample
             # is kept.
@@ -310,7 +326,7 @@ class LumpedEvaluator(RunEvaluator):
         response = motion.make_response(self.model.rig.modes, drive)
         if self.model.grooves is not None and self.model.grooves.lifted_mass:
             response = self._add_vertical_force(response, drive)
-        window = response.select(response.time >= times[3] * (1 - 1e-15))
+        window = response.select(response.time >= times.window_start * (1 - 1e-15))
 
         run = LumpedRun(
             values=dict(motion.values),
@@ -325,7 +341,7 @@ class LumpedEvaluator(RunEvaluator):
             cycles_done=cycles,
             events=len(motion.event_rows),
             log=self._list_events(motion, drive),
-            snapshots=self._list_snapshots(motion, response, times[2], start),
+            snapshots=self._list_snapshots(motion, response, times.snapshots, start),
             repeats=motion.repeats,
         )
         if not self.strips_slide_apart:
@@ -428,7 +444,7 @@ class LumpedEvaluator(RunEvaluator):
         if not is_sinusoidal(drive):
             values |= dict.fromkeys(select_names("sine"))
         if self.has_friction:
-            values |= self._limit_loop_measures(run, values)
+            values |= self._limit_loop_measures(run)
             work = run.window.extra["ledger"][0]
             energies = run.ledger | compute_sampled_work(run.window)
             values["work_check"] = compute_work_check(energies | {"booked": work[-1] - work[0]})
@@ -441,7 +457,7 @@ class LumpedEvaluator(RunEvaluator):
         values.pop("energy_stored", None)
         return IntegratedMeasures(values)
 
-    def _limit_loop_measures(self, run, values: dict) -> dict:
+    def _limit_loop_measures(self, run) -> dict[str, None]:
         """Return the measures of a loop that have no value, because the interface hardly moves or moves in several modes."""
         missing = {}
         if np.ptp(run.window.slide) <= MIN_SLIDE_RANGE:
@@ -451,7 +467,7 @@ class LumpedEvaluator(RunEvaluator):
             missing = {"equivalent_damping": None}
         return missing
 
-    def collect_cycle_data(self, run, drive, *, stuck: bool) -> dict:
+    def collect_cycle_data(self, run, drive, *, stuck: bool) -> Fields:
         """Return whether the interfaces are strips of a single one.
 
         Parameters
@@ -465,7 +481,7 @@ class LumpedEvaluator(RunEvaluator):
         """
         return {"is_single_interface": self.strips_slide_apart}
 
-    def _find_stuck_vibration(self, run, motion: Response, drive) -> list:
+    def _find_stuck_vibration(self, motion: Response, drive) -> list[VibratingMode]:
         """Return the free vibration of the modes in a part of the motion in which no interface slips; [] if one does."""
         springs = self.joints.springs
         if not springs.size or motion.time.size < 2 or is_periodic(drive) or not drive.segments:
@@ -475,7 +491,7 @@ class LumpedEvaluator(RunEvaluator):
             return []
         return compute_stuck_vibration(self.model.rig.modes, springs, motion)
 
-    def collect_solution_fields(self, run, drive) -> dict:
+    def collect_solution_fields(self, run, drive) -> Fields:
         """Return the vibration that remains after the last slip of a release."""
         if self.model.rig.drive.kind != "free" or not self.joints.springs.size:
             return {}
@@ -485,10 +501,10 @@ class LumpedEvaluator(RunEvaluator):
         if not moves.size:
             return {}
         after = response.select(response.time >= response.time[moves[-1] + 1])
-        vibration = self._find_stuck_vibration(run, after, drive)
+        vibration = self._find_stuck_vibration(after, drive)
         return {"tail": select_strongest(vibration)} if vibration else {}
 
-    def estimate_run_errors(self, run, drive, values: dict) -> dict:
+    def estimate_run_errors(self, run, drive, values: Values) -> Values:
         """Estimate the errors of the samples of a random motion.
 
         Parameters
@@ -549,8 +565,8 @@ def may_still_change(extremes, window: int, tolerance: float, decay: float) -> b
 
 
 def _divide(begin: float, end: float, period: float, minimum: int) -> np.ndarray:
-    """Return times (k,) [s] of equal distances from begin to end, SAMPLES_PER_CYCLE in a period."""
-    count = round((end - begin) / period * SAMPLES_PER_CYCLE) + 1
+    """Return times (k,) [s] of equal distances from begin to end, LATE_SAMPLES_PER_CYCLE in a period."""
+    count = round((end - begin) / period * LATE_SAMPLES_PER_CYCLE) + 1
     return np.linspace(begin, end, max(minimum, count))
 
 

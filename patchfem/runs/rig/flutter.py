@@ -4,6 +4,7 @@ In: a `postprocessing.CoupledRun` with such a mode. Out: `flutter_amplitude`, th
 largest unstable limit cycle (`dynamics.limit_cycles`), and notes.
 """
 
+from math import tau
 from typing import NamedTuple
 
 from ...core import Measure, NotConverged, Outcome, PatchfemError
@@ -85,7 +86,7 @@ def compute_flutter_amplitude(run) -> tuple:
 
     return {FLUTTER_MEASURE: Measure(limit.amplitude, unit, limit.error, floor)}, [
         "a mode of negative damping gains energy: without a drive this mode has an unstable steady oscillation of "
-        f"{format_length(limit.amplitude, 4)} at the output, at {limit.omega / 6.283185307179586:.4g} "
+        f"{format_length(limit.amplitude, 4)} at the output, at {limit.omega / tau:.4g} "
         "Hz; a free oscillation of "
         f"{decay_text}, and a free oscillation of larger amplitude grows",
         *end_notes,
@@ -114,7 +115,7 @@ def _find_limit_cycles(model, numerics, patch) -> LimitCycles:
         return LimitCycles([], "limit cycles can be computed for one interface only")
 
     modes = rig.modes
-    row = rig.modes.interfaces[0]
+    row = modes.interfaces[0]
     if not row[limit_cycles.find_unstable_modes(modes)].any():
         return LimitCycles([], NO_INTERFACE_NOTE)
 

@@ -61,13 +61,12 @@ def make_contact(model: Model, numerics: Numerics, patch) -> contacts.Contact:
 
 def _make_own_contact(model: Model, numerics: Numerics, patch, row) -> contacts.Contact:
     """Return the contact points of the only interface, of the slide `row` (n,) per coordinate."""
+    load = patch.pressure.load if patch is not None else model.point.load
     if model.grooves is not None:
-        load = patch.pressure.load if patch is not None else model.point.load
         return shear.make_flank_contact(model, load, patch, numerics.shear_modes)
     if model.rig.friction.load_varies:
         return _make_varying_contact(model, numerics, patch, row)
     law = model.friction.law
-    load = patch.pressure.load if patch is not None else model.point.load
     if law_has_trait(law, "bonds"):
         choice = choose_bond_summation(model, numerics)
         if model.partial_slip or choice.engine != "recursion" or numerics.per_point:

@@ -11,12 +11,7 @@ import numpy as np
 
 from ...core import Measure, SineDrive
 from ...response.events import join_events
-from ...response.levels import (
-    Level,
-    bracket_onset,
-    make_no_onset_reason,
-    make_onset_test,
-)
+from ...response.levels import Level, bracket_onset, make_no_onset_reason, make_onset_test
 from ...response.rows import TABLE
 from ...structure.drive_sizes import find_drive_omega
 
@@ -244,7 +239,7 @@ def join_runs(runs: list, duration: float):
     )
 
 
-def _join_histories(histories: list, shifts: list):
+def _join_histories(histories: list, shifts: list[float]):
     """Join the histories of successive runs and shift them by their start times [s]."""
     last = histories[-1]
     # The last sample of a run equals the first sample of the next run.

@@ -15,7 +15,7 @@ from ...core import IntegratedMeasures, Outcome
 from ...effects import law_has_trait
 from ...points import time_march as engine
 from ...response.ends import estimate_window_error
-from ...response.measures import compute_step_harmonic, peak_sampling_errors
+from ...response.measures import Values, compute_step_harmonic, peak_sampling_errors
 from ...response.spectrum import friction_harmonic, motion_harmonic
 from ...structure.drive_sizes import (
     estimate_peak_speed,
@@ -31,6 +31,7 @@ from .evaluation import RunEvaluator, compute_work_check
 from .interface import make_contact
 from .solution import (
     CycleLoop,
+    Fields,
     Solution,
     compute_sampled_loop,
     describe_escape,
@@ -117,7 +118,7 @@ class MarchEvaluator(RunEvaluator):
             stick_tolerance = 1e-3 * contact.length
         super().__init__(model, numerics, patch, contact, stick_tolerance)
 
-    def collect_solution_fields(self, run, drive) -> dict:
+    def collect_solution_fields(self, run, drive) -> Fields:
         """Return drive levels, bond summation and errors due to an end between two steps."""
         late = {}
         n_steps = self.numerics.cycles * self.numerics.steps
@@ -125,10 +126,9 @@ class MarchEvaluator(RunEvaluator):
             period = self.model.rig.drive.signal.period
             changes = estimate_window_error(run.window, period, n_steps - round(n_steps))
             late = {name: END_ERROR_FACTOR * change for name, change in changes.items()}
-        fields = {"bond_summation": self.choose_bond_summation(), "extra": {"late": late}}
-        return fields
+        return {"bond_summation": self.choose_bond_summation(), "extra": {"late": late}}
 
-    def estimate_run_errors(self, run, drive, values: dict) -> dict:
+    def estimate_run_errors(self, run, drive, values: Values) -> Values:
         """Estimate how far the peaks of a motion exceed its samples.
 
         Parameters
@@ -170,7 +170,7 @@ class MarchEvaluator(RunEvaluator):
             values |= {"slip_start_phase": None, "stick_fraction": 1.0}
         return IntegratedMeasures(values)
 
-    def _compute_energies(self, run, drive, *, stuck: bool) -> dict:
+    def _compute_energies(self, run, drive, *, stuck: bool) -> Values:
         """Return the energies of a run, with a scale for the round-off of a stuck rigid interface.
 
         This scale is the kinetic energy at the peak speed of the drive.
@@ -181,7 +181,7 @@ class MarchEvaluator(RunEvaluator):
         moving = rig.modes.mass * estimate_peak_speed(drive, rig.start) ** 2
         return run.ledger | {"power": run.ledger["power"] + moving}
 
-    def collect_cycle_data(self, run, drive, *, stuck: bool) -> dict:
+    def collect_cycle_data(self, run, drive, *, stuck: bool) -> Fields:
         """Return the friction loop and the energies of the last cycles.
 
         Parameters

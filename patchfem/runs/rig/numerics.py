@@ -21,7 +21,7 @@ WHOLE_CYCLE_TOL = 1e-6
 # Number of decay times after which a transient is neglected; its mean square is then reduced to
 # e^-6.
 N_DECAY_TIMES = 3.0
-MIN_SAMPLES = 100  # Smallest number of samples of a run with a non-sinusoidal drive.
+MIN_RUN_SAMPLES = 100  # Smallest number of samples of a run with a non-sinusoidal drive.
 
 
 @dataclass(frozen=True, slots=True)
@@ -106,8 +106,8 @@ def choose_numerics(model: Model) -> Numerics:
 
     steps = steps_per_cycle(model)
     if not is_sinusoidal(drive.signal) and accuracy.steps_per_cycle is None:
-        steps = max(steps, int(np.ceil(MIN_SAMPLES / cycles)))
-    pinned = {key for key in MARCH_SETTINGS if getattr(accuracy, key) is not None}
+        steps = max(steps, int(np.ceil(MIN_RUN_SAMPLES / cycles)))
+    pinned = frozenset(key for key in MARCH_SETTINGS if getattr(accuracy, key) is not None)
     numerics = Numerics(
         engine.name,
         steps,
@@ -115,7 +115,7 @@ def choose_numerics(model: Model) -> Numerics:
         window,
         accuracy.shear_modes,
         model.side == "lower",
-        frozenset(pinned),
+        pinned,
     )
 
     if engine is HYBRID:

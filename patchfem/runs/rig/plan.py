@@ -24,6 +24,7 @@ RESONANCE_TOL = 0.02
 # Smallest ratio of link stiffness to modal stiffness at which the link holds the block nearly at
 # rest.
 MIN_STIFF_LINK_RATIO = 10.0
+Chain = dict[str, float | str]  # stiffness [N/m] of each link by name, or why it has none
 
 
 def structure_stiffnesses(rig) -> dict:
@@ -33,7 +34,7 @@ def structure_stiffnesses(rig) -> dict:
     )
 
 
-def stuck_interface_stiffness(chain: dict, index: int = 0) -> float:
+def stuck_interface_stiffness(chain: Chain, index: int = 0) -> float:
     """Return the tangential stiffness [N/m] of a stuck interface, whose links act in series.
 
     It is inf if all links are rigid, and 0 for a law that creeps.
@@ -57,7 +58,7 @@ def stuck_interface_stiffness(chain: dict, index: int = 0) -> float:
     return 1 / soft if soft else inf
 
 
-def stuck_stiffnesses(rig, chain: dict) -> np.ndarray:
+def stuck_stiffnesses(rig, chain: Chain) -> np.ndarray:
     """Return the tangential stiffness (i,) [N/m] of each stuck interface of a rig.
 
     Strips have the stiffness of their patch. Without friction the stiffness is inf. A patch that was
@@ -74,14 +75,14 @@ def stuck_stiffnesses(rig, chain: dict) -> np.ndarray:
     return stiffness
 
 
-def mode_frequencies(rig, chain: dict) -> list:
+def mode_frequencies(rig, chain: Chain) -> list:
     """Return name, free and stuck frequency [Hz] of each mode as a list of dicts.
 
     The stuck frequency is that with stuck interfaces. It is None without friction and if no link of
     the stiffness chain is compliant.
     """
     modes = rig.modes
-    rows = rig.modes.interfaces
+    rows = modes.interfaces
     stiffness = stuck_stiffnesses(rig, chain)
     has_names = rig.structure.lists_modes and modes.shapes is None
     frequencies = []
@@ -200,7 +201,7 @@ def _find_participation_ratio(rig) -> float:
     return slide / base if rig.structure.lists_modes and base > 0 else 1.0
 
 
-def describe_stick(rig, sizes: dict, chain: dict) -> list:
+def describe_stick(rig, sizes: dict, chain: Chain) -> list[str]:
     """Describe in sentences for a plan whether friction stops a driven block.
 
     For a single mode, they say from D whether the block sticks, and whether friction bounds its

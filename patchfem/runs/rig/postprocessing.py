@@ -13,6 +13,7 @@ from ...model.rig import MAX_TRAVEL
 from ...response import reasons, stationary
 from ...response.decay_curve import DecayCurve
 from ...response.errors import add_run_error_estimates
+from ...response.measures import Measures
 from ...response.outcome import judge_outcome, remove_errors
 from ...structure.drive_sizes import find_decay_rate
 from ..patch import faces
@@ -21,7 +22,7 @@ from ..results.travel import check_pieces_overlap
 from . import decays, flutter, levels
 from .engines import ENGINES, describe_balance_error
 from .numerics import Numerics
-from .solution import Solution
+from .solution import Fields, Solution
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -39,10 +40,10 @@ class CoupledRun:
     inputs: RunInputs
     numerics: Numerics
     solution: Solution
-    measures: dict
+    measures: Measures
     outcome: Outcome | None = None
     decay: DecayCurve | None = None
-    notes: tuple = ()
+    notes: tuple[str, ...] = ()
 
     @property
     def model(self):
@@ -186,7 +187,7 @@ def find_final_outcome(run: CoupledRun) -> Outcome:
     return outcome
 
 
-def collect_summary_data(run: CoupledRun, measures: dict, notes: list) -> dict:
+def collect_summary_data(run: CoupledRun, measures: Measures, notes: list[str]) -> Fields:
     """Collect settings, levels, events, energies and notes of a run for its Result.
 
     Parameters

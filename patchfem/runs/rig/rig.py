@@ -11,7 +11,7 @@ from math import ceil
 import numpy as np
 
 from ...core import Outcome, PatchfemError
-from ...response.coarser import CoarserRuns
+from ...response.coarser import CoarserRuns, ComparisonRuns
 from ...response.errors import absolute_change, add_errors
 from ...response.reasons import find_missing_unbounded
 from ...response.rows import AMPLITUDE, set_final_floors
@@ -183,7 +183,7 @@ def run_refined(inputs: RunInputs, numerics: Numerics) -> CoupledRun:
     return replace(run, solution=solution, measures=measures)
 
 
-def _list_joint_runs(inputs: RunInputs, space_runs: list) -> list:
+def _list_joint_runs(inputs: RunInputs, space_runs: ComparisonRuns) -> ComparisonRuns:
     """List the comparison run with a stiffer joint, if a joint was subtracted from the modes.
 
     Its stiffness is larger by the error of the stiffness that was subtracted, so that the change of a
@@ -234,7 +234,7 @@ def _find_step_excess(run: CoupledRun) -> float:
     return largest
 
 
-def _meets_tolerance(run: CoupledRun, excesses: list) -> bool:
+def _meets_tolerance(run: CoupledRun, excesses: list[float]) -> bool:
     """Return whether the measures meet the tolerance as far as more steps can help.
 
     The displacement must meet it. Other measures are refined while the work of the run is at most
@@ -268,7 +268,7 @@ def _meets_tolerance(run: CoupledRun, excesses: list) -> bool:
     return work > MAX_REFINED_WORK
 
 
-def _is_finest(run: CoupledRun, displacement_errors: list) -> bool:
+def _is_finest(run: CoupledRun, displacement_errors: list[float]) -> bool:
     """Return whether no finer run is possible.
 
     Parameters
@@ -293,7 +293,9 @@ def _is_finest(run: CoupledRun, displacement_errors: list) -> bool:
     )
 
 
-def _add_level_errors(solution: Solution, coarser_runs: list, solutions: dict) -> Solution:
+def _add_level_errors(
+    solution: Solution, coarser_runs: ComparisonRuns, solutions: dict[Numerics, Solution]
+) -> Solution:
     """Add errors from coarse runs to the drive levels of a Solution.
 
     Parameters

@@ -35,10 +35,7 @@ def solve_rig(model, numerics, patch, frames: int = 0, say=None, progress=None) 
         run = march.march_in_time
     else:
         run = steady.solve_steady_motion
-    solution = run(model, numerics, patch, frames, say, progress)
-    if model.rig.modes.gauge is None:
-        return solution
-    return replace_output_by_gauge(model, solution)
+    return replace_output_by_gauge(model, run(model, numerics, patch, frames, say, progress))
 
 
 def refuse_long_run(model, numerics) -> None:

@@ -14,19 +14,19 @@ from ....core import IntegratedMeasures, NotConverged, Outcome, Response, SineDr
 from ....dynamics.harmonic import branch as branches
 from ....dynamics.harmonic.forces import LawGroup
 from ....dynamics.harmonic.laws import Interlock, Spring
-from ....dynamics.harmonic.motion import find_cycle_energies, make_cycle_response
+from ....dynamics.harmonic.motion import SteadyMotion, find_cycle_energies, make_cycle_response
 from ....dynamics.harmonic.motion import find_regime as balanced_regime
 from ....dynamics.harmonic.stability import add_stability
 from ....dynamics.harmonic.steady import find_steady_motion as periodic_point
 from ....dynamics.harmonic.steady import refine_steady_motion
 from ....formatting import format_length, format_quantity
 from ....response.errors import finer_errors
-from ....response.measures import compute_peak
+from ....response.measures import Values, compute_peak
 from ....response.rows import AMPLITUDE
 from ....response.spectrum import find_acceleration_harmonics, make_acceleration_measures
 from ..evaluation import RunEvaluator, compute_sampled_work, compute_work_check
 from ..interface import make_single_law
-from ..solution import Solution, compute_sampled_loop
+from ..solution import Fields, Solution, compute_sampled_loop
 from .curves import (
     COLUMN_MEASURES,
     HARMONIC_ROUND_OFF,
@@ -43,7 +43,7 @@ REASONS_OF_END = {
     "step": "no neighbouring motion was found there",
 }
 # Number of samples per cycle from which the measures of a steady motion are computed.
-SAMPLES_PER_CYCLE = 4096
+BALANCE_SAMPLES_PER_CYCLE = 4096
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -60,7 +60,7 @@ class CycleRun:
     window: Response
     extremes: np.ndarray
     phasors: np.ndarray
-    ledger: dict
+    ledger: Values
     outcome: Outcome | None = None
     message: str = ""
     snapshots: list = field(default_factory=list)
@@ -102,7 +102,7 @@ class BalanceEvaluator(RunEvaluator):
         values["slip_amplitude"] = float(np.ptp(slips)) / 2
         return IntegratedMeasures(values, reversals=(tuple(turn[:2] for turn in self.turns),))
 
-    def collect_cycle_data(self, run, drive, *, stuck: bool) -> dict:
+    def collect_cycle_data(self, run, drive, *, stuck: bool) -> Fields:
         """Return the friction loop of the cycle.
 
         Parameters
@@ -125,9 +125,9 @@ class CycleMeasures(NamedTuple):
     - book: energies [J] and counters by name.
     """
 
-    values: dict
-    response: object
-    book: dict
+    values: Values
+    response: Response
+    book: Values
 
 
 class StableMotion(NamedTuple):
@@ -137,9 +137,9 @@ class StableMotion(NamedTuple):
     - notes: sentences on other motions under the same drive.
     """
 
-    motion: object
-    stability: object
-    notes: tuple = ()
+    motion: SteadyMotion
+    stability: SteadyMotion
+    notes: tuple[str, ...] = ()
 
 
 class BalanceFinder:
@@ -167,7 +167,7 @@ class BalanceFinder:
         self.group = LawGroup(rig.modes, parts)
         self.tolerance = model.accuracy.tolerance
 
-    def compute_steady_motion(self, drive, guess=None) -> tuple:
+    def compute_steady_motion(self, drive, guess=None) -> tuple[Solution, SteadyMotion]:
         """Compute the steady motion under sinusoidal drive, with error estimates.
 
         The errors are estimated with twice as many harmonics and twice as many samples.
@@ -180,9 +180,7 @@ class BalanceFinder:
             Initial guess from the response curve, for use if several motions exist.
         """
         begin = perf_counter()
-        motion = periodic_point(
-            self.modes, drive, self.group, self.harmonics, self.tolerance, start=guess
-        )
+        motion = self._solve_balance(drive, guess)
         motion, stability, notes = self._find_stable_motion(drive, motion)
 
         values, response, book = self._compute_measures(motion, drive)
@@ -190,15 +188,19 @@ class BalanceFinder:
             values,
             motion,
             drive,
-            lambda motion, sine: self._compute_measures(motion, sine, 2 * SAMPLES_PER_CYCLE).values,
+            lambda motion, sine: (
+                self._compute_measures(motion, sine, 2 * BALANCE_SAMPLES_PER_CYCLE).values
+            ),
         )
 
         # The instants of slip have at least the error of a sample, and a phase at most that of half a cycle.
         if "slip_start_phase" in errors:
             errors["slip_start_phase"] = max(
-                min(errors["slip_start_phase"], np.pi / 2), 2 * np.pi / SAMPLES_PER_CYCLE
+                min(errors["slip_start_phase"], np.pi / 2), 2 * np.pi / BALANCE_SAMPLES_PER_CYCLE
             )
-            errors["stick_fraction"] = max(errors.get("stick_fraction", 0.0), 4 / SAMPLES_PER_CYCLE)
+            errors["stick_fraction"] = max(
+                errors.get("stick_fraction", 0.0), 4 / BALANCE_SAMPLES_PER_CYCLE
+            )
 
         name = balanced_regime(motion)
         is_stuck = name == "stuck"
@@ -231,7 +233,13 @@ class BalanceFinder:
             notes=notes,
         ), motion
 
-    def _estimate_errors(self, values: dict, motion, drive, compute_measures) -> dict:
+    def _solve_balance(self, drive, guess) -> SteadyMotion:
+        """Solve the harmonic balance under a drive from an initial guess; None for none."""
+        return periodic_point(
+            self.modes, drive, self.group, self.harmonics, self.tolerance, start=guess
+        )
+
+    def _estimate_errors(self, values: Values, motion, drive, compute_measures) -> Values:
         """Estimate the errors of the measures of a steady motion from a solution with more harmonics.
 
         If that solution does not converge, the error estimate of the balance itself is used.
@@ -269,9 +277,7 @@ class BalanceFinder:
         if not stable_motions:
             return StableMotion(motion, stability)
 
-        motion = periodic_point(
-            self.modes, drive, self.group, self.harmonics, self.tolerance, start=stable_motions[0]
-        )
+        motion = self._solve_balance(drive, stable_motions[0])
 
         output = self.modes.output
         sizes = ", ".join(format_length(branch.amplitude(output), 3) for branch in motions)
@@ -299,10 +305,8 @@ class BalanceFinder:
         needs_histories : bool
             Whether histories are requested; they are always returned.
         """
-        motion = periodic_point(
-            self.modes, drive, self.group, self.harmonics, self.tolerance, start=guess
-        )
-        window = make_cycle_response(motion, self.modes, drive, SAMPLES_PER_CYCLE)
+        motion = self._solve_balance(drive, guess)
+        window = make_cycle_response(motion, self.modes, drive, BALANCE_SAMPLES_PER_CYCLE)
         peak = compute_peak(window.acceleration)
         return ObservedMotion(window, peak, motion.amplitude(self._measured_row), motion)
 
@@ -313,9 +317,7 @@ class BalanceFinder:
 
     def compute_curve_point(self, drive, guess=None) -> CurvePoint:
         """Compute one point of a response curve, without error estimates."""
-        motion = periodic_point(
-            self.modes, drive, self.group, self.harmonics, self.tolerance, start=guess
-        )
+        motion = self._solve_balance(drive, guess)
         return self._make_curve_point(add_stability(motion, self.modes))
 
     def _make_curve_point(self, motion) -> CurvePoint:
@@ -334,9 +336,9 @@ class BalanceFinder:
             motion,
         )
 
-    def _compute_curve_measures(self, motion, drive) -> dict:
+    def _compute_curve_measures(self, motion, drive) -> Values:
         """Return a dict of the measures of a point of a response curve."""
-        response = make_cycle_response(motion, self.modes, drive, SAMPLES_PER_CYCLE)
+        response = make_cycle_response(motion, self.modes, drive, BALANCE_SAMPLES_PER_CYCLE)
         values = {
             COLUMN_MEASURES["amplitude"]: motion.amplitude(self._measured_row),
             COLUMN_MEASURES["acceleration_peak"]: compute_peak(response.acceleration),
@@ -344,7 +346,9 @@ class BalanceFinder:
         }
         return {name: value for name, value in values.items() if value is not None}
 
-    def _compute_measures(self, motion, drive, samples: int = SAMPLES_PER_CYCLE) -> CycleMeasures:
+    def _compute_measures(
+        self, motion, drive, samples: int = BALANCE_SAMPLES_PER_CYCLE
+    ) -> CycleMeasures:
         """Compute the measures of a steady motion from samples of its cycle."""
         response = make_cycle_response(motion, self.modes, drive, samples)
         book = find_cycle_energies(motion, self.modes) | {

@@ -16,9 +16,10 @@ import numpy as np
 
 from ....core import NotConverged
 from ....response.errors import absolute_change
+from ....response.measures import Values
 from ....response.rows import AMPLITUDE
 from ..solution import Solution, replace_output_by_gauge
-from .curves import ResponseCurve, find_largest_point, tabulate_curve
+from .curves import CurvePoint, ResponseCurve, find_largest_point, tabulate_curve
 
 MAX_ADDED_POINTS = 40  # Largest number of points that are added to refine a peak.
 # Smallest fraction of the peak at which a resonance curve is assumed concave; that of a single mode
@@ -43,12 +44,12 @@ class RefinedPeak(NamedTuple):
       bounded motion.
     """
 
-    points: list
+    points: list[CurvePoint]
     best: int
     above: float
 
 
-def refine_peak(points: list, finder, tolerance: float) -> RefinedPeak:
+def refine_peak(points: list[CurvePoint], finder, tolerance: float) -> RefinedPeak:
     """Add points to a response curve around its peak.
 
     Parameters
@@ -212,10 +213,10 @@ def solve_peak(curve: ResponseCurve, finder) -> Solution:
     points, best, above = refine_peak(curve.points, finder, finder.model.accuracy.tolerance)
     peak_point = points[best]
     solution = finder.compute_steady_motion(peak_point.drive, peak_point.guess)[0]
-    solution = replace(solution, notes=(*solution.notes, *curve.notes))
     errors = dict(solution.errors or {})
     solution = replace(
         solution,
+        notes=(*solution.notes, *curve.notes),
         extra=solution.extra | {"curve": tabulate_curve(points, curve.folds)},
         drive=peak_point.drive,
     )
@@ -260,7 +261,7 @@ def solve_peak(curve: ResponseCurve, finder) -> Solution:
     return replace(solution, errors=errors, peak_error=float(max_position_error))
 
 
-def _compute_neighbour_differences(finder, neighbour, solution: Solution) -> dict:
+def _compute_neighbour_differences(finder, neighbour, solution: Solution) -> Values:
     """Return the differences of all measures between a curve point and a Solution."""
     try:
         other = finder.compute_steady_motion(neighbour.drive, neighbour.guess)[0]

@@ -16,6 +16,7 @@ from ....hybrid import cases, periodic
 from ....hybrid import runs as hybrid_runs
 from ....hybrid.laws import is_rigid
 from ....hybrid.records import Clock, Status, Whole, Window
+from ....response.measures import Values
 from ....response.spectrum import make_acceleration_measures
 from ....structure.response import compute_receptance
 from ..event_to_event import LumpedEvaluator
@@ -236,7 +237,7 @@ class ShootingFinder(TracedCurve):
             guess=motion.batch.states,
         )
 
-    def _estimate_point_errors(self, values: dict, motion) -> dict:
+    def _estimate_point_errors(self, values: Values, motion) -> Values:
         """Return the errors of the measures of a point of a response curve."""
         relative = find_relative_error(motion)
         errors = estimate_exact_errors(values, relative)
