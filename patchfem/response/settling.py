@@ -131,13 +131,9 @@ def extrapolate_steady_amplitudes(amplitudes, phasors) -> ArrayPair:
     count, n_windows = amplitudes.shape
     if n_windows < 5:
         return np.full(count, np.nan), np.full(count, np.nan)
-
     magnitude = np.abs(phasors)
     is_moving = np.all(magnitude[:, -5:] > 0, axis=1)
     waveform = amplitudes[:, -2:] / np.where(magnitude[:, -2:] > 0, magnitude[:, -2:], 1.0)
-
-    aitken_limits = _extrapolate_magnitudes(phasors, geometric_remainders, 3, 3)
-    map_limits = _extrapolate_magnitudes(phasors, plane_map_remainders, 4, 2)
 
     # The ratio of amplitude to |phasor| approaches its limit as the phasors do.
     previous_change = np.abs(phasors[:, -2] - phasors[:, -3])
@@ -148,6 +144,8 @@ def extrapolate_steady_amplitudes(amplitudes, phasors) -> ArrayPair:
     )
     waveform_change = (waveform[:, -1] - waveform[:, -2]) * decay_factor / (1 - decay_factor)
 
+    aitken_limits = _extrapolate_magnitudes(phasors, geometric_remainders, 3, 3)
+    map_limits = _extrapolate_magnitudes(phasors, plane_map_remainders, 4, 2)
     has_map_limit = ~np.isnan(map_limits).any(axis=1)
     limit = np.where(has_map_limit, map_limits[:, 0], aitken_limits[:, 0])
     spread = np.where(
@@ -160,13 +158,11 @@ def extrapolate_steady_amplitudes(amplitudes, phasors) -> ArrayPair:
     # With w = amplitude/|phasor|: value = limit w, error = spread w + 2 |dw| limit.
     value = limit * (waveform[:, -1] + waveform_change)
     error = spread * waveform[:, -1] + 2 * np.abs(waveform_change) * limit + 1e-9 * value
-    extrapolated_change = np.abs(value - amplitudes[:, -1])
     is_known = (
         is_moving
-        & (error < np.maximum(extrapolated_change, 1e-6 * value))
+        & (error < np.maximum(np.abs(value - amplitudes[:, -1]), 1e-6 * value))
         & (value < 20 * amplitudes[:, -1])
     )
-
     return np.where(is_known, value, np.nan), np.where(is_known, error, np.nan)
 
 

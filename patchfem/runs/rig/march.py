@@ -44,7 +44,7 @@ END_ERROR_FACTOR = 1.5
 
 
 def march_in_time(model, numerics, patch, frames: int = 0, say=None, progress=None) -> Solution:
-    """Integrate the motion of a rig in time steps and evaluate its measures.
+    """Integrate the motion of a rig in time steps and evaluate its measures, without errors from coarse runs.
 
     Parameters
     ----------
@@ -58,11 +58,6 @@ def march_in_time(model, numerics, patch, frames: int = 0, say=None, progress=No
         Number of snapshots of the interface in the last cycle.
     say, progress : callable, optional
         Callbacks for a line of text and for the completed fraction.
-
-    Returns
-    -------
-    Solution
-        Without errors from coarse runs.
     """
     rig = model.rig
     begin = perf_counter()

@@ -90,7 +90,6 @@ def choose_numerics(model: Model) -> Numerics:
     drive = rig.drive
     cycles = drive.cycles
     engine = choose_engine(model)
-
     window = int(max(1, min(10, (cycles + WHOLE_CYCLE_TOL) // 10)))
     # Under a random drive, the window is the whole record without its initial transient.
     if drive.waveform.is_random:

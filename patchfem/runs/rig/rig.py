@@ -64,7 +64,6 @@ def run_rig(inputs: RunInputs) -> Result:
             "drive.kind",
         )
 
-    # A run that would take too long is refused before its first part is computed.
     numerics = choose_numerics(model)
     refuse_long_run(model, numerics)
     run = run_refined(inputs, numerics)

@@ -182,7 +182,6 @@ class BalanceFinder:
         begin = perf_counter()
         motion = self._solve_balance(drive, guess)
         motion, stability, notes = self._find_stable_motion(drive, motion)
-
         values, response, book = self._compute_measures(motion, drive)
         errors = self._estimate_errors(
             values,
@@ -201,17 +200,13 @@ class BalanceFinder:
             errors["stick_fraction"] = max(
                 errors.get("stick_fraction", 0.0), 4 / BALANCE_SAMPLES_PER_CYCLE
             )
-
         name = balanced_regime(motion)
-        is_stuck = name == "stuck"
         extra = {
             "regime": name if stability.stable else f"{name}, unstable",
             "multipliers": stability.multipliers,
             "harmonics": motion.harmonics,
         }
-
-        amplitude = np.array([values[AMPLITUDE]])
-        outcome = Outcome.STUCK if is_stuck else Outcome.STEADY
+        outcome = Outcome.STUCK if name == "stuck" else Outcome.STEADY
         message = ""
         if not stability.stable:
             outcome = Outcome.NOT_CONVERGED
@@ -221,7 +216,7 @@ class BalanceFinder:
             values,
             response,
             response,
-            amplitude,
+            np.array([values[AMPLITUDE]]),
             (None, None),
             outcome,
             [],

@@ -83,7 +83,6 @@ def refine_peak(points: list[CurvePoint], finder, tolerance: float) -> RefinedPe
             fractions[is_stable[:-1] != is_stable[1:]] = (
                 0.5  # The limit of stability between two points is found by bisection.
             )
-
         if not np.isfinite(y[max(best - 1, 0) : best + 2]).all():
             return RefinedPeak(points, best, np.inf)
 
@@ -220,7 +219,6 @@ def solve_peak(curve: ResponseCurve, finder) -> Solution:
         extra=solution.extra | {"curve": tabulate_curve(points, curve.folds)},
         drive=peak_point.drive,
     )
-
     height = peak_point.values.get(AMPLITUDE, 0.0)
     y = _collect_amplitudes(points)
     if not height > 0 or AMPLITUDE not in solution.values:
