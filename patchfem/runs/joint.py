@@ -102,6 +102,9 @@ def remove_joint(model: Model, patches: Sequence) -> FreeRig:
     """
     if not model.has_bolted_patch:
         return FreeRig(model, patches)
+
+    # The bolted modes may belong to another contact than the one of this run: `written` is the one
+    # of the measurement.
     bolted = model.rig.structure.bolted
     written = bolted.model or model
     with locate_errors(model.source):
@@ -123,6 +126,8 @@ def remove_joint(model: Model, patches: Sequence) -> FreeRig:
             rig = replace(rig, structure=replace(rig.structure, bolted=removed))
             return FreeRig(replace(model, rig=rig), own_patches)
 
+        # The second result has the joint stiffer by its error, and its change is the error of the
+        # motion.
         free = subtract(0.0)
         return free if own is None else free._replace(stiffer=subtract(1.0))
 

@@ -154,10 +154,13 @@ def _make_plan(model: Model) -> Plan:
         except PatchfemError as error:
             error.key = error.key or "measured.file"
             raise
+
     chain = {"holder": "rigid", "pieces_shear": "rigid", "asperities": "rigid"}
     groups = {}
     rig = model.rig
     motion_sentences = []
+
+    # The stiffness of the joint is subtracted from the measured modes of a bolted rig first.
     if model.has_bolted_patch:
         build_rig = rig.structure.bolted.build_rig
         model, patches, _ = joint.solve_without_joint(model)
@@ -167,6 +170,8 @@ def _make_plan(model: Model) -> Plan:
         rig = replace(model.rig, structure=replace(model.rig.structure, bolted=bolted))
         model = replace(model, rig=rig)
     motion_sentences += model.describe_removed_joint()
+
+    # Structure of the rig and contact of the patch.
     patch_sentences = []
     law_sentences = []
     if rig is not None:
@@ -181,6 +186,7 @@ def _make_plan(model: Model) -> Plan:
             chain |= patch_plan.find_solved_links(chain, values)
         groups |= patch_plan.compute_patch_groups(model)
         patch_sentences += patch_plan.describe_patch_plan(groups, model.patch)
+
     interfaces = rig.friction.interfaces if rig is not None else ()
     for number, interface in enumerate(interfaces):
         if interface.patch is not None:
@@ -192,6 +198,8 @@ def _make_plan(model: Model) -> Plan:
             patch_sentences.append(
                 patch_plan.describe_shear(interface.patch, slip_length, rig.friction.names[number])
             )
+
+    # Sizes of the computation, by which time and memory are predicted.
     unknowns = {}
     if model.patch is not None or model.has_interface_patches:
         unknowns = patch_plan.count_unknowns(model)
@@ -205,6 +213,8 @@ def _make_plan(model: Model) -> Plan:
         engine, counts, samples = of_bench.count_bench_sizes(model)
         unknowns |= counts
         groups = of_bench.compute_dimensionless_groups(model) | groups
+
+    # Laws, and what the numbers of the plan say of the motion.
     if model.wear is not None and model.patch is not None:
         law_sentences.append(_describe_wear(model))
     if model.friction is not None:
@@ -213,12 +223,14 @@ def _make_plan(model: Model) -> Plan:
         law_sentences += _describe_grooves(model)
     if rig is not None:
         motion_sentences += of_rig.describe_stick(rig, groups, chain)
+
     if (
         engine in SKIPPING_ENGINES
         and drive_sizes.is_sinusoidal(rig.drive.signal)
         and rig.drive.cycles >= MIN_SKIPPED_CYCLES
     ):
         law_sentences.append(SKIPPING_NOTE)
+
     sentences = [*motion_sentences, *patch_sentences, *law_sentences]
     if "slip_length" in groups:
         sentences.append(patch_plan.describe_shear(model.patch, groups["slip_length"]))
@@ -227,6 +239,7 @@ def _make_plan(model: Model) -> Plan:
             f"the normal load changes with the motion, so {model.partial_slip} is computed with the tangential modes of "
             "all nodes; the numerical error is estimated from a second run with half as many modes"
         )
+
     return Plan(
         model,
         engine,

@@ -60,12 +60,15 @@ def judge_pass(
     before : Pass or None
         Pass before this one.
     """
+
     model = given if before is None else before.model
     name, excess = find_worst_measure(result.measures, model.accuracy.tolerance)
     if excess <= 1 or result.outcome in FAILED_OUTCOMES:
         return Pass(excess)
     if before is not None and excess * MIN_GAIN > before.excess:
         return Pass(excess)
+
+    # A pass is repeated only along the axis whose error is largest, and only if the run chose it.
     axis = find_axis(result.measures[name], name)
     finer = None
     if axis in list_repeated_axes(
@@ -75,12 +78,15 @@ def judge_pass(
         has_fixed_steps=given.accuracy.steps_per_cycle is not None,
     ):
         finer = refine_meshes(model) if axis == "mesh" else _refine_steps(model, result)
+
+    # Each further pass divides the error by ERROR_RATIO and multiplies the time by COST_RATIO.
     n_passes = ceil(log(excess) / log(ERROR_RATIO))
     expected = total_seconds + seconds * sum(COST_RATIO**k for k in range(1, n_passes + 1))
     if finer is None:
         return Pass(excess)
     if expected > (model.accuracy.max_seconds or MAX_SECONDS):
         return Pass(excess, None, expected)
+
     resolution = "half the element size" if axis == "mesh" else "twice the steps"
     reason = (
         f"{name} has {format_number(excess, 2)} times the error that the tolerance allows; the run is repeated with "

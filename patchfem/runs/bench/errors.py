@@ -100,12 +100,15 @@ def estimate_bench_errors(model, patches: list, fine_run, steps: int, say=None) 
         cpu_seconds[variant] = process_time() - begin
         return coarse_run
 
+    # The runs are stored by their settings, because several estimates share one run.
     cpu_seconds = {}
     coarser_runs = list_coarser_runs(model, patches, fine_run, steps)
     bench_runs = {}
     errors, seconds = estimate_errors(solve, fine_run.values, coarser_runs, bench_runs)
     if find_bond_sum_error(fine_run.engine):
         errors.append(("bonds", _estimate_bond_sum_errors(model, fine_run)))
+
+    # The history of step numbers serves the accuracy curve of the report.
     step_runs = [StepRun(steps, fine_run.seconds, fine_run.values)]
     for run in coarser_runs[0].runs:
         values = bench_runs[run].values
@@ -136,6 +139,7 @@ def list_coarser_runs(model, patches: list, fine_run, steps: int) -> list:
     sampled_steps = None if uses_parallel_elements(model) else steps
     rule = partial(convergence_errors, steps=sampled_steps)
     out = [CoarserRuns((halved, quarter), rule, source="steps")]
+
     has_coarser_mesh = len(patches) > 1
     patch = patches[0]
     if has_coarser_mesh and uses_parallel_elements(model):
@@ -152,11 +156,14 @@ def list_coarser_runs(model, patches: list, fine_run, steps: int) -> list:
         if count:
             coarser = quarter._replace(modes=shear_modes.comparison_mode_count(count))
             out.append(CoarserRuns((coarser,), second_order_errors, quarter, "modes"))
+
     if law_has_trait(model.friction.law, "cells") and fine_run.engine.method is Method.ELEMENTS:
         # Groups of four cells are merged into one.
         joins = [partial(join_cells, *merge) for merge in CELL_MERGES]
         runs = tuple(quarter._replace(springs=join) for join in joins)
         out.append(CoarserRuns(runs, merged_cell_errors, quarter, "cells"))
+
+    # A merged bond list converges to the full list as its strips become narrower.
     if choice is not None and choice.merge > 0:
         narrow = quarter._replace(choice=replace(choice, merge=FINER_MERGE_FACTOR * choice.merge))
         out.append(CoarserRuns((narrow,), finer_errors, quarter, "bonds"))

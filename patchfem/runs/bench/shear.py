@@ -45,6 +45,8 @@ def make_flank_contact(model, load: float, patch=None, n_modes: int | None = Non
     """
     f = model.friction
     law = model.bonds if law_has_trait(f.law, "bonds") else f
+
+    # On a rig the lifted mass is compared to the modal mass at the interface, m / (s . s).
     grooves = model.grooves
     row = np.zeros(0)
     if model.rig is None:
@@ -53,12 +55,19 @@ def make_flank_contact(model, load: float, patch=None, n_modes: int | None = Non
         modes = model.rig.modes
         row = modes.slide
         grooves.check_lifted_mass(f.static, modes.mass / float(modes.slide @ modes.slide))
+
     if not model.partial_slip:
         return contacts.make_flank_contact(law, grooves, load, row)
+
+    # Points on pieces that deform in shear: limit mu N of each node, and the length over which it
+    # is reached.
     force = patch.pressure.sigma_n * patch.pieces.interface.weight
     limit = f.static * force
     tolerance = model.accuracy.tolerance
     length = getattr(law, "length", None) or f.bond_length
+
+    # Coulomb's law yields at once; a length far below the slide at gross slip, sum(limit) / k_t,
+    # replaces the jump.
     if not length:
         compliance = patch.slip_compliance
         gross_slip_slide = limit.sum() / tangential_stiffness(compliance, force > 0)
@@ -66,9 +75,12 @@ def make_flank_contact(model, load: float, patch=None, n_modes: int | None = Non
             update={"bond_length": COULOMB_LENGTH_RATIO * tolerance * gross_slip_slide}
         )
         length = max(COULOMB_LENGTH_RATIO * tolerance, MIN_LENGTH_RATIO) * gross_slip_slide
+
+    # After growth the friction falls by the ratio of the law, which the reduction has to resolve.
     weakening = 1.0
     if getattr(law, "has_growth", False):
         weakening = 1 / law.ratio if law.ratio > 0 else np.inf
+
     if n_modes is not None:
         reduced = shear_modes.shear_modes(patch.slip_compliance, limit, length, n_modes, weakening)
     else:
@@ -80,6 +92,8 @@ def make_flank_contact(model, load: float, patch=None, n_modes: int | None = Non
             0.1 * tolerance,
             weakening,
         )
+
+    # The load of the grooves is distributed over the points as the pressure is.
     shares = force[reduced.points] / force.sum()
     return contacts.make_flank_contact(law, grooves, load, row, reduced, shares)
 

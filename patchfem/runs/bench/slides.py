@@ -323,6 +323,8 @@ def _follow_by_points(task: SlideTask) -> SlideHistories:
     model = task.model
     patch = task.patch
     contact, jenkins_set = _make_contact(task)
+
+    # A long bond list is stopped by its guard before it takes too long.
     report = task.progress if contact.bond_sum is None else BondListGuard(task.progress)
     motion = slides.follow(contact, task.time, task.slide, task.frames, task.say, report)
     if motion.n_unsolved:
@@ -331,6 +333,8 @@ def _follow_by_points(task: SlideTask) -> SlideHistories:
             "above the limit; raise accuracy.steps_per_cycle",
             "",
         )
+
+    # Shear stress and local slip of the frames, by what represents the shear of the pieces.
     load = task.compute_loads()
     slip = motion.slip
     frames = task.frames
@@ -374,6 +378,8 @@ def _make_contact(task: SlideTask) -> tuple:
     friction = model.friction
     row = np.zeros(0)
     load = float(task.evaluate_pressure([0])[0] @ task.weight)
+
+    # Laws with state along the path: grooves, bonds, or a load that changes.
     if model.grooves is not None:
         modes = model.accuracy.shear_modes
         return shear.make_flank_contact(model, load, patch, modes), None
@@ -382,6 +388,8 @@ def _make_contact(task: SlideTask) -> tuple:
     if model.load_varies:
         point = model.point
         return contacts.make_pressed_contact(friction, load, row, load=point.evaluate), None
+
+    # Pieces that deform in shear are parallel Jenkins elements of the same slip curve.
     if model.partial_slip:
         length = make_law(friction, 1.0).element(1.0).length
         jenkins_set = jenkins_elements.elements(patch, friction.static, length)
@@ -389,6 +397,8 @@ def _make_contact(task: SlideTask) -> tuple:
         if task.engine.springs is not None:
             springs = task.engine.springs(*springs)
         return contacts.make_parallel_contact(*springs, row), jenkins_set
+
+    # Rigid pieces are one element of the law itself.
     element = make_law(friction, load).element(load)
     if task.engine.springs is not None:
         springs = task.engine.springs(*np.split(element.numbers[2:], 2))

@@ -94,6 +94,8 @@ def condense(patch_model, grid, upper_grid=None) -> CondensedPair:
     -------
     CondensedPair
     """
+
+    # Both pieces share one compliance if they are identical.
     width = patch_model.pieces.width * patch_model.pieces.pairs
     start = perf_counter()
     piece = upper = Piece(grid, make_elastic_layers(patch_model, patch_model.pieces.lower))
@@ -101,6 +103,8 @@ def condense(patch_model, grid, upper_grid=None) -> CondensedPair:
     if upper_grid is not None:
         upper = Piece(upper_grid, make_elastic_layers(patch_model, patch_model.pieces.upper))
         upper_compliance = interface_compliance(upper)
+
+    # Interfaces with different nodes are joined by the mortar method.
     joint = None
     x = grid.x
     tributary_lengths = grid.tributary_lengths()
@@ -120,14 +124,18 @@ def condense(patch_model, grid, upper_grid=None) -> CondensedPair:
             lower_compliance.tt + upper_compliance.tt,
             lower_compliance.nt - upper_compliance.nt,
         )
+
+    # The compliances hold per unit width; pairs of equal pieces act in parallel.
     normal, tangential, closing = (frozen_array(part / width) for part in compliances)
     if np.abs(closing).max() <= COUPLING_ROUND_OFF * np.abs(tangential).max():
         closing = frozen_array(np.zeros(closing.shape))
     interface = Interface(frozen_array(x), frozen_array(tributary_lengths * width), width)
+
     # Rounded ends of the pieces open the gap.
     bodies = (grid, upper_grid or grid)
     end_gap = sum(np.interp(interface.x, body.x, body.interface_depths) for body in bodies)
     seconds = {"condense": perf_counter() - start}
+
     pieces = Compliance(interface, normal, tangential)
     return CondensedPair(
         grid,

@@ -110,9 +110,13 @@ def add_slip_fields(model, faces: tuple, snapshots) -> tuple:
     for face in faces:
         law = model.rig.friction.interfaces[face.number]
         fields = collect_rest_frame(face.patch)
+
+        # Only an interface whose pieces deform in shear has slip that varies along x.
         jenkins_set = None
         if face.partial_slip and snapshots:
             jenkins_set = make_patch_elements(law, model.accuracy.tolerance)[2]
+
+        # The stretches of the elements give the shear stress and the local slip of each node.
         if jenkins_set is not None:
             states = [snapshot.faces[face.number] for snapshot in snapshots]
             length = record.make_law(law.numbers, law.load).element(law.load).length

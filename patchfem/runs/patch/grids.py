@@ -147,6 +147,7 @@ def _search_contact_region(patch_model) -> BaseGrids:
     loaded_models = (patch_model, *make_load_variants(patch_model))
     layout = make_search_layout(patch_model)
     contact = None
+
     # Without a load there is no contact to search for.
     for _ in range(MAX_SEARCHES if patch_model.nominal_load > 0 else 0):
         pair = condense(patch_model, *make_grids(patch_model, layout))
@@ -155,6 +156,8 @@ def _search_contact_region(patch_model) -> BaseGrids:
         for loaded_model in loaded_models:
             patch = solve_patch_contact(loaded_model, pair)
             extents.append(find_contact_extent(patch, patch_model.mesh.slip))
+
+        # The next layout follows from this contact; the search compares the two.
         contact = extents[0]
         previous_layout = layout
         layout = make_column_layout(patch_model, extents)
@@ -162,6 +165,7 @@ def _search_contact_region(patch_model) -> BaseGrids:
         is_resolved = _resolves_waves(patch_model, x, layout) and _resolves_slip_zones(
             contact.slip_zones, x, layout
         )
+
         if edge_cell_ratio <= 1 / (EDGE_CELLS[patch_model.mesh.is_static] - 1) and is_resolved:
             break
         if _have_bands_converged(layout, previous_layout):
@@ -237,14 +241,17 @@ def make_column_layout(patch_model, extents: list) -> Layout:
     half = length / 2
     span = (min(extent.span[0] for extent in extents), max(extent.span[1] for extent in extents))
     width = min(extent.width for extent in extents)
+
     coating = _min_coating_thickness(patch_model)
     # The third mesh, whose cells are a quarter as long, has to resolve the waves.
     max_cell = min(length / 12, 4 * _max_wave_cell(patch_model))
+
     if max(len(extent.places) for extent in extents) > MAX_CONTACT_ENDS:
         return Layout(-half, half, (), span, *(2 * [min(length / 64, max_cell)]), 0.0)
     if patch_model.mesh.edge_motion == "wear":
         max_cell = min(max_cell, length * MAX_WEAR_CELL_RATIO)
     max_loaded_cell = min(width / 6, length / 24, max_cell)
+
     # A contact of one or two nodes is searched for again with shorter cells.
     n_contact_cells = N_SMALL_CONTACT_CELLS
     if np.isfinite(max(extent.cell for extent in extents)):
@@ -253,15 +260,19 @@ def make_column_layout(patch_model, extents: list) -> Layout:
     # contact set.
     coating_cell = coating / 4 if coating and patch_model.mesh.edge_motion != "load" else np.inf
     min_cell = max(min(width / n_contact_cells, coating_cell), MIN_CELL_RATIO * length)
+
     bands = _make_edge_bands([extent.places for extent in extents], min_cell)
     # A node is placed on each step of the gap; the quantities there converge at first order in the
     # cell length.
     step_cell = min_cell / STEP_CELL_FACTOR
     bands += _make_point_bands(patch_model.gap.jumps, step_cell)
+
     rounded_edges, rounding_length = find_rounded_edges(patch_model)
     for place in rounded_edges:
         if span[0] - min_cell <= place <= span[1] + min_cell:
             bands.append((place, place, min(min_cell, rounding_length / 4)))
+
+    # Peaks of the pressure and zones of slip each have a number of cells.
     corner_factor = STEP_CELL_FACTOR if patch_model.has_singular_ends else 1
     has_waves = _max_wave_cell(patch_model) < np.inf
     for extent in extents if has_waves else ():
@@ -271,6 +282,8 @@ def make_column_layout(patch_model, extents: list) -> Layout:
         for start, stop in extent.slip_zones:
             cell = max((stop - start) / N_CELLS_PER_SLIP_ZONE, MIN_CELL_RATIO * length)
             bands.append((start, stop, cell))
+
+    # At a loaded corner the pressure is singular or, under a coating, changes over its thickness.
     corner_cell = max(
         min(
             coating / 16 if coating else np.inf,
@@ -333,20 +346,26 @@ def find_contact_extent(patch: Patch, slip=None) -> ContactExtent:
         low = float(x[max(closest_node - 1, 0)])
         high = float(x[min(closest_node + 1, x.size - 1)])
         return ContactExtent((low, high), (float(x[closest_node]),), (), np.inf)
+
     strips = patch.state.pressure
     is_loaded = strips > (1e-3 * strips.max() if patch.has_smooth_skin else 0.0)
     loaded_nodes = np.flatnonzero(is_loaded.any(axis=0))
     low = x[max(loaded_nodes[0] - 1, 0)]
     high = x[min(loaded_nodes[-1] + 1, x.size - 1)]
+
     # Around a contact of few nodes, the next search has shorter cells.
     if loaded_nodes.size < 4 and loaded_nodes.size < x.size:
         return ContactExtent((float(low), float(high)), tuple(x[loaded_nodes].tolist()), (), np.inf)
+
+    # An edge lies in the cell between a loaded and a free node; the solver knows it more
+    # accurately.
     edge_cells = np.flatnonzero((is_loaded[:, 1:] != is_loaded[:, :-1]).any(axis=0))
     edge_positions = (x[edge_cells] + x[edge_cells + 1]) / 2
     cells = np.diff(x)[edge_cells]
     edges = contact_ends(patch)
     if len(edges) == edge_cells.size:
         edge_positions = np.array([end.position for end in edges])
+
     corners = tuple(float(x[at]) for at in (0, -1) if is_loaded[:, at].any())
     low = edge_positions[0] if loaded_nodes[0] else x[0]
     high = edge_positions[-1] if loaded_nodes[-1] < x.size - 1 else x[-1]

@@ -110,6 +110,8 @@ def estimate_static_measures(
     coarse = _select_meshes_with_same_contact_intervals(
         fine, [patch for patch in coarse if patch is not None]
     )
+
+    # The series over the meshes gives a value, its limit and their errors.
     if coarse and finest["normal_load"] > 0:
         missed_peak = unresolved_edge_rounding_pressure(fine)
         estimates = extrapolate_static_measures(
@@ -123,7 +125,10 @@ def estimate_static_measures(
     else:
         error = 0.0 if coarse else None
         estimates = {name: Estimate(value, error) for name, value in finest.items()}
+
     out = {name: estimate.to_measure(name) for name, estimate in estimates.items()}
+
+    # Errors and reasons that no series over meshes shows.
     if coarse and fine.averaging is not None:
         out |= _widen_errors_by_corner_pressure(out, fine, coarse[0])
     if fine.points is not None:
@@ -275,6 +280,8 @@ def extrapolate_static_measures(
     for name, finest in values_by_mesh[-1].items():
         limit = extrapolate_to_zero_cell_length([values[name] for values in values_by_mesh], nested)
         hidden = hidden_errors.get(name, 0.0)
+
+        # The limit replaces the value only if it is needed and has the smaller error.
         value = finest
         error = max(error_factor * limit.error, hidden)
         allowed = np.inf
@@ -287,8 +294,12 @@ def extrapolate_static_measures(
             if extrapolated_error < error:
                 value = limit.extrapolated
                 error = extrapolated_error
+
         error = max(error, min_relative_error * abs(finest))
         out[name] = Estimate(value, error, value != finest)
+
+    # The loaded fraction is mean pressure / peak pressure, so that it has the relative error of the
+    # peak at least.
     peak, fraction = (out[name] for name in PEAK_MEASURES)
     relative = peak.error / peak.value if peak.value > 0 else 0.0
     fraction_error = increase_error_by_peak_error(fraction.value, fraction.error, relative)
@@ -398,6 +409,7 @@ def _compute_resolution(patch: Patch, missed_peak: float) -> Resolution:
     active = patch.active
     interface = pieces.interface
     sigma = patch.pressure.sigma_n
+
     all_cells = np.diff(interface.x)
     cells = edge_cell_lengths(patch.x, active)
     longest_cell = float(cells.max(initial=0.0))
@@ -413,6 +425,7 @@ def _compute_resolution(patch: Patch, missed_peak: float) -> Resolution:
 
     first, last = ~active[[0, -1]]
     n_nodes = max(int(active.sum()), 1)
+
     is_unresolved = n_nodes <= MAX_UNRESOLVED_NODES and cells.any()
     edge_offset = None
     if not patch.has_smooth_skin:
@@ -459,19 +472,24 @@ def estimate_hidden_errors(resolution: Resolution, finest: dict) -> dict:
     n_nodes = resolution.n_nodes
     load = finest["normal_load"]
     peak = finest["pressure_peak"]
+
     # Errors add up over the edges of the contact: half of all their cells, but at least the longest one.
     cell = max(resolution.longest_cell, resolution.edge_cells / 2)
     is_unresolved = n_nodes <= MAX_UNRESOLVED_NODES
     centre_error = cell / (2 * n_nodes**2) if is_unresolved else 1e-3 * cell
+
     peak_error = resolution.corner_pressure
     if cell > 0 and n_nodes <= MIN_RESOLVED_NODES:
         peak_error = peak_error + peak / (4 * n_nodes**2)
     peak_error = max(peak_error, resolution.wedge_pressure, resolution.rounding_pressure - peak)
+
+    # Displacements have round-off, and a wrong centre times the angle of rotation.
     displacement = (
         ROUND_OFF_FRACTION * (abs(finest["approach"]) + resolution.closing)
         + abs(finest["rotation"]) * centre_error * resolution.can_rotate
     )
     fraction_per_pressure = finest["loaded_fraction"] / peak if peak else 0.0
+
     edge_offset = 0.0
     if resolution.edge_offset is not None:
         # In a contact of few nodes, an edge may lie anywhere in its cell.
@@ -480,6 +498,7 @@ def estimate_hidden_errors(resolution: Resolution, finest: dict) -> dict:
     outer_cells = resolution.edge_cells - resolution.inner_cells
     length_error = edge_offset * resolution.edge_cells + resolution.open_ends
     width_error = edge_offset * outer_cells + resolution.open_ends
+
     return {
         "normal_load": 1e-10 * load,
         "pressure_peak": peak_error,
@@ -541,10 +560,14 @@ def note_on_plane_state(patch_model, patch: Patch) -> list:
         is_certain = ratio <= 1 / MIN_PLANE_STRAIN_RATIO
     if is_certain:
         return []
+
     assumption = (
         f"plane {pieces.plane} is assumed, and the pieces are {ratio:.2g} times as wide as tall; "
         "the true state lies between plane strain and plane stress"
     )
+
+    # The change between the two plane states bounds the error, because the true state lies between
+    # them.
     other_model = replace(patch_model, pieces=replace(pieces, plane=other_plane))
     try:
         pair = condense_on_same_meshes(other_model, patch.pair)
@@ -554,6 +577,7 @@ def note_on_plane_state(patch_model, patch: Patch) -> list:
             f"{assumption}; how much the two "
             f"differ is not known, because for plane {other_plane} the contact could not be solved ({error})"
         ]
+
     changes = _format_changes(patch_model, compute_static_values(patch), other_values)
     if not changes:
         return []

@@ -170,14 +170,18 @@ def solve_on_refined_meshes(patch_model, tolerance: float, estimate: bool = True
                 if not patches or patches[0] is None:
                     raise
                 return with_static_measures((*patches, *(2 - len(patches)) * [None]), tolerance)
+
         patches = (patch, *patches)
         grids = [grid.refine() for grid in grids]
         if len(patches) < MIN_LEVELS:
             continue
+
         # The solution on the points of the profile is used with all finer meshes.
         patches = with_static_measures(patches, tolerance, points)
         if not estimate or patch.pressure.outcome is Outcome.NO_CONTACT:
             return patches
+
+        # Points replace the next mesh if its condensation would take too long.
         seconds = predict_condensing_seconds(grids)
         is_within = max_mesh_error_ratio(patches[0].measures, tolerance) <= 1
         if (
@@ -192,6 +196,7 @@ def solve_on_refined_meshes(patch_model, tolerance: float, estimate: bool = True
             # points that do not converge do not do so on the next mesh either
             has_failed_on_points = points is None
             patches = with_static_measures(patches, tolerance, points)
+
         # The points do not determine a peak that may be at a free corner, but a finer mesh does.
         is_done = is_within or (points is not None and "pressure_peak" in points.measures)
         is_done = is_done and resolves_slip_work(patch_model, patches, tolerance)

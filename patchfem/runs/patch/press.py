@@ -406,12 +406,15 @@ def solve_contact(
     count, roll, offset = patch_model.interface.strips or PatchStrips(1, 0.0, None)
     strip = split_into_strips(pieces, count)
     offsets = strip_offsets(patch_model.pieces.width, count)
+
     strips = StripModel(
         StripCompliance(strip.normal, added, warm_start),
         StripLayout(pieces.interface.x, strip.weight, offsets),
         None if skin is None else make_skin_law(patch_model),
     )
     is_loaded = loading.approach is None
+
+    # A prescribed approach leaves load and moment to the solution; otherwise they are given.
     holder = Holder(
         load=loading.load if is_loaded else None,
         approach=loading.approach,
@@ -421,11 +424,14 @@ def solve_contact(
         rotation=patch_model.gap.angle,
         roll=roll,
     )
+
     state = press_strips(strips, gap, holder)
     pressure = state.pressure
     # A smooth law never reaches 0; what is set to 0 is smaller than the residual of the load balance.
     if strips.is_smooth:
         pressure = np.where(pressure > edges.MIN_RELATIVE_PRESSURE * pressure.max(), pressure, 0.0)
+
+    # The fields of a patch are means over its strips; the gap is the smallest one.
     mean_state = ContactState(
         frozen_array(pressure.mean(axis=0)),
         frozen_array(state.gap.min(axis=0)),
@@ -437,6 +443,8 @@ def solve_contact(
         state.iterations,
         state.residuals,
     )
+
+    # Without strips, the layer can be part of the compliance.
     if skin is not None and patch_model.interface.strips is None:
         pieces = _add_layer(skin, pieces, compute_layer_compliance(skin, state)[0])
     return SolvedContact(pieces, mean_state, state)

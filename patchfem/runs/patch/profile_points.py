@@ -297,6 +297,8 @@ def _solve_level(patch_model, ends: FreeEnds, count: int, start=None) -> PointLe
     x = normal.x
     half_points = np.linspace(-length / 2, length / 2, 2 * count + 1)
     gap = patch_model.gap.evaluate(half_points).heights[1::2]
+
+    # Opening of the interface: gap + rotation x - approach + deflection, not below 0.
     solution = _solve_nodal_forces(patch_model, normal, gap, start)
     force = solution.force
     deflection = normal.product(force)
@@ -309,9 +311,12 @@ def _solve_level(patch_model, ends: FreeEnds, count: int, start=None) -> PointLe
         )
     if not active.any():
         raise NotConverged("contact: the pieces touch on coarser cells only")
+
     opening = np.where(active, 0.0, np.maximum(opening, 0.0))
     sigma = force / normal.area
     unit = np.ones(count)
+
+    # The edges between the points follow from the forces on the points in contact.
     contact_edges = find_edges(normal, force, opening, normal.solve_forces(active, unit))
     intervals = _contact_intervals(active, contact_edges, length)
     state = HolderState(
@@ -320,6 +325,7 @@ def _solve_level(patch_model, ends: FreeEnds, count: int, start=None) -> PointLe
         solution.approach,
         patch_model.gap.angle + solution.rotation,
     )
+
     # For dissimilar pieces, the tangential stiffness also depends on the coupling of shear and normal
     # displacement, which is not computed here.
     tangential = np.nan
@@ -332,11 +338,14 @@ def _solve_level(patch_model, ends: FreeEnds, count: int, start=None) -> PointLe
         tangential=tangential,
         rotational=set_stiffness(normal, active, x, contact_edges),
     )
+
     # At an end of the interface the pressure is that of the point there.
     peak = estimate_peak_pressure(x, sigma, node_fraction=unit)
     values = assemble_static_values(length, normal.area * count, state, peak, edge_values)
     if np.isnan(tangential):
         del values["tangential_stiffness"]
+
+    # What this level resolves, for the errors that a finer level does not show.
     cell = length / count
     resolution = Resolution(
         length=length,
@@ -349,6 +358,7 @@ def _solve_level(patch_model, ends: FreeEnds, count: int, start=None) -> PointLe
     )
     n_corner = max(1, round(CORNER_LENGTH_RATIO * count))
     corner_force = max(force[:n_corner].max(), force[-n_corner:].max())
+
     return PointLevel(
         force,
         Surface(x, np.full(count, normal.area), sigma, opening, gap),
@@ -382,6 +392,7 @@ def _solve_nodal_forces(patch_model, normal: PointCompliance, gap, start) -> Poi
     has_approach = loading.approach is not None
     offset = loading.approach if has_approach else gap.min()
     moment = None if has_approach else loading.moment
+
     problem = patch_problem(
         x,
         gap - offset,
@@ -392,6 +403,8 @@ def _solve_nodal_forces(patch_model, normal: PointCompliance, gap, start) -> Poi
     force, n_iterations = solve_by_gradients(
         normal, problem, CONTACT_TOL, MAX_ITERATIONS, initial_force
     )
+
+    # Approach and rotation are those of a rigid line fitted to the loaded points (least squares).
     active = force > 0
     if has_approach or not active.any():
         return PointForces(force, float(offset), 0.0, n_iterations)

@@ -121,16 +121,20 @@ def patch_warnings(patch_model, patch, *, has_error_mesh: bool = True) -> list:
             patch.pressure.approach / sum(piece.height for piece in patch_model.pieces.both)
         ),
     }
+
     warnings = []
     for words, strain in strains.items():
         if strain > MAX_SMALL_STRAIN:
             limit = f", beyond the small strains that are assumed ({MAX_SMALL_STRAIN:g})"
             warnings.append(words.format(strain) + limit)
+
     if contact_reaches_steep_end(patch):
         warnings.append(
             "on a rounded end the contact reaches the point where the slope is 0.097, and beyond this point no "
             "contact is computed; lower the tilt or the load"
         )
+
+    # A mesh that the run chose is refined until locking is part of its error; a given mesh is not.
     poisson = max(material.poisson for material in materials)
     is_fixed = not patch_model.mesh.is_automatic
     if patch_model.pieces.plane == "strain" and poisson > MAX_POISSON and is_fixed:
@@ -139,6 +143,7 @@ def patch_warnings(patch_model, patch, *, has_error_mesh: bool = True) -> list:
             f"Poisson's ratio is {poisson:g} (limit {MAX_POISSON:g}), so the true errors may be "
             f"twice the estimates; {_advise_shorter_elements(patch_model)}"
         )
+
     warnings += [text for text in patch.notes if not nodes.is_note(text)]
     if not has_error_mesh:
         warnings.append(
@@ -168,6 +173,8 @@ def notes_on_neglected_effects(face) -> list:
     patch_model = model.patch
     patch, *coarse = face.patches
     out = [text for text in patch.notes if nodes.is_note(text)]
+
+    # How the results treat the waves of a profile.
     if patch.points is not None:
         out.append(
             f"each static measure is computed on the mesh and on points {format_length(patch.averaging, 3)} apart, and "
@@ -179,6 +186,7 @@ def notes_on_neglected_effects(face) -> list:
             "where the profile is in contact, its heights are averaged over a length of "
             f"{format_length(patch.averaging, 3)}; the errors include the effect of the choice of this length"
         )
+
     if patch.has_skin and patch.pressure.load > 0:
         loaded_area = patch.pieces.interface.weight @ patch.active
         out += skin.note_on_asperity_stiffness(
@@ -186,6 +194,8 @@ def notes_on_neglected_effects(face) -> list:
         )
     if patch.strips is not None:
         out.append(NEGLECTED_SHEAR_NOTE)
+
+    # Coupling of shear and normal motion, which acts only between dissimilar pieces.
     if model.kind == "patch":
         out += note_on_normal_shear_coupling(patch_model, patch)
     elif patch.pair.coupling > MIN_COUPLING_RATIO:
@@ -194,6 +204,7 @@ def notes_on_neglected_effects(face) -> list:
             f"neglected; under a shear force the largest normal displacement is {patch.pair.coupling:.2g} times "
             "the largest slide"
         )
+
     if coarse[0] is not None and patch.pressure.outcome is not Outcome.NO_CONTACT:
         # An unstructured mesh has no coarser one: its second mesh is finer than its first. Even the
         # coarsest mesh of a static patch has 20 cells along the contact, which is enough for the change.

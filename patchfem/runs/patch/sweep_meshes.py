@@ -214,6 +214,7 @@ def _merge_layouts(layouts: list, has_intermediate_cases: bool) -> Layout:
         bands.update(layout.bands, [(*layout.span, layout.max_loaded_length)])
     if has_intermediate_cases:
         bands |= set(_interpolate_bands(layouts))
+
     first = layouts[0]
     bands = sorted(bands, key=lambda band: (band[2], band))
     merged = Layout(
@@ -224,6 +225,7 @@ def _merge_layouts(layouts: list, has_intermediate_cases: bool) -> Layout:
         *2 * [min(layout.max_length for layout in layouts)],
         min(layout.slope for layout in layouts),
     )
+
     low, high, _ = np.array(bands).T
     positions = np.linspace(low, high, 5, axis=1)
     # Bands that do not shorten any cell are dropped, because most bands are redundant.

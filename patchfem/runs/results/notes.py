@@ -62,6 +62,7 @@ def warn_of_bonds(model, speed: float, measures: dict, outcome: Outcome) -> list
         return []
     law = model.bonds
     warnings = []
+
     # The traction of the initial bonds is infinite at first if the order is negative. Bonds that form later carry at
     # most the fraction P(p + 1, R/eps_0) of mu_s N, with or without growth.
     if law.order < 0 and law.initial != 0:
@@ -69,6 +70,7 @@ def warn_of_bonds(model, speed: float, measures: dict, outcome: Outcome) -> list
             "friction.order below 0 with friction.initial_bonds: the traction is infinite at the first instant, so "
             "friction peaks depend on the time step; set initial_bonds = 0"
         )
+
     forming_ratio = parameters.growth_path_ratio(law, speed) if law.reading == "report" else 0.0
     if forming_ratio > MAX_FORMING_RATIO:
         # At this growth path, growth_path_ratio(law, speed) equals MAX_FORMING_RATIO.
@@ -81,6 +83,7 @@ def warn_of_bonds(model, speed: float, measures: dict, outcome: Outcome) -> list
             "friction.slip_growth = "
             f'"{0.95e6 * max_growth_path:.2g} um", or friction.reading = "stretch"'
         )
+
     # The drift of a bounded motion (Dahl's creep) is a property of the law, not of the joint.
     drift = measures.get("drift_per_cycle")
     is_bounded = outcome in (Outcome.STEADY, Outcome.STUCK) and law.reading == "stretch"
@@ -104,11 +107,15 @@ def note_on_growth(model, peak: float | None) -> list:
         return []
     if law.reading == "report" and law.initial == 0:
         return []
+
+    # In the reading of the report, growth changes only the bonds that form later.
     if law.reading == "report":
         return [
             "in the law as printed in the report, the initial bonds keep the bond length eps_0, even though the length "
             "of later bonds grows"
         ]
+
+    # In the other reading, bonds of a short length pull harder as the length grows.
     notes = []
     if law.order > 1:
         notes.append(
@@ -116,6 +123,7 @@ def note_on_growth(model, peak: float | None) -> list:
             "length grows, a bond that formed while the length was small pulls harder and breaks later; set "
             "friction.order <= 1 to keep friction near mu_s N"
         )
+
     if peak is not None and peak > 1 + MIN_EXCESS_RATIO:
         notes.append(
             f"the friction force reaches {peak:.3g} times mu_s N: the bond length grows during the run, and "

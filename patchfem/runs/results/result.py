@@ -301,6 +301,8 @@ def collect_used_settings(result) -> dict:
         settings["engine"] = engine
     if (map_name := extra.get("map")) is not None:
         settings["map"] = map_name
+
+    # Settings that this engine does not have are left out.
     steps = extra.get("steps")
     if steps is not None:
         settings["steps_per_cycle"] = int(steps)
@@ -309,6 +311,8 @@ def collect_used_settings(result) -> dict:
         settings["quadrature"] = summed
     if (window := extra.get("window")) is not None:
         settings["window_cycles"] = int(window)
+
+    # Resolution of the pressed interfaces.
     for face in result.faces:
         settings[rows.add_interface_number("interface_nodes", face.number)] = int(face.patch.x.size)
     if patch is not None:

@@ -200,6 +200,7 @@ def compute_wear(
     clock = perf_counter()
     patch_model = model.patch
     n_cycles = model.wear.cycles
+
     motion = _SlipPathFunction(model, patch)
     problem = WearProblem(
         make_contact_force_function(patch_model, patch.pair),
@@ -208,6 +209,8 @@ def compute_wear(
         model.wear.coefficient,
         n_cycles,
     )
+
+    # A motion without bound has no slip path, so that no wear is computed for it.
     stop_reason = ""
     try:
         if initial is None:
@@ -222,6 +225,8 @@ def compute_wear(
         stop_reason = f"nothing was worn: {reason}"
         seconds = perf_counter() - clock
         return WornPatch(patch, tuple(worn), None, (), (), None, 0.0, seconds, stop_reason)
+
+    # Jumps over many cycles, each with the contact solved on the worn gap.
     while state.cycle < n_cycles and find_worn_through_coating(model, state.depth) is None:
         try:
             state = _take_next_jump(model, problem, state)
@@ -236,6 +241,8 @@ def compute_wear(
             store(state, moments)
         if progress is not None:
             progress(state.cycle / n_cycles)
+
+    # The jumps are repeated on coarser meshes and with other strips for the errors.
     replayed = []
     for mesh in coarse:
         if mesh is not None:
@@ -244,6 +251,7 @@ def compute_wear(
     stripped = None
     if replayed and strips_model is not patch_model:
         stripped = _replay_wear(strips_model, model, patch, patch, moments)
+
     worn = (*(worn for worn, _ in replayed), *(None for mesh in coarse if mesh is None))
     patch, *worn = with_static_measures((patch, *worn), model.accuracy.tolerance)
     return WornPatch(
@@ -316,6 +324,8 @@ def _take_next_jump(model, problem: WearProblem, state: WearState) -> WearState:
 
     problem.press.start_from_forces(state.force)
     next_state = jump_to(find_cycle_of_next_table_row(model.wear, problem, state))
+
+    # Bracket: worn fraction - 1 is negative at `low` and positive at `high`.
     low = state.cycle
     high = np.inf
     previous = 0.0
@@ -328,6 +338,9 @@ def _take_next_jump(model, problem: WearProblem, state: WearState) -> WearState:
             value < 0 and (next_state.cycle < end or high == np.inf)
         ):
             return next_state
+
+        # Illinois: an end that is kept twice has its value halved, so that the bracket shrinks from
+        # both sides.
         if value > 0:
             if high < np.inf and previous > 0:
                 low_value = low_value / 2
@@ -338,6 +351,7 @@ def _take_next_jump(model, problem: WearProblem, state: WearState) -> WearState:
                 high_value = high_value / 2
             low = next_state.cycle
             low_value = value
+
         previous = value
         end = low - low_value * (high - low) / (high_value - low_value)
         next_state = jump_to(end)
@@ -419,15 +433,19 @@ def _record_moment(patch, state: WearState, motion: _SlipPathFunction) -> WearMo
     model = motion.model
     area = nodal_areas(model.patch, patch.pieces.interface)
     worn = make_worn_model(model, patch, state.depth)
+
     measures = compute_static_values(patch) | motion.last.values
     measures["worn_volume"] = float(np.vdot(state.depth, area))
     measures["worn_depth_max"] = float(state.depth.max(initial=0.0))
+
+    # Wear changes the grooves and, by a table, the friction law.
     if model.grooves is not None:
         measures["groove_amplitude"] = 0.0 if worn.grooves is None else worn.grooves.amplitude
     if model.wear.friction is not None:
         measures["static_coefficient"] = worn.friction.static
         if worn.friction.bond_length is not None:
             measures["bond_length"] = worn.friction.bond_length
+
     return WearMoment(
         state.cycle,
         state.depth,
@@ -546,11 +564,13 @@ def load_wear_state(path: Path, key: str) -> tuple:
                 f"{path.parent.name}: the state saved there belongs to another scene or to another "
                 "version of patchfem; run without --resume"
             )
+
         fields = {name: arrays[f"state_{name}"] for name in STATE_FIELDS}
         for name, value in fields.items():
             if value.ndim == 0:
                 fields[name] = float(value)
         state = WearState(**fields)
+
         columns = [arrays[f"moment_{name}"] for name in MOMENT_FIELDS]
         moments = []
         all_values = json.loads(str(arrays["values"]))

@@ -41,16 +41,20 @@ def add_wear_measures(result, evolved, estimate: bool = True):
         Whether to estimate the errors.
     """
     model = result.plan.model
+
+    # A single point has no surface that could change: only its worn volume is computed, after the run.
     if evolved is None:
         if result.outcome in UNBOUNDED_OUTCOMES:
             warning = f"nothing was worn: {result.outcome.sentence}"
             return replace(result, warnings=[*result.warnings, warning])
         volume = _measure_point_volume(model, result, estimate=estimate)
         return replace(result, measures=result.measures | volume)
+
     warnings = [*result.warnings, *([evolved.stopped] if evolved.stopped else [])]
     result = replace(result, seconds=result.seconds | {"wear": evolved.seconds}, warnings=warnings)
     if evolved.state is None:
         return result
+
     worn = _measure_patch_wear(model, evolved, result.measures, estimate=estimate)
     if model.wear.friction is not None:
         worn |= _measure_worn_friction(model, evolved, result.measures, worn["worn_volume"].error)
@@ -58,6 +62,7 @@ def add_wear_measures(result, evolved, estimate: bool = True):
     if estimate:
         result = _widen_errors_by_jumps(result, evolved)
     result = _add_wear_frames(replace(result, measures=result.measures | worn), evolved)
+
     notes = [*result.extra.get("notes", []), *_note_on_earlier_run(model)]
     if "worn_through_cycle" in worn:
         notes += _note_on_worn_through_coating(model, evolved)
@@ -215,6 +220,8 @@ def _measure_patch_wear(model, evolved, motion: dict, *, estimate: bool = True) 
     slip_error = (
         evolved.frame_error + _relative_slip_error(motion) + _relative_slip_change(evolved, motion)
     )
+
+    # Values on the coarser meshes and with another number of strips, for the errors.
     fine_values = _compute_worn_volume_and_depth(model.patch, evolved.patch, state.depth)
     coarse = []
     for patch, depth in zip(evolved.coarse, evolved.depths):
@@ -223,15 +230,19 @@ def _measure_patch_wear(model, evolved, motion: dict, *, estimate: bool = True) 
     strips = fine_values
     if evolved.stripped:
         strips = _compute_worn_volume_and_depth(other_model, *evolved.stripped)
+
     jump_errors = {
         "worn_volume": float(np.vdot(np.abs(state.depth - state.coarse_depth), area))
         + state.path_error * float(area.sum()),
         "worn_depth_max": state.error,
     }
+
     mesh_errors = convergence_errors(fine_values, *coarse) if coarse else {}
     before = evolved.moments[0].values
     start = model.wear.start
     measures = {}
+
+    # The errors of jumps, slip path, mesh, round-off, earlier run and strips add up.
     for name, value in fine_values.items():
         error = None
         start_error = 0.0 if start is None else start.measure_error(name, before[name])
@@ -245,6 +256,7 @@ def _measure_patch_wear(model, evolved, motion: dict, *, estimate: bool = True) 
                 + float(convergence_error(strips[name] - value, ratio=ratio))
             )
         measures[name] = _make_wear_measure(name, value, error, WORN_SOURCE)
+
     amplitude = evolved.moments[-1].values.get("groove_amplitude")
     if amplitude is not None:
         error = measures["worn_volume"].error
@@ -275,9 +287,12 @@ def _measure_worn_friction(model, evolved, motion: dict, error: float | None) ->
     last_moments = evolved.moments[-3:]
     depths = [compute_mean_worn_depth(evolved.patch, moment.depth) for moment in last_moments]
     depth = depths[-1]
+
+    # The table of friction is evaluated at the bounds of the mean depth.
     depth_error = None if error is None else error / area
     bounds = [] if error is None else [depth - depth_error, depth + depth_error]
     bound_laws = [table.compute_worn_law(model.friction, max(bound, 0.0)) for bound in bounds]
+
     law = table.compute_worn_law(model.friction, depth)
     measures = {}
     for name, key in (("static_coefficient", "static"), ("bond_length", "bond_length")):
@@ -285,13 +300,17 @@ def _measure_worn_friction(model, evolved, motion: dict, error: float | None) ->
         if value is not None:
             changes = [abs(getattr(bound_law, key) - value) for bound_law in bound_laws]
             measures[name] = _make_wear_measure(name, value, max(changes, default=None))
+
     if depth_error is None:
         return measures
+
+    # Rate of a measure: change per change of the mean worn depth in a jump.
     jumps = []
     for pair in pairwise(zip(last_moments, depths)):
         (before, depth_before), (after, depth_after) = pair
         if depth_after > depth_before:
             jumps.append((before.values, after.values, depth_after - depth_before))
+
     static_names = compute_static_values(evolved.patch)
     for name, measure in motion.items():
         if measure.error is None or name in static_names:
@@ -381,6 +400,8 @@ def _add_wear_frames(result, evolved):
     states = [evolved.moments[number] for number in _select_stored_moments(evolved.moments)[:-1]]
     n_states = len(states)
     depth = evolved.state.depth
+
+    # Frames of the wear history: contact after each stored jump, at rest.
     pressure = np.array([state.pressure for state in states])
     pressure = pressure.reshape(n_states, evolved.patch.x.size)
     wear = {
@@ -390,6 +411,8 @@ def _add_wear_frames(result, evolved):
         "status": (pressure > 0).astype(np.int8),
         "worn_depth": np.array([state.depth for state in states]).reshape(n_states, *depth.shape),
     }
+
+    # The last cycle follows all cycles of wear, and its worn depth stays as it is.
     motion = motion | {
         "time": motion["time"] + evolved.state.cycle * period,
         "worn_depth": np.repeat(depth[None], n_motion, axis=0),
@@ -398,6 +421,8 @@ def _add_wear_frames(result, evolved):
         wear[f"holder_{field}"] = np.array([state.values[name] for state in states])
         value = getattr(evolved.patch.pressure, name)
         motion[f"holder_{field}"] = np.full(n_motion, value)
+
+    # Fields that exist only in motion are 0 in the frames of wear.
     fields = {}
     for name, field in motion.items():
         zeros = np.zeros((n_states, *np.shape(field)[1:]))
