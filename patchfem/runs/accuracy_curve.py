@@ -35,6 +35,7 @@ def compute_accuracy_curve(result) -> list[StepSetting]:
     Parameters
     ----------
     result : Result
+        Result of the motion, with `extra["step_runs"]`.
 
     Returns
     -------

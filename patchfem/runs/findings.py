@@ -207,6 +207,7 @@ def _advise_mesh(
     Parameters
     ----------
     missed : Missed
+        Measures of the run that miss the tolerance.
     solved : list
         Pairs of a PatchModel and its patches, from fine to coarse.
     name : str

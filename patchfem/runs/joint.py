@@ -62,6 +62,7 @@ def solve_without_joint(model: Model) -> FreeRig:
     Parameters
     ----------
     model : Model
+        Model of a rig with a patch.
 
     Raises
     ------
@@ -92,6 +93,7 @@ def remove_joint(model: Model, patches: Sequence) -> FreeRig:
     Parameters
     ----------
     model : Model
+        Model of a rig, whose modes may include the joint.
     patches : sequence of Patch or None
         The patch of [contact] on its meshes, from fine to coarse (`mesh_levels.solve_with_coarser`).
 
@@ -194,6 +196,7 @@ def _sum_nodal_forces(patch, factor: float, bond_length: float) -> float:
     Parameters
     ----------
     patch : Patch
+        Solved patch in partial contact or full contact.
     factor : float
         Factor of the tangential compliance.
     bond_length : float
@@ -251,6 +254,7 @@ def find_stuck_patch_stiffness(model: Model, patches: Sequence) -> StickStiffnes
     Parameters
     ----------
     model : Model
+        Model of a rig with a patch.
     patches : sequence of Patch or None
         The patch of [contact] on its meshes, from fine to coarse; None for a missing mesh.
     """

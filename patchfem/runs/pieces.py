@@ -214,7 +214,9 @@ def find_yielding(patch_model, pieces: Pieces, min_peak: float = 0.0) -> dict:
     Parameters
     ----------
     patch_model : PatchModel
+        Patch with the strengths of its materials.
     pieces : Pieces
+        Stresses of both pieces in all frames.
     min_peak : float
         Lower limit of the peak pressure [Pa]. A material of a face is left out if this pressure
         causes a larger stress there than the mesh shows.

@@ -134,6 +134,7 @@ def plan(source) -> Plan:
     Parameters
     ----------
     source : Scene or Model
+        What to run.
 
     Raises
     ------

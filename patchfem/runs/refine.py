@@ -55,6 +55,7 @@ def judge_pass(
     given : Model
         Model of the first pass, with the settings that the scene fixes.
     result : Result
+        Result of this pass, with errors.
     seconds, total_seconds : float
         CPU times [s] of this pass and of all passes.
     before : Pass or None

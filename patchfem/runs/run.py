@@ -62,6 +62,7 @@ def run(
     Parameters
     ----------
     runnable : Plan, Scene or Model
+        What to run.
     say : callable, optional
         Callback for a line of text when code has to be compiled.
     progress : callable, optional
@@ -316,6 +317,7 @@ def _complete_result(done: FinishedPass, passed: refine.Pass | None) -> Result:
     Parameters
     ----------
     done : FinishedPass
+        Result of the last pass that counts, and its notes.
     passed : refine.Pass or None
         Why no further pass follows; None for a run without errors.
     """
@@ -405,8 +407,11 @@ def hash_run(model, patch, version: str) -> str:
     Parameters
     ----------
     model : Model
+        Model of the run.
     patch : Patch or None
+        Unworn patch; None for a single point ([normal]).
     version : str
+        Version of the program.
     """
     arrays = []
     if patch is not None:

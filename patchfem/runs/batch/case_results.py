@@ -74,7 +74,9 @@ class CaseResults:
         Parameters
         ----------
         case : int
+            Index of the case.
         outcome : str
+            How the run ended, as the value of an `Outcome`.
         measures : dict
             core.Measure by name.
         seconds : float
@@ -164,6 +166,7 @@ def solve_in_parts(
     Parameters
     ----------
     models : sequence of Model
+        Models in the order of the results.
     cases_per_call : int
         Largest number of models per call.
     solve : callable

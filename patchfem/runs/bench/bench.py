@@ -63,6 +63,7 @@ def run_bench(model, patch, steps: int, frames: int = 0, path=None, **settings) 
     Parameters
     ----------
     model : Model
+        Model of a bench, with `slide`.
     patch : Patch or None
         None for a single point ([normal]).
     steps : int

@@ -69,6 +69,7 @@ def choose_bench_engine(
     Parameters
     ----------
     model : Model
+        Model of a bench, whose friction law decides.
     slide : (k,)
         Relative displacement [m].
     choice : EngineChoice, optional

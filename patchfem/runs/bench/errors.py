@@ -72,6 +72,7 @@ def estimate_bench_errors(model, patches: list, fine_run, steps: int, say=None) 
     Parameters
     ----------
     model : Model
+        Model of the run.
     patches : list of Patch
         Patches on nested meshes, from fine to coarse; [None] without a patch.
     fine_run : BenchRun
@@ -127,8 +128,11 @@ def list_coarser_runs(model, patches: list, fine_run, steps: int) -> list:
     Parameters
     ----------
     model : Model
+        Model of the run.
     patches : list of Patch
+        Patches on nested meshes, from fine to coarse; [None] without a patch.
     fine_run : BenchRun
+        Run whose errors are estimated.
     steps : int
         Number of steps per cycle of `fine_run`.
     """

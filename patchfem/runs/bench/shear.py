@@ -32,6 +32,7 @@ def make_flank_contact(model, load: float, patch=None, n_modes: int | None = Non
     Parameters
     ----------
     model : Model
+        Model of a bench or a rig with grooves.
     load : float
         Normal load [N].
     patch : Patch, optional
@@ -76,7 +77,7 @@ def make_flank_contact(model, load: float, patch=None, n_modes: int | None = Non
         )
         length = max(COULOMB_LENGTH_RATIO * tolerance, MIN_LENGTH_RATIO) * gross_slip_slide
 
-    # After growth the friction falls by the ratio of the law, which the reduction has to resolve.
+    # A bond length that shrinks from eps_0 to eps_k = ratio eps_0 weakens the contact, which could jump.
     weakening = 1.0
     if getattr(law, "has_growth", False):
         weakening = 1 / law.ratio if law.ratio > 0 else np.inf
@@ -104,8 +105,11 @@ def compute_groove_fields(patch, contact, snapshots) -> tuple:
     Parameters
     ----------
     patch : Patch
+        Patch whose pieces deform in shear.
     contact : points.contacts.Contact
+        Points of the law on the flanks, reduced to shear modes.
     snapshots : sequence of points.time_march.Snapshot
+        States of the points in the f frames.
     """
     index = contact.reduction.points
     weight = patch.pieces.interface.weight[index]
@@ -128,6 +132,7 @@ def make_bond_sum(law, choice) -> "contacts.BondSum | None":
     Parameters
     ----------
     law : Bonds
+        Parameters of the bond law.
     choice : EngineChoice or None
         Method of bond summation.
     """
@@ -145,7 +150,9 @@ def compute_point_shear_modes(model, patch, n_modes: int | None = None):
     Parameters
     ----------
     model : Model
+        Model with a law whose stretch varies along the interface.
     patch : Patch
+        Solved patch, which gives limits and compliance of the points.
     n_modes : int, optional
         Number of modes; default: by the scene, otherwise by the tolerance.
     """
@@ -189,7 +196,9 @@ def make_lower_contact(model, patch, row, modes, bond_sum) -> contacts.Contact:
     Parameters
     ----------
     model : Model
+        Model with a bond law.
     patch : Patch
+        Solved patch, whose pressure moves with the lower piece.
     row : (n,) array
         Slide per modal coordinate.
     modes : ShearModes or None

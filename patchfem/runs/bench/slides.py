@@ -216,6 +216,7 @@ def find_rest_ends(model, slide) -> dict:
     Parameters
     ----------
     model : Model
+        Model of a bench, whose friction law decides.
     slide : (k,) array
         Relative displacement [m].
     """

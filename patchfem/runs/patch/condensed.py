@@ -87,6 +87,7 @@ def condense(patch_model, grid, upper_grid=None) -> CondensedPair:
     Parameters
     ----------
     patch_model : PatchModel
+        Patch whose materials, width and coatings the pieces have.
     grid, upper_grid : TensorGrid or PieceMesh
         Meshes from `make_piece_meshes`; the upper one is None if the pieces are identical.
 
@@ -173,6 +174,7 @@ def cache_condensed_pairs(patch_model, meshes, pairs) -> None:
     patch_model : PatchModel
         One of the patches that use the meshes.
     meshes : SharedMeshes
+        Meshes that the patches share, with their levels.
     pairs : sequence of CondensedPair
         From fine to coarse.
     """

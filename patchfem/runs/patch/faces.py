@@ -62,7 +62,9 @@ def make_patch_elements(interface, tolerance: float, coarser: bool = False) -> t
     Parameters
     ----------
     interface : InterfaceLaw
+        Friction law and patch of the interface.
     tolerance : float
+        Relative error of the static measures for which the patch is solved.
     coarser : bool
         Whether to use the coarser mesh, for the error estimate.
 
@@ -101,7 +103,9 @@ def add_slip_fields(model, faces: tuple, snapshots) -> tuple:
     Parameters
     ----------
     model : Model
+        Model of the rig.
     faces : tuple of Face
+        Pressed interfaces of the rig, in their order.
     snapshots : list
         States of the event-driven engine: time [s], and for each interface its slide [m] and the
         stretch (t,) [m] of its elements.

@@ -336,6 +336,7 @@ def find_contact_extent(patch: Patch, slip=None) -> ContactExtent:
     Parameters
     ----------
     patch : Patch
+        Solved patch on a coarse grid.
     slip : PrescribedSlip, optional
         Prescribed displacement of the holders; None without partial slip.
     """
@@ -406,6 +407,7 @@ def make_grids(patch_model, layout: Layout) -> list:
     Parameters
     ----------
     patch_model : PatchModel
+        Patch whose pieces are meshed.
     layout : Layout
         Column layout, from `make_column_layout`.
 
@@ -443,6 +445,7 @@ def predict_condensing_seconds(bodies) -> float:
     Parameters
     ----------
     bodies : iterable of TensorGrid, PieceMesh or None
+        Meshes of the lower and the upper piece; None for the upper one of identical pieces.
     """
     return sum(
         SECONDS_PER_NODE * body.n_nodes**NODE_EXPONENT for body in bodies if body is not None

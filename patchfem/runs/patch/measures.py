@@ -96,6 +96,7 @@ def estimate_static_measures(
     Parameters
     ----------
     fine : Patch
+        The patch on its finest mesh.
     *coarse : Patch or None
         The patch on coarser meshes, from fine to coarse; None where there is no such mesh.
     tolerance : float or None
@@ -196,6 +197,7 @@ def _select_meshes_with_same_contact_intervals(fine: Patch, coarse: list) -> lis
     Parameters
     ----------
     fine : Patch
+        The patch on its finest mesh.
     coarse : list of Patch
         From fine to coarse.
 
@@ -612,7 +614,9 @@ def add_strip_count_errors(patch_model, patch: Patch, measures_by_name: dict) ->
     Parameters
     ----------
     patch_model : PatchModel
+        Patch with its number of strips.
     patch : Patch
+        The patch on its finest mesh, on which the other number of strips is solved too.
     measures_by_name : dict
         Measures by name.
 

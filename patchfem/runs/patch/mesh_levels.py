@@ -40,7 +40,9 @@ def solve_with_coarser(patch_model, tolerance: float, estimate: bool = True) -> 
     Parameters
     ----------
     patch_model : PatchModel
+        Patch to solve, with its mesh, shared mesh or element size.
     tolerance : float
+        Relative error that the static measures have to meet.
     estimate : bool
         Whether to solve the coarser meshes as well.
 
@@ -75,10 +77,11 @@ def solve_on_pairs(patch_model, pairs, tolerance: float, estimate: bool = True) 
     Parameters
     ----------
     patch_model : PatchModel
+        Patch to solve.
     pairs : sequence of CondensedPair
         From fine to coarse.
     tolerance : float
-        See `with_static_measures`.
+        Relative error; measures that miss it are extrapolated if the mesh is automatic.
     estimate : bool
         Whether to use the coarser pieces as well.
 
@@ -143,7 +146,9 @@ def solve_on_refined_meshes(patch_model, tolerance: float, estimate: bool = True
     Parameters
     ----------
     patch_model : PatchModel
+        Patch to solve, without a prescribed element size.
     tolerance : float
+        Relative error that the static measures have to meet.
     estimate : bool
         If False, only the third mesh is solved.
 
@@ -231,8 +236,12 @@ def solve_on_static_meshes(patch_model, tolerance: float, estimate: bool = True)
 
     Parameters
     ----------
-    patch_model, tolerance, estimate
-        See `solve_on_refined_meshes`.
+    patch_model : PatchModel
+        Patch of a bench.
+    tolerance : float
+        Relative error that the static measures have to meet.
+    estimate : bool
+        If False, only the third mesh is solved.
 
     Returns
     -------
@@ -256,9 +265,11 @@ def resolves_slip_work(patch_model, patches, tolerance: float) -> bool:
     Parameters
     ----------
     patch_model : PatchModel
+        Patch, with the prescribed displacement of its mesh settings.
     patches : sequence of Patch or None
         From fine to coarse; None for a missing mesh.
     tolerance : float
+        Relative error that work and peak force have to meet.
     """
     slip = patch_model.mesh.slip
     if slip is None:
@@ -273,9 +284,11 @@ def needs_finer_mesh(patch_model, patches, tolerance: float) -> bool:
     Parameters
     ----------
     patch_model : PatchModel
+        Patch of the run.
     patches : sequence of Patch or None
         Patches from fine to coarse.
     tolerance : float
+        The smaller tolerance.
     """
     finer = [mesh.refine() for mesh in patches[0].pair.meshes if mesh is not None]
     if predict_condensing_seconds(finer) > max_condensing_seconds(patch_model, tolerance):

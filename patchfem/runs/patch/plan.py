@@ -149,6 +149,7 @@ def describe_shear(patch_model, slip_length: float, name: str = "") -> str:
     Parameters
     ----------
     patch_model : PatchModel
+        Patch of the interface.
     slip_length : float
         Elastic slide of the pieces under their friction limit [m].
     name : str

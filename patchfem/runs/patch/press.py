@@ -209,7 +209,9 @@ def solve_patch_contact(patch_model, pair: CondensedPair, worn=None, coarse=None
     Parameters
     ----------
     patch_model : PatchModel
+        Model whose gap, load and asperity layer are used.
     pair : CondensedPair
+        Condensed pieces, on whose nodes the contact is solved.
     worn : (m,) or (s, m), optional
         Worn depth [m], which is added to the gap.
     coarse : Patch, optional
@@ -291,11 +293,15 @@ def make_patch(
     Parameters
     ----------
     patch_model : PatchModel
+        Model that was solved.
     pair : CondensedPair
+        Condensed pieces of the solution.
     gap : (m,)
         Unloaded gap [m].
     contact : SolvedContact
+        Solution on the nodes of the pieces.
     notes : tuple
+        Sentences on the gap.
     seconds : dict
         CPU seconds by name.
 
@@ -388,6 +394,7 @@ def solve_contact(
     Parameters
     ----------
     patch_model : PatchModel
+        Model whose asperity layer, load and holder are used.
     pieces : Compliance
         Compliance of the pieces without asperity layer.
     gap : (m,) or (s, m)

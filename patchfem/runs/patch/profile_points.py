@@ -141,6 +141,7 @@ def solve_on_points(patch_model, meets_tolerance) -> PointSolution | None:
     Parameters
     ----------
     patch_model : PatchModel
+        Patch with a profile, without strips.
     meets_tolerance : callable
         Function of a PointSolution that ends the refinement. MAX_POINTS and MAX_WORK end it as
         well.
@@ -247,7 +248,9 @@ def make_point_compliances(patch_model, ends: FreeEnds, count: int) -> tuple:
     Parameters
     ----------
     patch_model : PatchModel
+        Patch whose pieces and coatings the points are on.
     ends : FreeEnds
+        Ends of the pieces that are free sides.
     count : int
         Number of points.
 

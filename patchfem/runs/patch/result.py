@@ -51,6 +51,7 @@ def static_measures(model, patch, coarse) -> dict:
     Parameters
     ----------
     model : Model
+        Model of the run.
     patch : Patch
         With measures, as from `solve_with_coarser`.
     coarse : sequence of Patch or None
@@ -106,7 +107,9 @@ def patch_warnings(patch_model, patch, *, has_error_mesh: bool = True) -> list:
     Parameters
     ----------
     patch_model : PatchModel
+        Model of the patch.
     patch : Patch
+        The patch on its finest mesh.
     has_error_mesh : bool
         Whether the patch is solved on another mesh too, from which its errors follow.
     """
@@ -168,6 +171,7 @@ def notes_on_neglected_effects(face) -> list:
     Parameters
     ----------
     face : Face
+        The interface with its patch on all meshes, from fine to coarse.
     """
     model = face.model
     patch_model = model.patch

@@ -103,7 +103,9 @@ def max_slip_error_ratio(patches, slip, tolerance: float) -> float:
     patches : sequence of Patch
         The patch on two or more nested meshes, from fine to coarse.
     slip : PrescribedSlip
+        Prescribed displacement of the holders, with the friction law.
     tolerance : float
+        Relative error that work and peak force have to meet.
     """
     values = []
     for patch in patches:

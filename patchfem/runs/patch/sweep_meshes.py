@@ -68,6 +68,7 @@ def choose_shared_meshes(
     Parameters
     ----------
     patches : sequence of PatchModel
+        Patches of a sweep, in any order.
     tolerance : float
         Relative error that the static measures of all patches have to meet.
     is_complete : bool
@@ -124,6 +125,7 @@ def select_distinct_patches(patches) -> tuple:
     Parameters
     ----------
     patches : sequence of PatchModel
+        Patches of equal geometry.
     """
     rows = {_load_and_shape_parameters(patch): patch for patch in patches}
     keys = sorted(rows)
@@ -172,6 +174,7 @@ def _make_common_layout(cases: list, has_intermediate_cases: bool) -> Layout | N
     Parameters
     ----------
     cases : list of PatchModel
+        Patches of equal geometry.
     has_intermediate_cases : bool
         Whether the sweep contains cases between the given ones.
     """
@@ -265,9 +268,11 @@ def _refine_until_tolerance_is_met(cases: list, bodies, tolerance: float) -> lis
     Parameters
     ----------
     cases : list of PatchModel
+        Patches that share the meshes.
     bodies : list
         Meshes of the pieces on the coarsest level.
     tolerance : float
+        Relative error that the static measures of all patches have to meet.
 
     Returns
     -------

@@ -72,6 +72,7 @@ def split_trace(
     Parameters
     ----------
     patch_model : PatchModel
+        Patch with a profile from a trace.
     cutoff : float, optional
         Cutoff wavelength [m]; None: chosen from the element length and the mean pressure.
     element : float, optional
@@ -170,6 +171,7 @@ def advise_split(patch_model, element: float) -> list[str]:
     Parameters
     ----------
     patch_model : PatchModel
+        Patch with a profile from a trace.
     element : float
         Length [m] of the elements that carry load.
     """

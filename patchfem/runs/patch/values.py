@@ -125,6 +125,7 @@ def assemble_static_values(
     peak : float
         Largest pressure [Pa].
     edge_values : EdgeValues
+        Lengths and stiffnesses, which depend on the positions of the contact edges.
 
     Returns
     -------

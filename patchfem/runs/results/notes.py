@@ -52,11 +52,13 @@ def warn_of_bonds(model, speed: float, measures: dict, outcome: Outcome) -> list
     Parameters
     ----------
     model : Model
+        Model of a bench or a rig.
     speed : float
         Peak speed [m/s].
     measures : dict
         Measures by name.
     outcome : Outcome
+        How the motion ended; a bounded motion may creep.
     """
     if not law_has_trait(model.friction.law, "bonds"):
         return []
@@ -184,6 +186,7 @@ def warn_of_created_energy(model, created: float, exchanged: float) -> list:
     Parameters
     ----------
     model : Model
+        Model of a bench or a rig.
     created, exchanged : float
         Energy created, and integral of the absolute friction power [J].
     """

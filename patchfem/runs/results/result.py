@@ -49,7 +49,9 @@ class Advice(NamedTuple):
         Parameters
         ----------
         key : str
+            Key as the scene writes it, "table.key".
         value : float
+            Number in the unit of the key.
         more : str
             Words that follow the value.
         """
@@ -213,6 +215,7 @@ def make_interface_frames(patch, time, tau, node_slip, slide, rule=GRADUAL_SLIP)
     Parameters
     ----------
     patch : Patch
+        Solved patch of the interface.
     time : (f,)
         [s].
     tau, node_slip : (f, m)
@@ -220,6 +223,7 @@ def make_interface_frames(patch, time, tau, node_slip, slide, rule=GRADUAL_SLIP)
     slide : (f,)
         Displacement of the upper holder [m].
     rule : SlipRule
+        What counts as slip.
 
     Returns
     -------
@@ -254,6 +258,7 @@ def compute_status(active, tau, slip, rule=GRADUAL_SLIP) -> np.ndarray:
     tau, slip : (f, m)
         Traction [Pa] and slip [m]; the first frame is that of the pressed pieces.
     rule : SlipRule
+        What counts as slip.
     """
     moved = np.abs(np.diff(slip, axis=0, prepend=slip[:1]))
     if not rule.starts_at_rest:
@@ -273,7 +278,9 @@ def can_estimate_mesh_error(model, patch, coarse) -> bool:
     Parameters
     ----------
     model : Model
+        Model of a bench or a rig.
     patch : Patch or None
+        The patch on its finest mesh; None for a single point ([normal]).
     coarse : sequence
         Patches on coarser meshes; None for a missing one.
     """

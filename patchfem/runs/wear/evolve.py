@@ -153,7 +153,9 @@ def make_worn_model(model, patch, depth):
     Parameters
     ----------
     model : Model
+        Unworn model with [wear].
     patch : Patch
+        Patch on whose nodes the depth is given.
     depth : (m,) or (s, m)
         Worn depth [m].
     """
@@ -182,6 +184,7 @@ def compute_wear(
     Parameters
     ----------
     model : Model
+        Unworn model with [wear].
     patch : Patch
         Unworn patch.
     coarse : sequence of Patch or None
@@ -370,7 +373,9 @@ def find_cycle_of_next_table_row(wear, problem: WearProblem, state: WearState) -
     wear
         Wear parameters of the model.
     problem : WearProblem
+        Contact, slip path and wear law.
     state : WearState
+        State at the start of the jump.
 
     Returns
     -------
@@ -467,9 +472,11 @@ def _replay_wear(patch_model, model, patch, other_patch, moments) -> tuple:
     patch_model : PatchModel
         Model of the other patch, which has its number of strips.
     model : Model
+        Model of the run.
     patch, other_patch : Patch
         Patch of the moments, and the unworn patch on the other mesh.
     moments : sequence of WearMoment
+        States after each jump of the run.
     """
     area = nodal_areas(patch_model, other_patch.pieces.interface)
 
@@ -505,8 +512,14 @@ def compute_and_save_wear(storage, key: str, model, patch, coarse, progress=None
         File of the state, as `run.StateFile`; None: the state is not saved.
     key : str
         Hash of scene and version, which a saved state must match.
-    model, patch, coarse, progress
-        See `compute_wear`.
+    model : Model
+        Unworn model with [wear].
+    patch : Patch
+        Unworn patch.
+    coarse : sequence of Patch or None
+        The unworn patch on coarser meshes; None for a missing one.
+    progress : callable, optional
+        Called with the completed fraction of the cycles.
     """
     if storage is None:
         return compute_wear(model, patch, coarse, progress)
@@ -522,10 +535,13 @@ def save_wear_state(path: Path, key: str, state: WearState, moments: tuple) -> N
     Parameters
     ----------
     path : Path
+        File of the saved state.
     key : str
         Hash of scene and version.
     state : WearState
+        State after the last jump.
     moments : tuple of WearMoment
+        States after each jump so far.
     """
     arrays = {f"state_{name}": np.asarray(getattr(state, name)) for name in STATE_FIELDS}
     for name in MOMENT_FIELDS:

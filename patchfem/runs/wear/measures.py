@@ -35,6 +35,7 @@ def add_wear_measures(result, evolved, estimate: bool = True):
     Parameters
     ----------
     result : Result
+        Result of the run on the worn patch.
     evolved : WornPatch or None
         None for a single contact point.
     estimate : bool
@@ -85,8 +86,11 @@ def _make_wear_measure(name: str, value: float, error: float | None, engine: str
     Parameters
     ----------
     name : str
+        Name in the measure table.
     value : float
+        Value in the unit of the measure table.
     error : float or None
+        Error in the same unit; None without estimates.
     engine : str
         Method that computed the value.
     """
@@ -142,7 +146,9 @@ def _widen_errors_by_jumps(result, evolved):
     Parameters
     ----------
     result : Result
+        Result of the run on the worn patch.
     evolved : WornPatch
+        The worn patch with its jumps, also on the coarser meshes.
     """
     patch_model = result.plan.model.patch
     coarse_depth = frozen_array(evolved.state.coarse_depth)
@@ -209,7 +215,9 @@ def _measure_patch_wear(model, evolved, motion: dict, *, estimate: bool = True) 
     Parameters
     ----------
     model : Model
+        Unworn model with [wear].
     evolved : WornPatch
+        The worn patch with its jumps, also on the coarser meshes.
     motion : dict
         Measures of the run on the worn patch by name.
     estimate : bool
@@ -276,7 +284,9 @@ def _measure_worn_friction(model, evolved, motion: dict, error: float | None) ->
     Parameters
     ----------
     model : Model
+        Unworn model with [wear].
     evolved : WornPatch
+        The worn patch with its jumps.
     motion : dict
         Measures of the run on the worn patch by name.
     error : float or None
@@ -375,7 +385,9 @@ def _measure_point_volume(model, result, *, estimate: bool = True) -> dict:
     Parameters
     ----------
     model : Model
+        Model with [wear] and [normal].
     result : Result
+        Result of the motion, with the histories of its last cycles.
     estimate : bool
         Whether to estimate the error.
     """

@@ -76,7 +76,9 @@ def compute_cycle_slip(model, patch, frames: int) -> CycleSlip:
     Parameters
     ----------
     model : Model
+        Model at the present wear.
     patch : Patch
+        Patch at the present wear.
     frames : int
         Number of frames per cycle from which the path is computed.
     """
@@ -217,6 +219,7 @@ def compute_point_slip_path(model, window, values: dict) -> tuple[float, float]:
     Parameters
     ----------
     model : Model
+        Model of a bench or a rig with [normal].
     window
         Histories of a bench or a rig.
     values : dict
@@ -342,6 +345,7 @@ def wear_force_on_flanks(model, slide, force, load) -> np.ndarray:
     Parameters
     ----------
     model : Model
+        Model with grooves and [wear].
     slide : (k,)
         Relative displacement [m].
     force, load : (k,)
@@ -364,7 +368,9 @@ def compute_flank_slip(model, patch, slide, vertical, local, tau) -> tuple:
     Parameters
     ----------
     model : Model
+        Model with grooves and [wear].
     patch : Patch
+        Patch at the present wear, whose pressure distributes the load.
     slide : (f,)
         Displacement of the holder [m] in each frame.
     vertical : (f,)
@@ -393,8 +399,11 @@ def compute_frame_slip(model, patch, frames: Frames) -> CycleSlip:
     Parameters
     ----------
     model : Model
+        Model with [wear], whose form decides.
     patch : Patch
+        Patch at the present wear.
     frames : Frames
+        Slip and shear stress of the nodes along the cycle.
     """
     count = len(frames.slip)
 
