@@ -19,6 +19,7 @@ from ..structure import drive_sizes
 from . import joint
 from .bench import engine as of_bench
 from .patch import plan as patch_plan
+from .results.patch_rows import Values
 from .rig import engines
 from .rig import plan as of_rig
 
@@ -74,11 +75,11 @@ class Plan:
 
     model: Model
     engine: str
-    unknowns: dict
+    unknowns: dict[str, int]
     samples: int
-    chain: dict
-    groups: dict
-    verdict: tuple
+    chain: patch_plan.StiffnessChain
+    groups: Values
+    verdict: tuple[str, ...]
 
     @property
     def kind(self) -> str:
@@ -269,7 +270,7 @@ def _describe_wear(model: Model) -> str:
     return f"wear: {model.wear.cycles:.6g} cycles in {jumps}; {repetition}"
 
 
-def _interface_stiffnesses(model: Model) -> dict:
+def _interface_stiffnesses(model: Model) -> patch_plan.StiffnessChain:
     """Return the stiffnesses of grooves and bonds, in series at the interface, by name."""
     load = model.nominal_load
     if not load > 0:
@@ -293,7 +294,7 @@ def _law_stiffness(law, load: float):
     return "rigid until it slips" if stiffness == inf else stiffness
 
 
-def _compute_law_groups(model: Model) -> dict:
+def _compute_law_groups(model: Model) -> Values:
     """Return the dimensionless groups of the friction law by name."""
     if model.spread is None:
         return {}
@@ -301,7 +302,7 @@ def _compute_law_groups(model: Model) -> dict:
     return {"share_of_the_spread": spread.carried_fraction(model.pad, model.spread)}
 
 
-def _describe_grooves(model: Model) -> list:
+def _describe_grooves(model: Model) -> list[str]:
     """Return a list with a sentence on the grooves that the load climbs."""
     load = model.nominal_load
     if model.grooves is None or not load > 0:

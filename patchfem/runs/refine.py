@@ -18,6 +18,7 @@ from ..model.model import Model
 from ..response import rows
 from ..scene.rules.accuracy import list_repeated_axes
 from .results.patch_rows import TABLE as PATCH_TABLE
+from .results.patch_rows import Measures
 
 MAX_SECONDS = 60.0  # Largest CPU time [s] of all passes without accuracy.max_seconds.
 COST_RATIO = 4.0  # Expected ratio of the CPU times of two successive passes.
@@ -96,7 +97,7 @@ def judge_pass(
     return Pass(excess, finer, reason=reason)
 
 
-def bound_errors(measures: dict, before: dict) -> dict:
+def bound_errors(measures: Measures, before: Measures) -> Measures:
     """Return measures whose errors are not smaller than those of a method of second order.
 
     The error of a pass follows from the difference of two resolutions, which may vanish by chance; the loop would stop
@@ -129,7 +130,7 @@ def is_main(name: str) -> bool:
     return row is not None and row.has("main")
 
 
-def find_worst_measure(measures: dict, tolerance: float) -> tuple[str, float]:
+def find_worst_measure(measures: Measures, tolerance: float) -> tuple[str, float]:
     """Return the main measure with the largest ratio of error to allowed error, and this ratio; ("", 0) without one."""
     found = filter(is_main, measures)
     ratios = {name: min(measures[name].error_ratio(tolerance), MAX_EXCESS) for name in found}
@@ -143,8 +144,9 @@ def find_axis(measure, name: str) -> str:
         return "mesh"
     if measure.causes is None:
         return "own"
-    axis = max(measure.causes.parts, key=measure.causes.parts.get, default="own")
-    return axis if measure.causes.parts.get(axis, 0.0) > 0 else "own"
+    parts = measure.causes.parts
+    axis = max(parts, key=parts.get, default="own")
+    return axis if parts.get(axis, 0.0) > 0 else "own"
 
 
 def _refine_steps(model: Model, result) -> Model | None:

@@ -26,7 +26,7 @@ from .patch import faces, mesh_levels, store, strength
 from .patch import result as patch_result
 from .plan import Plan, plan
 from .results.interfaces import Face, merge_sentences
-from .results.patch_rows import find_unknown_measures
+from .results.patch_rows import Measures, find_unknown_measures
 from .results.result import Result, RunInputs, describe_measure, shorten_file_names
 from .rig import engines, rig
 from .wear import evolve, measures
@@ -135,7 +135,7 @@ class FinishedPass(NamedTuple):
     """
 
     result: Result
-    notes: list
+    notes: list[str]
     start: float
     pressed: tuple[Face, ...]
 
@@ -241,7 +241,7 @@ def _press_interfaces(model: Model, *, estimate: bool) -> tuple[Face, ...]:
     return (Face(0, "", model, patches, static=static),)
 
 
-def _collect_static_measures(pressed: tuple[Face, ...]) -> dict:
+def _collect_static_measures(pressed: tuple[Face, ...]) -> Measures:
     """Return the static measures of interfaces by name, with error estimates."""
     measures = {}
     for face in pressed:
@@ -256,7 +256,7 @@ def _is_open(patch) -> bool:
     return patch is not None and patch.pressure.outcome is Outcome.NO_CONTACT
 
 
-def _warn_of_pressed_patch(face: Face, *, estimate: bool) -> list:
+def _warn_of_pressed_patch(face: Face, *, estimate: bool) -> list[str]:
     """Return warnings on large strains, and on a mesh too coarse for an error estimate."""
     has_error_mesh = not estimate or face.patches[1] is not None
     return patch_result.patch_warnings(face.model.patch, face.patch, has_error_mesh=has_error_mesh)

@@ -13,6 +13,7 @@ import numpy as np
 from ...inputs import measured
 from ...model.model import Model
 from ...model.similar_models import select_models
+from ..results.patch_rows import Arrays, Measures
 
 FAILED_OUTCOME = "failed"  # outcome of a case that was rejected or ended with an error
 
@@ -33,10 +34,10 @@ class CaseResults:
     """
 
     outcome: np.ndarray
-    values: dict = field(default_factory=dict)
-    errors: dict = field(default_factory=dict)
-    floors: dict = field(default_factory=dict)
-    units: dict = field(default_factory=dict)
+    values: Arrays = field(default_factory=dict)
+    errors: Arrays = field(default_factory=dict)
+    floors: Arrays = field(default_factory=dict)
+    units: dict[str, str] = field(default_factory=dict)
     reasons: dict = field(default_factory=dict)
     messages: dict = field(default_factory=dict)
     warnings: dict = field(default_factory=dict)
@@ -68,7 +69,7 @@ class CaseResults:
         self.outcome[case] = FAILED_OUTCOME
         self.messages[case] = message
 
-    def put(self, case: int, outcome: str, measures: dict, seconds: float) -> None:
+    def put(self, case: int, outcome: str, measures: Measures, seconds: float) -> None:
         """Store outcome, measures and computing time of a case.
 
         Parameters
@@ -86,7 +87,7 @@ class CaseResults:
         self.seconds[case] = seconds
         self.fill(case, measures)
 
-    def fill(self, case: int, measures: dict) -> None:
+    def fill(self, case: int, measures: Measures) -> None:
         """Store measures of a case; existing values are replaced.
 
         measures: core.Measure by name.

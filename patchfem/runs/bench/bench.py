@@ -22,6 +22,7 @@ from ...response.measures import (
     compute_step_harmonic,
     work_difference,
 )
+from ..results.patch_rows import Values
 from .engine import BenchEngine, choose_bench_engine
 from .slides import SlideHistories, SlideTask, follow_path
 
@@ -51,7 +52,7 @@ class BenchRun:
     frames: np.ndarray
     tau: np.ndarray
     local: np.ndarray
-    values: dict
+    values: Values
     seconds: float
     first: int
     engine: BenchEngine
@@ -133,7 +134,7 @@ def _choose_frames(n_samples: int, n_frames: int) -> np.ndarray:
     return np.unique(numbers[numbers > 0])
 
 
-def _compute_measures(model, histories: SlideHistories, cycle_start: int) -> dict:
+def _compute_measures(model, histories: SlideHistories, cycle_start: int) -> Values:
     """Compute all measures of a bench run except those of the friction loop."""
     force = histories.force
     load = histories.load
@@ -169,7 +170,7 @@ def _compute_measures(model, histories: SlideHistories, cycle_start: int) -> dic
 
 def _compute_loop_measures(
     model, time, slide, histories: SlideHistories, cycle_start: int, omega: float
-) -> dict:
+) -> Values:
     """Compute the measures of the friction loop in the last cycle, which starts at sample `cycle_start`."""
     time = time[cycle_start:]
     slide = slide[cycle_start:]

@@ -25,6 +25,7 @@ from ...response.errors import (
     merged_cell_errors,
 )
 from ...slip import shear_modes
+from ..results.patch_rows import Values
 from . import bench, shear
 from .engine import Method, uses_parallel_elements
 
@@ -61,9 +62,9 @@ class BenchErrors(NamedTuple):
     - step_runs: StepRun of the run and of each run with fewer steps, from fine to coarse.
     """
 
-    errors: list
+    errors: list[tuple[str, Values]]
     seconds: float
-    step_runs: list
+    step_runs: list[StepRun]
 
 
 def estimate_bench_errors(model, patches: list, fine_run, steps: int, say=None) -> BenchErrors:
@@ -117,7 +118,7 @@ def estimate_bench_errors(model, patches: list, fine_run, steps: int, say=None) 
     return BenchErrors(errors, seconds, step_runs)
 
 
-def list_coarser_runs(model, patches: list, fine_run, steps: int) -> list:
+def list_coarser_runs(model, patches: list, fine_run, steps: int) -> list[CoarserRuns]:
     """List the coarser runs from which the errors of a bench run are estimated.
 
     Two runs have half and a quarter of the steps. Further runs with a quarter of the steps have,
@@ -179,7 +180,7 @@ def find_bond_sum_error(engine) -> float:
     return 0.0 if engine.choice is None else engine.choice.error
 
 
-def _estimate_bond_sum_errors(model, fine_run) -> dict:
+def _estimate_bond_sum_errors(model, fine_run) -> Values:
     """Estimate the errors of the measures due to bond summation."""
     work = np.abs(np.diff(fine_run.ledger[0]))
     friction = model.friction
@@ -193,7 +194,7 @@ def _estimate_bond_sum_errors(model, fine_run) -> dict:
     return friction_errors(fine_run.values, find_bond_sum_error(fine_run.engine), scale)
 
 
-def _estimate_mesh_errors(*values: dict) -> dict:
+def _estimate_mesh_errors(*values: Values) -> Values:
     """Estimate the mesh errors of the measures from their values on nested meshes.
 
     Measures that are themselves errors, such as the energy balance, have their change as error.

@@ -113,7 +113,7 @@ def run_prescribed(inputs: RunInputs) -> Result:
     )
 
 
-def _warn_of_kept_pressure(model) -> list:
+def _warn_of_kept_pressure(model) -> list[str]:
     """Return a list with a warning that bonds of the printed law keep the pressure at which they formed."""
     if model.friction.reading != "report" or not model.load_varies:
         return []
@@ -142,7 +142,7 @@ def _compute_loop_closing_error(fine) -> float:
     return gap
 
 
-def _warn_of_open_loop(model, patch, fine, steps: int) -> list:
+def _warn_of_open_loop(model, patch, fine, steps: int) -> list[str]:
     """Return a list with a warning if the last friction loop is not closed, and its area is not that of a longer run."""
     tolerance = model.accuracy.tolerance
     slide = model.slide
@@ -163,7 +163,7 @@ def _warn_of_open_loop(model, patch, fine, steps: int) -> list:
     ]
 
 
-def _warn_of_overhang(patch, fine) -> list:
+def _warn_of_overhang(patch, fine) -> list[str]:
     """Return warnings if the upper piece leaves the loaded area or the lower piece."""
     warnings = []
     load_loss = 1 - float(fine.load.min() / fine.load[0]) if fine.load[0] > 0 else 0.0

@@ -77,7 +77,7 @@ def make_flank_contact(model, load: float, patch=None, n_modes: int | None = Non
         )
         length = max(COULOMB_LENGTH_RATIO * tolerance, MIN_LENGTH_RATIO) * gross_slip_slide
 
-    # A bond length that shrinks from eps_0 to eps_k = ratio eps_0 weakens the contact, which could jump.
+    # Growth makes the friction in motion smaller: `weakening` is the static / kinetic coefficient.
     weakening = 1.0
     if getattr(law, "has_growth", False):
         weakening = 1 / law.ratio if law.ratio > 0 else np.inf

@@ -207,7 +207,7 @@ class _FrictionLimits:
         return ratio * self.compute_tractions(sample, direction)
 
 
-def find_rest_ends(model, slide) -> dict:
+def find_rest_ends(model, slide) -> dict[int, float]:
     """Return the samples at which sliding starts from rest, with the sign of the motion.
 
     These are the first sample of the path and the last sample of each rest. The dict is empty
@@ -390,19 +390,22 @@ def _make_contact(task: SlideTask) -> tuple:
         point = model.point
         return contacts.make_pressed_contact(friction, load, row, load=point.evaluate), None
 
+    # A comparison run merges the springs of parallel elements.
+    merge_springs = task.engine.springs
+
     # Pieces that deform in shear are parallel Jenkins elements of the same slip curve.
     if model.partial_slip:
         length = make_law(friction, 1.0).element(1.0).length
         jenkins_set = jenkins_elements.elements(patch, friction.static, length)
         springs = jenkins_set.stiffness, jenkins_set.yield_displacement
-        if task.engine.springs is not None:
-            springs = task.engine.springs(*springs)
+        if merge_springs is not None:
+            springs = merge_springs(*springs)
         return contacts.make_parallel_contact(*springs, row), jenkins_set
 
     # Rigid pieces are one element of the law itself.
     element = make_law(friction, load).element(load)
-    if task.engine.springs is not None:
-        springs = task.engine.springs(*np.split(element.numbers[2:], 2))
+    if merge_springs is not None:
+        springs = merge_springs(*np.split(element.numbers[2:], 2))
         element = elastic_plastic.parallel_element(*springs)
     return contacts.make_contact([element], [row]), None
 

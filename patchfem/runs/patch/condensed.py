@@ -38,13 +38,13 @@ class CondensedPair:
 
     grid: object
     upper_grid: object
-    piece: object
-    upper: object
+    piece: Piece
+    upper: Piece
     compliance: Compliance
     closing: np.ndarray
-    joint: object
+    joint: mortar.Mortar | None
     end_gap: np.ndarray
-    seconds: dict
+    seconds: dict[str, float]
 
     @property
     def coupling(self) -> float:
@@ -151,7 +151,7 @@ def condense(patch_model, grid, upper_grid=None) -> CondensedPair:
     )
 
 
-def condense_on_shared_meshes(patch_model) -> tuple:
+def condense_on_shared_meshes(patch_model) -> tuple[CondensedPair, ...]:
     """Return the condensed pieces of a model on all levels of its shared meshes."""
     levels = range(len(patch_model.mesh.shared.levels))
     return tuple(condense_on_shared_level(patch_model, level) for level in levels)
@@ -186,14 +186,15 @@ def cache_condensed_pairs(patch_model, meshes, pairs) -> None:
 
 def _condensed_pair_key(patch_model, name: str, level: int) -> tuple:
     """Return the cache key of the condensed pieces on one level of a shared mesh."""
+    pieces = patch_model.pieces
     return (
         "pair",
         name,
         level,
-        patch_model.pieces.lower,
-        patch_model.pieces.upper,
-        patch_model.pieces.plane,
-        patch_model.pieces.width * patch_model.pieces.pairs,
+        pieces.lower,
+        pieces.upper,
+        pieces.plane,
+        pieces.width * pieces.pairs,
     )
 
 

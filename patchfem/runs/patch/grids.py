@@ -72,6 +72,9 @@ MAX_CONDENSING_SECONDS = {True: 3.6, False: 0.8}
 SECONDS_PER_NODE = 4.2e-6  # CPU time [s] of condensing a mesh over (number of nodes)^NODE_EXPONENT
 NODE_EXPONENT = 1.1
 
+Pairs = tuple[tuple[float, float], ...]  # (start, end) or (position, half-width) [m]
+Bands = list[tuple[float, float, float]]  # (from, to, cell length) [m], as in `Layout.bands`
+
 
 @dataclass(frozen=True, eq=False, slots=True)
 class ContactExtent:
@@ -86,12 +89,12 @@ class ContactExtent:
     - slip_zones: (start, end) [m] of the zones that slip under a prescribed displacement.
     """
 
-    span: tuple
-    places: tuple
-    corners: tuple
+    span: tuple[float, float]
+    places: tuple[float, ...]
+    corners: tuple[float, ...]
     cell: float
-    crests: tuple = ()
-    slip_zones: tuple = ()
+    crests: Pairs = ()
+    slip_zones: Pairs = ()
 
     @property
     def width(self) -> float:
@@ -191,7 +194,7 @@ def _have_bands_converged(layout: Layout, previous_layout: Layout) -> bool:
     return bool((np.abs(bands - previous_bands) <= BAND_CHANGE_TOL * cells).all())
 
 
-def _resolves_slip_zones(zones: tuple, x, layout: Layout) -> bool:
+def _resolves_slip_zones(zones: Pairs, x, layout: Layout) -> bool:
     """Return whether columns at x (k,) [m] resolve the slip zones of a patch.
 
     Their cells may be up to MAX_SEARCH_CELL_RATIO times as long as those of the layout.
@@ -232,13 +235,15 @@ def make_search_layout(patch_model) -> Layout:
     return Layout(-half, half, (), (-half, half), cell, cell, 0.0)
 
 
-def make_column_layout(patch_model, extents: list) -> Layout:
+def make_column_layout(patch_model, extents: list[ContactExtent]) -> Layout:
     """Return the column layout of the coarsest mesh, graded towards given contact regions.
 
     extents: ContactExtents of one patch under several loads, or of several patches.
     """
     length = patch_model.pieces.length
     half = length / 2
+    mesh = patch_model.mesh
+    n_edge_cells = EDGE_CELLS[mesh.is_static]
     span = (min(extent.span[0] for extent in extents), max(extent.span[1] for extent in extents))
     width = min(extent.width for extent in extents)
 
@@ -248,17 +253,17 @@ def make_column_layout(patch_model, extents: list) -> Layout:
 
     if max(len(extent.places) for extent in extents) > MAX_CONTACT_ENDS:
         return Layout(-half, half, (), span, *(2 * [min(length / 64, max_cell)]), 0.0)
-    if patch_model.mesh.edge_motion == "wear":
+    if mesh.edge_motion == "wear":
         max_cell = min(max_cell, length * MAX_WEAR_CELL_RATIO)
     max_loaded_cell = min(width / 6, length / 24, max_cell)
 
     # A contact of one or two nodes is searched for again with shorter cells.
     n_contact_cells = N_SMALL_CONTACT_CELLS
     if np.isfinite(max(extent.cell for extent in extents)):
-        n_contact_cells = EDGE_CELLS[patch_model.mesh.is_static]
+        n_contact_cells = n_edge_cells
     # A band along the path of a moving edge would need many cells, each of which changes the
     # contact set.
-    coating_cell = coating / 4 if coating and patch_model.mesh.edge_motion != "load" else np.inf
+    coating_cell = coating / 4 if coating and mesh.edge_motion != "load" else np.inf
     min_cell = max(min(width / n_contact_cells, coating_cell), MIN_CELL_RATIO * length)
 
     bands = _make_edge_bands([extent.places for extent in extents], min_cell)
@@ -287,7 +292,7 @@ def make_column_layout(patch_model, extents: list) -> Layout:
     corner_cell = max(
         min(
             coating / 16 if coating else np.inf,
-            width / EDGE_CELLS[patch_model.mesh.is_static] / corner_factor,
+            width / n_edge_cells / corner_factor,
         ),
         MIN_CELL_RATIO * length,
     )
@@ -302,16 +307,16 @@ def make_column_layout(patch_model, extents: list) -> Layout:
         span,
         max(max_loaded_cell, min_cell),
         max_cell,
-        CELL_GROWTH[patch_model.mesh.is_static],
+        CELL_GROWTH[mesh.is_static],
     )
 
 
-def _make_point_bands(places, cell: float) -> list:
+def _make_point_bands(places, cell: float) -> Bands:
     """Return bands with a node at each position [m] between cells of a given length [m]."""
     return [(place, place, cell) for place in places]
 
 
-def _make_edge_bands(edge_positions: list, min_cell: float) -> list:
+def _make_edge_bands(edge_positions: list, min_cell: float) -> Bands:
     """Return the bands of short columns around the contact edges.
 
     If all contacts have equally many edges, each band covers the range over which its edge moves.
@@ -380,7 +385,7 @@ def find_contact_extent(patch: Patch, slip=None) -> ContactExtent:
     )
 
 
-def _find_pressure_maxima(x, sigma) -> tuple:
+def _find_pressure_maxima(x, sigma) -> Pairs:
     """Return (position, half-width) [m] of the pressure maxima inside a contact.
 
     Both follow from parabolas through three nodal pressures.

@@ -7,7 +7,7 @@ module also estimates the model errors due to the plane state and to the number 
 """
 
 from dataclasses import replace
-from itertools import pairwise
+from itertools import pairwise, takewhile
 from typing import NamedTuple
 
 import numpy as np
@@ -19,10 +19,10 @@ from ...mesh.grid import TensorGrid
 from ...response import errors
 from ...scene.keys.contact import compute_outermost_strip_distance
 from ..results import patch_rows
-from ..results.patch_rows import MESH_MEASURES, TABLE
+from ..results.patch_rows import MESH_MEASURES, TABLE, Measures, Values
 from .condensed import condense_on_same_meshes
 from .limits import extrapolate_to_zero_cell_length
-from .press import Patch, solve_patch_contact
+from .press import Patch, Patches, solve_patch_contact
 from .values import (
     compute_static_values,
     edge_cell_lengths,
@@ -49,10 +49,8 @@ EXTRAPOLATED_ERROR_RATIO = 2.0
 # Error factor for meshes that do not resolve the rounded ends of a piece.
 UNRESOLVED_ROUNDING_FACTOR = 2.0
 MEASURES_WITH_BAND = ("pressure_peak", "normal_stiffness", "tangential_stiffness")
-PEAK_MEASURES = (
-    "pressure_peak",
-    "loaded_fraction",
-)  # Measures without a value where the pressure is unbounded.
+# Measures without a value where the pressure is unbounded.
+PEAK_MEASURES = ("pressure_peak", "loaded_fraction")
 
 
 class Estimate(NamedTuple):
@@ -78,9 +76,12 @@ class Estimate(NamedTuple):
         return Measure(float(self.value), row.unit, error, row.floor, engine=engine)
 
 
+Estimates = dict[str, Estimate]  # by the name of the measure
+
+
 def estimate_static_measures(
     fine: Patch, *coarse: Patch | None, tolerance: float | None = None
-) -> dict:
+) -> Measures:
     """Return the static measures of a patch with their error estimates.
 
     A value is that of the finest mesh, or its limit for vanishing cells if the value misses the
@@ -140,7 +141,7 @@ def estimate_static_measures(
     return out
 
 
-def with_static_measures(patches, tolerance: float | None, points=None) -> tuple:
+def with_static_measures(patches, tolerance: float | None, points=None) -> Patches:
     """Return solved patches of which the finest one has its static measures with their errors.
 
     Parameters
@@ -165,7 +166,9 @@ def with_static_measures(patches, tolerance: float | None, points=None) -> tuple
     return replace(fine, measures=measures), *coarse
 
 
-def _select_more_accurate_point_measures(measures_by_name: dict, estimates: dict) -> dict:
+def _select_more_accurate_point_measures(
+    measures_by_name: Measures, estimates: Estimates
+) -> Measures:
     """Return the measures that profile points determine more accurately than the mesh.
 
     Peak measures are compared by their relative errors: a mesh that smooths the profile has a low
@@ -187,7 +190,7 @@ def _select_more_accurate_point_measures(measures_by_name: dict, estimates: dict
     return out
 
 
-def _select_meshes_with_same_contact_intervals(fine: Patch, coarse: list) -> list:
+def _select_meshes_with_same_contact_intervals(fine: Patch, coarse: list[Patch]) -> list[Patch]:
     """Select the coarser solutions with as many contact intervals as the finest one.
 
     A short contact interval beside a step may be missing on a coarse mesh. The change to this mesh
@@ -209,13 +212,10 @@ def _select_meshes_with_same_contact_intervals(fine: Patch, coarse: list) -> lis
     if not fine.model.gap.jumps:
         return coarse
     n_intervals = _count_contact_intervals(fine.active)
-    n_selected = 0
-    while (
-        n_selected < len(coarse)
-        and _count_contact_intervals(coarse[n_selected].active) == n_intervals
-    ):
-        n_selected += 1
-    return coarse[: max(n_selected, 1)]
+    selected = takewhile(
+        lambda patch: _count_contact_intervals(patch.active) == n_intervals, coarse
+    )
+    return list(selected) or coarse[:1]
 
 
 def _count_contact_intervals(active) -> int:
@@ -223,7 +223,9 @@ def _count_contact_intervals(active) -> int:
     return int(active[0]) + int(np.count_nonzero(active[1:] & ~active[:-1]))
 
 
-def _widen_errors_by_corner_pressure(measures_by_name: dict, fine: Patch, coarse: Patch) -> dict:
+def _widen_errors_by_corner_pressure(
+    measures_by_name: Measures, fine: Patch, coarse: Patch
+) -> Measures:
     """Increase the errors of the peak measures if the pressure at a corner still grows.
 
     At a corner that the profile just reaches, every refinement raises the pressure, although the
@@ -246,13 +248,13 @@ def _widen_errors_by_corner_pressure(measures_by_name: dict, fine: Patch, coarse
 
 
 def extrapolate_static_measures(
-    values_by_mesh: list,
-    hidden_errors: dict,
+    values_by_mesh: list[Values],
+    hidden_errors: Values,
     tolerance: float | None,
     nested: bool = True,
     min_relative_error: float = MIN_ERROR,
     error_factor: float = 1.0,
-) -> dict:
+) -> Estimates:
     """Extrapolate static measures over a sequence of refined meshes, with error estimates.
 
     The error of a value is the larger one of `error_factor` times the error of the series (`limits`) and
@@ -327,7 +329,7 @@ def increase_error_by_peak_error(
     return max(error, fraction * relative_peak_error / (1 - min(relative_peak_error, 0.5)))
 
 
-def max_mesh_error_ratio(measures_by_name: dict, tolerance: float) -> float:
+def max_mesh_error_ratio(measures_by_name: Measures, tolerance: float) -> float:
     """Return the largest ratio of error to allowed error of the measures that control the mesh.
 
     A ratio above 1 means that a measure misses the tolerance. Measures without value or error are
@@ -450,7 +452,7 @@ def _compute_resolution(patch: Patch, missed_peak: float) -> Resolution:
     )
 
 
-def estimate_hidden_errors(resolution: Resolution, finest: dict) -> dict:
+def estimate_hidden_errors(resolution: Resolution, finest: Values) -> Values:
     """Estimate the errors of the static measures that mesh refinement does not reveal.
 
     They are due to a contact of few nodes, to a coating thinner than the cells at a loaded corner,
@@ -546,7 +548,7 @@ def _wedge_indentation_pressure(patch: Patch) -> float:
     return float(slopes[..., ends].max() / flexibility)
 
 
-def note_on_plane_state(patch_model, patch: Patch) -> list:
+def note_on_plane_state(patch_model, patch: Patch) -> list[str]:
     """Return a list with a note on the model error due to assuming plane strain or plane stress.
 
     The list is empty for a piece in plane strain that is far wider than tall, and for one in plane
@@ -588,7 +590,7 @@ def note_on_plane_state(patch_model, patch: Patch) -> list:
     ]
 
 
-def _format_changes(patch_model, values: dict, other_values: dict) -> list[str]:
+def _format_changes(patch_model, values: Values, other_values: Values) -> list[str]:
     """Format the changes of the measures from the assumed plane state to the opposite one."""
     changes = []
     names = MEASURES_WITH_BAND
@@ -605,7 +607,7 @@ def _format_changes(patch_model, values: dict, other_values: dict) -> list[str]:
     return changes
 
 
-def add_strip_count_errors(patch_model, patch: Patch, measures_by_name: dict) -> dict:
+def add_strip_count_errors(patch_model, patch: Patch, measures_by_name: Measures) -> Measures:
     """Add the errors due to the finite number of strips to the measures of a patch.
 
     The error follows from the change with another number of strips on the same mesh, assuming
@@ -623,6 +625,7 @@ def add_strip_count_errors(patch_model, patch: Patch, measures_by_name: dict) ->
     Returns
     -------
     dict
+        Measure by name.
     """
     other_model, ratio = with_other_strip_count(patch_model)
     if other_model is patch_model:

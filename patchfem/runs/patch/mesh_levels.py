@@ -14,7 +14,7 @@ from . import profile_points, slip_zones, store
 from .condensed import condense, condense_on_shared_meshes
 from .grids import MAX_CONDENSING_SECONDS, MIN_LEVELS, make_base_grids, predict_condensing_seconds
 from .measures import estimate_static_measures, max_mesh_error_ratio, with_static_measures
-from .press import solve_patch_contact
+from .press import Patches, solve_patch_contact
 
 # Tolerance at which a patch with prescribed partial slip may take as much CPU time as a patch in a
 # rig. The allowed time is proportional to tolerance^-0.5: a tenth of the tolerance allows 3.2 times
@@ -24,7 +24,7 @@ SLIP_REFERENCE_TOL = 1e-3
 MAX_COLUMNS_WITHOUT_COARSER = 8
 
 
-def solve_with_coarser(patch_model, tolerance: float, estimate: bool = True) -> tuple:
+def solve_with_coarser(patch_model, tolerance: float, estimate: bool = True) -> Patches:
     """Solve a patch on its mesh and on the coarser meshes of its error estimate.
 
     On each mesh the pieces are condensed to the nodes of the interface, so that a compliance [m/N]
@@ -71,7 +71,7 @@ def solve_with_coarser(patch_model, tolerance: float, estimate: bool = True) -> 
     return patches
 
 
-def solve_on_pairs(patch_model, pairs, tolerance: float, estimate: bool = True) -> tuple:
+def solve_on_pairs(patch_model, pairs, tolerance: float, estimate: bool = True) -> Patches:
     """Solve a patch on given condensed pieces.
 
     Parameters
@@ -99,7 +99,7 @@ def solve_on_pairs(patch_model, pairs, tolerance: float, estimate: bool = True) 
 
 def _solve_on_given_meshes(
     patch_model, bodies: tuple, tolerance: float | None, estimate: bool
-) -> tuple:
+) -> Patches:
     """Solve a patch on given meshes and on the meshes of its error estimate."""
     levels = [bodies, *(make_comparison_meshes(*bodies) if estimate else ())]
     pairs = [condense(patch_model, *level) for level in levels]
@@ -133,7 +133,7 @@ def make_comparison_meshes(lower, upper) -> list:
     return out
 
 
-def solve_on_refined_meshes(patch_model, tolerance: float, estimate: bool = True) -> tuple:
+def solve_on_refined_meshes(patch_model, tolerance: float, estimate: bool = True) -> Patches:
     """Solve a patch on successively finer meshes until it meets the tolerance.
 
     At least MIN_LEVELS meshes are solved, because the error follows from the changes between them. Each
@@ -211,7 +211,7 @@ def solve_on_refined_meshes(patch_model, tolerance: float, estimate: bool = True
             n_finer -= 1
 
 
-def _meets_tolerance(patches: tuple, tolerance: float, points) -> bool:
+def _meets_tolerance(patches: Patches, tolerance: float, points) -> bool:
     """Return whether the measures that control the mesh meet the tolerance with given points."""
     fine = with_static_measures(patches, tolerance, points)[0]
     return max_mesh_error_ratio(fine.measures, tolerance) <= 1
@@ -231,7 +231,7 @@ def max_condensing_seconds(patch_model, tolerance: float) -> float:
     )
 
 
-def solve_on_static_meshes(patch_model, tolerance: float, estimate: bool = True) -> tuple:
+def solve_on_static_meshes(patch_model, tolerance: float, estimate: bool = True) -> Patches:
     """Solve a bench patch with partial slip on the meshes of a static run.
 
     Parameters

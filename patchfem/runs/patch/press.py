@@ -24,6 +24,7 @@ from ...contact.strip_compliance import StripCompliance, WarmStart
 from ...core import Compliance, ContactState, PatchfemError, frozen_array
 from ...exceptions import UnresolvedTrace
 from ...model.patch import PatchStrips
+from ..results.patch_rows import Arrays, Measures, Values
 from .condensed import CondensedPair
 from .skin import make_skin_law
 
@@ -109,12 +110,12 @@ class Patch:
     slip_compliance: np.ndarray
     unloaded_gap: np.ndarray
     notes: tuple
-    seconds: dict
+    seconds: Values
     averaging: float | None = None
     step_variants: tuple = ()
     points: PointSolution | None = None
-    measures: dict | None = None
-    frames: dict = field(default_factory=dict)
+    measures: Measures | None = None
+    frames: Arrays = field(default_factory=dict)
 
     @property
     def x(self) -> np.ndarray:
@@ -199,6 +200,10 @@ class Patch:
     def active(self) -> np.ndarray:
         """Contact set (m,) of bool: whether each node carries pressure."""
         return self.pressure.sigma_n > 0
+
+
+# A patch on several meshes, from fine to coarse; None for a mesh on which it is not solved.
+Patches = tuple[Patch | None, ...]
 
 
 def solve_patch_contact(patch_model, pair: CondensedPair, worn=None, coarse=None) -> Patch:
@@ -286,7 +291,12 @@ def _gap_variants_at_step(node: int, gap, half_steps, worn) -> tuple:
 
 
 def make_patch(
-    patch_model, pair: CondensedPair, gap, contact: SolvedContact, notes: tuple, seconds: dict
+    patch_model,
+    pair: CondensedPair,
+    gap,
+    contact: SolvedContact,
+    notes: tuple,
+    seconds: Values,
 ) -> Patch:
     """Assemble the Patch record of a solved contact.
 

@@ -31,6 +31,7 @@ from .measures import (
     MIN_EDGE_OFFSET,
     PEAK_MEASURES,
     Estimate,
+    Estimates,
     Resolution,
     estimate_hidden_errors,
     extrapolate_static_measures,
@@ -185,7 +186,9 @@ def _is_next_level_expensive(level: PointLevel) -> bool:
     return 2 * count > MAX_POINTS or 3 * level.n_iterations * count > MAX_WORK
 
 
-def _combine_refinement_series(end_levels: list, point_levels: list) -> dict:
+def _combine_refinement_series(
+    end_levels: list[PointLevel], point_levels: list[PointLevel]
+) -> Estimates:
     """Combine two series of refinements into one estimate of each measure.
 
     The first series halves the cells at the ends. The second doubles the points, with the shortest
@@ -214,9 +217,12 @@ def _combine_refinement_series(end_levels: list, point_levels: list) -> dict:
 
 def _compute_free_end_compliance(patch_model, level: int) -> FreeEnds:
     """Compute the change of compliance due to the free ends, with the cells of a given level."""
-    half = patch_model.pieces.length / 2
-    cell = END_CELL_RATIO * patch_model.pieces.length
-    middle_cell = MIDDLE_CELL_RATIO * patch_model.pieces.length
+    length = patch_model.pieces.length
+    half = length / 2
+    cell = END_CELL_RATIO * length
+    middle_cell = MIDDLE_CELL_RATIO * length
+
+    # Short columns only at both ends, where the compliance differs from that of infinite layers.
     bands = ((-half, -half, cell), (half, half, cell))
     layout = Layout(
         start=-half,
@@ -228,6 +234,8 @@ def _compute_free_end_compliance(patch_model, level: int) -> FreeEnds:
         slope=CELL_GROWTH,
     ).scale_cells(0.5**level)
     x = divide_into_columns(layout)
+
+    # Two equal pieces count twice.
     changes = 0.0
     for piece, multiplicity in _distinct_pieces(patch_model):
         grid = TensorGrid(x, *_row_depths(piece, layout))

@@ -101,7 +101,7 @@ def make_static_result(inputs: RunInputs) -> Result:
     )
 
 
-def patch_warnings(patch_model, patch, *, has_error_mesh: bool = True) -> list:
+def patch_warnings(patch_model, patch, *, has_error_mesh: bool = True) -> list[str]:
     """Return warnings on large strains, locking elements, the gap, the ends of the pieces and a missing coarser mesh.
 
     Parameters
@@ -163,7 +163,7 @@ def _advise_shorter_elements(patch_model) -> str:
     return "leave out contact.element_size"
 
 
-def notes_on_neglected_effects(face) -> list:
+def notes_on_neglected_effects(face) -> list[str]:
     """Return notes on the effects that the model of a pressed interface neglects in any motion.
 
     Without a patch on coarser meshes there is no note on the plane state.
@@ -236,7 +236,7 @@ def _describe_results_on_mesh(model, patch) -> str:
     return f"fields and motion are computed on {where}"
 
 
-def note_on_normal_shear_coupling(patch_model, patch) -> list:
+def note_on_normal_shear_coupling(patch_model, patch) -> list[str]:
     """Return a list with a note on the coupling of normal and shear displacement of dissimilar pieces.
 
     The surfaces of dissimilar pieces slide on each other under pressure. If they stick, shear stresses

@@ -43,7 +43,7 @@ def asperity_layer_stiffness(patch_model, pressure: float) -> float:
     return float(law.stiffness(law.separation(np.array([pressure])))[0]) if pressure > 0 else 0.0
 
 
-def note_on_asperity_stiffness(patch_model, pressure: float) -> list:
+def note_on_asperity_stiffness(patch_model, pressure: float) -> list[str]:
     """Return a list with a note on how reliable the stiffness of Hertzian asperities is.
 
     The list is empty unless the asperities come from a profile or from rms values. pressure: mean

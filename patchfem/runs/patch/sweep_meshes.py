@@ -16,7 +16,7 @@ from ...core import PatchfemError
 from ...mesh.grading import Layout
 from ...model.patch import SharedMeshes
 from . import grids, mesh_levels
-from .condensed import cache_condensed_pairs, condense
+from .condensed import CondensedPair, cache_condensed_pairs, condense
 from .measures import max_mesh_error_ratio
 from .press import solve_patch_contact
 
@@ -147,7 +147,7 @@ def select_distinct_patches(patches) -> tuple:
     return [rows[keys[k]] for k in sorted(selected)], False
 
 
-def _load_and_shape_parameters(patch_model) -> tuple:
+def _load_and_shape_parameters(patch_model) -> tuple[float, ...]:
     """Return the load and gap parameters that may differ between patches of one mesh geometry."""
     loading = patch_model.loading
     shapes = []
@@ -210,7 +210,7 @@ def _find_contact_extent(patch_model, pair):
         return None
 
 
-def _merge_layouts(layouts: list, has_intermediate_cases: bool) -> Layout:
+def _merge_layouts(layouts: list[Layout], has_intermediate_cases: bool) -> Layout:
     """Merge column layouts, taking the shortest cell of all layouts at each position."""
     bands = set()
     for layout in layouts:
@@ -243,7 +243,7 @@ def _merge_layouts(layouts: list, has_intermediate_cases: bool) -> Layout:
     return replace(merged, bands=tuple(needed_bands))
 
 
-def _interpolate_bands(layouts: list) -> list:
+def _interpolate_bands(layouts: list[Layout]) -> grids.Bands:
     """Return bands of short columns between the contact edges of neighbouring cases."""
     bands = []
     half_length = max(layout.stop for layout in layouts)
@@ -262,7 +262,7 @@ def _interpolate_bands(layouts: list) -> list:
     return bands
 
 
-def _refine_until_tolerance_is_met(cases: list, bodies, tolerance: float) -> list:
+def _refine_until_tolerance_is_met(cases: list, bodies, tolerance: float) -> list[CondensedPair]:
     """Refine nested meshes until all patches meet the tolerance or the mesh is too expensive.
 
     Parameters
@@ -293,7 +293,7 @@ def _refine_until_tolerance_is_met(cases: list, bodies, tolerance: float) -> lis
             return pairs
 
 
-def _meets_tolerance(patch_model, pairs: list, tolerance: float) -> bool:
+def _meets_tolerance(patch_model, pairs: list[CondensedPair], tolerance: float) -> bool:
     """Return whether a patch meets the tolerance on given condensed pieces, or cannot be solved on them."""
     try:
         patches = mesh_levels.solve_on_pairs(patch_model, pairs, tolerance)

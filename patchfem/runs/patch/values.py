@@ -14,6 +14,7 @@ from ...contact import edges, stiffness
 from ...contact.press import split_into_strips
 from ...elasticity.lapack import use_one_blas_thread
 from ...mesh.grid import TensorGrid
+from ..results.patch_rows import Values
 from .press import Patch
 
 # Largest ratio of the curvatures of neighbouring parabolas at which the pressure curve counts as
@@ -113,7 +114,7 @@ def _extrapolate_pressure_to_end(x, sigma) -> float:
 
 def assemble_static_values(
     length: float, area: float, state, peak, edge_values: EdgeValues
-) -> dict:
+) -> Values:
     """Return the static measures by name.
 
     Parameters
@@ -130,6 +131,7 @@ def assemble_static_values(
     Returns
     -------
     dict of float
+        In SI units.
     """
     is_loaded = state.load > 0
     return {
@@ -148,7 +150,7 @@ def assemble_static_values(
     }
 
 
-def compute_static_values(patch: Patch) -> dict:
+def compute_static_values(patch: Patch) -> Values:
     """Return the values of all static measures of a solved patch by name, in SI units.
 
     If a node lies at the edge of a step, the values are the weighted mean of the two solutions with
@@ -159,7 +161,7 @@ def compute_static_values(patch: Patch) -> dict:
     return _VALUES_BY_PATCH[patch].copy()
 
 
-def _compute_static_values(patch: Patch) -> dict:
+def _compute_static_values(patch: Patch) -> Values:
     """Return the values of all static measures of a solved patch by name, in SI units."""
     # A node at the edge of a step belongs to both sides of it: the values are the weighted mean of
     # the solutions with this node on either side.
@@ -240,7 +242,7 @@ def loaded_nodes(patch: Patch) -> np.ndarray:
     return pressure > minimum * pressure.max()
 
 
-def contact_intervals(patch: Patch, ends: list) -> np.ndarray:
+def contact_intervals(patch: Patch, ends: list[edges.ContactEdge]) -> np.ndarray:
     """Return the contact intervals (k, 2) [m] of a patch in the order of increasing x.
 
     ends: contact edges from `contact_ends`.
@@ -248,7 +250,7 @@ def contact_intervals(patch: Patch, ends: list) -> np.ndarray:
     return edges.contact_intervals(patch.x, patch.active, ends)
 
 
-def contact_ends(patch: Patch) -> list:
+def contact_ends(patch: Patch) -> list[edges.ContactEdge]:
     """Return the contact edges between nodes as a list of `ContactEdge`; [] for a patch in strips."""
     if patch.strips is not None or not patch.active.any():
         return []
@@ -344,9 +346,8 @@ def unresolved_edge_rounding_pressure(patch: Patch) -> float:
     largest = 0.0
     for node in (loaded[0], loaded[-1]):
         cell = np.diff(x)[max(node - 1, 0) : node + 1].max()
-        if (
-            abs(abs(x[node]) - half_flat_length) > 2 * cell
-        ):  # The contact does not end at the rounded end.
+        # The contact does not end at the rounded end.
+        if abs(abs(x[node]) - half_flat_length) > 2 * cell:
             continue
         stress_intensity = sigma[max(node - 2, 0) : node + 3].max() * np.sqrt(cell)
         peak_width, peak = contact.rounded_corner_contact(stress_intensity, radius, modulus)
@@ -376,7 +377,7 @@ def contact_reaches_steep_end(patch: Patch) -> bool:
     return bool((patch.active[[0, -1]] & (cells < open_rounded_length(patch))).any())
 
 
-def _rounded_bodies(pair) -> list:
+def _rounded_bodies(pair) -> list[TensorGrid]:
     """Return the meshes of the pieces whose interface ends are rounded."""
     bodies = []
     for body in (pair.grid, pair.upper_grid):

@@ -9,6 +9,7 @@ from ...core import Outcome
 from ...effects import law_has_trait
 from ...formatting import format_length
 from ...friction.bonds import parameters
+from .patch_rows import Measures
 from .result import Advice
 
 # Largest relative difference of the friction works from samples and from energies without a
@@ -27,7 +28,7 @@ MIN_PROPOSED_HARMONICS = 31  # Smallest number of harmonics that a warning propo
 MAX_PROPOSED_HARMONICS = 500
 
 
-def note_on_groove_slope(model, patch) -> list:
+def note_on_groove_slope(model, patch) -> list[str]:
     """Return a list with a note on grooves under pieces that are compliant in shear.
 
     All points take the slope of the grooves at the displacement of the holders. The note reports
@@ -46,7 +47,7 @@ def note_on_groove_slope(model, patch) -> list:
     ]
 
 
-def warn_of_bonds(model, speed: float, measures: dict, outcome: Outcome) -> list:
+def warn_of_bonds(model, speed: float, measures: Measures, outcome: Outcome) -> list[str]:
     """Return warnings on a bond law whose bonds break before they form, creep, or start with an infinite traction.
 
     Parameters
@@ -99,7 +100,7 @@ def warn_of_bonds(model, speed: float, measures: dict, outcome: Outcome) -> list
     return warnings
 
 
-def note_on_growth(model, peak: float | None) -> list:
+def note_on_growth(model, peak: float | None) -> list[str]:
     """Return notes on the effects of growing bonds.
 
     peak: largest ratio of friction force to mu_s N in the run; None if the load varies.
@@ -135,7 +136,9 @@ def note_on_growth(model, peak: float | None) -> list:
     return notes
 
 
-def warn_of_work_check(values: dict, steps: int | None, harmonics: int | None = None) -> list:
+def warn_of_work_check(
+    values: Measures, steps: int | None, harmonics: int | None = None
+) -> list[str]:
     """Return a list with a warning if sampled friction work differs from that in the energies.
 
     The trapezoidal rule for the samples is of second order. A difference below the error of the
@@ -180,7 +183,7 @@ def advise_harmonics(n_harmonics: int, n_law_harmonics: float = 0.0) -> Advice:
     return Advice.set_key("accuracy.harmonics", n_proposed)
 
 
-def warn_of_created_energy(model, created: float, exchanged: float) -> list:
+def warn_of_created_energy(model, created: float, exchanged: float) -> list[str]:
     """Return a list with a warning if the law of the 1985 report has created energy.
 
     Parameters

@@ -29,7 +29,7 @@ def measure_contact_length(patch) -> float:
     return float(ends[loaded_nodes[-1] + 1] - ends[loaded_nodes[0]])
 
 
-def warn_of_large_slide(patch, slide) -> list:
+def warn_of_large_slide(patch, slide) -> list[str]:
     """Return a list with a warning if the displacement is large compared with the contact length.
 
     slide: relative displacement (k,) [m].

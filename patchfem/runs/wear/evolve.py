@@ -34,14 +34,8 @@ from .slip import (
 )
 
 STATE_FIELDS = tuple(WearState.__slots__)  # Fields of the wear state in a saved file.
-MOMENT_FIELDS = (
-    "cycle",
-    "depth",
-    "used",
-    "pressure",
-    "gap",
-    "miss",
-)  # Arrays of a saved WearMoment.
+# Arrays of a saved WearMoment.
+MOMENT_FIELDS = ("cycle", "depth", "used", "pressure", "gap", "miss")
 # Largest remaining fraction of the coating thickness at which the coating counts as worn through.
 THIN_FRACTION = 1e-6
 # Largest number of jumps in the search for the cycle in which a coating is worn through.
@@ -70,7 +64,7 @@ class WearMoment:
     pressure: np.ndarray
     gap: np.ndarray
     miss: float
-    values: dict
+    values: dict[str, float]
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -91,8 +85,8 @@ class WornPatch:
     patch: object
     coarse: tuple
     state: WearState
-    moments: tuple
-    depths: tuple
+    moments: tuple[WearMoment, ...]
+    depths: tuple[np.ndarray, ...]
     stripped: tuple | None
     frame_error: float
     seconds: float

@@ -15,7 +15,7 @@ from ...response.errors import convergence_error, convergence_errors
 from ..patch.measures import with_other_strip_count
 from ..patch.press import nodal_areas, solve_patch_contact
 from ..patch.values import compute_static_values
-from ..results.patch_rows import TABLE, WORN_SOURCE
+from ..results.patch_rows import TABLE, WORN_SOURCE, Arrays, Measures, Values
 from .evolve import THIN_FRACTION, compute_mean_worn_depth, find_worn_through_coating
 from .slip import UNBOUNDED_OUTCOMES, compute_point_slip_path
 
@@ -98,7 +98,7 @@ def _make_wear_measure(name: str, value: float, error: float | None, engine: str
     return Measure(value, row.unit, error, row.floor, engine=engine)
 
 
-def _measure_worn_through_cycle(model, evolved, error: float | None) -> dict:
+def _measure_worn_through_cycle(model, evolved, error: float | None) -> Measures:
     """Return a dict with the cycle in which the wear first reaches the substrate, if it does.
 
     error: error of the largest worn depth [m].
@@ -114,12 +114,12 @@ def _measure_worn_through_cycle(model, evolved, error: float | None) -> dict:
     return {name: _make_wear_measure(name, last.cycle, cycle_error)}
 
 
-def _note_on_earlier_run(model) -> list:
+def _note_on_earlier_run(model) -> list[str]:
     """Return a list with a note on the earlier run whose wear is continued."""
     return [] if model.wear.start is None else [model.wear.start.sentence]
 
 
-def _note_on_worn_through_coating(model, evolved) -> list:
+def _note_on_worn_through_coating(model, evolved) -> list[str]:
     """Return a list with a note on the coating that is worn through."""
     depth = evolved.state.depth
     coating = find_worn_through_coating(model, depth)
@@ -179,7 +179,7 @@ def find_wear_period(model, result) -> float:
     return model.slide.period or float(result.response.time[-1])
 
 
-def _warn_of_worn_depth(model, evolved) -> list:
+def _warn_of_worn_depth(model, evolved) -> list[str]:
     """Return warnings on a worn depth that is large compared with a piece or its coating."""
     depth = float(evolved.state.depth.max(initial=0.0))
     pieces = model.patch.pieces
@@ -198,7 +198,7 @@ def _warn_of_worn_depth(model, evolved) -> list:
     return warnings
 
 
-def _relative_slip_error(measures: dict) -> float:
+def _relative_slip_error(measures: Measures) -> float:
     """Return the relative error of the slip amplitude, or else of the displacement amplitude."""
     for name in ("slip_amplitude", "relative_displacement_amplitude"):
         measure = measures.get(name)
@@ -207,7 +207,7 @@ def _relative_slip_error(measures: dict) -> float:
     return 0.0
 
 
-def _measure_patch_wear(model, evolved, motion: dict, *, estimate: bool = True) -> dict:
+def _measure_patch_wear(model, evolved, motion: Measures, *, estimate: bool = True) -> Measures:
     """Return the measures of worn volume, worn depth and groove amplitude.
 
     Their errors include those of the earlier run.
@@ -275,7 +275,7 @@ def _measure_patch_wear(model, evolved, motion: dict, *, estimate: bool = True) 
     return measures
 
 
-def _measure_worn_friction(model, evolved, motion: dict, error: float | None) -> dict:
+def _measure_worn_friction(model, evolved, motion: Measures, error: float | None) -> Measures:
     """Return the friction parameters after wear, and the measures of the motion with wider errors.
 
     The error of the mean worn depth changes the measures of the motion, at the rate observed in the
@@ -333,7 +333,7 @@ def _measure_worn_friction(model, evolved, motion: dict, error: float | None) ->
     return measures
 
 
-def _warn_of_friction_table(model, evolved) -> list:
+def _warn_of_friction_table(model, evolved) -> list[str]:
     """Return warnings on wear beyond the friction table and on jumps over several of its rows."""
     table = model.wear.friction
     if table is None:
@@ -357,7 +357,7 @@ def _warn_of_friction_table(model, evolved) -> list:
     return warnings
 
 
-def _compute_worn_volume_and_depth(patch_model, patch, depth) -> dict:
+def _compute_worn_volume_and_depth(patch_model, patch, depth) -> Values:
     """Return a dict of the worn volume [m3] and the largest worn depth [m] of a patch."""
     return {
         "worn_volume": float(np.vdot(depth, nodal_areas(patch_model, patch.pieces.interface))),
@@ -365,7 +365,7 @@ def _compute_worn_volume_and_depth(patch_model, patch, depth) -> dict:
     }
 
 
-def _relative_slip_change(evolved, motion: dict) -> float:
+def _relative_slip_change(evolved, motion: Measures) -> float:
     """Return the relative difference of the slip amplitude in the last wear cycle and the final run.
 
     The final run, on the worn patch, may have used smaller time steps.
@@ -377,7 +377,7 @@ def _relative_slip_change(evolved, motion: dict) -> float:
     return abs(wear_amplitude / final_amplitude.value - 1)
 
 
-def _measure_point_volume(model, result, *, estimate: bool = True) -> dict:
+def _measure_point_volume(model, result, *, estimate: bool = True) -> Measures:
     """Return a dict with the worn volume of a single contact point under [normal].
 
     It is the wear coefficient times load times slip path, over all cycles.
@@ -456,7 +456,7 @@ def _select_stored_moments(moments) -> np.ndarray:
     return np.unique([*by_jump, *by_cycle])
 
 
-def _collect_wear_history(evolved) -> dict:
+def _collect_wear_history(evolved) -> Arrays:
     """Return a dict of the wear measures over the cycles (j,).
 
     The entries `cycle` and `EDGE_PEAK` are included.

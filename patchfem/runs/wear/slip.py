@@ -151,6 +151,7 @@ def _compute_bench_slip(model, patch, frames: int) -> CycleSlip:
 def _compute_rig_slip(model, patch, frames: int) -> CycleSlip:
     """Compute the slip path of the interface nodes in the last cycle of a rig."""
     settings = numerics.choose_numerics(model)
+    pressed_load = patch.pressure.load
     is_uniform = slips_uniformly(model, settings.per_point and model.grooves is None)
     solution = solve.solve_rig(model, settings, patch, 0 if is_uniform else frames)
 
@@ -170,11 +171,11 @@ def _compute_rig_slip(model, patch, frames: int) -> CycleSlip:
     )
 
     # The slip follows from the histories if it is uniform, else from the frames of the cycle.
-    cycle = _select_last_rig_cycle(model, solution.window, patch.pressure.load)
+    cycle = _select_last_rig_cycle(model, solution.window, pressed_load)
     if strips_slide_independently(model) and is_uniform:
         slip = _compute_strip_slip(model, patch, solution.window)
     elif is_uniform:
-        slip = _compute_uniform_slip(model, patch, cycle, patch.pressure.load)
+        slip = _compute_uniform_slip(model, patch, cycle, pressed_load)
     else:
         frame_fields = fields.collect_interface_fields(model, settings, patch, solution)
         frame_fields = {name: values[1:] for name, values in frame_fields.items()}
@@ -184,7 +185,7 @@ def _compute_rig_slip(model, patch, frames: int) -> CycleSlip:
         # The load on the flanks varies with the lift of the rig.
         if model.grooves is not None:
             response = solution.response
-            constant = np.full(response.time.size, patch.pressure.load)
+            constant = np.full(response.time.size, pressed_load)
             load = np.interp(
                 frame_fields["time"],
                 response.time,
