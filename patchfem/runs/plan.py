@@ -77,7 +77,7 @@ class Plan:
     engine: str
     unknowns: dict[str, int]
     samples: int
-    chain: patch_plan.StiffnessChain
+    chain: dict
     groups: Values
     verdict: tuple[str, ...]
 
@@ -270,7 +270,7 @@ def _describe_wear(model: Model) -> str:
     return f"wear: {model.wear.cycles:.6g} cycles in {jumps}; {repetition}"
 
 
-def _interface_stiffnesses(model: Model) -> patch_plan.StiffnessChain:
+def _interface_stiffnesses(model: Model) -> dict:
     """Return the stiffnesses of grooves and bonds, in series at the interface, by name."""
     load = model.nominal_load
     if not load > 0:

@@ -42,7 +42,7 @@ class CondensedPair:
     upper: Piece
     compliance: Compliance
     closing: np.ndarray
-    joint: mortar.Mortar | None
+    joint: object
     end_gap: np.ndarray
     seconds: dict[str, float]
 
