@@ -22,7 +22,7 @@ SLIDE_SAMPLE_BYTES = 250.0  # per sample of a prescribed slide [bytes]
 MODE_PAIR_BYTES = 125.0  # per pair of modes: matrices, mode shapes and eigenvalue solver [bytes]
 HARMONIC_PAIR_BYTES = 94.0  # per pair of unknowns of harmonic balance: Jacobian and factors [bytes]
 DRIVE_ROW_BYTES = 400.0  # per row of a recorded drive [bytes]
-SAMPLES_PER_CYCLE = 400  # stored samples of a cycle of the engine `hybrid`
+HYBRID_SAMPLES_PER_CYCLE = 400  # stored samples of a cycle of the engine `hybrid`
 # Expected number of reversals per cycle, which are also stored for the cycles before the window.
 REVERSALS_PER_CYCLE = 4.0
 
@@ -144,7 +144,7 @@ def _list_parts_of_motion(plan: Plan) -> list[MemoryPart]:
     settings = numerics.choose_numerics(model)
     is_march = plan.engine == "march"
     history = HISTORY_BYTES[plan.engine]
-    samples = max(2, settings.window) * (settings.steps if is_march else SAMPLES_PER_CYCLE)
+    samples = max(2, settings.window) * (settings.steps if is_march else HYBRID_SAMPLES_PER_CYCLE)
     width = 2.0 * n_modes + 12 + 6 * n_interfaces
     turns = min(REVERSALS_PER_CYCLE * drive.cycles, checkpoint.MAX_EARLY_SAMPLES)
     length = "drive.duration" if drive.waveform.is_random else "drive.cycles"

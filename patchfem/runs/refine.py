@@ -62,7 +62,6 @@ def judge_pass(
     before : Pass or None
         Pass before this one.
     """
-
     model = given if before is None else before.model
     name, excess = find_worst_measure(result.measures, model.accuracy.tolerance)
     if excess <= 1 or result.outcome in FAILED_OUTCOMES:

@@ -143,7 +143,7 @@ def refusal_reason(model: Model) -> str:
     ):
         return "the interface of the case is not one point under a constant load, or its flexure has an end stop"
 
-    # A bond population is one state variable only if all bonds are alike and do not age.
+    # A bond population is one state variable only if all bonds are alike and do not grow.
     if law_has_trait(friction.law, "bonds") and (
         needs_bond_list(friction) or friction.slip_growth is not None or friction.initial_bonds != 1
     ):
@@ -218,15 +218,14 @@ def _list_numbers(model: Model) -> tuple:
     law = make_point_law(friction, load)
     cycles = int(rig.drive.cycles)
 
-    # Reference stiffness: friction force / bond length for laws with a length, else that of the
-    # law.
+    # Stiffness during stick: friction limit / bond length for laws with a length.
     stiffness = 0.0
     if friction.law == "elastic-plastic" or law_has_trait(friction.law, "bonds"):
         stiffness = friction.static * load / friction.bond_length
     elif friction.law not in ("coulomb", "tanh"):
         stiffness = friction.stiffness
 
-    # The order is that of `Number`, followed by that of the laws and of `Scales`.
+    # The order is that of `collect_cases`: `Number`, law, memory, stiffness of the mode, `Scales`.
     return (
         *list_parameters(rig.modes, rig.drive.signal, load, cycles, min(10, cycles // 10), rig.start),
         *law.numbers,

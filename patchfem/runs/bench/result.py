@@ -69,7 +69,7 @@ def run_prescribed(inputs: RunInputs) -> Result:
         *_warn_of_open_loop(model, patch, fine, steps),
     ]
 
-    # A frame shows slip where the shear stress reaches the limit of its node.
+    # A node slips in a frame where its shear stress reaches its limit, or else where its slip changes.
     fields = {}
     if patch is not None:
         warnings += _warn_of_overhang(patch, fine)

@@ -95,7 +95,6 @@ def condense(patch_model, grid, upper_grid=None) -> CondensedPair:
     -------
     CondensedPair
     """
-
     # Both pieces share one compliance if they are identical.
     width = patch_model.pieces.width * patch_model.pieces.pairs
     start = perf_counter()

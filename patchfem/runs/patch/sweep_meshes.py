@@ -25,7 +25,7 @@ from .press import solve_patch_contact
 MAX_CASES = 48
 # Largest number of contact searches; each search uses columns graded to the contacts of the
 # previous one.
-MAX_SEARCHES = 4
+MAX_LAYOUT_SEARCHES = 4
 # Largest number of interface nodes of the finest mesh; a finer mesh slows down every case.
 MAX_INTERFACE_NODES = 400
 # Tolerance that needs the cells of a single case; a larger one needs longer cells, because the errors
@@ -181,7 +181,7 @@ def _make_common_layout(cases: list, has_intermediate_cases: bool) -> Layout | N
     first = cases[0]
     max_cell_ratio = 1 / (grids.EDGE_CELLS[first.mesh.is_static] - 1)
     layout = grids.make_search_layout(first)
-    for _ in range(MAX_SEARCHES):
+    for _ in range(MAX_LAYOUT_SEARCHES):
         pair = condense(first, *grids.make_grids(first, layout))
         layouts = []
         largest_ratio = 0.0

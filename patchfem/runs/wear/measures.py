@@ -19,13 +19,13 @@ from ..results.patch_rows import TABLE, WORN_SOURCE, Arrays, Measures, Values
 from .evolve import THIN_FRACTION, compute_mean_worn_depth, find_worn_through_coating
 from .slip import UNBOUNDED_OUTCOMES, compute_point_slip_path
 
-N_FRAMES = 24  # Number of frames of the interface during the wear.
+N_WEAR_FRAMES = 24  # Number of frames of the interface during the wear.
 EDGE_PEAK = "pressure_peak_at_edge"  # Name of the pressure peak at a contact edge in the history.
 N_EDGE_NODES = 2  # Number of nodes next to a contact edge that count as the edge.
 # Largest ratio of the worn depth to the thickness of a coating, or to the height of a piece, at
 # which the stiffness of the unworn piece is valid.
 MAX_WORN_FRACTION = 0.2
-ROUND_OFF = 1e-12  # Relative error of a worn volume or depth due to round-off.
+WORN_ROUND_OFF = 1e-12  # Relative error of a worn volume or depth due to round-off.
 HOLDER_MEASURES = {"closing": "approach", "rotation": "rotation"}
 
 
@@ -259,7 +259,7 @@ def _measure_patch_wear(model, evolved, motion: Measures, *, estimate: bool = Tr
                 jump_errors[name]
                 + slip_error * max(value - before[name], 0.0)
                 + float(mesh_errors[name])
-                + ROUND_OFF * value
+                + WORN_ROUND_OFF * value
                 + start_error
                 + float(convergence_error(strips[name] - value, ratio=ratio))
             )
@@ -396,7 +396,7 @@ def _measure_point_volume(model, result, *, estimate: bool = True) -> Measures:
     volume = model.wear.coefficient * model.point.load * path * model.wear.cycles
     error = None
     if estimate:
-        error = (path_error + _relative_slip_error(result.measures) + ROUND_OFF) * volume
+        error = (path_error + _relative_slip_error(result.measures) + WORN_ROUND_OFF) * volume
     return {"worn_volume": _make_wear_measure("worn_volume", volume, error, WORN_SOURCE)}
 
 
@@ -450,8 +450,8 @@ def _select_stored_moments(moments) -> np.ndarray:
     """
     last = len(moments) - 1
     cycles = np.array([moment.cycle for moment in moments])
-    by_jump = np.linspace(0, last, N_FRAMES // 2).round().astype(int)
-    places = np.linspace(0, cycles[-1], N_FRAMES // 2)
+    by_jump = np.linspace(0, last, N_WEAR_FRAMES // 2).round().astype(int)
+    places = np.linspace(0, cycles[-1], N_WEAR_FRAMES // 2)
     by_cycle = np.searchsorted(cycles, places).clip(0, last)
     return np.unique([*by_jump, *by_cycle])
 
