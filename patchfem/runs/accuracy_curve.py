@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 from ..response.errors import ERROR_MEASURES, absolute_change
 from .refine import is_main
+from .results.patch_rows import Measures, Values
 
 ROUND_OFF = 1e-9  # Largest relative error that counts as round-off in long sums.
 # Smallest ratio of the errors with finer and coarser steps at which the steps do not matter.
@@ -35,6 +36,7 @@ def compute_accuracy_curve(result) -> list[StepSetting]:
     Parameters
     ----------
     result : Result
+        Result of the motion, with `extra["step_runs"]`.
 
     Returns
     -------
@@ -51,7 +53,7 @@ def compute_accuracy_curve(result) -> list[StepSetting]:
     # The first run also loads compiled code, so that the smallest time per step is used.
     step_seconds = min(run.seconds / run.steps for run in step_runs)
 
-    def make_setting(steps: int, errors: dict) -> StepSetting:
+    def make_setting(steps: int, errors: Values) -> StepSetting:
         """Return the StepSetting with the largest of the errors of all measures by name."""
         fractions = [0.0]
         for name, measure in measures.items():
@@ -72,7 +74,7 @@ def compute_accuracy_curve(result) -> list[StepSetting]:
     return settings if has_effect and present >= ROUND_OFF else []
 
 
-def _select_measures(measures: dict, step_runs) -> dict:
+def _select_measures(measures: Measures, step_runs) -> Measures:
     """Return the main measures that have errors and occur in all runs; else all such measures."""
     common = {}
     for name, measure in measures.items():

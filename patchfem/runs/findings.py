@@ -207,6 +207,7 @@ def _advise_mesh(
     Parameters
     ----------
     missed : Missed
+        Measures of the run that miss the tolerance.
     solved : list
         Pairs of a PatchModel and its patches, from fine to coarse.
     name : str
@@ -280,6 +281,8 @@ def _advise_steps(missed: Missed) -> Advice | None:
     name = missed.worst
     parts, order = missed.measures[name].causes
     fixed = [key for key in ("method", "steps_per_cycle") if key in accuracy.model_fields_set]
+
+    # The hybrid engine needs no steps, so that leaving out the keys may be the better advice.
     exact = None
     if (
         model.kind == "rig"
@@ -289,6 +292,7 @@ def _advise_steps(missed: Missed) -> Advice | None:
         left_out = " and ".join(f"accuracy.{key}" for key in fixed)
         text = f"leave out {left_out}; the steps then follow from the tolerance"
         exact = Advice(text, left_out)
+
     if order is None:
         clause = (
             f"the results with {steps // 4}, {steps // 2} and {steps} steps per cycle show no order of convergence of "

@@ -62,6 +62,7 @@ def solve_without_joint(model: Model) -> FreeRig:
     Parameters
     ----------
     model : Model
+        Model of a rig with a patch.
 
     Raises
     ------
@@ -92,6 +93,7 @@ def remove_joint(model: Model, patches: Sequence) -> FreeRig:
     Parameters
     ----------
     model : Model
+        Model of a rig, whose modes may include the joint.
     patches : sequence of Patch or None
         The patch of [contact] on its meshes, from fine to coarse (`mesh_levels.solve_with_coarser`).
 
@@ -102,6 +104,9 @@ def remove_joint(model: Model, patches: Sequence) -> FreeRig:
     """
     if not model.has_bolted_patch:
         return FreeRig(model, patches)
+
+    # The bolted modes may belong to another contact than the one of this run: `written` is the one
+    # of the measurement.
     bolted = model.rig.structure.bolted
     written = bolted.model or model
     with locate_errors(model.source):
@@ -123,6 +128,8 @@ def remove_joint(model: Model, patches: Sequence) -> FreeRig:
             rig = replace(rig, structure=replace(rig.structure, bolted=removed))
             return FreeRig(replace(model, rig=rig), own_patches)
 
+        # The second result has the joint stiffer by its error, and its change is the error of the
+        # motion.
         free = subtract(0.0)
         return free if own is None else free._replace(stiffer=subtract(1.0))
 
@@ -189,6 +196,7 @@ def _sum_nodal_forces(patch, factor: float, bond_length: float) -> float:
     Parameters
     ----------
     patch : Patch
+        Solved patch in partial contact or full contact.
     factor : float
         Factor of the tangential compliance.
     bond_length : float
@@ -246,6 +254,7 @@ def find_stuck_patch_stiffness(model: Model, patches: Sequence) -> StickStiffnes
     Parameters
     ----------
     model : Model
+        Model of a rig with a patch.
     patches : sequence of Patch or None
         The patch of [contact] on its meshes, from fine to coarse; None for a missing mesh.
     """

@@ -22,7 +22,7 @@ SLIDE_SAMPLE_BYTES = 250.0  # per sample of a prescribed slide [bytes]
 MODE_PAIR_BYTES = 125.0  # per pair of modes: matrices, mode shapes and eigenvalue solver [bytes]
 HARMONIC_PAIR_BYTES = 94.0  # per pair of unknowns of harmonic balance: Jacobian and factors [bytes]
 DRIVE_ROW_BYTES = 400.0  # per row of a recorded drive [bytes]
-SAMPLES_PER_CYCLE = 400  # stored samples of a cycle of the engine `hybrid`
+HYBRID_SAMPLES_PER_CYCLE = 400  # stored samples of a cycle of the engine `hybrid`
 # Expected number of reversals per cycle, which are also stored for the cycles before the window.
 REVERSALS_PER_CYCLE = 4.0
 
@@ -65,18 +65,23 @@ def list_parts(plan: Plan) -> list[MemoryPart]:
     model = plan.model
     counts = plan.unknowns
     points = counts.get("interface_points", 0)
+
+    # All pressed interfaces count: the one of [contact] and those of the rig.
     patches = [model.patch]
     if model.rig is not None:
         patches += [interface.patch for interface in model.rig.friction.interfaces]
     patches = [patch for patch in patches if patch is not None]
     layers = [patch.interface.strips for patch in patches]
     strips = max((1 if layer is None else layer.count for layer in layers), default=0)
+
     finer = "make contact.element_size larger"
     if any(patch.mesh.file for patch in patches):
         finer = "give contact.mesh fewer nodes on the interface"
+
     n_bonds = counts.get("bond_list_about")
     list_bytes = time_march.count_list_bytes(n_bonds) if n_bonds else 0.0
     n_shear = counts.get("shear_modes", 0)
+
     parts = [
         MemoryPart(FIXED_BYTES, "packages and compiled code"),
         MemoryPart(
@@ -89,6 +94,7 @@ def list_parts(plan: Plan) -> list[MemoryPart]:
             f"{strips} strips of them",
             "lower contact.strips.count",
         ),
+        # Bonds and shear modes exist only where the friction law or the pieces need them.
         MemoryPart(list_bytes, "the list of bonds", "raise accuracy.tail or accuracy.merge"),
         MemoryPart(
             SHEAR_NODE_BYTES * n_shear * points,
@@ -96,6 +102,8 @@ def list_parts(plan: Plan) -> list[MemoryPart]:
             "lower accuracy.shear_modes",
         ),
     ]
+
+    # The histories of a motion count by its stored samples.
     if model.rig is not None:
         parts += _list_parts_of_motion(plan)
     elif model.slide is not None:
@@ -136,7 +144,7 @@ def _list_parts_of_motion(plan: Plan) -> list[MemoryPart]:
     settings = numerics.choose_numerics(model)
     is_march = plan.engine == "march"
     history = HISTORY_BYTES[plan.engine]
-    samples = max(2, settings.window) * (settings.steps if is_march else SAMPLES_PER_CYCLE)
+    samples = max(2, settings.window) * (settings.steps if is_march else HYBRID_SAMPLES_PER_CYCLE)
     width = 2.0 * n_modes + 12 + 6 * n_interfaces
     turns = min(REVERSALS_PER_CYCLE * drive.cycles, checkpoint.MAX_EARLY_SAMPLES)
     length = "drive.duration" if drive.waveform.is_random else "drive.cycles"

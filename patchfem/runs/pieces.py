@@ -12,6 +12,7 @@ from ..elasticity import coating_traction, recovery
 from ..elasticity.elasticity import compute_displacement, von_mises
 from ..formatting import format_length
 from .patch.strength import YIELDING_NEGLECTED, min_von_mises_ratio, yield_strength
+from .results.patch_rows import Arrays
 from .results.result import patch_surface
 
 # Height over that of the piece of the region at the held far face in which no yielding is looked
@@ -117,7 +118,7 @@ def compute_pieces(result) -> Pieces:
     return Pieces(fields["time"], lower, upper, surface.x, surface.weight, interface, width)
 
 
-def _nodal_forces(patch, fields: dict) -> list[tuple[np.ndarray, np.ndarray]]:
+def _nodal_forces(patch, fields: Arrays) -> list[tuple[np.ndarray, np.ndarray]]:
     """Return shear and normal forces (1 + f, n) [N/m] on the nodes of the lower and upper piece.
 
     The first row is the pressed state, the others add to it in each frame. A frame of a worn patch
@@ -171,7 +172,7 @@ def _bond_stress(piece: _LoadedPiece, side: str, x) -> dict[str, np.ndarray]:
     return {f"{name}_{side}": signs[name] * (u[:1] + u[1:]) for name, u in bonds.items()}
 
 
-def _holder_motion(patch, fields: dict, points) -> np.ndarray:
+def _holder_motion(patch, fields: Arrays, points) -> np.ndarray:
     """Return the motion (f, n, 2) [m] of points (n, 2) [m] that move with the upper holder."""
     rotation = _holder_field(fields, "rotation", patch.pressure.rotation)
     closing = _holder_field(fields, "closing", patch.pressure.approach)
@@ -180,7 +181,7 @@ def _holder_motion(patch, fields: dict, points) -> np.ndarray:
     return np.stack([slide - rotation * y, rotation * x - closing], axis=2)
 
 
-def _holder_field(fields: dict, name: str, constant: float) -> np.ndarray:
+def _holder_field(fields: Arrays, name: str, constant: float) -> np.ndarray:
     """Return a motion of the upper holder (f, 1), or the constant that it has in all frames."""
     return fields.get(f"holder_{name}", np.full(len(fields["time"]), constant))[:, None]
 
@@ -214,7 +215,9 @@ def find_yielding(patch_model, pieces: Pieces, min_peak: float = 0.0) -> dict:
     Parameters
     ----------
     patch_model : PatchModel
+        Patch with the strengths of its materials.
     pieces : Pieces
+        Stresses of both pieces in all frames.
     min_peak : float
         Lower limit of the peak pressure [Pa]. A material of a face is left out if this pressure
         causes a larger stress there than the mesh shows.

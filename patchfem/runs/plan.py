@@ -19,6 +19,7 @@ from ..structure import drive_sizes
 from . import joint
 from .bench import engine as of_bench
 from .patch import plan as patch_plan
+from .results.patch_rows import Values
 from .rig import engines
 from .rig import plan as of_rig
 
@@ -74,11 +75,11 @@ class Plan:
 
     model: Model
     engine: str
-    unknowns: dict
+    unknowns: dict[str, int]
     samples: int
     chain: dict
-    groups: dict
-    verdict: tuple
+    groups: Values
+    verdict: tuple[str, ...]
 
     @property
     def kind(self) -> str:
@@ -134,6 +135,7 @@ def plan(source) -> Plan:
     Parameters
     ----------
     source : Scene or Model
+        What to run.
 
     Raises
     ------
@@ -154,10 +156,13 @@ def _make_plan(model: Model) -> Plan:
         except PatchfemError as error:
             error.key = error.key or "measured.file"
             raise
+
     chain = {"holder": "rigid", "pieces_shear": "rigid", "asperities": "rigid"}
     groups = {}
     rig = model.rig
     motion_sentences = []
+
+    # The stiffness of the joint is subtracted from the measured modes of a bolted rig first.
     if model.has_bolted_patch:
         build_rig = rig.structure.bolted.build_rig
         model, patches, _ = joint.solve_without_joint(model)
@@ -167,6 +172,8 @@ def _make_plan(model: Model) -> Plan:
         rig = replace(model.rig, structure=replace(model.rig.structure, bolted=bolted))
         model = replace(model, rig=rig)
     motion_sentences += model.describe_removed_joint()
+
+    # Structure of the rig and contact of the patch.
     patch_sentences = []
     law_sentences = []
     if rig is not None:
@@ -181,6 +188,7 @@ def _make_plan(model: Model) -> Plan:
             chain |= patch_plan.find_solved_links(chain, values)
         groups |= patch_plan.compute_patch_groups(model)
         patch_sentences += patch_plan.describe_patch_plan(groups, model.patch)
+
     interfaces = rig.friction.interfaces if rig is not None else ()
     for number, interface in enumerate(interfaces):
         if interface.patch is not None:
@@ -192,6 +200,8 @@ def _make_plan(model: Model) -> Plan:
             patch_sentences.append(
                 patch_plan.describe_shear(interface.patch, slip_length, rig.friction.names[number])
             )
+
+    # Sizes of the computation, by which time and memory are predicted.
     unknowns = {}
     if model.patch is not None or model.has_interface_patches:
         unknowns = patch_plan.count_unknowns(model)
@@ -205,6 +215,8 @@ def _make_plan(model: Model) -> Plan:
         engine, counts, samples = of_bench.count_bench_sizes(model)
         unknowns |= counts
         groups = of_bench.compute_dimensionless_groups(model) | groups
+
+    # Laws, and what the numbers of the plan say of the motion.
     if model.wear is not None and model.patch is not None:
         law_sentences.append(_describe_wear(model))
     if model.friction is not None:
@@ -213,12 +225,14 @@ def _make_plan(model: Model) -> Plan:
         law_sentences += _describe_grooves(model)
     if rig is not None:
         motion_sentences += of_rig.describe_stick(rig, groups, chain)
+
     if (
         engine in SKIPPING_ENGINES
         and drive_sizes.is_sinusoidal(rig.drive.signal)
         and rig.drive.cycles >= MIN_SKIPPED_CYCLES
     ):
         law_sentences.append(SKIPPING_NOTE)
+
     sentences = [*motion_sentences, *patch_sentences, *law_sentences]
     if "slip_length" in groups:
         sentences.append(patch_plan.describe_shear(model.patch, groups["slip_length"]))
@@ -227,6 +241,7 @@ def _make_plan(model: Model) -> Plan:
             f"the normal load changes with the motion, so {model.partial_slip} is computed with the tangential modes of "
             "all nodes; the numerical error is estimated from a second run with half as many modes"
         )
+
     return Plan(
         model,
         engine,
@@ -279,7 +294,7 @@ def _law_stiffness(law, load: float):
     return "rigid until it slips" if stiffness == inf else stiffness
 
 
-def _compute_law_groups(model: Model) -> dict:
+def _compute_law_groups(model: Model) -> Values:
     """Return the dimensionless groups of the friction law by name."""
     if model.spread is None:
         return {}
@@ -287,7 +302,7 @@ def _compute_law_groups(model: Model) -> dict:
     return {"share_of_the_spread": spread.carried_fraction(model.pad, model.spread)}
 
 
-def _describe_grooves(model: Model) -> list:
+def _describe_grooves(model: Model) -> list[str]:
     """Return a list with a sentence on the grooves that the load climbs."""
     load = model.nominal_load
     if model.grooves is None or not load > 0:

@@ -18,6 +18,7 @@ from ..model.model import Model
 from ..response import rows
 from ..scene.rules.accuracy import list_repeated_axes
 from .results.patch_rows import TABLE as PATCH_TABLE
+from .results.patch_rows import Measures
 
 MAX_SECONDS = 60.0  # Largest CPU time [s] of all passes without accuracy.max_seconds.
 COST_RATIO = 4.0  # Expected ratio of the CPU times of two successive passes.
@@ -55,6 +56,7 @@ def judge_pass(
     given : Model
         Model of the first pass, with the settings that the scene fixes.
     result : Result
+        Result of this pass, with errors.
     seconds, total_seconds : float
         CPU times [s] of this pass and of all passes.
     before : Pass or None
@@ -66,6 +68,8 @@ def judge_pass(
         return Pass(excess)
     if before is not None and excess * MIN_GAIN > before.excess:
         return Pass(excess)
+
+    # A pass is repeated only along the axis whose error is largest, and only if the run chose it.
     axis = find_axis(result.measures[name], name)
     finer = None
     if axis in list_repeated_axes(
@@ -75,12 +79,15 @@ def judge_pass(
         has_fixed_steps=given.accuracy.steps_per_cycle is not None,
     ):
         finer = refine_meshes(model) if axis == "mesh" else _refine_steps(model, result)
+
+    # Each further pass divides the error by ERROR_RATIO and multiplies the time by COST_RATIO.
     n_passes = ceil(log(excess) / log(ERROR_RATIO))
     expected = total_seconds + seconds * sum(COST_RATIO**k for k in range(1, n_passes + 1))
     if finer is None:
         return Pass(excess)
     if expected > (model.accuracy.max_seconds or MAX_SECONDS):
         return Pass(excess, None, expected)
+
     resolution = "half the element size" if axis == "mesh" else "twice the steps"
     reason = (
         f"{name} has {format_number(excess, 2)} times the error that the tolerance allows; the run is repeated with "
@@ -89,7 +96,7 @@ def judge_pass(
     return Pass(excess, finer, reason=reason)
 
 
-def bound_errors(measures: dict, before: dict) -> dict:
+def bound_errors(measures: Measures, before: Measures) -> Measures:
     """Return measures whose errors are not smaller than those of a method of second order.
 
     The error of a pass follows from the difference of two resolutions, which may vanish by chance; the loop would stop
@@ -122,7 +129,7 @@ def is_main(name: str) -> bool:
     return row is not None and row.has("main")
 
 
-def find_worst_measure(measures: dict, tolerance: float) -> tuple[str, float]:
+def find_worst_measure(measures: Measures, tolerance: float) -> tuple[str, float]:
     """Return the main measure with the largest ratio of error to allowed error, and this ratio; ("", 0) without one."""
     found = filter(is_main, measures)
     ratios = {name: min(measures[name].error_ratio(tolerance), MAX_EXCESS) for name in found}
@@ -136,8 +143,9 @@ def find_axis(measure, name: str) -> str:
         return "mesh"
     if measure.causes is None:
         return "own"
-    axis = max(measure.causes.parts, key=measure.causes.parts.get, default="own")
-    return axis if measure.causes.parts.get(axis, 0.0) > 0 else "own"
+    parts = measure.causes.parts
+    axis = max(parts, key=parts.get, default="own")
+    return axis if parts.get(axis, 0.0) > 0 else "own"
 
 
 def _refine_steps(model: Model, result) -> Model | None:

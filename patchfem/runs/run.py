@@ -26,7 +26,7 @@ from .patch import faces, mesh_levels, store, strength
 from .patch import result as patch_result
 from .plan import Plan, plan
 from .results.interfaces import Face, merge_sentences
-from .results.patch_rows import find_unknown_measures
+from .results.patch_rows import Measures, find_unknown_measures
 from .results.result import Result, RunInputs, describe_measure, shorten_file_names
 from .rig import engines, rig
 from .wear import evolve, measures
@@ -62,6 +62,7 @@ def run(
     Parameters
     ----------
     runnable : Plan, Scene or Model
+        What to run.
     say : callable, optional
         Callback for a line of text when code has to be compiled.
     progress : callable, optional
@@ -90,6 +91,9 @@ def run(
         if fresh:
             store.clear_cache()
         begin = process_time()
+
+        # Each pass refines the model by the errors of the pass before, until it meets the tolerance
+        # or cannot improve.
         earlier = passed = None
         next_plan = runnable
         for n_before in count():
@@ -100,6 +104,7 @@ def run(
                 if earlier is None:
                     raise
                 return _complete_result(earlier, passed)
+
             if not estimate:
                 return _complete_result(done, None)
             if earlier is not None:
@@ -107,6 +112,7 @@ def run(
                     return _complete_result(earlier, passed)
                 bounded = refine.bound_errors(done.result.measures, earlier.result.measures)
                 done = done._replace(result=replace(done.result, measures=bounded))
+
             end = process_time()
             passed = refine.judge_pass(
                 runnable.model, done.result, end - begin_pass, end - begin, passed
@@ -129,7 +135,7 @@ class FinishedPass(NamedTuple):
     """
 
     result: Result
-    notes: list
+    notes: list[str]
     start: float
     pressed: tuple[Face, ...]
 
@@ -161,6 +167,8 @@ def _run_pass(
         contact = contact._replace(model=model, patches=tuple(patches))
         pressed = (contact,)
         run_plan = replace(run_plan, model=model)
+
+    # Sentences on the static contact; those of several interfaces are merged.
     warnings += merge_sentences(model, pressed, partial(_warn_of_pressed_patch, estimate=estimate))
     if pressed:
         notes += merge_sentences(model, pressed, patch_result.notes_on_neglected_effects)
@@ -181,6 +189,8 @@ def _run_pass(
             worn = (worn_patch.patch, *worn_patch.coarse)
             pressed = (contact._replace(patches=worn, unworn=contact.patches),)
             inputs = _make_worn_inputs(replace(inputs, faces=pressed), worn_patch)
+
+        # A long run saves its state, so that it can be resumed.
         try:
             with _saving_context(state_file, run_plan, inputs.patch, n_before):
                 if run_plan.kind == "patch":
@@ -200,6 +210,8 @@ def _run_pass(
                     FinishedPass(at_rest, notes, start, unmoved), None
                 )
             raise
+
+        # Static measures come first, and fields of the interfaces and wear follow the motion.
         if pressed and model.kind != "patch":
             static = _collect_static_measures(pressed)
             motion = {name: m for name, m in result.measures.items() if name not in static}
@@ -229,7 +241,7 @@ def _press_interfaces(model: Model, *, estimate: bool) -> tuple[Face, ...]:
     return (Face(0, "", model, patches, static=static),)
 
 
-def _collect_static_measures(pressed: tuple[Face, ...]) -> dict:
+def _collect_static_measures(pressed: tuple[Face, ...]) -> Measures:
     """Return the static measures of interfaces by name, with error estimates."""
     measures = {}
     for face in pressed:
@@ -244,7 +256,7 @@ def _is_open(patch) -> bool:
     return patch is not None and patch.pressure.outcome is Outcome.NO_CONTACT
 
 
-def _warn_of_pressed_patch(face: Face, *, estimate: bool) -> list:
+def _warn_of_pressed_patch(face: Face, *, estimate: bool) -> list[str]:
     """Return warnings on large strains, and on a mesh too coarse for an error estimate."""
     has_error_mesh = not estimate or face.patches[1] is not None
     return patch_result.patch_warnings(face.model.patch, face.patch, has_error_mesh=has_error_mesh)
@@ -305,23 +317,28 @@ def _complete_result(done: FinishedPass, passed: refine.Pass | None) -> Result:
     Parameters
     ----------
     done : FinishedPass
+        Result of the last pass that counts, and its notes.
     passed : refine.Pass or None
         Why no further pass follows; None for a run without errors.
     """
     result, notes, start, pressed = done
     model = result.plan.model
     result.seconds["total"] = perf_counter() - start
+
+    # What misses the tolerance, with advice by cause.
     next_seconds = 0.0 if passed is None else passed.seconds
     missed = Missed(model, result.measures, pressed, result.extra, next_seconds)
     findings = tuple(find_missed_measures(missed))
     warnings = [*result.warnings, *(finding.sentence for finding in findings)]
     notes = [*notes, *result.extra.get("notes", [])]
+
     yielding_faces = _note_on_yielding_faces(result)
     outcome = result.outcome
     if outcome is Outcome.DONE and find_unknown_measures(result.measures):
         outcome = Outcome.NOT_CONVERGED
     path = model.source.path
     notes = [*shorten_file_names(notes, path), *yielding_faces.values()]
+
     patch = result.patch
     if patch is not None:
         patch = replace(patch, frames=result.fields)
@@ -330,6 +347,7 @@ def _complete_result(done: FinishedPass, passed: refine.Pass | None) -> Result:
     described = {}
     for name, measure in result.measures.items():
         described[name] = replace(measure, text=describe_measure(name, part))
+
     return replace(
         result,
         outcome=outcome,
@@ -389,8 +407,11 @@ def hash_run(model, patch, version: str) -> str:
     Parameters
     ----------
     model : Model
+        Model of the run.
     patch : Patch or None
+        Unworn patch; None for a single point ([normal]).
     version : str
+        Version of the program.
     """
     arrays = []
     if patch is not None:

@@ -90,6 +90,8 @@ def solve_models(
         if group.key is not None:
             groups[group] = cases
             cases = range(0)
+
+    # Cases of one group are computed together; with a callback each case needs a run of its own.
     for case in cases:
         model = models[case]
         if isinstance(model, PatchfemError):
@@ -97,6 +99,8 @@ def solve_models(
             continue
         group = find_group(model, n_study_cases) if on_result is None else Group()
         groups.setdefault(group, []).append(case)
+
+    # Each group falls back to single runs if its common computation fails.
     for group, cases in groups.items():
         forward = on_result and partial(_forward_result, on_result, cases)
         solve_one_by_one = partial(

@@ -13,6 +13,7 @@ import numpy as np
 from ...inputs import measured
 from ...model.model import Model
 from ...model.similar_models import select_models
+from ..results.patch_rows import Arrays, Measures
 
 FAILED_OUTCOME = "failed"  # outcome of a case that was rejected or ended with an error
 
@@ -33,10 +34,10 @@ class CaseResults:
     """
 
     outcome: np.ndarray
-    values: dict = field(default_factory=dict)
-    errors: dict = field(default_factory=dict)
-    floors: dict = field(default_factory=dict)
-    units: dict = field(default_factory=dict)
+    values: Arrays = field(default_factory=dict)
+    errors: Arrays = field(default_factory=dict)
+    floors: Arrays = field(default_factory=dict)
+    units: dict[str, str] = field(default_factory=dict)
     reasons: dict = field(default_factory=dict)
     messages: dict = field(default_factory=dict)
     warnings: dict = field(default_factory=dict)
@@ -68,13 +69,15 @@ class CaseResults:
         self.outcome[case] = FAILED_OUTCOME
         self.messages[case] = message
 
-    def put(self, case: int, outcome: str, measures: dict, seconds: float) -> None:
+    def put(self, case: int, outcome: str, measures: Measures, seconds: float) -> None:
         """Store outcome, measures and computing time of a case.
 
         Parameters
         ----------
         case : int
+            Index of the case.
         outcome : str
+            How the run ended, as the value of an `Outcome`.
         measures : dict
             core.Measure by name.
         seconds : float
@@ -84,7 +87,7 @@ class CaseResults:
         self.seconds[case] = seconds
         self.fill(case, measures)
 
-    def fill(self, case: int, measures: dict) -> None:
+    def fill(self, case: int, measures: Measures) -> None:
         """Store measures of a case; existing values are replaced.
 
         measures: core.Measure by name.
@@ -164,6 +167,7 @@ def solve_in_parts(
     Parameters
     ----------
     models : sequence of Model
+        Models in the order of the results.
     cases_per_call : int
         Largest number of models per call.
     solve : callable

@@ -130,6 +130,8 @@ def refusal_reason(model: Model) -> str:
         or has_unreadable_measurements(model)
     ):
         return "the contact of the case is not a single point, or its table of measured responses cannot be read"
+
+    # The kernel has one slip variable per case, one normal force and a linear flexure.
     friction, modes = model.friction, rig.modes
     if (
         len(rig.friction.interfaces) != 1
@@ -140,10 +142,14 @@ def refusal_reason(model: Model) -> str:
         or law_has_trait(friction.law, "averaged")
     ):
         return "the interface of the case is not one point under a constant load, or its flexure has an end stop"
+
+    # A bond population is one state variable only if all bonds are alike and do not grow.
     if law_has_trait(friction.law, "bonds") and (
         needs_bond_list(friction) or friction.slip_growth is not None or friction.initial_bonds != 1
     ):
         return "its bonds grow, differ or are computed as a list of bonds"
+
+    # The kernel marches displacement and velocity of one mode.
     if (
         modes.omega.size != 1
         or modes.gauge is not None
@@ -153,9 +159,13 @@ def refusal_reason(model: Model) -> str:
         or not (modes.base[0] and modes.slide[0] and modes.output[0])
     ):
         return "the case is not one mode with one sensor under one sine"
+
+    # All cases of a group have arrays of one length, so that the cycles are whole and bounded.
     cycles = rig.drive.cycles
     if not MIN_CYCLES <= cycles <= MAX_CYCLES or cycles != int(cycles):
         return "its number of cycles is not whole, too small or too large"
+
+    # The only setting of the kernel is its number of steps, which follows from the tolerance.
     if (
         model.accuracy.method != "auto"
         or list_fixed_settings(model.accuracy)
@@ -207,11 +217,15 @@ def _list_numbers(model: Model) -> tuple:
     load = model.point.load
     law = make_point_law(friction, load)
     cycles = int(rig.drive.cycles)
+
+    # Stiffness during stick: friction limit / bond length for laws with a length.
     stiffness = 0.0
     if friction.law == "elastic-plastic" or law_has_trait(friction.law, "bonds"):
         stiffness = friction.static * load / friction.bond_length
     elif friction.law not in ("coulomb", "tanh"):
         stiffness = friction.stiffness
+
+    # The order is that of `collect_cases`: `Number`, law, memory, stiffness of the mode, `Scales`.
     return (
         *list_parameters(rig.modes, rig.drive.signal, load, cycles, min(10, cycles // 10), rig.start),
         *law.numbers,
@@ -244,6 +258,8 @@ def refine(cases: Cases, scales: Scales) -> Refined:
     """
     left = np.arange(len(cases.parameters))
     quarter, half = march_cases(cases, STEPS[0] // 4), march_cases(cases, STEPS[0] // 2)
+
+    # In each turn the former fine march becomes the one with half the steps (Richardson's series).
     refined = None
     for count in STEPS:
         fine = march_cases(cases.select(left), count)
@@ -259,6 +275,8 @@ def refine(cases: Cases, scales: Scales) -> Refined:
             # A measure that only one of the two finest marches has shows an event that the other missed.
             is_absent = np.isnan(values[0][name]) & np.isnan(values[1][name])
             is_met &= (errors[name] <= allowed[name]) | is_absent
+
+        # Only cases beyond their tolerance are marched again with twice the steps.
         done = Refined(fine, errors, np.full(left.size, count), is_met)
         refined = done if refined is None else _insert(refined, left, done)
         left = left[~is_met]
@@ -321,11 +339,14 @@ def make_results(
         Outcome.STUCK if stuck else CLASSES[number] for number, stuck in zip(classes, is_stuck)
     ]
     results.outcome[:] = list(map(str, outcomes))
+
     # An interface that sticks while the rig still vibrates freely has not settled.
     decay = scales.decay * 2 * np.pi / cases.parameters[:, Number.OMEGA]
     ringing = remaining_ringing(refined.march.extremes, window, decay)
     sizes = (values[AMPLITUDE], errors[AMPLITUDE], find_floor(AMPLITUDE, values, scales))
     is_ringing = is_stuck & is_ringing_visible(ringing, *sizes, scales.tolerance)
+
+    # The warning states the remaining amplitude relative to the motion.
     results.outcome[is_ringing] = str(Outcome.TRANSIENT)
     for case in np.flatnonzero(is_ringing).tolist():
         ratio = float(ringing[case] / values[AMPLITUDE][case])
@@ -343,6 +364,8 @@ def make_results(
     errors[STEADY_AMPLITUDE] = steady_estimate_error(
         steady, steady_error, values[AMPLITUDE], errors[AMPLITUDE]
     )
+
+    # A growing motion has no limit, so that no error is stated for its values.
     grows = results.outcome == str(Outcome.GROWS)
     for name, value in values.items():
         is_known = ~np.isnan(value)
@@ -354,6 +377,8 @@ def make_results(
 
     unresolved = np.flatnonzero(is_transient & np.isnan(values[STEADY_AMPLITUDE]))
     _put_reason(results, STEADY_AMPLITUDE, unresolved, CHANGE_NOT_RESOLVED_REASON)
+
+    # The secant stiffness of a rigid stick is infinite at a reversal.
     first = models[0]
     if first.sticks_rigidly:
         sticks = values["stick_fraction"] > TABLE["stick_fraction"].floor + errors["stick_fraction"]
@@ -361,6 +386,8 @@ def make_results(
         _put_reason(
             results, RIGID_SECANT, np.flatnonzero(sticks & moves), STICKS_AT_REVERSAL_REASON
         )
+
+    # Measures that a case lacks get the reasons that a single run states.
     drive = first.rig.drive.signal
     last_cycles = SimpleNamespace(time=np.array([0.0, window * drive.period]), extra={})
     for case in range(len(results)):
@@ -402,6 +429,8 @@ def _judge_motions(cases: Cases, scales: Scales, refined: Refined) -> tuple:
     cycles = march.extremes.shape[1]
     window = int(cases.parameters[0, Number.WINDOW])
     ends = np.arange(cycles - 1, -1, -window)[::-1][-N_FINAL_WINDOWS:]
+
+    # The amplitudes of the final windows are extrapolated to infinite time.
     with np.errstate(all="ignore"):
         steady = extrapolate_steady_amplitudes(
             np.ptp(march.extremes[:, ends], axis=2) / 2, march.phasors[:, ends]
@@ -417,6 +446,8 @@ def _judge_motions(cases: Cases, scales: Scales, refined: Refined) -> tuple:
                 scales.decay * window * 2 * np.pi / omega,
             ),
         )
+
+    # A periodic motion about a moving mean is transient, which is class 0.
     drifts = is_drifting(
         values["drift_per_cycle"],
         refined.errors["drift_per_cycle"],

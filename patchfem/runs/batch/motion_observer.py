@@ -66,6 +66,7 @@ class MotionObserver:
         Parameters
         ----------
         drive : core.SineDrive
+            Sine with the amplitude and frequency of the point to be computed.
         initial_guess
             `ObservedMotion.initial_guess` for a similar drive; None: start from rest.
 

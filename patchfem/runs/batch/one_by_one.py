@@ -35,6 +35,7 @@ def solve(
     Parameters
     ----------
     models : sequence of Model
+        Models in the order of the results.
     report : callable, optional
         Callback for progress messages.
     on_result : callable, optional
@@ -75,6 +76,7 @@ def replace_by_single_runs(
     results : CaseResults
         Results of all models; changed in place.
     models : sequence of Model
+        All models, in the order of the results.
     cases : (n,) of bool
         Mask of the cases to be replaced.
     report : callable, optional

@@ -24,7 +24,9 @@ def average_behind(model, patch, direction: float, offset: float = 0.0) -> np.nd
     Parameters
     ----------
     model : Model
+        Model with a law whose pressure is averaged along the motion.
     patch : Patch
+        Solved patch, whose pressure is averaged.
     direction : float
         Sign of the motion.
     offset : float
@@ -77,7 +79,9 @@ def distribute_slip_force(model, patch, force) -> np.ndarray:
     Parameters
     ----------
     model : Model
+        Model with a law whose pressure is averaged along the motion.
     patch : Patch
+        Solved patch, which gives nodes and pressure.
     force : (f,)
         Resultant forces [N].
 

@@ -22,6 +22,7 @@ from ...response.measures import (
     compute_step_harmonic,
     work_difference,
 )
+from ..results.patch_rows import Values
 from .engine import BenchEngine, choose_bench_engine
 from .slides import SlideHistories, SlideTask, follow_path
 
@@ -51,7 +52,7 @@ class BenchRun:
     frames: np.ndarray
     tau: np.ndarray
     local: np.ndarray
-    values: dict
+    values: Values
     seconds: float
     first: int
     engine: BenchEngine
@@ -63,6 +64,7 @@ def run_bench(model, patch, steps: int, frames: int = 0, path=None, **settings) 
     Parameters
     ----------
     model : Model
+        Model of a bench, with `slide`.
     patch : Patch or None
         None for a single point ([normal]).
     steps : int
@@ -88,22 +90,29 @@ def run_bench(model, patch, steps: int, frames: int = 0, path=None, **settings) 
     """
     begin = perf_counter()
     time, slide, first, omega = model.slide.samples(steps) if path is None else path
+
+    # A varying load bends the force between the samples of the slide.
     if model.load_varies:
         start = time[first]
         time, slide = model.point.refine_samples(model.slide, time, slide, steps)
         first = int(np.searchsorted(time, start))
+
     engine = choose_bench_engine(model, slide, settings.pop("choice", None))
     engine = replace(engine, springs=settings.pop("springs", None))
     stored = _choose_frames(slide.size, frames)
     histories = follow_path(SlideTask(model, patch, time, slide, stored, engine, **settings))
     jumps = reversal_force_rule(model) == "jumps"
+
+    # The measures of a loop exist only for a cyclic motion.
     values = _compute_measures(model, histories, first)
     values |= _compute_loop_measures(model, time, slide, histories, first, omega) if omega else {}
     values["work_check"] = work_difference(histories.ledger[0], [(slide, histories.force)], jumps)
+
     span = time[-1]  # Scaling by the time span avoids overflow for extremely slow motions.
     rate = np.zeros(time.size)
     if time.size > 2:
         rate = np.gradient(slide, time / span) / span
+
     return BenchRun(
         time=time,
         slide=slide,
@@ -125,21 +134,26 @@ def _choose_frames(n_samples: int, n_frames: int) -> np.ndarray:
     return np.unique(numbers[numbers > 0])
 
 
-def _compute_measures(model, histories: SlideHistories, cycle_start: int) -> dict:
+def _compute_measures(model, histories: SlideHistories, cycle_start: int) -> Values:
     """Compute all measures of a bench run except those of the friction loop."""
     force = histories.force
     load = histories.load
+
     # The friction ratio refers to the applied load, because friction vanishes where the upper piece
     # leaves the pressed area.
     applied = load if model.load_varies else np.full_like(load, load[0])
     is_loaded = applied > 1e-3 * applied.max(initial=0.0)
     ratio = np.divide(force, applied, out=np.zeros_like(force), where=is_loaded)
+
+    # Energy balance: work - change of stored energy - dissipated + created = 0, relative to the
+    # exchanged energy.
     work, stored, dissipated, created = histories.ledger
     exchanged = np.abs(np.diff(work)).sum()
     imbalance = abs(work[-1] - (stored[-1] - stored[0]) - dissipated[-1] + created[-1])
     balance = 0.0
     if exchanged > 0:
         balance = float(imbalance / (exchanged + np.abs(stored).max()))
+
     return {
         "normal_load": float(model.point.load if model.load_varies else load[0]),
         "friction_force_peak": float(np.abs(force).max()),
@@ -156,18 +170,23 @@ def _compute_measures(model, histories: SlideHistories, cycle_start: int) -> dic
 
 def _compute_loop_measures(
     model, time, slide, histories: SlideHistories, cycle_start: int, omega: float
-) -> dict:
+) -> Values:
     """Compute the measures of the friction loop in the last cycle, which starts at sample `cycle_start`."""
     time = time[cycle_start:]
     slide = slide[cycle_start:]
     force = histories.force[cycle_start:]
     work = histories.ledger[0, cycle_start:]
+
+    # Weights of the trapezoidal rule [s] for the harmonics at unequal steps.
     weight = np.zeros(time.size)
     weight[1:] += np.diff(time) / 2
     weight[:-1] += np.diff(time) / 2
+
+    # The work of a step defines its mean force, dW/du; a step at rest has the mean of its ends.
     moves = np.diff(slide)
     mean_force = (force[1:] + force[:-1]) / 2
     means = np.divide(np.diff(work), moves, out=mean_force, where=moves != 0)
+
     reversals = find_reversals(
         time,
         slide,
@@ -176,6 +195,8 @@ def _compute_loop_measures(
         time[-1] - time[0],
         reversal_force_rule(model),
     )
+
+    # Without a mode there is no stiffness that damping could refer to, hence the 0.
     measures = interface_loop(
         mean_half_range(reversals),
         compute_harmonic(time, weight, slide - slide.mean(), omega),

@@ -69,6 +69,7 @@ def choose_bench_engine(
     Parameters
     ----------
     model : Model
+        Model of a bench, whose friction law decides.
     slide : (k,)
         Relative displacement [m].
     choice : EngineChoice, optional
@@ -164,7 +165,7 @@ def choose_smooth_bond_summation(model, slide) -> "bond_engines.EngineChoice | N
     return replace(choice, engine="truncated", merge=0.0, error=choice.tail)
 
 
-def mean_stroke(slide) -> tuple:
+def mean_stroke(slide) -> tuple[float, float]:
     """Return the mean path [m] and the mean number of moving steps between reversals."""
     moves = np.diff(slide)
     directions = np.sign(moves[moves != 0])

@@ -25,6 +25,7 @@ from ...response.errors import (
     merged_cell_errors,
 )
 from ...slip import shear_modes
+from ..results.patch_rows import Values
 from . import bench, shear
 from .engine import Method, uses_parallel_elements
 
@@ -61,9 +62,9 @@ class BenchErrors(NamedTuple):
     - step_runs: StepRun of the run and of each run with fewer steps, from fine to coarse.
     """
 
-    errors: list
+    errors: list[tuple[str, Values]]
     seconds: float
-    step_runs: list
+    step_runs: list[StepRun]
 
 
 def estimate_bench_errors(model, patches: list, fine_run, steps: int, say=None) -> BenchErrors:
@@ -72,6 +73,7 @@ def estimate_bench_errors(model, patches: list, fine_run, steps: int, say=None) 
     Parameters
     ----------
     model : Model
+        Model of the run.
     patches : list of Patch
         Patches on nested meshes, from fine to coarse; [None] without a patch.
     fine_run : BenchRun
@@ -100,12 +102,15 @@ def estimate_bench_errors(model, patches: list, fine_run, steps: int, say=None) 
         cpu_seconds[variant] = process_time() - begin
         return coarse_run
 
+    # The runs are stored by their settings, because several estimates share one run.
     cpu_seconds = {}
     coarser_runs = list_coarser_runs(model, patches, fine_run, steps)
     bench_runs = {}
     errors, seconds = estimate_errors(solve, fine_run.values, coarser_runs, bench_runs)
     if find_bond_sum_error(fine_run.engine):
         errors.append(("bonds", _estimate_bond_sum_errors(model, fine_run)))
+
+    # The history of step numbers serves the accuracy curve of the report.
     step_runs = [StepRun(steps, fine_run.seconds, fine_run.values)]
     for run in coarser_runs[0].runs:
         values = bench_runs[run].values
@@ -113,7 +118,7 @@ def estimate_bench_errors(model, patches: list, fine_run, steps: int, say=None) 
     return BenchErrors(errors, seconds, step_runs)
 
 
-def list_coarser_runs(model, patches: list, fine_run, steps: int) -> list:
+def list_coarser_runs(model, patches: list, fine_run, steps: int) -> list[CoarserRuns]:
     """List the coarser runs from which the errors of a bench run are estimated.
 
     Two runs have half and a quarter of the steps. Further runs with a quarter of the steps have,
@@ -124,8 +129,11 @@ def list_coarser_runs(model, patches: list, fine_run, steps: int) -> list:
     Parameters
     ----------
     model : Model
+        Model of the run.
     patches : list of Patch
+        Patches on nested meshes, from fine to coarse; [None] without a patch.
     fine_run : BenchRun
+        Run whose errors are estimated.
     steps : int
         Number of steps per cycle of `fine_run`.
     """
@@ -136,6 +144,7 @@ def list_coarser_runs(model, patches: list, fine_run, steps: int) -> list:
     sampled_steps = None if uses_parallel_elements(model) else steps
     rule = partial(convergence_errors, steps=sampled_steps)
     out = [CoarserRuns((halved, quarter), rule, source="steps")]
+
     has_coarser_mesh = len(patches) > 1
     patch = patches[0]
     if has_coarser_mesh and uses_parallel_elements(model):
@@ -152,11 +161,14 @@ def list_coarser_runs(model, patches: list, fine_run, steps: int) -> list:
         if count:
             coarser = quarter._replace(modes=shear_modes.comparison_mode_count(count))
             out.append(CoarserRuns((coarser,), second_order_errors, quarter, "modes"))
+
     if law_has_trait(model.friction.law, "cells") and fine_run.engine.method is Method.ELEMENTS:
         # Groups of four cells are merged into one.
         joins = [partial(join_cells, *merge) for merge in CELL_MERGES]
         runs = tuple(quarter._replace(springs=join) for join in joins)
         out.append(CoarserRuns(runs, merged_cell_errors, quarter, "cells"))
+
+    # A merged bond list converges to the full list as its strips become narrower.
     if choice is not None and choice.merge > 0:
         narrow = quarter._replace(choice=replace(choice, merge=FINER_MERGE_FACTOR * choice.merge))
         out.append(CoarserRuns((narrow,), finer_errors, quarter, "bonds"))
@@ -168,7 +180,7 @@ def find_bond_sum_error(engine) -> float:
     return 0.0 if engine.choice is None else engine.choice.error
 
 
-def _estimate_bond_sum_errors(model, fine_run) -> dict:
+def _estimate_bond_sum_errors(model, fine_run) -> Values:
     """Estimate the errors of the measures due to bond summation."""
     work = np.abs(np.diff(fine_run.ledger[0]))
     friction = model.friction
@@ -182,7 +194,7 @@ def _estimate_bond_sum_errors(model, fine_run) -> dict:
     return friction_errors(fine_run.values, find_bond_sum_error(fine_run.engine), scale)
 
 
-def _estimate_mesh_errors(*values: dict) -> dict:
+def _estimate_mesh_errors(*values: Values) -> Values:
     """Estimate the mesh errors of the measures from their values on nested meshes.
 
     Measures that are themselves errors, such as the energy balance, have their change as error.

@@ -46,6 +46,8 @@ def run_prescribed(inputs: RunInputs) -> Result:
     frames = N_FRAMES if patch is not None else 0
     fine = bench.run_bench(model, patch, steps, frames, say=inputs.say, progress=inputs.progress)
     inputs.seconds["bench"] = fine.seconds
+
+    # The errors follow from coarser runs on the same path.
     error_estimates = BenchErrors([], 0.0, [])
     if inputs.estimate:
         patches = [patch, *(mesh for mesh in inputs.coarse if mesh is not None)]
@@ -55,6 +57,7 @@ def run_prescribed(inputs: RunInputs) -> Result:
     measures = add_errors(
         fine.values, error_estimates.errors, step_values, min_relative_error=1e-10
     )
+
     warnings = [
         *inputs.warnings,
         *warn_of_bonds(model, model.speed_scale, measures, Outcome.DONE),
@@ -65,6 +68,8 @@ def run_prescribed(inputs: RunInputs) -> Result:
         *warn_of_work_check(measures, steps),
         *_warn_of_open_loop(model, patch, fine, steps),
     ]
+
+    # A node slips in a frame where its shear stress reaches its limit, or else where its slip changes.
     fields = {}
     if patch is not None:
         warnings += _warn_of_overhang(patch, fine)
@@ -76,8 +81,12 @@ def run_prescribed(inputs: RunInputs) -> Result:
             fine.slide[fine.frames],
             SlipRule(nodal_element_limit(model, patch), starts_at_rest=True),
         )
+
+    # A missing mesh error would make every stated error too small.
     if not (inputs.estimate and can_estimate_mesh_error(model, patch, inputs.coarse)):
         measures = remove_errors(measures)
+
+    # The friction ratio has one limit only under a constant load.
     peak_ratio = None
     if model.friction.static > 0 and not model.load_varies:
         peak_ratio = fine.values["friction_ratio_peak"] / model.friction.static
@@ -89,6 +98,7 @@ def run_prescribed(inputs: RunInputs) -> Result:
     }
     if model.partial_slip and (count := shear.count_shear_modes(model, patch)):
         extra["shear_modes"] = count
+
     return Result(
         inputs.plan,
         check_pieces_overlap(Outcome.DONE, model.patch, patch, fine.slide),
@@ -103,7 +113,7 @@ def run_prescribed(inputs: RunInputs) -> Result:
     )
 
 
-def _warn_of_kept_pressure(model) -> list:
+def _warn_of_kept_pressure(model) -> list[str]:
     """Return a list with a warning that bonds of the printed law keep the pressure at which they formed."""
     if model.friction.reading != "report" or not model.load_varies:
         return []
@@ -132,7 +142,7 @@ def _compute_loop_closing_error(fine) -> float:
     return gap
 
 
-def _warn_of_open_loop(model, patch, fine, steps: int) -> list:
+def _warn_of_open_loop(model, patch, fine, steps: int) -> list[str]:
     """Return a list with a warning if the last friction loop is not closed, and its area is not that of a longer run."""
     tolerance = model.accuracy.tolerance
     slide = model.slide
@@ -153,7 +163,7 @@ def _warn_of_open_loop(model, patch, fine, steps: int) -> list:
     ]
 
 
-def _warn_of_overhang(patch, fine) -> list:
+def _warn_of_overhang(patch, fine) -> list[str]:
     """Return warnings if the upper piece leaves the loaded area or the lower piece."""
     warnings = []
     load_loss = 1 - float(fine.load.min() / fine.load[0]) if fine.load[0] > 0 else 0.0

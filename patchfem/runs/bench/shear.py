@@ -32,6 +32,7 @@ def make_flank_contact(model, load: float, patch=None, n_modes: int | None = Non
     Parameters
     ----------
     model : Model
+        Model of a bench or a rig with grooves.
     load : float
         Normal load [N].
     patch : Patch, optional
@@ -45,6 +46,8 @@ def make_flank_contact(model, load: float, patch=None, n_modes: int | None = Non
     """
     f = model.friction
     law = model.bonds if law_has_trait(f.law, "bonds") else f
+
+    # On a rig the lifted mass is compared to the modal mass at the interface, m / (s . s).
     grooves = model.grooves
     row = np.zeros(0)
     if model.rig is None:
@@ -53,12 +56,19 @@ def make_flank_contact(model, load: float, patch=None, n_modes: int | None = Non
         modes = model.rig.modes
         row = modes.slide
         grooves.check_lifted_mass(f.static, modes.mass / float(modes.slide @ modes.slide))
+
     if not model.partial_slip:
         return contacts.make_flank_contact(law, grooves, load, row)
+
+    # Points on pieces that deform in shear: limit mu N of each node, and the length over which it
+    # is reached.
     force = patch.pressure.sigma_n * patch.pieces.interface.weight
     limit = f.static * force
     tolerance = model.accuracy.tolerance
     length = getattr(law, "length", None) or f.bond_length
+
+    # Coulomb's law yields at once; a length far below the slide at gross slip, sum(limit) / k_t,
+    # replaces the jump.
     if not length:
         compliance = patch.slip_compliance
         gross_slip_slide = limit.sum() / tangential_stiffness(compliance, force > 0)
@@ -66,9 +76,12 @@ def make_flank_contact(model, load: float, patch=None, n_modes: int | None = Non
             update={"bond_length": COULOMB_LENGTH_RATIO * tolerance * gross_slip_slide}
         )
         length = max(COULOMB_LENGTH_RATIO * tolerance, MIN_LENGTH_RATIO) * gross_slip_slide
+
+    # Growth makes the friction in motion smaller: `weakening` is the static / kinetic coefficient.
     weakening = 1.0
     if getattr(law, "has_growth", False):
         weakening = 1 / law.ratio if law.ratio > 0 else np.inf
+
     if n_modes is not None:
         reduced = shear_modes.shear_modes(patch.slip_compliance, limit, length, n_modes, weakening)
     else:
@@ -80,6 +93,8 @@ def make_flank_contact(model, load: float, patch=None, n_modes: int | None = Non
             0.1 * tolerance,
             weakening,
         )
+
+    # The load of the grooves is distributed over the points as the pressure is.
     shares = force[reduced.points] / force.sum()
     return contacts.make_flank_contact(law, grooves, load, row, reduced, shares)
 
@@ -90,8 +105,11 @@ def compute_groove_fields(patch, contact, snapshots) -> tuple:
     Parameters
     ----------
     patch : Patch
+        Patch whose pieces deform in shear.
     contact : points.contacts.Contact
+        Points of the law on the flanks, reduced to shear modes.
     snapshots : sequence of points.time_march.Snapshot
+        States of the points in the f frames.
     """
     index = contact.reduction.points
     weight = patch.pieces.interface.weight[index]
@@ -114,6 +132,7 @@ def make_bond_sum(law, choice) -> "contacts.BondSum | None":
     Parameters
     ----------
     law : Bonds
+        Parameters of the bond law.
     choice : EngineChoice or None
         Method of bond summation.
     """
@@ -131,7 +150,9 @@ def compute_point_shear_modes(model, patch, n_modes: int | None = None):
     Parameters
     ----------
     model : Model
+        Model with a law whose stretch varies along the interface.
     patch : Patch
+        Solved patch, which gives limits and compliance of the points.
     n_modes : int, optional
         Number of modes; default: by the scene, otherwise by the tolerance.
     """
@@ -175,7 +196,9 @@ def make_lower_contact(model, patch, row, modes, bond_sum) -> contacts.Contact:
     Parameters
     ----------
     model : Model
+        Model with a bond law.
     patch : Patch
+        Solved patch, whose pressure moves with the lower piece.
     row : (n,) array
         Slide per modal coordinate.
     modes : ShearModes or None

@@ -23,7 +23,7 @@ from .engine import BenchEngine, BondListGuard, Method, has_changing_pressure
 
 N_GAUSS_POINTS = 8  # Number of Gauss points per time step along the flank of a groove.
 # Largest ratio of created to dissipated energy at which the created energy counts as round-off.
-ROUND_OFF_FRACTION = 1e-13
+CREATED_ROUND_OFF = 1e-13
 
 
 class SlideHistories(NamedTuple):
@@ -207,7 +207,7 @@ class _FrictionLimits:
         return ratio * self.compute_tractions(sample, direction)
 
 
-def find_rest_ends(model, slide) -> dict:
+def find_rest_ends(model, slide) -> dict[int, float]:
     """Return the samples at which sliding starts from rest, with the sign of the motion.
 
     These are the first sample of the path and the last sample of each rest. The dict is empty
@@ -216,6 +216,7 @@ def find_rest_ends(model, slide) -> dict:
     Parameters
     ----------
     model : Model
+        Model of a bench, whose friction law decides.
     slide : (k,) array
         Relative displacement [m].
     """
@@ -310,7 +311,7 @@ def stack_energies(work, stored, losses) -> np.ndarray:
     """
     steps = np.stack([work, np.maximum(losses, 0.0), np.maximum(-losses, 0.0)])
     work, dissipated, created = np.pad(np.cumsum(steps, axis=1), ((0, 0), (1, 0)))
-    if created[-1] <= ROUND_OFF_FRACTION * dissipated[-1]:
+    if created[-1] <= CREATED_ROUND_OFF * dissipated[-1]:
         created = np.zeros(created.size)
     return np.stack([work, stored, dissipated, created])
 
@@ -323,6 +324,8 @@ def _follow_by_points(task: SlideTask) -> SlideHistories:
     model = task.model
     patch = task.patch
     contact, jenkins_set = _make_contact(task)
+
+    # A long bond list is stopped by its guard before it takes too long.
     report = task.progress if contact.bond_sum is None else BondListGuard(task.progress)
     motion = slides.follow(contact, task.time, task.slide, task.frames, task.say, report)
     if motion.n_unsolved:
@@ -331,6 +334,8 @@ def _follow_by_points(task: SlideTask) -> SlideHistories:
             "above the limit; raise accuracy.steps_per_cycle",
             "",
         )
+
+    # Shear stress and local slip of the frames, by what represents the shear of the pieces.
     load = task.compute_loads()
     slip = motion.slip
     frames = task.frames
@@ -374,6 +379,8 @@ def _make_contact(task: SlideTask) -> tuple:
     friction = model.friction
     row = np.zeros(0)
     load = float(task.evaluate_pressure([0])[0] @ task.weight)
+
+    # Laws with state along the path: grooves, bonds, or a load that changes.
     if model.grooves is not None:
         modes = model.accuracy.shear_modes
         return shear.make_flank_contact(model, load, patch, modes), None
@@ -382,16 +389,23 @@ def _make_contact(task: SlideTask) -> tuple:
     if model.load_varies:
         point = model.point
         return contacts.make_pressed_contact(friction, load, row, load=point.evaluate), None
+
+    # A comparison run merges the springs of parallel elements.
+    merge_springs = task.engine.springs
+
+    # Pieces that deform in shear are parallel Jenkins elements of the same slip curve.
     if model.partial_slip:
         length = make_law(friction, 1.0).element(1.0).length
         jenkins_set = jenkins_elements.elements(patch, friction.static, length)
         springs = jenkins_set.stiffness, jenkins_set.yield_displacement
-        if task.engine.springs is not None:
-            springs = task.engine.springs(*springs)
+        if merge_springs is not None:
+            springs = merge_springs(*springs)
         return contacts.make_parallel_contact(*springs, row), jenkins_set
+
+    # Rigid pieces are one element of the law itself.
     element = make_law(friction, load).element(load)
-    if task.engine.springs is not None:
-        springs = task.engine.springs(*np.split(element.numbers[2:], 2))
+    if merge_springs is not None:
+        springs = merge_springs(*np.split(element.numbers[2:], 2))
         element = elastic_plastic.parallel_element(*springs)
     return contacts.make_contact([element], [row]), None
 

@@ -38,13 +38,13 @@ class CondensedPair:
 
     grid: object
     upper_grid: object
-    piece: object
-    upper: object
+    piece: Piece
+    upper: Piece
     compliance: Compliance
     closing: np.ndarray
     joint: object
     end_gap: np.ndarray
-    seconds: dict
+    seconds: dict[str, float]
 
     @property
     def coupling(self) -> float:
@@ -87,6 +87,7 @@ def condense(patch_model, grid, upper_grid=None) -> CondensedPair:
     Parameters
     ----------
     patch_model : PatchModel
+        Patch whose materials, width and coatings the pieces have.
     grid, upper_grid : TensorGrid or PieceMesh
         Meshes from `make_piece_meshes`; the upper one is None if the pieces are identical.
 
@@ -94,6 +95,7 @@ def condense(patch_model, grid, upper_grid=None) -> CondensedPair:
     -------
     CondensedPair
     """
+    # Both pieces share one compliance if they are identical.
     width = patch_model.pieces.width * patch_model.pieces.pairs
     start = perf_counter()
     piece = upper = Piece(grid, make_elastic_layers(patch_model, patch_model.pieces.lower))
@@ -101,6 +103,8 @@ def condense(patch_model, grid, upper_grid=None) -> CondensedPair:
     if upper_grid is not None:
         upper = Piece(upper_grid, make_elastic_layers(patch_model, patch_model.pieces.upper))
         upper_compliance = interface_compliance(upper)
+
+    # Interfaces with different nodes are joined by the mortar method.
     joint = None
     x = grid.x
     tributary_lengths = grid.tributary_lengths()
@@ -120,14 +124,18 @@ def condense(patch_model, grid, upper_grid=None) -> CondensedPair:
             lower_compliance.tt + upper_compliance.tt,
             lower_compliance.nt - upper_compliance.nt,
         )
+
+    # The compliances hold per unit width; pairs of equal pieces act in parallel.
     normal, tangential, closing = (frozen_array(part / width) for part in compliances)
     if np.abs(closing).max() <= COUPLING_ROUND_OFF * np.abs(tangential).max():
         closing = frozen_array(np.zeros(closing.shape))
     interface = Interface(frozen_array(x), frozen_array(tributary_lengths * width), width)
+
     # Rounded ends of the pieces open the gap.
     bodies = (grid, upper_grid or grid)
     end_gap = sum(np.interp(interface.x, body.x, body.interface_depths) for body in bodies)
     seconds = {"condense": perf_counter() - start}
+
     pieces = Compliance(interface, normal, tangential)
     return CondensedPair(
         grid,
@@ -142,7 +150,7 @@ def condense(patch_model, grid, upper_grid=None) -> CondensedPair:
     )
 
 
-def condense_on_shared_meshes(patch_model) -> tuple:
+def condense_on_shared_meshes(patch_model) -> tuple[CondensedPair, ...]:
     """Return the condensed pieces of a model on all levels of its shared meshes."""
     levels = range(len(patch_model.mesh.shared.levels))
     return tuple(condense_on_shared_level(patch_model, level) for level in levels)
@@ -165,6 +173,7 @@ def cache_condensed_pairs(patch_model, meshes, pairs) -> None:
     patch_model : PatchModel
         One of the patches that use the meshes.
     meshes : SharedMeshes
+        Meshes that the patches share, with their levels.
     pairs : sequence of CondensedPair
         From fine to coarse.
     """
@@ -176,14 +185,15 @@ def cache_condensed_pairs(patch_model, meshes, pairs) -> None:
 
 def _condensed_pair_key(patch_model, name: str, level: int) -> tuple:
     """Return the cache key of the condensed pieces on one level of a shared mesh."""
+    pieces = patch_model.pieces
     return (
         "pair",
         name,
         level,
-        patch_model.pieces.lower,
-        patch_model.pieces.upper,
-        patch_model.pieces.plane,
-        patch_model.pieces.width * patch_model.pieces.pairs,
+        pieces.lower,
+        pieces.upper,
+        pieces.plane,
+        pieces.width * pieces.pairs,
     )
 
 

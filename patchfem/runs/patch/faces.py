@@ -62,7 +62,9 @@ def make_patch_elements(interface, tolerance: float, coarser: bool = False) -> t
     Parameters
     ----------
     interface : InterfaceLaw
+        Friction law and patch of the interface.
     tolerance : float
+        Relative error of the static measures for which the patch is solved.
     coarser : bool
         Whether to use the coarser mesh, for the error estimate.
 
@@ -101,7 +103,9 @@ def add_slip_fields(model, faces: tuple, snapshots) -> tuple:
     Parameters
     ----------
     model : Model
+        Model of the rig.
     faces : tuple of Face
+        Pressed interfaces of the rig, in their order.
     snapshots : list
         States of the event-driven engine: time [s], and for each interface its slide [m] and the
         stretch (t,) [m] of its elements.
@@ -110,9 +114,13 @@ def add_slip_fields(model, faces: tuple, snapshots) -> tuple:
     for face in faces:
         law = model.rig.friction.interfaces[face.number]
         fields = collect_rest_frame(face.patch)
+
+        # Only an interface whose pieces deform in shear has slip that varies along x.
         jenkins_set = None
         if face.partial_slip and snapshots:
             jenkins_set = make_patch_elements(law, model.accuracy.tolerance)[2]
+
+        # The stretches of the elements give the shear stress and the local slip of each node.
         if jenkins_set is not None:
             states = [snapshot.faces[face.number] for snapshot in snapshots]
             length = record.make_law(law.numbers, law.load).element(law.load).length

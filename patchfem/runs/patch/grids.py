@@ -72,6 +72,9 @@ MAX_CONDENSING_SECONDS = {True: 3.6, False: 0.8}
 SECONDS_PER_NODE = 4.2e-6  # CPU time [s] of condensing a mesh over (number of nodes)^NODE_EXPONENT
 NODE_EXPONENT = 1.1
 
+Pairs = tuple[tuple[float, float], ...]  # (start, end) or (position, half-width) [m]
+Bands = list[tuple[float, float, float]]  # (from, to, cell length) [m], as in `Layout.bands`
+
 
 @dataclass(frozen=True, eq=False, slots=True)
 class ContactExtent:
@@ -86,12 +89,12 @@ class ContactExtent:
     - slip_zones: (start, end) [m] of the zones that slip under a prescribed displacement.
     """
 
-    span: tuple
-    places: tuple
-    corners: tuple
+    span: tuple[float, float]
+    places: tuple[float, ...]
+    corners: tuple[float, ...]
     cell: float
-    crests: tuple = ()
-    slip_zones: tuple = ()
+    crests: Pairs = ()
+    slip_zones: Pairs = ()
 
     @property
     def width(self) -> float:
@@ -147,6 +150,7 @@ def _search_contact_region(patch_model) -> BaseGrids:
     loaded_models = (patch_model, *make_load_variants(patch_model))
     layout = make_search_layout(patch_model)
     contact = None
+
     # Without a load there is no contact to search for.
     for _ in range(MAX_SEARCHES if patch_model.nominal_load > 0 else 0):
         pair = condense(patch_model, *make_grids(patch_model, layout))
@@ -155,6 +159,8 @@ def _search_contact_region(patch_model) -> BaseGrids:
         for loaded_model in loaded_models:
             patch = solve_patch_contact(loaded_model, pair)
             extents.append(find_contact_extent(patch, patch_model.mesh.slip))
+
+        # The next layout follows from this contact; the search compares the two.
         contact = extents[0]
         previous_layout = layout
         layout = make_column_layout(patch_model, extents)
@@ -162,6 +168,7 @@ def _search_contact_region(patch_model) -> BaseGrids:
         is_resolved = _resolves_waves(patch_model, x, layout) and _resolves_slip_zones(
             contact.slip_zones, x, layout
         )
+
         if edge_cell_ratio <= 1 / (EDGE_CELLS[patch_model.mesh.is_static] - 1) and is_resolved:
             break
         if _have_bands_converged(layout, previous_layout):
@@ -187,7 +194,7 @@ def _have_bands_converged(layout: Layout, previous_layout: Layout) -> bool:
     return bool((np.abs(bands - previous_bands) <= BAND_CHANGE_TOL * cells).all())
 
 
-def _resolves_slip_zones(zones: tuple, x, layout: Layout) -> bool:
+def _resolves_slip_zones(zones: Pairs, x, layout: Layout) -> bool:
     """Return whether columns at x (k,) [m] resolve the slip zones of a patch.
 
     Their cells may be up to MAX_SEARCH_CELL_RATIO times as long as those of the layout.
@@ -228,40 +235,49 @@ def make_search_layout(patch_model) -> Layout:
     return Layout(-half, half, (), (-half, half), cell, cell, 0.0)
 
 
-def make_column_layout(patch_model, extents: list) -> Layout:
+def make_column_layout(patch_model, extents: list[ContactExtent]) -> Layout:
     """Return the column layout of the coarsest mesh, graded towards given contact regions.
 
     extents: ContactExtents of one patch under several loads, or of several patches.
     """
     length = patch_model.pieces.length
     half = length / 2
+    mesh = patch_model.mesh
+    n_edge_cells = EDGE_CELLS[mesh.is_static]
     span = (min(extent.span[0] for extent in extents), max(extent.span[1] for extent in extents))
     width = min(extent.width for extent in extents)
+
     coating = _min_coating_thickness(patch_model)
     # The third mesh, whose cells are a quarter as long, has to resolve the waves.
     max_cell = min(length / 12, 4 * _max_wave_cell(patch_model))
+
     if max(len(extent.places) for extent in extents) > MAX_CONTACT_ENDS:
         return Layout(-half, half, (), span, *(2 * [min(length / 64, max_cell)]), 0.0)
-    if patch_model.mesh.edge_motion == "wear":
+    if mesh.edge_motion == "wear":
         max_cell = min(max_cell, length * MAX_WEAR_CELL_RATIO)
     max_loaded_cell = min(width / 6, length / 24, max_cell)
+
     # A contact of one or two nodes is searched for again with shorter cells.
     n_contact_cells = N_SMALL_CONTACT_CELLS
     if np.isfinite(max(extent.cell for extent in extents)):
-        n_contact_cells = EDGE_CELLS[patch_model.mesh.is_static]
+        n_contact_cells = n_edge_cells
     # A band along the path of a moving edge would need many cells, each of which changes the
     # contact set.
-    coating_cell = coating / 4 if coating and patch_model.mesh.edge_motion != "load" else np.inf
+    coating_cell = coating / 4 if coating and mesh.edge_motion != "load" else np.inf
     min_cell = max(min(width / n_contact_cells, coating_cell), MIN_CELL_RATIO * length)
+
     bands = _make_edge_bands([extent.places for extent in extents], min_cell)
     # A node is placed on each step of the gap; the quantities there converge at first order in the
     # cell length.
     step_cell = min_cell / STEP_CELL_FACTOR
     bands += _make_point_bands(patch_model.gap.jumps, step_cell)
+
     rounded_edges, rounding_length = find_rounded_edges(patch_model)
     for place in rounded_edges:
         if span[0] - min_cell <= place <= span[1] + min_cell:
             bands.append((place, place, min(min_cell, rounding_length / 4)))
+
+    # Peaks of the pressure and zones of slip each have a number of cells.
     corner_factor = STEP_CELL_FACTOR if patch_model.has_singular_ends else 1
     has_waves = _max_wave_cell(patch_model) < np.inf
     for extent in extents if has_waves else ():
@@ -271,10 +287,12 @@ def make_column_layout(patch_model, extents: list) -> Layout:
         for start, stop in extent.slip_zones:
             cell = max((stop - start) / N_CELLS_PER_SLIP_ZONE, MIN_CELL_RATIO * length)
             bands.append((start, stop, cell))
+
+    # At a loaded corner the pressure is singular or, under a coating, changes over its thickness.
     corner_cell = max(
         min(
             coating / 16 if coating else np.inf,
-            width / EDGE_CELLS[patch_model.mesh.is_static] / corner_factor,
+            width / n_edge_cells / corner_factor,
         ),
         MIN_CELL_RATIO * length,
     )
@@ -289,16 +307,16 @@ def make_column_layout(patch_model, extents: list) -> Layout:
         span,
         max(max_loaded_cell, min_cell),
         max_cell,
-        CELL_GROWTH[patch_model.mesh.is_static],
+        CELL_GROWTH[mesh.is_static],
     )
 
 
-def _make_point_bands(places, cell: float) -> list:
+def _make_point_bands(places, cell: float) -> Bands:
     """Return bands with a node at each position [m] between cells of a given length [m]."""
     return [(place, place, cell) for place in places]
 
 
-def _make_edge_bands(edge_positions: list, min_cell: float) -> list:
+def _make_edge_bands(edge_positions: list, min_cell: float) -> Bands:
     """Return the bands of short columns around the contact edges.
 
     If all contacts have equally many edges, each band covers the range over which its edge moves.
@@ -323,6 +341,7 @@ def find_contact_extent(patch: Patch, slip=None) -> ContactExtent:
     Parameters
     ----------
     patch : Patch
+        Solved patch on a coarse grid.
     slip : PrescribedSlip, optional
         Prescribed displacement of the holders; None without partial slip.
     """
@@ -333,20 +352,26 @@ def find_contact_extent(patch: Patch, slip=None) -> ContactExtent:
         low = float(x[max(closest_node - 1, 0)])
         high = float(x[min(closest_node + 1, x.size - 1)])
         return ContactExtent((low, high), (float(x[closest_node]),), (), np.inf)
+
     strips = patch.state.pressure
     is_loaded = strips > (1e-3 * strips.max() if patch.has_smooth_skin else 0.0)
     loaded_nodes = np.flatnonzero(is_loaded.any(axis=0))
     low = x[max(loaded_nodes[0] - 1, 0)]
     high = x[min(loaded_nodes[-1] + 1, x.size - 1)]
+
     # Around a contact of few nodes, the next search has shorter cells.
     if loaded_nodes.size < 4 and loaded_nodes.size < x.size:
         return ContactExtent((float(low), float(high)), tuple(x[loaded_nodes].tolist()), (), np.inf)
+
+    # An edge lies in the cell between a loaded and a free node; the solver knows it more
+    # accurately.
     edge_cells = np.flatnonzero((is_loaded[:, 1:] != is_loaded[:, :-1]).any(axis=0))
     edge_positions = (x[edge_cells] + x[edge_cells + 1]) / 2
     cells = np.diff(x)[edge_cells]
     edges = contact_ends(patch)
     if len(edges) == edge_cells.size:
         edge_positions = np.array([end.position for end in edges])
+
     corners = tuple(float(x[at]) for at in (0, -1) if is_loaded[:, at].any())
     low = edge_positions[0] if loaded_nodes[0] else x[0]
     high = edge_positions[-1] if loaded_nodes[-1] < x.size - 1 else x[-1]
@@ -360,7 +385,7 @@ def find_contact_extent(patch: Patch, slip=None) -> ContactExtent:
     )
 
 
-def _find_pressure_maxima(x, sigma) -> tuple:
+def _find_pressure_maxima(x, sigma) -> Pairs:
     """Return (position, half-width) [m] of the pressure maxima inside a contact.
 
     Both follow from parabolas through three nodal pressures.
@@ -387,6 +412,7 @@ def make_grids(patch_model, layout: Layout) -> list:
     Parameters
     ----------
     patch_model : PatchModel
+        Patch whose pieces are meshed.
     layout : Layout
         Column layout, from `make_column_layout`.
 
@@ -424,6 +450,7 @@ def predict_condensing_seconds(bodies) -> float:
     Parameters
     ----------
     bodies : iterable of TensorGrid, PieceMesh or None
+        Meshes of the lower and the upper piece; None for the upper one of identical pieces.
     """
     return sum(
         SECONDS_PER_NODE * body.n_nodes**NODE_EXPONENT for body in bodies if body is not None

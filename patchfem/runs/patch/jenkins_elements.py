@@ -33,6 +33,7 @@ def elements(patch: Patch, static: float, length: float) -> "shear_modes.Jenkins
     Parameters
     ----------
     patch : Patch
+        Solved patch without strips.
     static : float
         Coefficient of static friction.
     length : float
@@ -61,6 +62,7 @@ def strip_elements(patch: Patch, static: float, length: float) -> tuple[StripEle
     Parameters
     ----------
     patch : Patch
+        Solved patch in strips.
     static : float
         Coefficient of friction [1].
     length : float

@@ -7,7 +7,7 @@ module also estimates the model errors due to the plane state and to the number 
 """
 
 from dataclasses import replace
-from itertools import pairwise
+from itertools import pairwise, takewhile
 from typing import NamedTuple
 
 import numpy as np
@@ -19,10 +19,10 @@ from ...mesh.grid import TensorGrid
 from ...response import errors
 from ...scene.keys.contact import compute_outermost_strip_distance
 from ..results import patch_rows
-from ..results.patch_rows import MESH_MEASURES, TABLE
+from ..results.patch_rows import MESH_MEASURES, TABLE, Measures, Values
 from .condensed import condense_on_same_meshes
 from .limits import extrapolate_to_zero_cell_length
-from .press import Patch, solve_patch_contact
+from .press import Patch, Patches, solve_patch_contact
 from .values import (
     compute_static_values,
     edge_cell_lengths,
@@ -49,10 +49,8 @@ EXTRAPOLATED_ERROR_RATIO = 2.0
 # Error factor for meshes that do not resolve the rounded ends of a piece.
 UNRESOLVED_ROUNDING_FACTOR = 2.0
 MEASURES_WITH_BAND = ("pressure_peak", "normal_stiffness", "tangential_stiffness")
-PEAK_MEASURES = (
-    "pressure_peak",
-    "loaded_fraction",
-)  # Measures without a value where the pressure is unbounded.
+# Measures without a value where the pressure is unbounded.
+PEAK_MEASURES = ("pressure_peak", "loaded_fraction")
 
 
 class Estimate(NamedTuple):
@@ -78,9 +76,12 @@ class Estimate(NamedTuple):
         return Measure(float(self.value), row.unit, error, row.floor, engine=engine)
 
 
+Estimates = dict[str, Estimate]  # by the name of the measure
+
+
 def estimate_static_measures(
     fine: Patch, *coarse: Patch | None, tolerance: float | None = None
-) -> dict:
+) -> Measures:
     """Return the static measures of a patch with their error estimates.
 
     A value is that of the finest mesh, or its limit for vanishing cells if the value misses the
@@ -96,6 +97,7 @@ def estimate_static_measures(
     Parameters
     ----------
     fine : Patch
+        The patch on its finest mesh.
     *coarse : Patch or None
         The patch on coarser meshes, from fine to coarse; None where there is no such mesh.
     tolerance : float or None
@@ -110,6 +112,8 @@ def estimate_static_measures(
     coarse = _select_meshes_with_same_contact_intervals(
         fine, [patch for patch in coarse if patch is not None]
     )
+
+    # The series over the meshes gives a value, its limit and their errors.
     if coarse and finest["normal_load"] > 0:
         missed_peak = unresolved_edge_rounding_pressure(fine)
         estimates = extrapolate_static_measures(
@@ -123,7 +127,10 @@ def estimate_static_measures(
     else:
         error = 0.0 if coarse else None
         estimates = {name: Estimate(value, error) for name, value in finest.items()}
+
     out = {name: estimate.to_measure(name) for name, estimate in estimates.items()}
+
+    # Errors and reasons that no series over meshes shows.
     if coarse and fine.averaging is not None:
         out |= _widen_errors_by_corner_pressure(out, fine, coarse[0])
     if fine.points is not None:
@@ -134,7 +141,7 @@ def estimate_static_measures(
     return out
 
 
-def with_static_measures(patches, tolerance: float | None, points=None) -> tuple:
+def with_static_measures(patches, tolerance: float | None, points=None) -> Patches:
     """Return solved patches of which the finest one has its static measures with their errors.
 
     Parameters
@@ -159,7 +166,9 @@ def with_static_measures(patches, tolerance: float | None, points=None) -> tuple
     return replace(fine, measures=measures), *coarse
 
 
-def _select_more_accurate_point_measures(measures_by_name: dict, estimates: dict) -> dict:
+def _select_more_accurate_point_measures(
+    measures_by_name: Measures, estimates: Estimates
+) -> Measures:
     """Return the measures that profile points determine more accurately than the mesh.
 
     Peak measures are compared by their relative errors: a mesh that smooths the profile has a low
@@ -181,7 +190,7 @@ def _select_more_accurate_point_measures(measures_by_name: dict, estimates: dict
     return out
 
 
-def _select_meshes_with_same_contact_intervals(fine: Patch, coarse: list) -> list:
+def _select_meshes_with_same_contact_intervals(fine: Patch, coarse: list[Patch]) -> list[Patch]:
     """Select the coarser solutions with as many contact intervals as the finest one.
 
     A short contact interval beside a step may be missing on a coarse mesh. The change to this mesh
@@ -191,6 +200,7 @@ def _select_meshes_with_same_contact_intervals(fine: Patch, coarse: list) -> lis
     Parameters
     ----------
     fine : Patch
+        The patch on its finest mesh.
     coarse : list of Patch
         From fine to coarse.
 
@@ -202,13 +212,10 @@ def _select_meshes_with_same_contact_intervals(fine: Patch, coarse: list) -> lis
     if not fine.model.gap.jumps:
         return coarse
     n_intervals = _count_contact_intervals(fine.active)
-    n_selected = 0
-    while (
-        n_selected < len(coarse)
-        and _count_contact_intervals(coarse[n_selected].active) == n_intervals
-    ):
-        n_selected += 1
-    return coarse[: max(n_selected, 1)]
+    selected = takewhile(
+        lambda patch: _count_contact_intervals(patch.active) == n_intervals, coarse
+    )
+    return list(selected) or coarse[:1]
 
 
 def _count_contact_intervals(active) -> int:
@@ -216,7 +223,9 @@ def _count_contact_intervals(active) -> int:
     return int(active[0]) + int(np.count_nonzero(active[1:] & ~active[:-1]))
 
 
-def _widen_errors_by_corner_pressure(measures_by_name: dict, fine: Patch, coarse: Patch) -> dict:
+def _widen_errors_by_corner_pressure(
+    measures_by_name: Measures, fine: Patch, coarse: Patch
+) -> Measures:
     """Increase the errors of the peak measures if the pressure at a corner still grows.
 
     At a corner that the profile just reaches, every refinement raises the pressure, although the
@@ -239,13 +248,13 @@ def _widen_errors_by_corner_pressure(measures_by_name: dict, fine: Patch, coarse
 
 
 def extrapolate_static_measures(
-    values_by_mesh: list,
-    hidden_errors: dict,
+    values_by_mesh: list[Values],
+    hidden_errors: Values,
     tolerance: float | None,
     nested: bool = True,
     min_relative_error: float = MIN_ERROR,
     error_factor: float = 1.0,
-) -> dict:
+) -> Estimates:
     """Extrapolate static measures over a sequence of refined meshes, with error estimates.
 
     The error of a value is the larger one of `error_factor` times the error of the series (`limits`) and
@@ -275,6 +284,8 @@ def extrapolate_static_measures(
     for name, finest in values_by_mesh[-1].items():
         limit = extrapolate_to_zero_cell_length([values[name] for values in values_by_mesh], nested)
         hidden = hidden_errors.get(name, 0.0)
+
+        # The limit replaces the value only if it is needed and has the smaller error.
         value = finest
         error = max(error_factor * limit.error, hidden)
         allowed = np.inf
@@ -287,8 +298,12 @@ def extrapolate_static_measures(
             if extrapolated_error < error:
                 value = limit.extrapolated
                 error = extrapolated_error
+
         error = max(error, min_relative_error * abs(finest))
         out[name] = Estimate(value, error, value != finest)
+
+    # The loaded fraction is mean pressure / peak pressure, so that it has the relative error of the
+    # peak at least.
     peak, fraction = (out[name] for name in PEAK_MEASURES)
     relative = peak.error / peak.value if peak.value > 0 else 0.0
     fraction_error = increase_error_by_peak_error(fraction.value, fraction.error, relative)
@@ -314,7 +329,7 @@ def increase_error_by_peak_error(
     return max(error, fraction * relative_peak_error / (1 - min(relative_peak_error, 0.5)))
 
 
-def max_mesh_error_ratio(measures_by_name: dict, tolerance: float) -> float:
+def max_mesh_error_ratio(measures_by_name: Measures, tolerance: float) -> float:
     """Return the largest ratio of error to allowed error of the measures that control the mesh.
 
     A ratio above 1 means that a measure misses the tolerance. Measures without value or error are
@@ -398,6 +413,7 @@ def _compute_resolution(patch: Patch, missed_peak: float) -> Resolution:
     active = patch.active
     interface = pieces.interface
     sigma = patch.pressure.sigma_n
+
     all_cells = np.diff(interface.x)
     cells = edge_cell_lengths(patch.x, active)
     longest_cell = float(cells.max(initial=0.0))
@@ -413,6 +429,7 @@ def _compute_resolution(patch: Patch, missed_peak: float) -> Resolution:
 
     first, last = ~active[[0, -1]]
     n_nodes = max(int(active.sum()), 1)
+
     is_unresolved = n_nodes <= MAX_UNRESOLVED_NODES and cells.any()
     edge_offset = None
     if not patch.has_smooth_skin:
@@ -435,7 +452,7 @@ def _compute_resolution(patch: Patch, missed_peak: float) -> Resolution:
     )
 
 
-def estimate_hidden_errors(resolution: Resolution, finest: dict) -> dict:
+def estimate_hidden_errors(resolution: Resolution, finest: Values) -> Values:
     """Estimate the errors of the static measures that mesh refinement does not reveal.
 
     They are due to a contact of few nodes, to a coating thinner than the cells at a loaded corner,
@@ -459,19 +476,24 @@ def estimate_hidden_errors(resolution: Resolution, finest: dict) -> dict:
     n_nodes = resolution.n_nodes
     load = finest["normal_load"]
     peak = finest["pressure_peak"]
+
     # Errors add up over the edges of the contact: half of all their cells, but at least the longest one.
     cell = max(resolution.longest_cell, resolution.edge_cells / 2)
     is_unresolved = n_nodes <= MAX_UNRESOLVED_NODES
     centre_error = cell / (2 * n_nodes**2) if is_unresolved else 1e-3 * cell
+
     peak_error = resolution.corner_pressure
     if cell > 0 and n_nodes <= MIN_RESOLVED_NODES:
         peak_error = peak_error + peak / (4 * n_nodes**2)
     peak_error = max(peak_error, resolution.wedge_pressure, resolution.rounding_pressure - peak)
+
+    # Displacements have round-off, and a wrong centre times the angle of rotation.
     displacement = (
         ROUND_OFF_FRACTION * (abs(finest["approach"]) + resolution.closing)
         + abs(finest["rotation"]) * centre_error * resolution.can_rotate
     )
     fraction_per_pressure = finest["loaded_fraction"] / peak if peak else 0.0
+
     edge_offset = 0.0
     if resolution.edge_offset is not None:
         # In a contact of few nodes, an edge may lie anywhere in its cell.
@@ -480,6 +502,7 @@ def estimate_hidden_errors(resolution: Resolution, finest: dict) -> dict:
     outer_cells = resolution.edge_cells - resolution.inner_cells
     length_error = edge_offset * resolution.edge_cells + resolution.open_ends
     width_error = edge_offset * outer_cells + resolution.open_ends
+
     return {
         "normal_load": 1e-10 * load,
         "pressure_peak": peak_error,
@@ -525,7 +548,7 @@ def _wedge_indentation_pressure(patch: Patch) -> float:
     return float(slopes[..., ends].max() / flexibility)
 
 
-def note_on_plane_state(patch_model, patch: Patch) -> list:
+def note_on_plane_state(patch_model, patch: Patch) -> list[str]:
     """Return a list with a note on the model error due to assuming plane strain or plane stress.
 
     The list is empty for a piece in plane strain that is far wider than tall, and for one in plane
@@ -541,10 +564,14 @@ def note_on_plane_state(patch_model, patch: Patch) -> list:
         is_certain = ratio <= 1 / MIN_PLANE_STRAIN_RATIO
     if is_certain:
         return []
+
     assumption = (
         f"plane {pieces.plane} is assumed, and the pieces are {ratio:.2g} times as wide as tall; "
         "the true state lies between plane strain and plane stress"
     )
+
+    # The change between the two plane states bounds the error, because the true state lies between
+    # them.
     other_model = replace(patch_model, pieces=replace(pieces, plane=other_plane))
     try:
         pair = condense_on_same_meshes(other_model, patch.pair)
@@ -554,6 +581,7 @@ def note_on_plane_state(patch_model, patch: Patch) -> list:
             f"{assumption}; how much the two "
             f"differ is not known, because for plane {other_plane} the contact could not be solved ({error})"
         ]
+
     changes = _format_changes(patch_model, compute_static_values(patch), other_values)
     if not changes:
         return []
@@ -562,7 +590,7 @@ def note_on_plane_state(patch_model, patch: Patch) -> list:
     ]
 
 
-def _format_changes(patch_model, values: dict, other_values: dict) -> list[str]:
+def _format_changes(patch_model, values: Values, other_values: Values) -> list[str]:
     """Format the changes of the measures from the assumed plane state to the opposite one."""
     changes = []
     names = MEASURES_WITH_BAND
@@ -579,7 +607,7 @@ def _format_changes(patch_model, values: dict, other_values: dict) -> list[str]:
     return changes
 
 
-def add_strip_count_errors(patch_model, patch: Patch, measures_by_name: dict) -> dict:
+def add_strip_count_errors(patch_model, patch: Patch, measures_by_name: Measures) -> Measures:
     """Add the errors due to the finite number of strips to the measures of a patch.
 
     The error follows from the change with another number of strips on the same mesh, assuming
@@ -588,13 +616,16 @@ def add_strip_count_errors(patch_model, patch: Patch, measures_by_name: dict) ->
     Parameters
     ----------
     patch_model : PatchModel
+        Patch with its number of strips.
     patch : Patch
+        The patch on its finest mesh, on which the other number of strips is solved too.
     measures_by_name : dict
         Measures by name.
 
     Returns
     -------
     dict
+        Measure by name.
     """
     other_model, ratio = with_other_strip_count(patch_model)
     if other_model is patch_model:

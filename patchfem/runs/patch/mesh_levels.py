@@ -14,7 +14,7 @@ from . import profile_points, slip_zones, store
 from .condensed import condense, condense_on_shared_meshes
 from .grids import MAX_CONDENSING_SECONDS, MIN_LEVELS, make_base_grids, predict_condensing_seconds
 from .measures import estimate_static_measures, max_mesh_error_ratio, with_static_measures
-from .press import solve_patch_contact
+from .press import Patches, solve_patch_contact
 
 # Tolerance at which a patch with prescribed partial slip may take as much CPU time as a patch in a
 # rig. The allowed time is proportional to tolerance^-0.5: a tenth of the tolerance allows 3.2 times
@@ -24,7 +24,7 @@ SLIP_REFERENCE_TOL = 1e-3
 MAX_COLUMNS_WITHOUT_COARSER = 8
 
 
-def solve_with_coarser(patch_model, tolerance: float, estimate: bool = True) -> tuple:
+def solve_with_coarser(patch_model, tolerance: float, estimate: bool = True) -> Patches:
     """Solve a patch on its mesh and on the coarser meshes of its error estimate.
 
     On each mesh the pieces are condensed to the nodes of the interface, so that a compliance [m/N]
@@ -40,7 +40,9 @@ def solve_with_coarser(patch_model, tolerance: float, estimate: bool = True) -> 
     Parameters
     ----------
     patch_model : PatchModel
+        Patch to solve, with its mesh, shared mesh or element size.
     tolerance : float
+        Relative error that the static measures have to meet.
     estimate : bool
         Whether to solve the coarser meshes as well.
 
@@ -69,16 +71,17 @@ def solve_with_coarser(patch_model, tolerance: float, estimate: bool = True) -> 
     return patches
 
 
-def solve_on_pairs(patch_model, pairs, tolerance: float, estimate: bool = True) -> tuple:
+def solve_on_pairs(patch_model, pairs, tolerance: float, estimate: bool = True) -> Patches:
     """Solve a patch on given condensed pieces.
 
     Parameters
     ----------
     patch_model : PatchModel
+        Patch to solve.
     pairs : sequence of CondensedPair
         From fine to coarse.
     tolerance : float
-        See `with_static_measures`.
+        Relative error; measures that miss it are extrapolated if the mesh is automatic.
     estimate : bool
         Whether to use the coarser pieces as well.
 
@@ -96,7 +99,7 @@ def solve_on_pairs(patch_model, pairs, tolerance: float, estimate: bool = True) 
 
 def _solve_on_given_meshes(
     patch_model, bodies: tuple, tolerance: float | None, estimate: bool
-) -> tuple:
+) -> Patches:
     """Solve a patch on given meshes and on the meshes of its error estimate."""
     levels = [bodies, *(make_comparison_meshes(*bodies) if estimate else ())]
     pairs = [condense(patch_model, *level) for level in levels]
@@ -130,7 +133,7 @@ def make_comparison_meshes(lower, upper) -> list:
     return out
 
 
-def solve_on_refined_meshes(patch_model, tolerance: float, estimate: bool = True) -> tuple:
+def solve_on_refined_meshes(patch_model, tolerance: float, estimate: bool = True) -> Patches:
     """Solve a patch on successively finer meshes until it meets the tolerance.
 
     At least MIN_LEVELS meshes are solved, because the error follows from the changes between them. Each
@@ -143,7 +146,9 @@ def solve_on_refined_meshes(patch_model, tolerance: float, estimate: bool = True
     Parameters
     ----------
     patch_model : PatchModel
+        Patch to solve, without a prescribed element size.
     tolerance : float
+        Relative error that the static measures have to meet.
     estimate : bool
         If False, only the third mesh is solved.
 
@@ -170,14 +175,18 @@ def solve_on_refined_meshes(patch_model, tolerance: float, estimate: bool = True
                 if not patches or patches[0] is None:
                     raise
                 return with_static_measures((*patches, *(2 - len(patches)) * [None]), tolerance)
+
         patches = (patch, *patches)
         grids = [grid.refine() for grid in grids]
         if len(patches) < MIN_LEVELS:
             continue
+
         # The solution on the points of the profile is used with all finer meshes.
         patches = with_static_measures(patches, tolerance, points)
         if not estimate or patch.pressure.outcome is Outcome.NO_CONTACT:
             return patches
+
+        # Points replace the next mesh if its condensation would take too long.
         seconds = predict_condensing_seconds(grids)
         is_within = max_mesh_error_ratio(patches[0].measures, tolerance) <= 1
         if (
@@ -192,6 +201,7 @@ def solve_on_refined_meshes(patch_model, tolerance: float, estimate: bool = True
             # points that do not converge do not do so on the next mesh either
             has_failed_on_points = points is None
             patches = with_static_measures(patches, tolerance, points)
+
         # The points do not determine a peak that may be at a free corner, but a finer mesh does.
         is_done = is_within or (points is not None and "pressure_peak" in points.measures)
         is_done = is_done and resolves_slip_work(patch_model, patches, tolerance)
@@ -201,7 +211,7 @@ def solve_on_refined_meshes(patch_model, tolerance: float, estimate: bool = True
             n_finer -= 1
 
 
-def _meets_tolerance(patches: tuple, tolerance: float, points) -> bool:
+def _meets_tolerance(patches: Patches, tolerance: float, points) -> bool:
     """Return whether the measures that control the mesh meet the tolerance with given points."""
     fine = with_static_measures(patches, tolerance, points)[0]
     return max_mesh_error_ratio(fine.measures, tolerance) <= 1
@@ -221,13 +231,17 @@ def max_condensing_seconds(patch_model, tolerance: float) -> float:
     )
 
 
-def solve_on_static_meshes(patch_model, tolerance: float, estimate: bool = True) -> tuple:
+def solve_on_static_meshes(patch_model, tolerance: float, estimate: bool = True) -> Patches:
     """Solve a bench patch with partial slip on the meshes of a static run.
 
     Parameters
     ----------
-    patch_model, tolerance, estimate
-        See `solve_on_refined_meshes`.
+    patch_model : PatchModel
+        Patch of a bench.
+    tolerance : float
+        Relative error that the static measures have to meet.
+    estimate : bool
+        If False, only the third mesh is solved.
 
     Returns
     -------
@@ -251,9 +265,11 @@ def resolves_slip_work(patch_model, patches, tolerance: float) -> bool:
     Parameters
     ----------
     patch_model : PatchModel
+        Patch, with the prescribed displacement of its mesh settings.
     patches : sequence of Patch or None
         From fine to coarse; None for a missing mesh.
     tolerance : float
+        Relative error that work and peak force have to meet.
     """
     slip = patch_model.mesh.slip
     if slip is None:
@@ -268,9 +284,11 @@ def needs_finer_mesh(patch_model, patches, tolerance: float) -> bool:
     Parameters
     ----------
     patch_model : PatchModel
+        Patch of the run.
     patches : sequence of Patch or None
         Patches from fine to coarse.
     tolerance : float
+        The smaller tolerance.
     """
     finer = [mesh.refine() for mesh in patches[0].pair.meshes if mesh is not None]
     if predict_condensing_seconds(finer) > max_condensing_seconds(patch_model, tolerance):

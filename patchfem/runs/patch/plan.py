@@ -9,6 +9,7 @@ from math import sqrt
 from ...formatting import format_length
 from ...model.model import Model
 from ...model.pieces import make_piece_meshes
+from ..results.patch_rows import Values
 from . import skin, store
 from .grids import (
     MAX_CONDENSING_SECONDS,
@@ -24,6 +25,10 @@ TIGHT_TOL = 2e-3
 # Largest ratio of tilt to the opening tilt of bars at which full contact is certain. Elastic pieces
 # with height/length 0.08 to 4 open at 0.77 and above.
 MAX_FULL_CONTACT_TILT = 0.7
+
+
+# Stiffness [N/m] of each element in series, or "rigid", by name.
+StiffnessChain = dict[str, float | str]
 
 
 def _predict_mesh_levels(patch_model, tolerance: float) -> list:
@@ -51,7 +56,7 @@ def _predict_mesh_levels(patch_model, tolerance: float) -> list:
     return levels
 
 
-def count_unknowns(model: Model) -> dict:
+def count_unknowns(model: Model) -> dict[str, int]:
     """Count the unknowns of all patches of a model; equal patches of several interfaces are solved once."""
     patches = {} if model.patch is None else {"contact": model.patch}
     if model.has_interface_patches:
@@ -68,7 +73,7 @@ def count_unknowns(model: Model) -> dict:
     return {"interface_points": points, "elastic_unknowns_about": 2 * nodes}
 
 
-def stiffness_chain(patch_model) -> dict:
+def stiffness_chain(patch_model) -> StiffnessChain:
     """Return a dict of the stiffnesses [N/m] in series between holder and interface of a patch.
 
     An element that is not in the scene is "rigid".
@@ -78,22 +83,21 @@ def stiffness_chain(patch_model) -> dict:
         "pieces_shear": "rigid",
         "asperities": "rigid",
     }
+    pieces = patch_model.pieces
     if patch_model.interface.has_shear:
-        stiffnesses["pieces_shear"] = patch_model.pieces.shear_stiffness
-    if (
-        patch_model.interface.skin is not None
-        and patch_model.interface.skin.tangential_ratio is not None
-    ):
-        area = patch_model.pieces.length * patch_model.pieces.width * patch_model.pieces.pairs
+        stiffnesses["pieces_shear"] = pieces.shear_stiffness
+    layer = patch_model.interface.skin
+    if layer is not None and layer.tangential_ratio is not None:
+        area = pieces.length * pieces.width * pieces.pairs
         stiffnesses["asperities"] = (
-            patch_model.interface.skin.tangential_ratio
+            layer.tangential_ratio
             * skin.asperity_layer_stiffness(patch_model, patch_model.nominal_load / area)
             * area
         )
     return stiffnesses
 
 
-def find_solved_links(chain: dict, static_measures: dict) -> dict:
+def find_solved_links(chain: StiffnessChain, static_measures: Values) -> StiffnessChain:
     """Return the stiffness [N/m] of the pieces in the stiffness chain, from that of the solved patch.
 
     The stiffness of the patch is that of the pieces and the asperities in series.
@@ -120,7 +124,7 @@ def find_solved_links(chain: dict, static_measures: dict) -> dict:
     return links
 
 
-def compute_patch_groups(model: Model) -> dict:
+def compute_patch_groups(model: Model) -> Values:
     """Compute the dimensionless groups of a patch, and with friction its slip length [m].
 
     tilt_over_first_opening is the tilt divided by the tilt at which flat pieces, modelled as bars,
@@ -149,6 +153,7 @@ def describe_shear(patch_model, slip_length: float, name: str = "") -> str:
     Parameters
     ----------
     patch_model : PatchModel
+        Patch of the interface.
     slip_length : float
         Elastic slide of the pieces under their friction limit [m].
     name : str
@@ -165,7 +170,7 @@ def describe_shear(patch_model, slip_length: float, name: str = "") -> str:
     )
 
 
-def describe_patch_plan(dimensionless_groups: dict, patch_model) -> list:
+def describe_patch_plan(dimensionless_groups: Values, patch_model) -> list[str]:
     """Describe tilt and asperity layer of a patch in sentences for a plan.
 
     The tilt is compared with the opening tilt for flat pieces only.
@@ -178,7 +183,7 @@ def describe_patch_plan(dimensionless_groups: dict, patch_model) -> list:
     return [*_describe_tilt(dimensionless_groups, patch_model), *rough]
 
 
-def _describe_tilt(dimensionless_groups: dict, patch_model) -> list:
+def _describe_tilt(dimensionless_groups: Values, patch_model) -> list[str]:
     """Return a list with a sentence on the tilt relative to the tilt at which the contact opens."""
     tilt = dimensionless_groups.get("tilt_over_first_opening")
     gap = patch_model.gap

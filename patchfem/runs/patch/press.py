@@ -24,6 +24,7 @@ from ...contact.strip_compliance import StripCompliance, WarmStart
 from ...core import Compliance, ContactState, PatchfemError, frozen_array
 from ...exceptions import UnresolvedTrace
 from ...model.patch import PatchStrips
+from ..results.patch_rows import Arrays, Measures, Values
 from .condensed import CondensedPair
 from .skin import make_skin_law
 
@@ -109,12 +110,12 @@ class Patch:
     slip_compliance: np.ndarray
     unloaded_gap: np.ndarray
     notes: tuple
-    seconds: dict
+    seconds: Values
     averaging: float | None = None
     step_variants: tuple = ()
     points: PointSolution | None = None
-    measures: dict | None = None
-    frames: dict = field(default_factory=dict)
+    measures: Measures | None = None
+    frames: Arrays = field(default_factory=dict)
 
     @property
     def x(self) -> np.ndarray:
@@ -201,6 +202,10 @@ class Patch:
         return self.pressure.sigma_n > 0
 
 
+# A patch on several meshes, from fine to coarse; None for a mesh on which it is not solved.
+Patches = tuple[Patch | None, ...]
+
+
 def solve_patch_contact(patch_model, pair: CondensedPair, worn=None, coarse=None) -> Patch:
     """Solve the contact problem of condensed pieces with the gap and the load of a model.
 
@@ -209,7 +214,9 @@ def solve_patch_contact(patch_model, pair: CondensedPair, worn=None, coarse=None
     Parameters
     ----------
     patch_model : PatchModel
+        Model whose gap, load and asperity layer are used.
     pair : CondensedPair
+        Condensed pieces, on whose nodes the contact is solved.
     worn : (m,) or (s, m), optional
         Worn depth [m], which is added to the gap.
     coarse : Patch, optional
@@ -284,18 +291,27 @@ def _gap_variants_at_step(node: int, gap, half_steps, worn) -> tuple:
 
 
 def make_patch(
-    patch_model, pair: CondensedPair, gap, contact: SolvedContact, notes: tuple, seconds: dict
+    patch_model,
+    pair: CondensedPair,
+    gap,
+    contact: SolvedContact,
+    notes: tuple,
+    seconds: Values,
 ) -> Patch:
     """Assemble the Patch record of a solved contact.
 
     Parameters
     ----------
     patch_model : PatchModel
+        Model that was solved.
     pair : CondensedPair
+        Condensed pieces of the solution.
     gap : (m,)
         Unloaded gap [m].
     contact : SolvedContact
+        Solution on the nodes of the pieces.
     notes : tuple
+        Sentences on the gap.
     seconds : dict
         CPU seconds by name.
 
@@ -388,6 +404,7 @@ def solve_contact(
     Parameters
     ----------
     patch_model : PatchModel
+        Model whose asperity layer, load and holder are used.
     pieces : Compliance
         Compliance of the pieces without asperity layer.
     gap : (m,) or (s, m)
@@ -406,12 +423,15 @@ def solve_contact(
     count, roll, offset = patch_model.interface.strips or PatchStrips(1, 0.0, None)
     strip = split_into_strips(pieces, count)
     offsets = strip_offsets(patch_model.pieces.width, count)
+
     strips = StripModel(
         StripCompliance(strip.normal, added, warm_start),
         StripLayout(pieces.interface.x, strip.weight, offsets),
         None if skin is None else make_skin_law(patch_model),
     )
     is_loaded = loading.approach is None
+
+    # A prescribed approach leaves load and moment to the solution; otherwise they are given.
     holder = Holder(
         load=loading.load if is_loaded else None,
         approach=loading.approach,
@@ -421,11 +441,14 @@ def solve_contact(
         rotation=patch_model.gap.angle,
         roll=roll,
     )
+
     state = press_strips(strips, gap, holder)
     pressure = state.pressure
     # A smooth law never reaches 0; what is set to 0 is smaller than the residual of the load balance.
     if strips.is_smooth:
         pressure = np.where(pressure > edges.MIN_RELATIVE_PRESSURE * pressure.max(), pressure, 0.0)
+
+    # The fields of a patch are means over its strips; the gap is the smallest one.
     mean_state = ContactState(
         frozen_array(pressure.mean(axis=0)),
         frozen_array(state.gap.min(axis=0)),
@@ -437,6 +460,8 @@ def solve_contact(
         state.iterations,
         state.residuals,
     )
+
+    # Without strips, the layer can be part of the compliance.
     if skin is not None and patch_model.interface.strips is None:
         pieces = _add_layer(skin, pieces, compute_layer_compliance(skin, state)[0])
     return SolvedContact(pieces, mean_state, state)

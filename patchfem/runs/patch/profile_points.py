@@ -31,6 +31,7 @@ from .measures import (
     MIN_EDGE_OFFSET,
     PEAK_MEASURES,
     Estimate,
+    Estimates,
     Resolution,
     estimate_hidden_errors,
     extrapolate_static_measures,
@@ -141,6 +142,7 @@ def solve_on_points(patch_model, meets_tolerance) -> PointSolution | None:
     Parameters
     ----------
     patch_model : PatchModel
+        Patch with a profile, without strips.
     meets_tolerance : callable
         Function of a PointSolution that ends the refinement. MAX_POINTS and MAX_WORK end it as
         well.
@@ -184,7 +186,9 @@ def _is_next_level_expensive(level: PointLevel) -> bool:
     return 2 * count > MAX_POINTS or 3 * level.n_iterations * count > MAX_WORK
 
 
-def _combine_refinement_series(end_levels: list, point_levels: list) -> dict:
+def _combine_refinement_series(
+    end_levels: list[PointLevel], point_levels: list[PointLevel]
+) -> Estimates:
     """Combine two series of refinements into one estimate of each measure.
 
     The first series halves the cells at the ends. The second doubles the points, with the shortest
@@ -213,9 +217,12 @@ def _combine_refinement_series(end_levels: list, point_levels: list) -> dict:
 
 def _compute_free_end_compliance(patch_model, level: int) -> FreeEnds:
     """Compute the change of compliance due to the free ends, with the cells of a given level."""
-    half = patch_model.pieces.length / 2
-    cell = END_CELL_RATIO * patch_model.pieces.length
-    middle_cell = MIDDLE_CELL_RATIO * patch_model.pieces.length
+    length = patch_model.pieces.length
+    half = length / 2
+    cell = END_CELL_RATIO * length
+    middle_cell = MIDDLE_CELL_RATIO * length
+
+    # Short columns only at both ends, where the compliance differs from that of infinite layers.
     bands = ((-half, -half, cell), (half, half, cell))
     layout = Layout(
         start=-half,
@@ -227,6 +234,8 @@ def _compute_free_end_compliance(patch_model, level: int) -> FreeEnds:
         slope=CELL_GROWTH,
     ).scale_cells(0.5**level)
     x = divide_into_columns(layout)
+
+    # Two equal pieces count twice.
     changes = 0.0
     for piece, multiplicity in _distinct_pieces(patch_model):
         grid = TensorGrid(x, *_row_depths(piece, layout))
@@ -247,7 +256,9 @@ def make_point_compliances(patch_model, ends: FreeEnds, count: int) -> tuple:
     Parameters
     ----------
     patch_model : PatchModel
+        Patch whose pieces and coatings the points are on.
     ends : FreeEnds
+        Ends of the pieces that are free sides.
     count : int
         Number of points.
 
@@ -297,6 +308,8 @@ def _solve_level(patch_model, ends: FreeEnds, count: int, start=None) -> PointLe
     x = normal.x
     half_points = np.linspace(-length / 2, length / 2, 2 * count + 1)
     gap = patch_model.gap.evaluate(half_points).heights[1::2]
+
+    # Opening of the interface: gap + rotation x - approach + deflection, not below 0.
     solution = _solve_nodal_forces(patch_model, normal, gap, start)
     force = solution.force
     deflection = normal.product(force)
@@ -309,9 +322,12 @@ def _solve_level(patch_model, ends: FreeEnds, count: int, start=None) -> PointLe
         )
     if not active.any():
         raise NotConverged("contact: the pieces touch on coarser cells only")
+
     opening = np.where(active, 0.0, np.maximum(opening, 0.0))
     sigma = force / normal.area
     unit = np.ones(count)
+
+    # The edges between the points follow from the forces on the points in contact.
     contact_edges = find_edges(normal, force, opening, normal.solve_forces(active, unit))
     intervals = _contact_intervals(active, contact_edges, length)
     state = HolderState(
@@ -320,6 +336,7 @@ def _solve_level(patch_model, ends: FreeEnds, count: int, start=None) -> PointLe
         solution.approach,
         patch_model.gap.angle + solution.rotation,
     )
+
     # For dissimilar pieces, the tangential stiffness also depends on the coupling of shear and normal
     # displacement, which is not computed here.
     tangential = np.nan
@@ -332,11 +349,14 @@ def _solve_level(patch_model, ends: FreeEnds, count: int, start=None) -> PointLe
         tangential=tangential,
         rotational=set_stiffness(normal, active, x, contact_edges),
     )
+
     # At an end of the interface the pressure is that of the point there.
     peak = estimate_peak_pressure(x, sigma, node_fraction=unit)
     values = assemble_static_values(length, normal.area * count, state, peak, edge_values)
     if np.isnan(tangential):
         del values["tangential_stiffness"]
+
+    # What this level resolves, for the errors that a finer level does not show.
     cell = length / count
     resolution = Resolution(
         length=length,
@@ -349,6 +369,7 @@ def _solve_level(patch_model, ends: FreeEnds, count: int, start=None) -> PointLe
     )
     n_corner = max(1, round(CORNER_LENGTH_RATIO * count))
     corner_force = max(force[:n_corner].max(), force[-n_corner:].max())
+
     return PointLevel(
         force,
         Surface(x, np.full(count, normal.area), sigma, opening, gap),
@@ -382,6 +403,7 @@ def _solve_nodal_forces(patch_model, normal: PointCompliance, gap, start) -> Poi
     has_approach = loading.approach is not None
     offset = loading.approach if has_approach else gap.min()
     moment = None if has_approach else loading.moment
+
     problem = patch_problem(
         x,
         gap - offset,
@@ -392,6 +414,8 @@ def _solve_nodal_forces(patch_model, normal: PointCompliance, gap, start) -> Poi
     force, n_iterations = solve_by_gradients(
         normal, problem, CONTACT_TOL, MAX_ITERATIONS, initial_force
     )
+
+    # Approach and rotation are those of a rigid line fitted to the loaded points (least squares).
     active = force > 0
     if has_approach or not active.any():
         return PointForces(force, float(offset), 0.0, n_iterations)

@@ -51,6 +51,7 @@ def static_measures(model, patch, coarse) -> dict:
     Parameters
     ----------
     model : Model
+        Model of the run.
     patch : Patch
         With measures, as from `solve_with_coarser`.
     coarse : sequence of Patch or None
@@ -100,13 +101,15 @@ def make_static_result(inputs: RunInputs) -> Result:
     )
 
 
-def patch_warnings(patch_model, patch, *, has_error_mesh: bool = True) -> list:
+def patch_warnings(patch_model, patch, *, has_error_mesh: bool = True) -> list[str]:
     """Return warnings on large strains, locking elements, the gap, the ends of the pieces and a missing coarser mesh.
 
     Parameters
     ----------
     patch_model : PatchModel
+        Model of the patch.
     patch : Patch
+        The patch on its finest mesh.
     has_error_mesh : bool
         Whether the patch is solved on another mesh too, from which its errors follow.
     """
@@ -121,16 +124,20 @@ def patch_warnings(patch_model, patch, *, has_error_mesh: bool = True) -> list:
             patch.pressure.approach / sum(piece.height for piece in patch_model.pieces.both)
         ),
     }
+
     warnings = []
     for words, strain in strains.items():
         if strain > MAX_SMALL_STRAIN:
             limit = f", beyond the small strains that are assumed ({MAX_SMALL_STRAIN:g})"
             warnings.append(words.format(strain) + limit)
+
     if contact_reaches_steep_end(patch):
         warnings.append(
             "on a rounded end the contact reaches the point where the slope is 0.097, and beyond this point no "
             "contact is computed; lower the tilt or the load"
         )
+
+    # A mesh that the run chose is refined until locking is part of its error; a given mesh is not.
     poisson = max(material.poisson for material in materials)
     is_fixed = not patch_model.mesh.is_automatic
     if patch_model.pieces.plane == "strain" and poisson > MAX_POISSON and is_fixed:
@@ -139,6 +146,7 @@ def patch_warnings(patch_model, patch, *, has_error_mesh: bool = True) -> list:
             f"Poisson's ratio is {poisson:g} (limit {MAX_POISSON:g}), so the true errors may be "
             f"twice the estimates; {_advise_shorter_elements(patch_model)}"
         )
+
     warnings += [text for text in patch.notes if not nodes.is_note(text)]
     if not has_error_mesh:
         warnings.append(
@@ -155,7 +163,7 @@ def _advise_shorter_elements(patch_model) -> str:
     return "leave out contact.element_size"
 
 
-def notes_on_neglected_effects(face) -> list:
+def notes_on_neglected_effects(face) -> list[str]:
     """Return notes on the effects that the model of a pressed interface neglects in any motion.
 
     Without a patch on coarser meshes there is no note on the plane state.
@@ -163,11 +171,14 @@ def notes_on_neglected_effects(face) -> list:
     Parameters
     ----------
     face : Face
+        The interface with its patch on all meshes, from fine to coarse.
     """
     model = face.model
     patch_model = model.patch
     patch, *coarse = face.patches
     out = [text for text in patch.notes if nodes.is_note(text)]
+
+    # How the results treat the waves of a profile.
     if patch.points is not None:
         out.append(
             f"each static measure is computed on the mesh and on points {format_length(patch.averaging, 3)} apart, and "
@@ -179,6 +190,7 @@ def notes_on_neglected_effects(face) -> list:
             "where the profile is in contact, its heights are averaged over a length of "
             f"{format_length(patch.averaging, 3)}; the errors include the effect of the choice of this length"
         )
+
     if patch.has_skin and patch.pressure.load > 0:
         loaded_area = patch.pieces.interface.weight @ patch.active
         out += skin.note_on_asperity_stiffness(
@@ -186,6 +198,8 @@ def notes_on_neglected_effects(face) -> list:
         )
     if patch.strips is not None:
         out.append(NEGLECTED_SHEAR_NOTE)
+
+    # Coupling of shear and normal motion, which acts only between dissimilar pieces.
     if model.kind == "patch":
         out += note_on_normal_shear_coupling(patch_model, patch)
     elif patch.pair.coupling > MIN_COUPLING_RATIO:
@@ -194,6 +208,7 @@ def notes_on_neglected_effects(face) -> list:
             f"neglected; under a shear force the largest normal displacement is {patch.pair.coupling:.2g} times "
             "the largest slide"
         )
+
     if coarse[0] is not None and patch.pressure.outcome is not Outcome.NO_CONTACT:
         # An unstructured mesh has no coarser one: its second mesh is finer than its first. Even the
         # coarsest mesh of a static patch has 20 cells along the contact, which is enough for the change.
@@ -221,7 +236,7 @@ def _describe_results_on_mesh(model, patch) -> str:
     return f"fields and motion are computed on {where}"
 
 
-def note_on_normal_shear_coupling(patch_model, patch) -> list:
+def note_on_normal_shear_coupling(patch_model, patch) -> list[str]:
     """Return a list with a note on the coupling of normal and shear displacement of dissimilar pieces.
 
     The surfaces of dissimilar pieces slide on each other under pressure. If they stick, shear stresses

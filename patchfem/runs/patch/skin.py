@@ -43,7 +43,7 @@ def asperity_layer_stiffness(patch_model, pressure: float) -> float:
     return float(law.stiffness(law.separation(np.array([pressure])))[0]) if pressure > 0 else 0.0
 
 
-def note_on_asperity_stiffness(patch_model, pressure: float) -> list:
+def note_on_asperity_stiffness(patch_model, pressure: float) -> list[str]:
     """Return a list with a note on how reliable the stiffness of Hertzian asperities is.
 
     The list is empty unless the asperities come from a profile or from rms values. pressure: mean
@@ -52,7 +52,12 @@ def note_on_asperity_stiffness(patch_model, pressure: float) -> list:
     skin = patch_model.interface.skin
     if skin is None or skin.law != "hertz" or skin.rms_height is None or not pressure > 0:
         return []
+
+    # Persson: stiffness = pressure / u_0, with u_0 = 0.4 to 0.5 of the rms height.
     soft, stiff = peaks.persson_stiffness(pressure, skin.rms_height)
+
+    # The stiffness of Hertzian peaks depends on the shortest waves, so that half the samples of the
+    # trace show how uncertain it is.
     half = ""
     remarks = []
     waves = f" of the waves below {format_quantity(skin.cutoff, 'm', 3)}" if skin.cutoff else ""
@@ -61,6 +66,7 @@ def note_on_asperity_stiffness(patch_model, pressure: float) -> list:
         half = f" (from every second sample: {_format_coarse_stiffness(patch_model, moments.coarse, pressure)})"
         texts = (*moments.dust, moments.not_gaussian)
         remarks = [f"contact.asperities: {text}" for text in texts if text]
+    # Waves that the profile contains must not count again in the layer.
     elif patch_model.gap.profile is not None and skin.cutoff is None:
         remarks = [
             "contact.asperities.rms_height: the profile already contains all waves longer than "

@@ -30,10 +30,13 @@ def find_slip_zones(patch, slip, ends: list) -> tuple:
     """
     if patch.strips is not None or not patch.active.any():
         return ()
+
     jenkins_set = elements(patch, slip.static, slip.bond_length)
     yield_by_node = dict(zip(jenkins_set.points.tolist(), jenkins_set.point_yields.tolist()))
     edge_by_node = {(end.node, end.side): end.position for end in ends}
     out = []
+
+    # Each interval of neighbouring nodes in contact is interpolated by itself.
     for nodes in np.split(jenkins_set.points, 1 + np.flatnonzero(np.diff(jenkins_set.points) > 1)):
         positions = patch.x[nodes].tolist()
         yield_displacements = [yield_by_node[node] for node in nodes.tolist()]
@@ -46,6 +49,7 @@ def find_slip_zones(patch, slip, ends: list) -> tuple:
             if last is not None and last > positions[-1]:
                 positions = [*positions, last]
                 yield_displacements = [*yield_displacements, 0.0]
+
         out += _yielding_intervals(
             np.array(positions), np.array(yield_displacements), slip.amplitude
         )
@@ -99,7 +103,9 @@ def max_slip_error_ratio(patches, slip, tolerance: float) -> float:
     patches : sequence of Patch
         The patch on two or more nested meshes, from fine to coarse.
     slip : PrescribedSlip
+        Prescribed displacement of the holders, with the friction law.
     tolerance : float
+        Relative error that work and peak force have to meet.
     """
     values = []
     for patch in patches:

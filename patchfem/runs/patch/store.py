@@ -30,6 +30,7 @@ def get_or_compute_in_sweep(patch_model, key: tuple, make: Callable):
     patch_model : PatchModel
         Patch to which the result belongs.
     key : tuple
+        What the result depends on.
     make : callable
         Function without parameters that computes the result.
     """

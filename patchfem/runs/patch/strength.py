@@ -64,6 +64,7 @@ def note_on_yielding_faces(patch_model, peak: float) -> dict:
     Parameters
     ----------
     patch_model : PatchModel
+        Patch with the materials of both surfaces.
     peak : float
         Pressure [Pa] that is reached somewhere on the interface.
 

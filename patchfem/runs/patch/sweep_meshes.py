@@ -16,7 +16,7 @@ from ...core import PatchfemError
 from ...mesh.grading import Layout
 from ...model.patch import SharedMeshes
 from . import grids, mesh_levels
-from .condensed import cache_condensed_pairs, condense
+from .condensed import CondensedPair, cache_condensed_pairs, condense
 from .measures import max_mesh_error_ratio
 from .press import solve_patch_contact
 
@@ -25,7 +25,7 @@ from .press import solve_patch_contact
 MAX_CASES = 48
 # Largest number of contact searches; each search uses columns graded to the contacts of the
 # previous one.
-MAX_SEARCHES = 4
+MAX_LAYOUT_SEARCHES = 4
 # Largest number of interface nodes of the finest mesh; a finer mesh slows down every case.
 MAX_INTERFACE_NODES = 400
 # Tolerance that needs the cells of a single case; a larger one needs longer cells, because the errors
@@ -68,6 +68,7 @@ def choose_shared_meshes(
     Parameters
     ----------
     patches : sequence of PatchModel
+        Patches of a sweep, in any order.
     tolerance : float
         Relative error that the static measures of all patches have to meet.
     is_complete : bool
@@ -124,6 +125,7 @@ def select_distinct_patches(patches) -> tuple:
     Parameters
     ----------
     patches : sequence of PatchModel
+        Patches of equal geometry.
     """
     rows = {_load_and_shape_parameters(patch): patch for patch in patches}
     keys = sorted(rows)
@@ -145,7 +147,7 @@ def select_distinct_patches(patches) -> tuple:
     return [rows[keys[k]] for k in sorted(selected)], False
 
 
-def _load_and_shape_parameters(patch_model) -> tuple:
+def _load_and_shape_parameters(patch_model) -> tuple[float, ...]:
     """Return the load and gap parameters that may differ between patches of one mesh geometry."""
     loading = patch_model.loading
     shapes = []
@@ -172,13 +174,14 @@ def _make_common_layout(cases: list, has_intermediate_cases: bool) -> Layout | N
     Parameters
     ----------
     cases : list of PatchModel
+        Patches of equal geometry.
     has_intermediate_cases : bool
         Whether the sweep contains cases between the given ones.
     """
     first = cases[0]
     max_cell_ratio = 1 / (grids.EDGE_CELLS[first.mesh.is_static] - 1)
     layout = grids.make_search_layout(first)
-    for _ in range(MAX_SEARCHES):
+    for _ in range(MAX_LAYOUT_SEARCHES):
         pair = condense(first, *grids.make_grids(first, layout))
         layouts = []
         largest_ratio = 0.0
@@ -207,13 +210,14 @@ def _find_contact_extent(patch_model, pair):
         return None
 
 
-def _merge_layouts(layouts: list, has_intermediate_cases: bool) -> Layout:
+def _merge_layouts(layouts: list[Layout], has_intermediate_cases: bool) -> Layout:
     """Merge column layouts, taking the shortest cell of all layouts at each position."""
     bands = set()
     for layout in layouts:
         bands.update(layout.bands, [(*layout.span, layout.max_loaded_length)])
     if has_intermediate_cases:
         bands |= set(_interpolate_bands(layouts))
+
     first = layouts[0]
     bands = sorted(bands, key=lambda band: (band[2], band))
     merged = Layout(
@@ -224,6 +228,7 @@ def _merge_layouts(layouts: list, has_intermediate_cases: bool) -> Layout:
         *2 * [min(layout.max_length for layout in layouts)],
         min(layout.slope for layout in layouts),
     )
+
     low, high, _ = np.array(bands).T
     positions = np.linspace(low, high, 5, axis=1)
     # Bands that do not shorten any cell are dropped, because most bands are redundant.
@@ -238,7 +243,7 @@ def _merge_layouts(layouts: list, has_intermediate_cases: bool) -> Layout:
     return replace(merged, bands=tuple(needed_bands))
 
 
-def _interpolate_bands(layouts: list) -> list:
+def _interpolate_bands(layouts: list[Layout]) -> grids.Bands:
     """Return bands of short columns between the contact edges of neighbouring cases."""
     bands = []
     half_length = max(layout.stop for layout in layouts)
@@ -257,15 +262,17 @@ def _interpolate_bands(layouts: list) -> list:
     return bands
 
 
-def _refine_until_tolerance_is_met(cases: list, bodies, tolerance: float) -> list:
+def _refine_until_tolerance_is_met(cases: list, bodies, tolerance: float) -> list[CondensedPair]:
     """Refine nested meshes until all patches meet the tolerance or the mesh is too expensive.
 
     Parameters
     ----------
     cases : list of PatchModel
+        Patches that share the meshes.
     bodies : list
         Meshes of the pieces on the coarsest level.
     tolerance : float
+        Relative error that the static measures of all patches have to meet.
 
     Returns
     -------
@@ -286,7 +293,7 @@ def _refine_until_tolerance_is_met(cases: list, bodies, tolerance: float) -> lis
             return pairs
 
 
-def _meets_tolerance(patch_model, pairs: list, tolerance: float) -> bool:
+def _meets_tolerance(patch_model, pairs: list[CondensedPair], tolerance: float) -> bool:
     """Return whether a patch meets the tolerance on given condensed pieces, or cannot be solved on them."""
     try:
         patches = mesh_levels.solve_on_pairs(patch_model, pairs, tolerance)

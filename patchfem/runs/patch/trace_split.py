@@ -72,6 +72,7 @@ def split_trace(
     Parameters
     ----------
     patch_model : PatchModel
+        Patch with a profile from a trace.
     cutoff : float, optional
         Cutoff wavelength [m]; None: chosen from the element length and the mean pressure.
     element : float, optional
@@ -94,11 +95,14 @@ def split_trace(
             "a split needs [contact.profile] and contact.load, without [contact.asperities] and [contact.strips]",
             PROFILE_KEY,
         )
+
     pieces = patch_model.pieces
     element = element or patch_model.uniform_element_size
     trace = _level_trace(patch_model, element)
     pressure = loading.load / (pieces.length * pieces.width * pieces.pairs)
     modulus = patch_model.pieces.surface_modulus
+
+    # A wave is resolved if its contact under the mean pressure is longer than an element.
     is_given = cutoff is not None
     if not is_given:
         spectrum = wave_spectrum(trace)
@@ -114,6 +118,7 @@ def split_trace(
             f"{format_length(element, 3)}; reduce contact.element_size",
             PROFILE_KEY,
         )
+
     waves = trace_moments(trace, cutoff).fine
     if not waves.slope > 0:
         raise PatchfemError(
@@ -128,6 +133,9 @@ def split_trace(
             "layer represents them; reduce contact.element_size",
             PROFILE_KEY,
         )
+
+    # By Persson's theory the layer of the short waves is exponential, with a decay length of a
+    # multiple of their rms height.
     decay_length = sum(PERSSON) / 2 * waves.height
     tables = [
         "[contact.profile]",
@@ -142,6 +150,7 @@ def split_trace(
     if interface.has_shear:
         # Ridges on equal half-planes are as stiff along x as across it.
         tables.append("tangential_ratio = 1.0")
+
     return TraceSplit(
         cutoff, decay_length, closing_pressure, element, pressure, "\n".join(tables) + "\n"
     )
@@ -162,6 +171,7 @@ def advise_split(patch_model, element: float) -> list[str]:
     Parameters
     ----------
     patch_model : PatchModel
+        Patch with a profile from a trace.
     element : float
         Length [m] of the elements that carry load.
     """

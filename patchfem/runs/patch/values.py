@@ -14,6 +14,7 @@ from ...contact import edges, stiffness
 from ...contact.press import split_into_strips
 from ...elasticity.lapack import use_one_blas_thread
 from ...mesh.grid import TensorGrid
+from ..results.patch_rows import Values
 from .press import Patch
 
 # Largest ratio of the curvatures of neighbouring parabolas at which the pressure curve counts as
@@ -113,7 +114,7 @@ def _extrapolate_pressure_to_end(x, sigma) -> float:
 
 def assemble_static_values(
     length: float, area: float, state, peak, edge_values: EdgeValues
-) -> dict:
+) -> Values:
     """Return the static measures by name.
 
     Parameters
@@ -125,10 +126,12 @@ def assemble_static_values(
     peak : float
         Largest pressure [Pa].
     edge_values : EdgeValues
+        Lengths and stiffnesses, which depend on the positions of the contact edges.
 
     Returns
     -------
     dict of float
+        In SI units.
     """
     is_loaded = state.load > 0
     return {
@@ -147,7 +150,7 @@ def assemble_static_values(
     }
 
 
-def compute_static_values(patch: Patch) -> dict:
+def compute_static_values(patch: Patch) -> Values:
     """Return the values of all static measures of a solved patch by name, in SI units.
 
     If a node lies at the edge of a step, the values are the weighted mean of the two solutions with
@@ -158,17 +161,21 @@ def compute_static_values(patch: Patch) -> dict:
     return _VALUES_BY_PATCH[patch].copy()
 
 
-def _compute_static_values(patch: Patch) -> dict:
+def _compute_static_values(patch: Patch) -> Values:
     """Return the values of all static measures of a solved patch by name, in SI units."""
+    # A node at the edge of a step belongs to both sides of it: the values are the weighted mean of
+    # the solutions with this node on either side.
     if patch.step_variants:
         parts = [(weight, compute_static_values(part)) for weight, part in patch.step_variants]
         names = parts[0][1]
         return {name: float(sum(weight * part[name] for weight, part in parts)) for name in names}
+
     state = patch.state
     edge_values = EdgeValues(0.0, 0.0, 0.0, 0.0, 0.0)
     if patch.pressure.load > 0:
         with use_one_blas_thread():
             edge_values = _compute_edge_values(patch)
+
     out = assemble_static_values(
         np.ptp(patch.x),
         patch.pieces.interface.weight.sum(),
@@ -176,6 +183,7 @@ def _compute_static_values(patch: Patch) -> dict:
         max(estimate_peak_pressure(patch.x, row, patch.skin_fraction) for row in state.pressure),
         edge_values,
     )
+
     if patch.strips is not None:
         out |= {
             "pressure_centre_lateral": state.centre_y,
@@ -196,6 +204,7 @@ def _compute_edge_values(patch: Patch) -> EdgeValues:
     coupling = patch.pair.closing
     if count > 1:
         coupling = coupling * count
+
     for strip, active in enumerate(loaded_nodes(patch)):
         if not active.any():
             continue
@@ -207,11 +216,15 @@ def _compute_edge_values(patch: Patch) -> EdgeValues:
             normal = normal + np.diag(layer)
             if skin.tangential_ratio is not None:
                 tangential = tangential + np.diag(layer / skin.tangential_ratio)
+
+        # Stiffness of the set in contact under unit approach and rotation, with the partial cells
+        # at its edges.
         pressed = edges.SetFactor(normal, active)
         ends = _find_ends(patch, strip, pressed)
         intervals.append(edges.contact_intervals(patch.x, active, ends))
         stiffnesses[:2] += edges.set_stiffness(pressed, motions, ends)
         stiffnesses[2] += _full_stick_stiffness(normal, tangential, coupling, active, ends)
+
     normal_stiffness, rotational_stiffness, tangential_stiffness = stiffnesses.tolist()
     return EdgeValues(
         length=float(sum(np.diff(part).sum() for part in intervals) / count),
@@ -229,7 +242,7 @@ def loaded_nodes(patch: Patch) -> np.ndarray:
     return pressure > minimum * pressure.max()
 
 
-def contact_intervals(patch: Patch, ends: list) -> np.ndarray:
+def contact_intervals(patch: Patch, ends: list[edges.ContactEdge]) -> np.ndarray:
     """Return the contact intervals (k, 2) [m] of a patch in the order of increasing x.
 
     ends: contact edges from `contact_ends`.
@@ -237,7 +250,7 @@ def contact_intervals(patch: Patch, ends: list) -> np.ndarray:
     return edges.contact_intervals(patch.x, patch.active, ends)
 
 
-def contact_ends(patch: Patch) -> list:
+def contact_ends(patch: Patch) -> list[edges.ContactEdge]:
     """Return the contact edges between nodes as a list of `ContactEdge`; [] for a patch in strips."""
     if patch.strips is not None or not patch.active.any():
         return []
@@ -248,6 +261,8 @@ def _find_ends(patch: Patch, strip: int, pressed: edges.SetFactor) -> list:
     """Return the contact edges of one strip; `pressed` is the factor of its nodes in contact."""
     x = patch.x
     state = patch.state
+
+    # A smooth layer has no gap, so that its edges follow from the pressure alone.
     if patch.has_smooth_skin:
         pressure = state.pressure
         ends = edges.find_pressure_edges(
@@ -263,6 +278,8 @@ def _find_ends(patch: Patch, strip: int, pressed: edges.SetFactor) -> list:
             patch.pair.row,
             is_quadratic=patch.pair.is_quadratic,
         )
+
+    # An edge next to a step of the gap lies on the step.
     jumps = patch.model.gap.jumps
     if not jumps:
         return ends
@@ -319,16 +336,18 @@ def unresolved_edge_rounding_pressure(patch: Patch) -> float:
     # An asperity layer (skin) bounds the pressure.
     if not rounded or not loaded.size or patch.pieces is not pair.compliance:
         return 0.0
+
+    # The curvatures 1/R and the compliances 1/E* of the two bodies add up.
     half_flat_length = min(body.half_flat_length for body in rounded)
     radius = 1 / sum(1 / body.end.size for body in rounded)
     coatings = [piece.layers.coating for piece in (pair.piece, pair.upper)]
     modulus = 1 / sum((1 - nu**2) / young for young, nu in coatings)
+
     largest = 0.0
     for node in (loaded[0], loaded[-1]):
         cell = np.diff(x)[max(node - 1, 0) : node + 1].max()
-        if (
-            abs(abs(x[node]) - half_flat_length) > 2 * cell
-        ):  # The contact does not end at the rounded end.
+        # The contact does not end at the rounded end.
+        if abs(abs(x[node]) - half_flat_length) > 2 * cell:
             continue
         stress_intensity = sigma[max(node - 2, 0) : node + 3].max() * np.sqrt(cell)
         peak_width, peak = contact.rounded_corner_contact(stress_intensity, radius, modulus)
@@ -358,7 +377,7 @@ def contact_reaches_steep_end(patch: Patch) -> bool:
     return bool((patch.active[[0, -1]] & (cells < open_rounded_length(patch))).any())
 
 
-def _rounded_bodies(pair) -> list:
+def _rounded_bodies(pair) -> list[TensorGrid]:
     """Return the meshes of the pieces whose interface ends are rounded."""
     bodies = []
     for body in (pair.grid, pair.upper_grid):

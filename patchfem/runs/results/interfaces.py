@@ -69,7 +69,9 @@ def merge_sentences(model, faces: Iterable[Face], list_sentences: Callable) -> l
     Parameters
     ----------
     model : Model
+        Model of the run.
     faces : iterable of Face
+        Pressed interfaces of the run.
     list_sentences : callable
         Function that returns the sentences on a Face.
     """
@@ -85,7 +87,9 @@ def merge_findings(model, faces: Iterable[Face], list_findings: Callable) -> lis
     Parameters
     ----------
     model : Model
+        Model of the run.
     faces : iterable of Face
+        Pressed interfaces of the run.
     list_findings : callable
         Function that returns the findings on a Face.
     """

@@ -9,6 +9,7 @@ from ...core import Outcome
 from ...effects import law_has_trait
 from ...formatting import format_length
 from ...friction.bonds import parameters
+from .patch_rows import Measures
 from .result import Advice
 
 # Largest relative difference of the friction works from samples and from energies without a
@@ -27,7 +28,7 @@ MIN_PROPOSED_HARMONICS = 31  # Smallest number of harmonics that a warning propo
 MAX_PROPOSED_HARMONICS = 500
 
 
-def note_on_groove_slope(model, patch) -> list:
+def note_on_groove_slope(model, patch) -> list[str]:
     """Return a list with a note on grooves under pieces that are compliant in shear.
 
     All points take the slope of the grooves at the displacement of the holders. The note reports
@@ -46,22 +47,25 @@ def note_on_groove_slope(model, patch) -> list:
     ]
 
 
-def warn_of_bonds(model, speed: float, measures: dict, outcome: Outcome) -> list:
+def warn_of_bonds(model, speed: float, measures: Measures, outcome: Outcome) -> list[str]:
     """Return warnings on a bond law whose bonds break before they form, creep, or start with an infinite traction.
 
     Parameters
     ----------
     model : Model
+        Model of a bench or a rig.
     speed : float
         Peak speed [m/s].
     measures : dict
         Measures by name.
     outcome : Outcome
+        How the motion ended; a bounded motion may creep.
     """
     if not law_has_trait(model.friction.law, "bonds"):
         return []
     law = model.bonds
     warnings = []
+
     # The traction of the initial bonds is infinite at first if the order is negative. Bonds that form later carry at
     # most the fraction P(p + 1, R/eps_0) of mu_s N, with or without growth.
     if law.order < 0 and law.initial != 0:
@@ -69,6 +73,7 @@ def warn_of_bonds(model, speed: float, measures: dict, outcome: Outcome) -> list
             "friction.order below 0 with friction.initial_bonds: the traction is infinite at the first instant, so "
             "friction peaks depend on the time step; set initial_bonds = 0"
         )
+
     forming_ratio = parameters.growth_path_ratio(law, speed) if law.reading == "report" else 0.0
     if forming_ratio > MAX_FORMING_RATIO:
         # At this growth path, growth_path_ratio(law, speed) equals MAX_FORMING_RATIO.
@@ -81,6 +86,7 @@ def warn_of_bonds(model, speed: float, measures: dict, outcome: Outcome) -> list
             "friction.slip_growth = "
             f'"{0.95e6 * max_growth_path:.2g} um", or friction.reading = "stretch"'
         )
+
     # The drift of a bounded motion (Dahl's creep) is a property of the law, not of the joint.
     drift = measures.get("drift_per_cycle")
     is_bounded = outcome in (Outcome.STEADY, Outcome.STUCK) and law.reading == "stretch"
@@ -94,7 +100,7 @@ def warn_of_bonds(model, speed: float, measures: dict, outcome: Outcome) -> list
     return warnings
 
 
-def note_on_growth(model, peak: float | None) -> list:
+def note_on_growth(model, peak: float | None) -> list[str]:
     """Return notes on the effects of growing bonds.
 
     peak: largest ratio of friction force to mu_s N in the run; None if the load varies.
@@ -104,11 +110,15 @@ def note_on_growth(model, peak: float | None) -> list:
         return []
     if law.reading == "report" and law.initial == 0:
         return []
+
+    # In the reading of the report, growth changes only the bonds that form later.
     if law.reading == "report":
         return [
             "in the law as printed in the report, the initial bonds keep the bond length eps_0, even though the length "
             "of later bonds grows"
         ]
+
+    # In the other reading, bonds of a short length pull harder as the length grows.
     notes = []
     if law.order > 1:
         notes.append(
@@ -116,6 +126,7 @@ def note_on_growth(model, peak: float | None) -> list:
             "length grows, a bond that formed while the length was small pulls harder and breaks later; set "
             "friction.order <= 1 to keep friction near mu_s N"
         )
+
     if peak is not None and peak > 1 + MIN_EXCESS_RATIO:
         notes.append(
             f"the friction force reaches {peak:.3g} times mu_s N: the bond length grows during the run, and "
@@ -125,7 +136,9 @@ def note_on_growth(model, peak: float | None) -> list:
     return notes
 
 
-def warn_of_work_check(values: dict, steps: int | None, harmonics: int | None = None) -> list:
+def warn_of_work_check(
+    values: Measures, steps: int | None, harmonics: int | None = None
+) -> list[str]:
     """Return a list with a warning if sampled friction work differs from that in the energies.
 
     The trapezoidal rule for the samples is of second order. A difference below the error of the
@@ -170,12 +183,13 @@ def advise_harmonics(n_harmonics: int, n_law_harmonics: float = 0.0) -> Advice:
     return Advice.set_key("accuracy.harmonics", n_proposed)
 
 
-def warn_of_created_energy(model, created: float, exchanged: float) -> list:
+def warn_of_created_energy(model, created: float, exchanged: float) -> list[str]:
     """Return a list with a warning if the law of the 1985 report has created energy.
 
     Parameters
     ----------
     model : Model
+        Model of a bench or a rig.
     created, exchanged : float
         Energy created, and integral of the absolute friction power [J].
     """

@@ -4,7 +4,13 @@ In: a name. Out: its unit, floor and definition; and the names of the methods th
 measures.
 """
 
-from ...core import MeasureDefinition
+import numpy as np
+
+from ...core import Measure, MeasureDefinition
+
+Measures = dict[str, Measure]  # by name
+Arrays = dict[str, np.ndarray]  # fields, histories or columns by name
+Values = dict[str, float]  # measures or other numbers by name, in SI units
 
 ROWS = (
     MeasureDefinition(
@@ -181,7 +187,7 @@ MESH_MEASURES = tuple(row.name for row in ROWS if row.has("mesh"))
 POSITIVE_MESH_MEASURES = tuple(name for name in MESH_MEASURES if TABLE[name].minimum == 0.0)
 
 
-def find_unknown_measures(measures: dict) -> list:
+def find_unknown_measures(measures: Measures) -> list[str]:
     """Return the positive measures that control the mesh and whose error exceeds their value."""
     names = []
     for name in POSITIVE_MESH_MEASURES:

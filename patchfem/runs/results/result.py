@@ -16,16 +16,26 @@ from ...core import Outcome
 from ...formatting import rewrite_powers_of_ten
 from ...response import rows
 from . import patch_rows
+from .patch_rows import Arrays, Measures, Values
 
 N_FRAMES = 16  # Number of frames of the interface fields in the last cycle.
-MIN_SLIP_FRACTION = (
-    1e-2  # change of slip / largest change; above it, a node without friction limit slips
-)
+# Change of slip / largest change; above it, a node without friction limit slips.
+MIN_SLIP_FRACTION = 1e-2
 ROUND_OFF = 1e-9  # relative rounding error of the tractions and slips of elements
-COUNT_SETTINGS = ("steps_per_cycle", "harmonics", "shear_modes", "elements")
-_FOLDER_OF_PATH = re.compile(
-    r"/[^:]*/(?=[^/:]+: )"
-)  # Folder of an absolute path at the start of a remark.
+# Entries of `Result.extra` that are settings, with the names under which they are shown.
+SHOWN_SETTINGS = {
+    "engine": "engine",
+    "map": "map",
+    "steps": "steps_per_cycle",
+    "steps_per_cycle": "steps_per_cycle",
+    "harmonics": "harmonics",
+    "shear_modes": "shear_modes",
+    "elements": "elements",
+    "quadrature": "quadrature",
+    "window": "window_cycles",
+}
+# Folder of an absolute path at the start of a remark.
+_FOLDER_OF_PATH = re.compile(r"/[^:]*/(?=[^/:]+: )")
 
 
 class Advice(NamedTuple):
@@ -49,7 +59,9 @@ class Advice(NamedTuple):
         Parameters
         ----------
         key : str
+            Key as the scene writes it, "table.key".
         value : float
+            Number in the unit of the key.
         more : str
             Words that follow the value.
         """
@@ -91,8 +103,8 @@ class RunInputs:
     plan: object
     patch: object
     coarse: tuple
-    seconds: dict
-    warnings: list
+    seconds: Values
+    warnings: list[str]
     say: Callable | None
     progress: Callable | None
     estimate: bool
@@ -120,13 +132,13 @@ class Result:
 
     plan: object
     outcome: Outcome
-    measures: dict
+    measures: Measures
     response: object
     window: object
     patch: object
-    fields: dict
-    seconds: dict
-    warnings: list
+    fields: Arrays
+    seconds: Values
+    warnings: list[str]
     extra: dict
     findings: tuple[Finding, ...] = ()
     faces: tuple = ()
@@ -162,7 +174,7 @@ def describe_measure(name: str, numbered_kind: str = "interface") -> str:
     )
 
 
-def collect_rest_frame(patch) -> dict:
+def collect_rest_frame(patch) -> Arrays:
     """Return the fields of a solved patch without motion as a single frame (1, n).
 
     The fields are normal_stress [Pa], gap [m] and status of the finest solution, which is on the
@@ -171,7 +183,7 @@ def collect_rest_frame(patch) -> dict:
     return _make_surface_frame(patch.finest_surface)
 
 
-def _make_surface_frame(surface) -> dict:
+def _make_surface_frame(surface) -> Arrays:
     """Return pressure, gap and contact status (1, n) at the points of a surface."""
     return {
         "time": np.zeros(1),
@@ -181,7 +193,7 @@ def _make_surface_frame(surface) -> dict:
     }
 
 
-def patch_surface(patch, fields: dict):
+def patch_surface(patch, fields: Arrays):
     """Return the surface at whose points the fields of a patch are given; None without a patch.
 
     After a motion these are the nodes of the mesh, otherwise the points of `collect_rest_frame`.
@@ -207,12 +219,13 @@ class SlipRule(NamedTuple):
 GRADUAL_SLIP = SlipRule()  # slip rule, after earlier cycles, of a law without friction limit
 
 
-def make_interface_frames(patch, time, tau, node_slip, slide, rule=GRADUAL_SLIP) -> dict:
+def make_interface_frames(patch, time, tau, node_slip, slide, rule=GRADUAL_SLIP) -> Arrays:
     """Return the fields of an interface in all frames of a motion, after the pressed state.
 
     Parameters
     ----------
     patch : Patch
+        Solved patch of the interface.
     time : (f,)
         [s].
     tau, node_slip : (f, m)
@@ -220,6 +233,7 @@ def make_interface_frames(patch, time, tau, node_slip, slide, rule=GRADUAL_SLIP)
     slide : (f,)
         Displacement of the upper holder [m].
     rule : SlipRule
+        What counts as slip.
 
     Returns
     -------
@@ -254,6 +268,7 @@ def compute_status(active, tau, slip, rule=GRADUAL_SLIP) -> np.ndarray:
     tau, slip : (f, m)
         Traction [Pa] and slip [m]; the first frame is that of the pressed pieces.
     rule : SlipRule
+        What counts as slip.
     """
     moved = np.abs(np.diff(slip, axis=0, prepend=slip[:1]))
     if not rule.starts_at_rest:
@@ -273,7 +288,9 @@ def can_estimate_mesh_error(model, patch, coarse) -> bool:
     Parameters
     ----------
     model : Model
+        Model of a bench or a rig.
     patch : Patch or None
+        The patch on its finest mesh; None for a single point ([normal]).
     coarse : sequence
         Patches on coarser meshes; None for a missing one.
     """
@@ -294,33 +311,29 @@ def collect_used_settings(result) -> dict:
     the averaging length [m] of its profile. map: "events" or "yields", the map by which the steady
     motion was found.
     """
-    extra = result.extra
     patch = result.patch
+
+    # Settings that the engine does not have are left out; the others are names or counts.
     settings = {}
-    if (engine := extra.get("engine")) is not None:
-        settings["engine"] = engine
-    if (map_name := extra.get("map")) is not None:
-        settings["map"] = map_name
-    steps = extra.get("steps")
-    if steps is not None:
-        settings["steps_per_cycle"] = int(steps)
-    settings |= {name: int(extra[name]) for name in COUNT_SETTINGS if extra.get(name) is not None}
-    if (summed := extra.get("quadrature")) is not None:
-        settings["quadrature"] = summed
-    if (window := extra.get("window")) is not None:
-        settings["window_cycles"] = int(window)
+    for key, name in SHOWN_SETTINGS.items():
+        value = result.extra.get(key)
+        if value is not None:
+            settings[name] = value if isinstance(value, str) else int(value)
+
+    # Resolution of the pressed interfaces.
     for face in result.faces:
         settings[rows.add_interface_number("interface_nodes", face.number)] = int(face.patch.x.size)
     if patch is not None:
         settings["interface_nodes"] = int(patch.x.size)
         if patch.averaging is not None:
             settings["profile_averaging"] = float(patch.averaging)
-        if result.plan.model.patch.interface.strips is not None:
-            settings["strips"] = int(result.plan.model.patch.interface.strips[0])
+        strips = result.plan.model.patch.interface.strips
+        if strips is not None:
+            settings["strips"] = int(strips.count)
     return settings
 
 
-def engine_by_measure(result) -> dict:
+def engine_by_measure(result) -> dict[str, str]:
     """Return a dict of the engine or method that computed each measure of a run.
 
     For static measures of a patch it is the method on its meshes (`patch_rows`), for all others the
@@ -334,7 +347,7 @@ def engine_by_measure(result) -> dict:
     return engines
 
 
-def shorten_file_names(texts, path: Path) -> list:
+def shorten_file_names(texts, path: Path) -> list[str]:
     """Shorten absolute file names and rewrite powers of ten in remarks.
 
     path: path of the scene; file names become relative to its folder.
@@ -342,12 +355,12 @@ def shorten_file_names(texts, path: Path) -> list:
     return make_file_name_shortener(path)(texts)
 
 
-def make_file_name_shortener(path: Path) -> Callable[[Iterable[str]], list]:
+def make_file_name_shortener(path: Path) -> Callable[[Iterable[str]], list[str]]:
     """Return a function that shortens file names in remarks on the scenes of one folder."""
     folders = (path.parent, path.parent.absolute())
     prefixes = [f"{folder}/" for folder in folders if folder.is_absolute()]
 
-    def shorten(texts) -> list:
+    def shorten(texts) -> list[str]:
         """Shorten absolute file names and rewrite powers of ten in remarks."""
         short_texts = []
         for text in texts:

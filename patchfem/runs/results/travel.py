@@ -29,7 +29,7 @@ def measure_contact_length(patch) -> float:
     return float(ends[loaded_nodes[-1] + 1] - ends[loaded_nodes[0]])
 
 
-def warn_of_large_slide(patch, slide) -> list:
+def warn_of_large_slide(patch, slide) -> list[str]:
     """Return a list with a warning if the displacement is large compared with the contact length.
 
     slide: relative displacement (k,) [m].
@@ -50,12 +50,12 @@ def warn_of_large_slide(patch, slide) -> list:
 def check_pieces_overlap(outcome, patch_model, patch, slide):
     """Return LEAVES_CONTACT if one piece slides off the other, else the given outcome.
 
-    See `response.outcome.check_piece_length`.
-
     Parameters
     ----------
     outcome : Outcome or None
+        Outcome if the pieces overlap throughout.
     patch_model : PatchModel
+        Patch with the length of the pieces; None without one.
     patch : Patch or None
         None for [normal], which has no length.
     slide : (k,)

@@ -34,14 +34,8 @@ from .slip import (
 )
 
 STATE_FIELDS = tuple(WearState.__slots__)  # Fields of the wear state in a saved file.
-MOMENT_FIELDS = (
-    "cycle",
-    "depth",
-    "used",
-    "pressure",
-    "gap",
-    "miss",
-)  # Arrays of a saved WearMoment.
+# Arrays of a saved WearMoment.
+MOMENT_FIELDS = ("cycle", "depth", "used", "pressure", "gap", "miss")
 # Largest remaining fraction of the coating thickness at which the coating counts as worn through.
 THIN_FRACTION = 1e-6
 # Largest number of jumps in the search for the cycle in which a coating is worn through.
@@ -70,7 +64,7 @@ class WearMoment:
     pressure: np.ndarray
     gap: np.ndarray
     miss: float
-    values: dict
+    values: dict[str, float]
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -91,8 +85,8 @@ class WornPatch:
     patch: object
     coarse: tuple
     state: WearState
-    moments: tuple
-    depths: tuple
+    moments: tuple[WearMoment, ...]
+    depths: tuple[np.ndarray, ...]
     stripped: tuple | None
     frame_error: float
     seconds: float
@@ -153,7 +147,9 @@ def make_worn_model(model, patch, depth):
     Parameters
     ----------
     model : Model
+        Unworn model with [wear].
     patch : Patch
+        Patch on whose nodes the depth is given.
     depth : (m,) or (s, m)
         Worn depth [m].
     """
@@ -182,6 +178,7 @@ def compute_wear(
     Parameters
     ----------
     model : Model
+        Unworn model with [wear].
     patch : Patch
         Unworn patch.
     coarse : sequence of Patch or None
@@ -200,6 +197,7 @@ def compute_wear(
     clock = perf_counter()
     patch_model = model.patch
     n_cycles = model.wear.cycles
+
     motion = _SlipPathFunction(model, patch)
     problem = WearProblem(
         make_contact_force_function(patch_model, patch.pair),
@@ -208,6 +206,8 @@ def compute_wear(
         model.wear.coefficient,
         n_cycles,
     )
+
+    # A motion without bound has no slip path, so that no wear is computed for it.
     stop_reason = ""
     try:
         if initial is None:
@@ -222,6 +222,8 @@ def compute_wear(
         stop_reason = f"nothing was worn: {reason}"
         seconds = perf_counter() - clock
         return WornPatch(patch, tuple(worn), None, (), (), None, 0.0, seconds, stop_reason)
+
+    # Jumps over many cycles, each with the contact solved on the worn gap.
     while state.cycle < n_cycles and find_worn_through_coating(model, state.depth) is None:
         try:
             state = _take_next_jump(model, problem, state)
@@ -236,6 +238,8 @@ def compute_wear(
             store(state, moments)
         if progress is not None:
             progress(state.cycle / n_cycles)
+
+    # The jumps are repeated on coarser meshes and with other strips for the errors.
     replayed = []
     for mesh in coarse:
         if mesh is not None:
@@ -244,6 +248,7 @@ def compute_wear(
     stripped = None
     if replayed and strips_model is not patch_model:
         stripped = _replay_wear(strips_model, model, patch, patch, moments)
+
     worn = (*(worn for worn, _ in replayed), *(None for mesh in coarse if mesh is None))
     patch, *worn = with_static_measures((patch, *worn), model.accuracy.tolerance)
     return WornPatch(
@@ -316,6 +321,8 @@ def _take_next_jump(model, problem: WearProblem, state: WearState) -> WearState:
 
     problem.press.start_from_forces(state.force)
     next_state = jump_to(find_cycle_of_next_table_row(model.wear, problem, state))
+
+    # Bracket: worn fraction - 1 is negative at `low` and positive at `high`.
     low = state.cycle
     high = np.inf
     previous = 0.0
@@ -328,6 +335,9 @@ def _take_next_jump(model, problem: WearProblem, state: WearState) -> WearState:
             value < 0 and (next_state.cycle < end or high == np.inf)
         ):
             return next_state
+
+        # Illinois: an end that is kept twice has its value halved, so that the bracket shrinks from
+        # both sides.
         if value > 0:
             if high < np.inf and previous > 0:
                 low_value = low_value / 2
@@ -338,6 +348,7 @@ def _take_next_jump(model, problem: WearProblem, state: WearState) -> WearState:
                 high_value = high_value / 2
             low = next_state.cycle
             low_value = value
+
         previous = value
         end = low - low_value * (high - low) / (high_value - low_value)
         next_state = jump_to(end)
@@ -356,7 +367,9 @@ def find_cycle_of_next_table_row(wear, problem: WearProblem, state: WearState) -
     wear
         Wear parameters of the model.
     problem : WearProblem
+        Contact, slip path and wear law.
     state : WearState
+        State at the start of the jump.
 
     Returns
     -------
@@ -419,15 +432,19 @@ def _record_moment(patch, state: WearState, motion: _SlipPathFunction) -> WearMo
     model = motion.model
     area = nodal_areas(model.patch, patch.pieces.interface)
     worn = make_worn_model(model, patch, state.depth)
+
     measures = compute_static_values(patch) | motion.last.values
     measures["worn_volume"] = float(np.vdot(state.depth, area))
     measures["worn_depth_max"] = float(state.depth.max(initial=0.0))
+
+    # Wear changes the grooves and, by a table, the friction law.
     if model.grooves is not None:
         measures["groove_amplitude"] = 0.0 if worn.grooves is None else worn.grooves.amplitude
     if model.wear.friction is not None:
         measures["static_coefficient"] = worn.friction.static
         if worn.friction.bond_length is not None:
             measures["bond_length"] = worn.friction.bond_length
+
     return WearMoment(
         state.cycle,
         state.depth,
@@ -449,9 +466,11 @@ def _replay_wear(patch_model, model, patch, other_patch, moments) -> tuple:
     patch_model : PatchModel
         Model of the other patch, which has its number of strips.
     model : Model
+        Model of the run.
     patch, other_patch : Patch
         Patch of the moments, and the unworn patch on the other mesh.
     moments : sequence of WearMoment
+        States after each jump of the run.
     """
     area = nodal_areas(patch_model, other_patch.pieces.interface)
 
@@ -487,8 +506,14 @@ def compute_and_save_wear(storage, key: str, model, patch, coarse, progress=None
         File of the state, as `run.StateFile`; None: the state is not saved.
     key : str
         Hash of scene and version, which a saved state must match.
-    model, patch, coarse, progress
-        See `compute_wear`.
+    model : Model
+        Unworn model with [wear].
+    patch : Patch
+        Unworn patch.
+    coarse : sequence of Patch or None
+        The unworn patch on coarser meshes; None for a missing one.
+    progress : callable, optional
+        Called with the completed fraction of the cycles.
     """
     if storage is None:
         return compute_wear(model, patch, coarse, progress)
@@ -504,10 +529,13 @@ def save_wear_state(path: Path, key: str, state: WearState, moments: tuple) -> N
     Parameters
     ----------
     path : Path
+        File of the saved state.
     key : str
         Hash of scene and version.
     state : WearState
+        State after the last jump.
     moments : tuple of WearMoment
+        States after each jump so far.
     """
     arrays = {f"state_{name}": np.asarray(getattr(state, name)) for name in STATE_FIELDS}
     for name in MOMENT_FIELDS:
@@ -546,11 +574,13 @@ def load_wear_state(path: Path, key: str) -> tuple:
                 f"{path.parent.name}: the state saved there belongs to another scene or to another "
                 "version of patchfem; run without --resume"
             )
+
         fields = {name: arrays[f"state_{name}"] for name in STATE_FIELDS}
         for name, value in fields.items():
             if value.ndim == 0:
                 fields[name] = float(value)
         state = WearState(**fields)
+
         columns = [arrays[f"moment_{name}"] for name in MOMENT_FIELDS]
         moments = []
         all_values = json.loads(str(arrays["values"]))

@@ -15,17 +15,17 @@ from ...response.errors import convergence_error, convergence_errors
 from ..patch.measures import with_other_strip_count
 from ..patch.press import nodal_areas, solve_patch_contact
 from ..patch.values import compute_static_values
-from ..results.patch_rows import TABLE, WORN_SOURCE
+from ..results.patch_rows import TABLE, WORN_SOURCE, Arrays, Measures, Values
 from .evolve import THIN_FRACTION, compute_mean_worn_depth, find_worn_through_coating
 from .slip import UNBOUNDED_OUTCOMES, compute_point_slip_path
 
-N_FRAMES = 24  # Number of frames of the interface during the wear.
+N_WEAR_FRAMES = 24  # Number of frames of the interface during the wear.
 EDGE_PEAK = "pressure_peak_at_edge"  # Name of the pressure peak at a contact edge in the history.
 N_EDGE_NODES = 2  # Number of nodes next to a contact edge that count as the edge.
 # Largest ratio of the worn depth to the thickness of a coating, or to the height of a piece, at
 # which the stiffness of the unworn piece is valid.
 MAX_WORN_FRACTION = 0.2
-ROUND_OFF = 1e-12  # Relative error of a worn volume or depth due to round-off.
+WORN_ROUND_OFF = 1e-12  # Relative error of a worn volume or depth due to round-off.
 HOLDER_MEASURES = {"closing": "approach", "rotation": "rotation"}
 
 
@@ -35,22 +35,27 @@ def add_wear_measures(result, evolved, estimate: bool = True):
     Parameters
     ----------
     result : Result
+        Result of the run on the worn patch.
     evolved : WornPatch or None
         None for a single contact point.
     estimate : bool
         Whether to estimate the errors.
     """
     model = result.plan.model
+
+    # A single point has no surface that could change: only its worn volume is computed, after the run.
     if evolved is None:
         if result.outcome in UNBOUNDED_OUTCOMES:
             warning = f"nothing was worn: {result.outcome.sentence}"
             return replace(result, warnings=[*result.warnings, warning])
         volume = _measure_point_volume(model, result, estimate=estimate)
         return replace(result, measures=result.measures | volume)
+
     warnings = [*result.warnings, *([evolved.stopped] if evolved.stopped else [])]
     result = replace(result, seconds=result.seconds | {"wear": evolved.seconds}, warnings=warnings)
     if evolved.state is None:
         return result
+
     worn = _measure_patch_wear(model, evolved, result.measures, estimate=estimate)
     if model.wear.friction is not None:
         worn |= _measure_worn_friction(model, evolved, result.measures, worn["worn_volume"].error)
@@ -58,6 +63,7 @@ def add_wear_measures(result, evolved, estimate: bool = True):
     if estimate:
         result = _widen_errors_by_jumps(result, evolved)
     result = _add_wear_frames(replace(result, measures=result.measures | worn), evolved)
+
     notes = [*result.extra.get("notes", []), *_note_on_earlier_run(model)]
     if "worn_through_cycle" in worn:
         notes += _note_on_worn_through_coating(model, evolved)
@@ -80,8 +86,11 @@ def _make_wear_measure(name: str, value: float, error: float | None, engine: str
     Parameters
     ----------
     name : str
+        Name in the measure table.
     value : float
+        Value in the unit of the measure table.
     error : float or None
+        Error in the same unit; None without estimates.
     engine : str
         Method that computed the value.
     """
@@ -89,7 +98,7 @@ def _make_wear_measure(name: str, value: float, error: float | None, engine: str
     return Measure(value, row.unit, error, row.floor, engine=engine)
 
 
-def _measure_worn_through_cycle(model, evolved, error: float | None) -> dict:
+def _measure_worn_through_cycle(model, evolved, error: float | None) -> Measures:
     """Return a dict with the cycle in which the wear first reaches the substrate, if it does.
 
     error: error of the largest worn depth [m].
@@ -105,12 +114,12 @@ def _measure_worn_through_cycle(model, evolved, error: float | None) -> dict:
     return {name: _make_wear_measure(name, last.cycle, cycle_error)}
 
 
-def _note_on_earlier_run(model) -> list:
+def _note_on_earlier_run(model) -> list[str]:
     """Return a list with a note on the earlier run whose wear is continued."""
     return [] if model.wear.start is None else [model.wear.start.sentence]
 
 
-def _note_on_worn_through_coating(model, evolved) -> list:
+def _note_on_worn_through_coating(model, evolved) -> list[str]:
     """Return a list with a note on the coating that is worn through."""
     depth = evolved.state.depth
     coating = find_worn_through_coating(model, depth)
@@ -137,7 +146,9 @@ def _widen_errors_by_jumps(result, evolved):
     Parameters
     ----------
     result : Result
+        Result of the run on the worn patch.
     evolved : WornPatch
+        The worn patch with its jumps, also on the coarser meshes.
     """
     patch_model = result.plan.model.patch
     coarse_depth = frozen_array(evolved.state.coarse_depth)
@@ -168,7 +179,7 @@ def find_wear_period(model, result) -> float:
     return model.slide.period or float(result.response.time[-1])
 
 
-def _warn_of_worn_depth(model, evolved) -> list:
+def _warn_of_worn_depth(model, evolved) -> list[str]:
     """Return warnings on a worn depth that is large compared with a piece or its coating."""
     depth = float(evolved.state.depth.max(initial=0.0))
     pieces = model.patch.pieces
@@ -187,7 +198,7 @@ def _warn_of_worn_depth(model, evolved) -> list:
     return warnings
 
 
-def _relative_slip_error(measures: dict) -> float:
+def _relative_slip_error(measures: Measures) -> float:
     """Return the relative error of the slip amplitude, or else of the displacement amplitude."""
     for name in ("slip_amplitude", "relative_displacement_amplitude"):
         measure = measures.get(name)
@@ -196,7 +207,7 @@ def _relative_slip_error(measures: dict) -> float:
     return 0.0
 
 
-def _measure_patch_wear(model, evolved, motion: dict, *, estimate: bool = True) -> dict:
+def _measure_patch_wear(model, evolved, motion: Measures, *, estimate: bool = True) -> Measures:
     """Return the measures of worn volume, worn depth and groove amplitude.
 
     Their errors include those of the earlier run.
@@ -204,7 +215,9 @@ def _measure_patch_wear(model, evolved, motion: dict, *, estimate: bool = True) 
     Parameters
     ----------
     model : Model
+        Unworn model with [wear].
     evolved : WornPatch
+        The worn patch with its jumps, also on the coarser meshes.
     motion : dict
         Measures of the run on the worn patch by name.
     estimate : bool
@@ -215,6 +228,8 @@ def _measure_patch_wear(model, evolved, motion: dict, *, estimate: bool = True) 
     slip_error = (
         evolved.frame_error + _relative_slip_error(motion) + _relative_slip_change(evolved, motion)
     )
+
+    # Values on the coarser meshes and with another number of strips, for the errors.
     fine_values = _compute_worn_volume_and_depth(model.patch, evolved.patch, state.depth)
     coarse = []
     for patch, depth in zip(evolved.coarse, evolved.depths):
@@ -223,15 +238,19 @@ def _measure_patch_wear(model, evolved, motion: dict, *, estimate: bool = True) 
     strips = fine_values
     if evolved.stripped:
         strips = _compute_worn_volume_and_depth(other_model, *evolved.stripped)
+
     jump_errors = {
         "worn_volume": float(np.vdot(np.abs(state.depth - state.coarse_depth), area))
         + state.path_error * float(area.sum()),
         "worn_depth_max": state.error,
     }
+
     mesh_errors = convergence_errors(fine_values, *coarse) if coarse else {}
     before = evolved.moments[0].values
     start = model.wear.start
     measures = {}
+
+    # The errors of jumps, slip path, mesh, round-off, earlier run and strips add up.
     for name, value in fine_values.items():
         error = None
         start_error = 0.0 if start is None else start.measure_error(name, before[name])
@@ -240,11 +259,12 @@ def _measure_patch_wear(model, evolved, motion: dict, *, estimate: bool = True) 
                 jump_errors[name]
                 + slip_error * max(value - before[name], 0.0)
                 + float(mesh_errors[name])
-                + ROUND_OFF * value
+                + WORN_ROUND_OFF * value
                 + start_error
                 + float(convergence_error(strips[name] - value, ratio=ratio))
             )
         measures[name] = _make_wear_measure(name, value, error, WORN_SOURCE)
+
     amplitude = evolved.moments[-1].values.get("groove_amplitude")
     if amplitude is not None:
         error = measures["worn_volume"].error
@@ -255,7 +275,7 @@ def _measure_patch_wear(model, evolved, motion: dict, *, estimate: bool = True) 
     return measures
 
 
-def _measure_worn_friction(model, evolved, motion: dict, error: float | None) -> dict:
+def _measure_worn_friction(model, evolved, motion: Measures, error: float | None) -> Measures:
     """Return the friction parameters after wear, and the measures of the motion with wider errors.
 
     The error of the mean worn depth changes the measures of the motion, at the rate observed in the
@@ -264,7 +284,9 @@ def _measure_worn_friction(model, evolved, motion: dict, error: float | None) ->
     Parameters
     ----------
     model : Model
+        Unworn model with [wear].
     evolved : WornPatch
+        The worn patch with its jumps.
     motion : dict
         Measures of the run on the worn patch by name.
     error : float or None
@@ -275,9 +297,12 @@ def _measure_worn_friction(model, evolved, motion: dict, error: float | None) ->
     last_moments = evolved.moments[-3:]
     depths = [compute_mean_worn_depth(evolved.patch, moment.depth) for moment in last_moments]
     depth = depths[-1]
+
+    # The table of friction is evaluated at the bounds of the mean depth.
     depth_error = None if error is None else error / area
     bounds = [] if error is None else [depth - depth_error, depth + depth_error]
     bound_laws = [table.compute_worn_law(model.friction, max(bound, 0.0)) for bound in bounds]
+
     law = table.compute_worn_law(model.friction, depth)
     measures = {}
     for name, key in (("static_coefficient", "static"), ("bond_length", "bond_length")):
@@ -285,13 +310,17 @@ def _measure_worn_friction(model, evolved, motion: dict, error: float | None) ->
         if value is not None:
             changes = [abs(getattr(bound_law, key) - value) for bound_law in bound_laws]
             measures[name] = _make_wear_measure(name, value, max(changes, default=None))
+
     if depth_error is None:
         return measures
+
+    # Rate of a measure: change per change of the mean worn depth in a jump.
     jumps = []
     for pair in pairwise(zip(last_moments, depths)):
         (before, depth_before), (after, depth_after) = pair
         if depth_after > depth_before:
             jumps.append((before.values, after.values, depth_after - depth_before))
+
     static_names = compute_static_values(evolved.patch)
     for name, measure in motion.items():
         if measure.error is None or name in static_names:
@@ -304,7 +333,7 @@ def _measure_worn_friction(model, evolved, motion: dict, error: float | None) ->
     return measures
 
 
-def _warn_of_friction_table(model, evolved) -> list:
+def _warn_of_friction_table(model, evolved) -> list[str]:
     """Return warnings on wear beyond the friction table and on jumps over several of its rows."""
     table = model.wear.friction
     if table is None:
@@ -328,7 +357,7 @@ def _warn_of_friction_table(model, evolved) -> list:
     return warnings
 
 
-def _compute_worn_volume_and_depth(patch_model, patch, depth) -> dict:
+def _compute_worn_volume_and_depth(patch_model, patch, depth) -> Values:
     """Return a dict of the worn volume [m3] and the largest worn depth [m] of a patch."""
     return {
         "worn_volume": float(np.vdot(depth, nodal_areas(patch_model, patch.pieces.interface))),
@@ -336,7 +365,7 @@ def _compute_worn_volume_and_depth(patch_model, patch, depth) -> dict:
     }
 
 
-def _relative_slip_change(evolved, motion: dict) -> float:
+def _relative_slip_change(evolved, motion: Measures) -> float:
     """Return the relative difference of the slip amplitude in the last wear cycle and the final run.
 
     The final run, on the worn patch, may have used smaller time steps.
@@ -348,7 +377,7 @@ def _relative_slip_change(evolved, motion: dict) -> float:
     return abs(wear_amplitude / final_amplitude.value - 1)
 
 
-def _measure_point_volume(model, result, *, estimate: bool = True) -> dict:
+def _measure_point_volume(model, result, *, estimate: bool = True) -> Measures:
     """Return a dict with the worn volume of a single contact point under [normal].
 
     It is the wear coefficient times load times slip path, over all cycles.
@@ -356,7 +385,9 @@ def _measure_point_volume(model, result, *, estimate: bool = True) -> dict:
     Parameters
     ----------
     model : Model
+        Model with [wear] and [normal].
     result : Result
+        Result of the motion, with the histories of its last cycles.
     estimate : bool
         Whether to estimate the error.
     """
@@ -365,7 +396,7 @@ def _measure_point_volume(model, result, *, estimate: bool = True) -> dict:
     volume = model.wear.coefficient * model.point.load * path * model.wear.cycles
     error = None
     if estimate:
-        error = (path_error + _relative_slip_error(result.measures) + ROUND_OFF) * volume
+        error = (path_error + _relative_slip_error(result.measures) + WORN_ROUND_OFF) * volume
     return {"worn_volume": _make_wear_measure("worn_volume", volume, error, WORN_SOURCE)}
 
 
@@ -381,6 +412,8 @@ def _add_wear_frames(result, evolved):
     states = [evolved.moments[number] for number in _select_stored_moments(evolved.moments)[:-1]]
     n_states = len(states)
     depth = evolved.state.depth
+
+    # Frames of the wear history: contact after each stored jump, at rest.
     pressure = np.array([state.pressure for state in states])
     pressure = pressure.reshape(n_states, evolved.patch.x.size)
     wear = {
@@ -390,6 +423,8 @@ def _add_wear_frames(result, evolved):
         "status": (pressure > 0).astype(np.int8),
         "worn_depth": np.array([state.depth for state in states]).reshape(n_states, *depth.shape),
     }
+
+    # The last cycle follows all cycles of wear, and its worn depth stays as it is.
     motion = motion | {
         "time": motion["time"] + evolved.state.cycle * period,
         "worn_depth": np.repeat(depth[None], n_motion, axis=0),
@@ -398,6 +433,8 @@ def _add_wear_frames(result, evolved):
         wear[f"holder_{field}"] = np.array([state.values[name] for state in states])
         value = getattr(evolved.patch.pressure, name)
         motion[f"holder_{field}"] = np.full(n_motion, value)
+
+    # Fields that exist only in motion are 0 in the frames of wear.
     fields = {}
     for name, field in motion.items():
         zeros = np.zeros((n_states, *np.shape(field)[1:]))
@@ -413,13 +450,13 @@ def _select_stored_moments(moments) -> np.ndarray:
     """
     last = len(moments) - 1
     cycles = np.array([moment.cycle for moment in moments])
-    by_jump = np.linspace(0, last, N_FRAMES // 2).round().astype(int)
-    places = np.linspace(0, cycles[-1], N_FRAMES // 2)
+    by_jump = np.linspace(0, last, N_WEAR_FRAMES // 2).round().astype(int)
+    places = np.linspace(0, cycles[-1], N_WEAR_FRAMES // 2)
     by_cycle = np.searchsorted(cycles, places).clip(0, last)
     return np.unique([*by_jump, *by_cycle])
 
 
-def _collect_wear_history(evolved) -> dict:
+def _collect_wear_history(evolved) -> Arrays:
     """Return a dict of the wear measures over the cycles (j,).
 
     The entries `cycle` and `EDGE_PEAK` are included.

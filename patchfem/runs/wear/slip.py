@@ -76,7 +76,9 @@ def compute_cycle_slip(model, patch, frames: int) -> CycleSlip:
     Parameters
     ----------
     model : Model
+        Model at the present wear.
     patch : Patch
+        Patch at the present wear.
     frames : int
         Number of frames per cycle from which the path is computed.
     """
@@ -118,14 +120,19 @@ def _compute_bench_slip(model, patch, frames: int) -> CycleSlip:
         model, patch, steps_per_cycle(model), 0 if is_uniform else frames * cycles
     )
     outcome = check_pieces_overlap(None, model.patch, patch, run.slide)
+
+    # Pieces that do not deform in shear slip alike at all nodes: one path for all.
     if is_uniform:
         cycle = _select_last_bench_cycle(run)
         slip = _compute_uniform_slip(model, patch, cycle, cycle.load[0])
         return slip._replace(values=run.values, outcome=outcome)
+
     is_last = run.frames >= run.first
     local = run.local[is_last]
     tau = run.tau[is_last]
     slide = run.slide[run.frames[is_last]]
+
+    # A path that is not cyclic begins at rest, before its first frame.
     if run.first == 0:
         start = np.zeros((1, patch.x.size))
         local = np.concatenate([start, local])
@@ -136,6 +143,7 @@ def _compute_bench_slip(model, patch, frames: int) -> CycleSlip:
     if model.grooves is not None:
         load = np.full(slide.size, patch.pressure.load)
         local, tau = compute_flank_slip(model, patch, slide, load, local, tau)
+
     slip = compute_frame_slip(model, patch, Frames(local, tau, is_closed=False))
     return slip._replace(values=run.values, outcome=outcome)
 
@@ -143,8 +151,11 @@ def _compute_bench_slip(model, patch, frames: int) -> CycleSlip:
 def _compute_rig_slip(model, patch, frames: int) -> CycleSlip:
     """Compute the slip path of the interface nodes in the last cycle of a rig."""
     settings = numerics.choose_numerics(model)
+    pressed_load = patch.pressure.load
     is_uniform = slips_uniformly(model, settings.per_point and model.grooves is None)
     solution = solve.solve_rig(model, settings, patch, 0 if is_uniform else frames)
+
+    # A motion without bound has no slip path (the caller stops the wear).
     amplitude = Measure(solution.values["relative_displacement_amplitude"], "m", 0.0)
     outcome, _ = judge_outcome(
         solution,
@@ -158,19 +169,23 @@ def _compute_rig_slip(model, patch, frames: int) -> CycleSlip:
         patch,
         solution.response.slide,
     )
-    cycle = _select_last_rig_cycle(model, solution.window, patch.pressure.load)
+
+    # The slip follows from the histories if it is uniform, else from the frames of the cycle.
+    cycle = _select_last_rig_cycle(model, solution.window, pressed_load)
     if strips_slide_independently(model) and is_uniform:
         slip = _compute_strip_slip(model, patch, solution.window)
     elif is_uniform:
-        slip = _compute_uniform_slip(model, patch, cycle, patch.pressure.load)
+        slip = _compute_uniform_slip(model, patch, cycle, pressed_load)
     else:
         frame_fields = fields.collect_interface_fields(model, settings, patch, solution)
         frame_fields = {name: values[1:] for name, values in frame_fields.items()}
         local = frame_fields["slip"]
         tau = frame_fields["shear_stress"]
+
+        # The load on the flanks varies with the lift of the rig.
         if model.grooves is not None:
             response = solution.response
-            constant = np.full(response.time.size, patch.pressure.load)
+            constant = np.full(response.time.size, pressed_load)
             load = np.interp(
                 frame_fields["time"],
                 response.time,
@@ -180,6 +195,7 @@ def _compute_rig_slip(model, patch, frames: int) -> CycleSlip:
                 model, patch, frame_fields["holder_slide"], load, local, tau
             )
         slip = compute_frame_slip(model, patch, Frames(local, tau, is_closed=True))
+
     error = slip.error + _slip_amplitude_change(solution.values, cycle)
     return slip._replace(error=error, values=solution.values, outcome=outcome)
 
@@ -204,6 +220,7 @@ def compute_point_slip_path(model, window, values: dict) -> tuple[float, float]:
     Parameters
     ----------
     model : Model
+        Model of a bench or a rig with [normal].
     window
         Histories of a bench or a rig.
     values : dict
@@ -329,6 +346,7 @@ def wear_force_on_flanks(model, slide, force, load) -> np.ndarray:
     Parameters
     ----------
     model : Model
+        Model with grooves and [wear].
     slide : (k,)
         Relative displacement [m].
     force, load : (k,)
@@ -351,7 +369,9 @@ def compute_flank_slip(model, patch, slide, vertical, local, tau) -> tuple:
     Parameters
     ----------
     model : Model
+        Model with grooves and [wear].
     patch : Patch
+        Patch at the present wear, whose pressure distributes the load.
     slide : (f,)
         Displacement of the holder [m] in each frame.
     vertical : (f,)
@@ -380,8 +400,11 @@ def compute_frame_slip(model, patch, frames: Frames) -> CycleSlip:
     Parameters
     ----------
     model : Model
+        Model with [wear], whose form decides.
     patch : Patch
+        Patch at the present wear.
     frames : Frames
+        Slip and shear stress of the nodes along the cycle.
     """
     count = len(frames.slip)
 
