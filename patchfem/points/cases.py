@@ -80,6 +80,7 @@ def march_cases(cases: Cases, steps: int, *, has_samples: bool = False) -> CaseM
     has_samples : bool
         Whether the motion in the window is stored.
     """
+    # Half steps of the whole cycle, and of the finest level for the halving of steps.
     n = len(cases.parameters)
     columns = cases.parameters.T
     phase = (
@@ -124,13 +125,18 @@ def compute_measures(cases: Cases, now, seen, history) -> dict:
     count = seen[:, Seen.N_CYCLES]
     span = seen[:, Seen.SPAN]
     window = int(columns[Number.WINDOW].max(initial=1))
+
+    # Sums and extremes of the window.
     low = history[:, -window:, 0].min(axis=1)
     high = history[:, -window:, 1].max(axis=1)
     work = seen[:, Seen.WORK]
     stuck = seen[:, Seen.STUCK] / span
+
     energies = _compute_energies(cases, now, mass)
     gap = np.abs(seen[:, Seen.SAMPLED] - work)
     size = seen[:, Seen.PASSED] + mass * (now[:, Now.POWER] + now[:, Now.STORED])
+
+    # The relative displacement is that of the output; the loop area is that of one cycle.
     values = {
         "relative_displacement_amplitude": (high - low) / 2 * np.abs(ratio),
         "absolute_acceleration_peak": seen[:, Seen.MAX_ACCELERATION],
@@ -186,10 +192,13 @@ def _compute_harmonics(cases: Cases, now, seen, area, slide_range) -> dict:
     push = -columns[Number.MOBILITY] * push - v_jump - (turn + columns[Number.DAMPING]) * q_jump
     stiffness = columns[Number.STIFFNESS] + turn * (turn + columns[Number.DAMPING])
     third = v_jump + turn * (q_jump + turn * push / stiffness)
+
     ratio = columns[Number.OUTPUT]
     fundamental = np.abs(ratio * first - 1j * drive * columns[Number.BASE]) * 2 / span
     count = np.maximum(seen[:, Seen.N_CYCLES], 1)
     half_range = seen[:, Seen.RANGE] / count / 2
+
+    # Stiffness and damping of a point that hardly moves are NaN.
     n_secants = seen[:, Seen.N_SECANTS]
     moves = slide_range > MIN_SLIDE_RANGE
     damping = area / (2 * np.pi * cases.reference * half_range**2)

@@ -195,11 +195,13 @@ def load_checkpoint(path: Path, key: str, run, record) -> None:
     try:
         with np.load(path, allow_pickle=False) as file:
             arrays = {name: file[name] for name in file.files}
+
         if str(arrays["key"]) != key:
             raise PatchfemError(
                 f"{folder}: the state saved there belongs to another scene or to another version of patchfem; "
                 f"{RETRY_ADVICE}"
             )
+
         form = json.loads(str(arrays["form"]))
         system, march_state, record_state, cycles = unpack(form, arrays)
         run.system = convert_to_tuples(system, run.system)
