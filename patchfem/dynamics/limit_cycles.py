@@ -345,6 +345,8 @@ def _find_mode_cycles(modes: ModalBasis, group: LawGroup, mode: int, size: float
     """Return the limit cycles of one mode and the smallest amplitude [m] that was examined."""
     stuck_mode = modes.compute_stuck_mode(group.rows, group.stiffness(), mode)
     free_mode = (modes.omega[mode], np.eye(modes.omega.size)[mode])
+
+    # The path begins with the sticking contact, or with the sliding one if that fails.
     paths = (
         (np.geomspace(MIN_AMPLITUDE_RATIO, MAX_AMPLITUDE_RATIO, N_AMPLITUDES), stuck_mode, 0.0),
         (
@@ -353,6 +355,7 @@ def _find_mode_cycles(modes: ModalBasis, group: LawGroup, mode: int, size: float
             MIN_SLIDING_RATIO * size,
         ),
     )
+
     for ratios, start, min_amplitude in paths:
         found = [
             _find_undamped_motions(modes, group, mode, (size * ratios, start), harmonics)
@@ -360,17 +363,21 @@ def _find_mode_cycles(modes: ModalBasis, group: LawGroup, mode: int, size: float
         ]
         if None in found:
             continue
+
         coarse, fine = found
         if len(coarse) != len(fine):
             raise NotConverged(
                 f"{len(coarse)} limit cycles were found with {N_HARMONICS} harmonics but {len(fine)} limit "
                 f"cycles with {2 * N_HARMONICS + 1} harmonics"
             )
+
+        # The change with the number of harmonics bounds the error.
         cycles = []
         for other, cycle in zip(coarse, fine):
             change = abs(other.amplitude - cycle.amplitude)
             cycles.append(cycle._replace(error=2 * change + AMPLITUDE_TOL * cycle.amplitude))
         return cycles, min_amplitude
+
     raise NotConverged(NOT_FOLLOWED_MESSAGE)
 
 

@@ -173,12 +173,15 @@ def make_rig(
     settings[Setting.REPEAT] = repeat
     settings[Setting.MAX_STEPS] = options.max_steps
     settings[Setting.HAS_RIGID] = faces[:, Face.RIGID].any()
+
     table = np.zeros((len(Mode), n))
     damping = np.zeros((n, n))
     if modes is not None:
         gauge = modes.output if modes.gauge is None else modes.gauge
         table = np.array([modes.omega**2, -modes.base, modes.output, gauge], float)
         damping = np.array(modes.damping_matrix, float, order="C")
+
+    # Friction work, slip and loss of each interface.
     for load in faces[:, Face.LOAD]:
         work = load * scales[0]
         scales += [work, scales[0], work]

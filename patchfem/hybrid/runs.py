@@ -195,8 +195,10 @@ class Motion:
 
         slides = z @ rig.rows[0, :m].T
         slide_rates = rate @ rig.rows[0, :m].T
+        # The velocity of a rigid interface at rest is round-off.
         rests = (self._columns(rows, 2) == 0) & (rig.faces[:m, Face.RIGID] > 0)
         slide_rates[rests] = 0.0
+
         work = integrals[:, :m, 0]
         loss = integrals[:, :m, 2]
         slips = integrals[:, :m, 1] + self.case.y[:n] @ rig.rows[0, :m].T
@@ -205,6 +207,7 @@ class Motion:
                 [work.sum(1), (work - loss).sum(1), loss.sum(1), np.zeros(time.size)]
             )
         }
+
         if m and rig.faces[0, Face.SWING]:
             extra["normal_load"] = self._columns(rows, 1)[:, 0]
         if m > 1:

@@ -381,12 +381,14 @@ def add_stick(rig, state, fraction, i, row):
     """
     column = Probe.FACES + Probe.COUNT * i + Probe.SLIPPING
     h = state.clock[Clock.LENGTH]
+
     # A reversal without stick is a stick of a duration of round-off, after which slip does not start.
     shortest = MIN_STICK * rig.settings[Setting.PERIOD]
     sticks = state.probes[0, column] < 0
     duration = max(row[Window.STICKS], 0.0)
     if duration > shortest and not sticks:
         add_start(rig, state.clock, state.clock[Clock.TIME], row)
+
     for node in range(1, N_NODES):
         left = fraction * NODES[node - 1]
         right = fraction * NODES[node]

@@ -114,16 +114,20 @@ def identify_driven_modes(
             "has " + ", ".join(values) + ": choose channels with --map, or use --decay for a free "
             "decay"
         )
+
     input_name = inputs[0]
     step = find_time_step(values["time"])
     excitation = values[input_name]
     response = values[response_name]
+    # The modes describe the motion relative to the base.
     if input_name == "base_acceleration" and response_name == "acceleration":
         response = response - excitation
+
     modes = fit_driven_modes(step, excitation, response, response_name, band)
     rows, mass, notes = (
         _convert_force_residues(modes) if input_name == "force" else _convert_base_residues(modes)
     )
+
     if modes.misfit > MAX_MISFIT:
         notes.append(
             f"the modes leave {100 * modes.misfit:.0f} % of the response (root mean square) unexplained: the "
@@ -134,6 +138,7 @@ def identify_driven_modes(
             f"the modes are fitted to the first {MAX_FITTED_SAMPLES} of {excitation.size} samples, a duration of "
             f"{MAX_FITTED_SAMPLES * step:.4g} s"
         )
+
     return ListedModes(
         frequency=modes.frequency,
         damping=modes.damping,
@@ -233,6 +238,7 @@ def compute_decay_curve(values: dict, begin: float | None = None) -> tuple:
     half_cycles = find_half_cycles(time, value)
     order = DERIVATIVE_ORDERS[find_response_name(values)]
     curve = fit_decay_curve(_convert_to_displacement(half_cycles, order))
+
     notes = []
     is_certain = curve.damping_error <= MAX_ERROR_RATIO * np.abs(curve.damping)
     if curve.time.size and not is_certain.all():
@@ -246,6 +252,8 @@ def compute_decay_curve(values: dict, begin: float | None = None) -> tuple:
             f"of the damping ratio is wider than {MAX_ERROR_RATIO:g} times its value there"
         )
         curve = curve.select(is_certain)
+
+    # A decay that ends early for want of samples would look complete.
     reason = describe_missing_samples_at_end(time, half_cycles)
     if reason:
         notes.append(f"the decay is followed up to {half_cycles.middle[-1]:.4g} s only: {reason}")

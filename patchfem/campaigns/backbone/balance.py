@@ -170,6 +170,7 @@ def _compute_rigid_curve(joint: JointMode, amplitudes) -> Curve:
             "with rigid friction the free motion cannot be computed if the rig has a nonlinear "
             "spring or a mode of 0 Hz"
         )
+
     static = joint.friction_limit
     friction = model.friction
     kinetic = static
@@ -179,12 +180,15 @@ def _compute_rigid_curve(joint: JointMode, amplitudes) -> Curve:
     motions = limit_cycles.trace_relay_backbone(
         modes, row, (kinetic, static), amplitudes, joint.mode
     )
+
+    # Friction stops the motion in each cycle at the amplitudes that are left out.
     known = np.array([motion is not None for motion in motions])
     if not known.any():
         raise NotConverged(
             "at these amplitudes rigid friction stops the motion in each cycle, and only a motion "
             "that always slides can be computed; give larger amplitudes"
         )
+
     amplitude = np.asarray(amplitudes)[known]
     cycles, ratios = zip(*filter(None, motions))
     omega = np.array([cycle.omega for cycle in cycles])

@@ -171,9 +171,12 @@ def _compute(joint: JointMode, mode: str, amplitudes, methods, progress) -> Back
             "travel of the flexure; give smaller amplitudes with --amplitudes",
             "structure.travel",
         )
+
+    # A rig with more modes shows the error of the modes that this one neglects.
     richer = None
     if joint.has_errors and model.rig.structure.richer_rig is not None:
         richer = build_joint(replace(model, rig=model.rig.structure.richer_rig), mode)
+
     curves = {}
     missing = {}
     for method in methods:
@@ -200,6 +203,7 @@ def _compute(joint: JointMode, mode: str, amplitudes, methods, progress) -> Back
         notes=(),
         band=make_band(curves) if joint.has_errors else None,
     )
+
     backbone = backbone._replace(notes=words.write_notes(joint, amplitudes, backbone))
     if joint.has_errors:
         backbone = backbone._replace(advice=words.write_advice(joint, backbone))
@@ -279,6 +283,8 @@ def _fit_exponents(joint: JointMode, curve: Curve | None) -> LossExponents:
         return LossExponents()
     amplitude = curve.amplitude
     loss = curve.loss
+
+    # Energy m v^2 of the mode with its largest speed v; a loss below the errors has no slope.
     speed = 2 * np.pi * curve.frequency * amplitude / joint.reach
     energy = joint.modes.mass * speed**2
     relative_error = words.MIN_LOSS_RATIO * 2 * np.pi * curve.damping_error
@@ -288,6 +294,7 @@ def _fit_exponents(joint: JointMode, curve: Curve | None) -> LossExponents:
         known & (amplitude < words.MAX_MICRO_SLIP_RATIO * slip),
         known & (amplitude > MIN_GROSS_SLIP_RATIO * slip),
     )
+
     slopes = []
     for points, first in zip(map(np.flatnonzero, ranges), (0, -2)):
         slope = None

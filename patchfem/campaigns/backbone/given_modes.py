@@ -53,6 +53,7 @@ def prepare_model(build: Callable, modes: str | Iterable = "") -> PreparedModel:
     if not tables.modes:
         return PreparedModel(model, notes)
     given_modes = tables.modes
+
     # The joint that was bolted in the modal test is that of the scene as written.
     stiffness = _find_sticking_stiffness(
         build(BackboneTables(given_modes, stuck=False), is_written=True)
@@ -61,12 +62,14 @@ def prepare_model(build: Callable, modes: str | Iterable = "") -> PreparedModel:
     if stiffness is not None:
         used_modes = _assume_slides(given_modes, stiffness / model.rig.modes.mass)
         model = build(BackboneTables(used_modes), is_written=False)
+
     notes += _note_modes(used_modes, is_assumed=tables.is_assumed, is_stuck=stiffness is not None)
     if tables.assumes_mass and not tables.is_assumed:
         notes += (
             f"the modal mass is assumed to be {ASSUMED_MASS}, so the effect of a given `slide` on frequency and "
             "damping holds for this mass only; give yours as structure.moving_mass",
         )
+
     if any(mode.slide is None for mode in given_modes):
         notes += _note_slides(len(given_modes), stiffness)
         if sum(mode.slide is None for mode in given_modes) > 1:

@@ -349,6 +349,8 @@ def fit_curve(
             f"no curve of frequency and damping could be computed within the ranges of --free; {listed}; leave out "
             "the rows with the largest damping, or change the ranges of --free"
         )
+
+    # Assumed errors follow the deviations of the fit (iteratively reweighted least squares).
     for _ in range(MAX_REWEIGHTINGS if measured.assumed.any() else 0):
         before = measured.error
         measured = measured.scale_assumed_errors(curves.compute(first.values, method), len(ranges))
@@ -365,6 +367,7 @@ def fit_curve(
         reference = method
         fit = curves.solve(measured, reference, kind="series", start=first.values)
     fit = fit.count_earlier_search(first)
+
     fitted = curves.compute(fit.values, reference)
     widened, mode_note = _widen_by_missing_modes(fit, curves, measured, reference)
     beyond, advice = extrapolate_curve(curves, measured, widened, reference)

@@ -238,12 +238,15 @@ def _warn_of_doubtful_fit(readings: Readings, search: Descents, logs: np.ndarray
             f"{len(readings.empty_rows)} of {len(readings.rows)} rows have no reading and are left out: rows "
             f"{numbers}"
         )
+
     n_unstable = int(readings.unstable.sum())
     if n_unstable:
         warnings.append(
             f"{n_unstable} readings flagged U (unstable) count in the fit as lower bounds; scores_stable leaves these "
             "readings out"
         )
+
+    # A motion that is not bounded has the largest log ratio in place of a reading.
     unbounded = set()
     for k in readings.row[np.abs(logs) >= MAX_LOG_RATIO]:
         unbounded.add(f"{readings.rows[k].frequency:.6g} Hz, {readings.rows[k].input:.4g} m/s^2")
@@ -252,6 +255,7 @@ def _warn_of_doubtful_fit(readings: Readings, search: Descents, logs: np.ndarray
             f"no bounded motion is found at {'; '.join(sorted(unbounded))}: each row at these inputs "
             f"counts as if the model were wrong by a factor of {np.exp(MAX_LOG_RATIO):.0f}"
         )
+
     if search.n_best == 1 and search.rms.size > 1:
         warnings.append(
             f"only one of {search.rms.size} searches ended within 1 % of the best training score, so "

@@ -158,6 +158,8 @@ class FreeBalance:
             [motion.by_unknowns, np.stack([motion.by_omega * self.omega, by_zeta, by_a], axis=2)],
             axis=2,
         )
+
+        # Equations: slides, amplitude and phase of the coordinate, and the condition of the motion.
         r = balance.rank
         residual = np.empty(x.size)
         jacobian = np.zeros((x.size, x.size))
@@ -345,6 +347,7 @@ def find_free_motions(
         except NotConverged:
             return None
 
+    # Motions are followed upwards, then downwards to those that are missing.
     out: list[FreeSolution | None] = [None] * len(amplitudes)
     for k, amplitude in enumerate(map(float, amplitudes)):
         out[k] = solve_near(starts[k] if starts else None, amplitude)
@@ -352,6 +355,7 @@ def find_free_motions(
         out[k] = out[k] or solve_linear_mode(amplitude)
         if out[k] is None and 0 < small < amplitude and not any(out):
             out[k] = solve_near(solve_linear_mode(small), amplitude)
+
     for k in range(len(amplitudes) - 2, -1, -1):
         out[k] = out[k] or solve_near(out[k + 1], float(amplitudes[k]))
     return out

@@ -102,11 +102,14 @@ def follow_curve(
         raise NotConverged(
             "accuracy.method: the first point of the curve was not found near the given start"
         )
+
     point = _make_point(evaluate, first[0], along if forward else -along, unit)
     points = [point]
     folds = []
     step = settings.first_step
     ended = "points"
+
+    # A step without a solution is halved.
     while len(points) < settings.max_points:
         if not settings.size:
             unit[:-1] = max(unit[0], 0.5 * float(np.linalg.norm(point.w[:-1])))
@@ -134,6 +137,7 @@ def follow_curve(
         points.append(point)
         folds += _find_folds(previous, point, step, unit[-1])
         step = min(step * _step_factor(n_newton), settings.max_step)
+
     path = np.array([point.w for point in points])
     return CurvePath(path[:, :-1], path[:, -1], tuple(folds), ended)
 

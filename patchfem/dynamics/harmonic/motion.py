@@ -164,12 +164,15 @@ def make_cycle_response(motion: SteadyMotion, modes, drive, samples: int = 1000)
         chosen = values[..., slides.is_sample][..., ::stride]
         return np.concatenate([chosen, chosen[..., :1]], axis=-1).T
 
+    # Modal motion z = Re sum z_k exp(i k omega t) and its rate.
     k = np.arange(len(motion.modal))[:, None]
     waves = np.exp(1j * k * np.linspace(0, 2 * np.pi, samples + 1))
     z = (motion.modal.T @ waves).real.T
     rate = ((1j * k * omega * motion.modal).T @ waves).real.T
+
     total = select(np.array([sum(force.force for force in row) for row in forces]))
     time = np.arange(samples + 1) * (2 * np.pi / omega / samples)
+
     interface = (
         slides.q[0],
         omega * slides.rate[0],

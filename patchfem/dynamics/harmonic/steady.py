@@ -61,6 +61,7 @@ def find_steady_motion(
     """
     group = make_group(modes, group)
     slides = start.slides if isinstance(start, SteadyMotion) else start
+
     motion = None
     for h in _choose_counts(drive, group, harmonics, start):
         # Corners of the force are resolved once the amplitude is known.
@@ -72,11 +73,13 @@ def find_steady_motion(
             if isinstance(failure, Unbounded) or h == HARMONIC_COUNTS[-1] or harmonics:
                 raise
             continue
+
         known = None if motion is None else motion.slides
         motion = make_motion(balance, x, drive, known, count)
         if motion.error <= tolerance and known is not None and not harmonics:
             break
         slides = motion.slides
+
     if not harmonics and motion.error > tolerance:
         raise NotConverged(
             f"accuracy.tolerance: with {HARMONIC_COUNTS[-1]} harmonics the motion still has an error of "
@@ -246,6 +249,7 @@ def find_one_harmonic_roots(balance: HarmonicBalance, omega: float, level: float
     def find_mismatch(log: float) -> float:
         return abs(find_drive(log)) - 1
 
+    # An amplitude of the slide is a root if it needs the given drive; its phase turns that of the drive to 0.
     grid = np.log(size) + np.linspace(*np.log(ROOT_RANGE), N_ROOT_AMPLITUDES)
     values = [find_mismatch(log) for log in grid]
     roots = []

@@ -115,6 +115,7 @@ def make_answer(comparison: Comparison) -> Answer:
     surfaces = (comparison.before, comparison.after)
     file_notes = [note for surface in surfaces for note in surface.notes]
     track = comparison.track
+
     answer = build(
         sources=[surface.source for surface in surfaces],
         words=words._replace(notes=(*words.notes, *file_notes)),
@@ -133,6 +134,7 @@ def make_answer(comparison: Comparison) -> Answer:
             "notes": file_notes,
         },
     )
+    # A mean depth is meaningless without the region of the mean.
     if sentences.is_known(comparison.values.get("worn_depth_mean")):
         region = sentences.describe_region(comparison).removeprefix("the ")
         answer.details["worn_depth_mean"]["over"] = region
@@ -161,10 +163,12 @@ def build(
     details : dict
         Further content of compare.json.
     """
+    # Values are shown once on the page; compare.json has them all.
     values = values | {name_in_track(name): value for name, value in track.items()}
     shown = [
         name for name in values if name not in SHOWN_ELSEWHERE and not _is_repeated(name, values)
     ]
+
     content = {
         "patchfem": __version__,
         "verdict": words.verdict[0],
@@ -174,6 +178,7 @@ def build(
         **to_json(values),
         "track": to_json(track) or None,
     }
+
     return Answer(
         kind="compare",
         title=" and ".join(Path(source).name for source in sources),

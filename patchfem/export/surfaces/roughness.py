@@ -71,6 +71,7 @@ def make_answer(reports: list[RoughnessReport]) -> Answer:
             continue
         values = {value.name: value for value in members[0].values}
         state = ""
+        # Several surfaces of one kind give means, with a caution where these are of limited use.
         if len(members) > 1:
             averages = _average(members)
             caution = _find_caution(members)
@@ -221,6 +222,7 @@ def _make_data(reports: list[RoughnessReport]) -> dict[str, Variable]:
     data |= make_variables("material_ratio", "1", material_ratio=curves[0][0])
     heights = np.array([height for _, height in curves])
     data["abbott"] = Variable(("file", "material_ratio"), heights, "m", "height")
+    # Only Abbott curves can be compared over files.
     if len(reports) > 1:
         return data
 

@@ -44,9 +44,11 @@ def make_answer(
     analysis = analyse(table)
     verdict = make_verdict(table, analysis)
     notes = [sweep_scene.note_bolted_joint()] if sweep_scene.note_bolted_joint() else []
+
     details = {"answer": verdict[0], "sentences": list(verdict)}
     details |= _make_details(table, analysis) | {"of": identify_sweep(sweep_scene, cases)}
     keys = " × ".join(key.key for key in table.keys)
+
     return Answer(
         kind="sweep",
         title=f"Sweep of {keys} ({sweep_scene.path.stem})",
@@ -124,6 +126,8 @@ def _make_quantities(table: SweepTable, analysis: SweepAnalysis) -> Quantities:
     if len(analysis.peaks) == 1:
         unit = table.measures[analysis.peaks[0].measure].unit
         quantities |= make_peak_quantities(analysis.peaks[0], unit)
+
+    # A limit without a value gives the reason.
     for limit in analysis.limits:
         reason = "" if np.isfinite(limit.value) else "the cases do not show where it lies"
         quantities[f"limit_{limit.measure}"] = Quantity(
@@ -133,6 +137,7 @@ def _make_quantities(table: SweepTable, analysis: SweepAnalysis) -> Quantities:
             high=limit.high,
             reason="it is reached in no case" if limit.is_never_reached else reason,
         )
+
     for name, low, high, _ in analysis.ranges[:MAX_RANGES]:
         column = table.measures[name]
         for word, case in (("smallest", low), ("largest", high)):
