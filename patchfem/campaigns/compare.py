@@ -90,6 +90,7 @@ def run_both_surfaces(
     Parameters
     ----------
     before, after : Model
+        Models of the same scene with the two surfaces.
     title : str
         Title of the scene.
     say : callable, optional

@@ -74,7 +74,7 @@ def find_coarse_intervals(abscissas, values, tolerance: float) -> np.ndarray:
     abscissas, values : ndarray
         (n,); values may be nan.
     tolerance : float
-        See `sample_adaptively`.
+        Largest error of linear interpolation, relative to the larger value or MIN_VALUE_RATIO of the largest one.
 
     Returns
     -------

@@ -85,6 +85,7 @@ def estimate_amplitude(modes: ModalBasis, row, limit: float, mode: int) -> float
     Parameters
     ----------
     modes : ModalBasis
+        Modes of the structure without the contact.
     row : ndarray
         (n,) slide per coordinate.
     limit : float
@@ -212,12 +213,15 @@ def trace_relay_backbone(modes: ModalBasis, row, forces: tuple, amplitudes, mode
     Parameters
     ----------
     modes : ModalBasis
+        Modes of the structure without the contact.
     row : ndarray
+        (n,) slide per coordinate.
     forces : tuple
-        Kinetic and static friction [N], see `find_relay_cycles`.
+        Kinetic and static friction [N].
     amplitudes : array_like
         (k,) amplitudes [m].
     mode : int
+        Index of the coordinate of the mode.
 
     Returns
     -------
@@ -312,7 +316,9 @@ def find_balance_cycles(modes: ModalBasis, group: LawGroup, row, limit: float) -
     Parameters
     ----------
     modes : ModalBasis
+        Modes of the structure without the contact.
     group : LawGroup
+        Law of the interface.
     row : ndarray
         (n,) slide per coordinate.
     limit : float

@@ -120,10 +120,13 @@ def make_rig(
     modes : ModalBasis or None
         None for a bench, whose slide is the signal.
     signal : Signal
+        Drive of the rig, or slide of the bench.
     interfaces : sequence of Interface
+        Law, load and slide per modal coordinate of each interface.
     sizes : (float, float)
         Expected slide [m] and its speed [m/s].
     options : Options
+        Tolerance, steps and limits of the run.
     """
     # A bench has one mode without stiffness, which its slide replaces.
     n = 1 if modes is None else modes.omega.size
@@ -197,6 +200,7 @@ def make_start(rig: Rig, interfaces, start=None) -> np.ndarray:
     rig : Rig
         Arrays of the rig.
     interfaces : sequence of Interface
+        Law, load and slide per modal coordinate of each interface.
     start : InitialState, optional
         Modal coordinates [m] and velocities [m/s].
     """
@@ -264,9 +268,11 @@ def make_rig_case(
     Parameters
     ----------
     rig : model.rig.Rig
+        Structure and drive.
     joints : sequence of (LawNumbers, Load)
         Law and load of each interface.
     schedule : Schedule
+        Cycles, window and samples.
     signal : optional
         Drive in place of that of the rig.
     rtol : float
@@ -307,7 +313,9 @@ def find_sizes(modes: ModalBasis, signal: Signal, drive, start=None) -> tuple[fl
     Parameters
     ----------
     modes : ModalBasis
+        Modes of the structure without the contact.
     signal : Signal
+        Pieces and tones of the drive.
     drive
         Drive of the signal.
     start : InitialState, optional
@@ -336,6 +344,7 @@ def make_batch(cases, n_events: int = 0) -> tuple[Rig, State, Record]:
     Parameters
     ----------
     cases : sequence of Case
+        Rigs of equal shape, with their states at the start.
     n_events : int
         Number of events that a case can store.
     """

@@ -234,6 +234,7 @@ def run_batch(
     """Run cases whose arrays have the same shapes in one compiled loop.
 
     Parameters
+        Rigs of equal shape, with their states at the start.
     ----------
     cases : sequence of Case
     n_events : int
@@ -291,6 +292,7 @@ def run_case(
     Parameters
     ----------
     case : Case
+        Rig and state at the start.
     start : State, optional
         End of another motion of the same rig, from which the case goes on at t = 0; default: the start of the case.
     fills_histories : bool
@@ -342,10 +344,13 @@ def _fill_repeated_cycles(case: Case, cycles, samples, event_rows) -> tuple:
     Parameters
     ----------
     case : Case
+        Case that was run.
     cycles : (C, 12) array
+        Rows of the cycles.
     samples : (S, m) array
         NaN at times of these cycles.
     event_rows : (e, m) array
+        Rows of the events.
     """
     skipped = np.flatnonzero(cycles[:, Cycle.REPEATS])
     last = skipped[0] - 1

@@ -18,6 +18,7 @@ def describe_fit(fit: Fit, names) -> list:
     Parameters
     ----------
     fit : Fit
+        Best fit, with its intervals.
     names : sequence of str
         Names (n,) of the parameters.
 

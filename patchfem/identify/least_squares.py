@@ -154,6 +154,7 @@ class Problem:
         Parameters
         ----------
         search : Search
+            Starting points and callbacks of the search.
         interval_kind : str
             Value of `IntervalKind`.
 

@@ -890,7 +890,7 @@ def store_sample(sine, case, now, seen, samples):
     seen : (33,) array
         What was observed, in the rows of `case_rows.Seen`; changed in place.
     samples : (S, 5) array
-        Samples of the case, see `march_cases`.
+        Samples of the case; output.
     """
     row = int(seen[Seen.N_SAMPLES])
     if row >= samples.shape[0]:
@@ -916,7 +916,7 @@ def march_cycle(steps, table, waves, observes, case, now, numbers, memory, j, se
     table : (LEVELS + 1, 2, 5) array
         Responses of `write_responses`.
     waves : (2, k) array
-        Sines and cosines of the drive, see `march_cases`.
+        Sines and cosines of the drive at half steps of a cycle, and at half of the shortest steps of a step.
     observes : bool
         Whether the cycle is measured.
     case : (12,) array
@@ -932,7 +932,7 @@ def march_cycle(steps, table, waves, observes, case, now, numbers, memory, j, se
     seen : (33,) array
         What was observed, in the rows of `case_rows.Seen`; changed in place.
     samples : (S, 5) array
-        Samples of the case, see `march_cases`.
+        Samples of the case; output.
     """
     omega = case[Number.OMEGA]
     step = 2 * np.pi / omega / steps
@@ -1005,10 +1005,18 @@ def march_cases(steps, waves, parameters, numbers, memory, nows, seens, historie
         Steps per cycle.
     waves : (2, 2 steps + 2 TICKS + 2) array
         Sines and cosines of the drive at half steps of a cycle, and at half of the shortest steps of a step.
-    parameters, numbers, memory
-        See `case_rows.Cases`; the memory is changed.
-    nows : (c, 20), seens : (c, 33), histories : (c, n, 4) array
-        State, observations, and extremes and phasor of every cycle; output.
+    parameters : (c, 12) array
+        Numbers of the cases, in the rows of `case_rows.Number`.
+    numbers : (k, c) array
+        Numbers of the laws; row 0 is the `Law`.
+    memory : (l, c) array
+        Memory of the laws; changed in place.
+    nows : (c, 20) array
+        States of the cases, in the rows of `case_rows.Now`; output.
+    seens : (c, 33) array
+        What was observed, in the rows of `case_rows.Seen`; output.
+    histories : (c, n, 4) array
+        Extremes and phasor of every cycle; output.
     samples : (c, S, 5) array
         Slide, velocity, irreversible slide, force and acceleration at the ends of the first S whole steps of the window;
         output.

@@ -44,11 +44,13 @@ def list_parameters(
     modes : ModalBasis
         Of one mode that moves the contact; its numbers may be arrays (c,).
     drive : SineDrive
+        Frequency and level, which may be arrays (c,).
     load : float or (c,)
         Normal load [N].
     cycles, window : int
         Number of cycles, and of the last of them that are measured.
     start : core.InitialState, optional
+        Slide and velocity at the start; at rest by default.
     """
     slide = modes.slide[0]
     output = modes.output[0]
@@ -115,8 +117,13 @@ def compute_measures(cases: Cases, now, seen, history) -> dict:
     Parameters
     ----------
     cases : Cases
-    now : (c, 20), seen : (c, 33), history : (c, n, 4) array
-        State at the end and observations, see `case_rows`.
+        The cases that were run.
+    now : (c, 20) array
+        States at the end, in the rows of `case_rows.Now`.
+    seen : (c, 33) array
+        What was observed, in the rows of `case_rows.Seen`.
+    history : (c, n, 4) array
+        Extremes and phasor of every cycle.
     """
     columns = cases.parameters.T
     omega = columns[Number.OMEGA]

@@ -94,6 +94,7 @@ def open_checkpoint(run, record, request: tuple) -> MarchCheckpoint:
     run : time_march.March
         March at its start.
     record : time_march.Record
+        Its record, empty.
     request : tuple
         Numbers that identify what is marched; the first one is the number of steps.
 
@@ -152,10 +153,13 @@ def save_checkpoint(path: Path, key: str, run, record) -> None:
     Parameters
     ----------
     path : Path
+        File, which is replaced as a whole.
     key : str
         Identifies the march.
     run : time_march.March
+        March at its present state.
     record : time_march.Record
+        Its record.
 
     Raises
     ------
@@ -183,8 +187,14 @@ def load_checkpoint(path: Path, key: str, run, record) -> None:
 
     Parameters
     ----------
-    path, key, run, record
-        As in `save_checkpoint`; `run` and `record` are overwritten.
+    path : Path
+        Checkpoint file.
+    key : str
+        Identifies the march.
+    run : time_march.March
+        March at its start; overwritten.
+    record : time_march.Record
+        Its record; overwritten.
 
     Raises
     ------

@@ -162,6 +162,7 @@ def make_contact(elements, rows, springs=(), scale: float = 0.0) -> Contact:
     rows : (i, n) array
         Slide of each interface per modal coordinate.
     springs : sequence of PointSet
+        Springs of the rig, each with its row.
     scale : float
         Force by which residuals are measured where there is no friction [N].
     """
@@ -216,6 +217,7 @@ def make_bond_contact(
     Parameters
     ----------
     bonds : Bonds
+        Coefficient of friction, bond length and growth of the bonds.
     force : (m,) array or float
         Normal force of each point [N]; with `lower`, its area times the mean pressure.
     row : (n,) array
@@ -301,7 +303,9 @@ def make_flank_contact(law, grooves: Grooves, load: float, row, shear=None, shar
     Parameters
     ----------
     law : Bonds, or keys `law`, `static` and `bond_length` of a table [friction]
+        Law of the points.
     grooves : Grooves
+        Geometry of the grooves and mass that they lift.
     load : float
         Vertical load [N].
     row : (n,) array

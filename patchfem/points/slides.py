@@ -48,6 +48,7 @@ def follow(contact: Contact, time, slide, frames=(), say=None, report=None) -> S
     Parameters
     ----------
     contact : Contact
+        Laws and loads of the points.
     time, slide : (k,) array
         Samples of time [s] and slide [m].
     frames : sequence of int

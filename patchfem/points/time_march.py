@@ -238,13 +238,15 @@ def make_system(
     Parameters
     ----------
     contact : Contact
+        Laws and loads of the points.
     step : float
-        [s]
+        Duration of a whole step [s].
     modes : ModalBasis, optional
         Without modes the displacement of the first port is prescribed.
     travel : float
         Largest output [m].
     start : core.InitialState, optional
+        Modal coordinates and velocities; at rest by default.
     """
     # Rows of the ports; heave and pitch of a normal contact are two more.
     n = 0 if modes is None else modes.omega.size
@@ -813,10 +815,15 @@ def march(
     Parameters
     ----------
     modes : ModalBasis
+        Modes of the structure without the contact.
     drive : core.SineDrive or another drive
+        Acceleration of the base.
     contact : Contact
+        Laws and loads of the points.
     cycles : float
+        Number of cycles, whole or not.
     steps_per_cycle : int
+        Number of whole steps per cycle.
     window : int
         Number of last cycles whose samples are all kept.
     travel : float

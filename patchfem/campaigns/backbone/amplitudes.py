@@ -100,6 +100,7 @@ def refine_amplitudes(joint: JointMode, amplitudes) -> np.ndarray:
     Parameters
     ----------
     joint : JointMode
+        Mode and joint of the backbone.
     amplitudes : (k,) array
         Increasing [m].
 
@@ -147,6 +148,7 @@ def find_amplitudes_of_forces(joint: JointMode, forces) -> np.ndarray:
     Parameters
     ----------
     joint : JointMode
+        Mode and joint of the backbone.
     forces : (n,) array
         Amplitudes of the force [N], above 0.
 

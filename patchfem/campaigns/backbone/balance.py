@@ -35,7 +35,9 @@ def compute_balance_curve(
     Parameters
     ----------
     joint : JointMode
+        Mode and joint of the backbone.
     amplitudes : (k,) array
+        At the output [m], increasing.
     counts : tuple of int
         Numbers of harmonics that are tried in turn; with a single one the errors of the harmonics are not estimated.
     """
@@ -91,10 +93,13 @@ def tabulate_free_motions(
     Parameters
     ----------
     group : LawGroup
+        Laws of the interfaces on one mesh.
     joint : JointMode
+        Mode and joint of the backbone.
     amplitudes : (k,) array
         Increasing, at the output [m].
     harmonics : int
+        Number of harmonics of the motion.
 
     Returns
     -------

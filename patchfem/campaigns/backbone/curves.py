@@ -87,7 +87,7 @@ def compute_backbone(
     mode : str
         Name of the mode; "" for the first.
     amplitudes : (k,) array, optional
-        At the output [m]. By default a range around the onset of slip, as in `compute_backbones`.
+        At the output [m]. By default a range around the onset of slip.
     methods : sequence of str
         From METHODS.
     progress : callable, optional
@@ -127,14 +127,21 @@ def compute_backbones(
     ----------
     models : sequence of Model
         Models of rigs, such as those of one scene with several values of a key.
-    mode, methods, progress, errors
-        As for `compute_backbone`.
+    mode : str
+        Name of the mode; "" for the first.
+    methods : sequence of str
+        From METHODS.
+    progress : callable, optional
+        Takes the name of a method that begins.
+    errors : bool
+        Whether the force and the errors are computed.
     levels : Levels
+        Amplitudes, or forces at the output, of the points.
 
     Raises
     ------
     PatchfemError
-        As for `compute_backbone`, and for a force that no amplitude has.
+        If a scene has no rig, a rig does not have this mode, or no amplitude has one of the forces.
     """
     joints = []
     wanted = [np.asarray(levels.amplitudes, float)]

@@ -45,7 +45,8 @@ def prepare_model(build: Callable, modes: str | Iterable = "") -> PreparedModel:
         Function of `BackboneTables` that returns the model of the scene with these tables; with
         `is_written` that of the scene as written, before the changes by --set.
     modes : str or iterable
-        See `scene.backbone_scene.parse_modes`; "" for the modes of the scene.
+        Text such as "120 Hz:0.01, 170 Hz:0.02", or tuples of frequency, damping ratio and slide; "" for the modes of
+        the scene.
     """
     tables = BackboneTables(parse_modes(modes) if modes else (), stuck=False)
     model = build(tables, is_written=False)

@@ -59,6 +59,7 @@ def compute_cases(
         Function of `BackboneTables` that returns the model of the scene with these tables. With `is_written` it is that of
         the scene as written; with `sets`, a tuple of assignments "table.key=value", that of the changed scene.
     request : BackboneRequest
+        What is asked for.
     progress : callable, optional
         Takes the name of a method that begins.
 

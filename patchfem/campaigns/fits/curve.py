@@ -252,6 +252,7 @@ class CurveModel(FreeKeys):
         Parameters
         ----------
         measured : MeasuredCurve
+            Frequency and damping ratio with their errors.
         method : str
             From METHODS.
         starts : int
@@ -275,6 +276,7 @@ def compute_points(model: Model, amplitudes: np.ndarray, method: str) -> np.ndar
     Parameters
     ----------
     model : Model
+        Model of a rig.
     amplitudes : (k,) array
         [m]
     method : str
@@ -315,6 +317,7 @@ def fit_curve(
     Parameters
     ----------
     scene : Scene
+        Scene of a rig.
     curve_file : Path
         File of the measured curve, in the format of `read_damping_curve`.
     ranges : sequence of Range
@@ -460,14 +463,18 @@ def _widen_by_missing_modes(
     Parameters
     ----------
     fit : Fit
+        Fit by `method`.
     curves : CurveModel
+        Models of the scene, with the values of the keys.
     measured : MeasuredCurve
+        Curve to which the keys are fitted.
     method : str
         Method of the fitted curve.
 
     Returns
     -------
     fit : Fit
+        With wider intervals.
     note : str
         "" if no mode is neglected.
     """

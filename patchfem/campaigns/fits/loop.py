@@ -211,6 +211,7 @@ def fit_hysteresis_loop(
     Parameters
     ----------
     scene : Scene
+        Scene of a bench.
     loop_file : Path
         File of the measured loop.
     ranges : sequence of Range

@@ -207,6 +207,7 @@ def compute_rms_scores(readings: Readings, log_ratios, selected) -> dict | None:
     Parameters
     ----------
     readings : Readings
+        Readings of a table of measured responses.
     log_ratios : (n,) array
         ln(computed/measured).
     selected : (n,) bool

@@ -104,6 +104,7 @@ def fit_rows(
     Parameters
     ----------
     scene : Scene
+        Scene of a rig.
     measured : Path
         File of the table.
     ranges : sequence of Range
@@ -192,7 +193,9 @@ def make_residual(
     Parameters
     ----------
     readings : Readings
+        Measured readings (n,).
     model_readings : ModelReadings
+        Computes the readings of the model.
     training : (n,) bool
         Mask of the r readings.
     """

@@ -93,6 +93,7 @@ class SweepScene:
         Parameters
         ----------
         keys : sequence of str
+            The k keys, as "table.key".
         values : (n, k) array
             Values of the keys [SI].
         sets : callable

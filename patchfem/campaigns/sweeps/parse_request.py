@@ -61,6 +61,7 @@ def read_sweep(path: Path, sets: Sequence[str], request: Request) -> tuple[Sweep
     sets : sequence of str
         ``table.key=value`` strings for all cases.
     request : Request
+        Which cases are asked for.
 
     Returns
     -------

@@ -125,6 +125,7 @@ def estimate_random_indices(coordinates: np.ndarray, values: np.ndarray) -> list
     coordinates : (n, keys) array
         Coordinates of the cases, uniform in [0, 1].
     values : (n, measures) array
+        The measures of the cases.
 
     Returns
     -------

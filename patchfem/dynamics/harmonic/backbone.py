@@ -108,6 +108,7 @@ class FreeBalance:
         omega : float
             Frequency of the mode [rad/s].
         shape : (n,) array
+            Shape of the mode by its coordinates.
         amplitude : float
             At the output [m].
         """
@@ -203,6 +204,7 @@ class FreeBalance:
         x : (N,) array
             Unknowns of a similar motion.
         amplitude : float or None
+            At the output [m]; None for a motion without damping.
         max_steps : int
             Number of Newton steps.
 
@@ -284,10 +286,19 @@ def make_free_balance(
     Parameters
     ----------
     modes : ModalBasis
+        Modes of the structure without the contact.
     group : LawGroup
-    mode, harmonics, excitation, output
-        See `FreeBalance`.
+        Laws of the interfaces.
+    mode : int
+        Index of the coordinate of the mode.
+    harmonics : int
+        Number of harmonics.
+    excitation : (n, n) array, optional
+        Matrix E of the exciting force 2 zeta omega m E z'; default: a negative damping of all coordinates.
+    output : (n,) array, optional
+        Row of the displacement to which amplitudes belong; default: the coordinate.
     max_amplitude : float
+        At the output [m]; it decides how many samples resolve the corners of the force.
     factor : int, optional
         Samples per cycle, relative to those that the laws need.
     """
@@ -316,7 +327,9 @@ def find_free_motions(
     Parameters
     ----------
     equations : FreeBalance
+        Equations of the mode.
     amplitudes : (k,) array
+        At the output [m], increasing.
     small : float, optional
         Amplitude [m] at which the linear mode is nearly exact.
     starts : list, optional

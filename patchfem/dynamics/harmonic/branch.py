@@ -54,8 +54,11 @@ def trace_over_frequency(
     Parameters
     ----------
     modes : ModalBasis
+        Modes of the structure without the contact.
     drive : SineDrive
+        Its level is that of all points.
     group : LawGroup, or what `steady.make_group` takes
+        Laws of the interfaces.
     ends : tuple of float
         First and last frequency [Hz].
     harmonics : int, optional
@@ -129,6 +132,7 @@ def measure_distance(first: SteadyMotion, second: SteadyMotion, width: float) ->
     Parameters
     ----------
     first, second : SteadyMotion
+        Points on the branch.
     width : float
         Frequency step [rad/s] that counts as 1.
     """
@@ -145,12 +149,16 @@ def find_point_between(
 
     Parameters
     ----------
-    modes, drive
+    modes : ModalBasis
+        Modes of the structure without the contact.
+    drive : SineDrive
+        Its level is that of the branch.
     first, second : SteadyMotion
+        Points at the ends of the step.
     fraction : float
         Fraction of the step.
     width : float
-        See `measure_distance`.
+        Frequency step [rad/s] that counts as 1.
 
     Raises
     ------
@@ -176,9 +184,13 @@ def find_branches(modes, drive: SineDrive, group, tolerance: float = 1e-3) -> li
     Parameters
     ----------
     modes : ModalBasis
+        Modes of the structure without the contact.
     drive : SineDrive
+        Frequency and level.
     group : LawGroup, or what `steady.make_group` takes
+        Laws of the interfaces.
     tolerance : float, optional
+        Relative error of each motion.
 
     Returns
     -------

@@ -78,6 +78,7 @@ def follow_curve(
     evaluate : callable
         evaluate(x, p) -> PathEquations.
     x : array_like
+        Initial guess of the unknowns (N,).
     p : float
         Initial guess of the first point, which is corrected first.
     bounds : tuple
@@ -85,6 +86,7 @@ def follow_curve(
     forward : bool, optional
         Whether p increases at first.
     settings : PathSettings, optional
+        Tolerance and steps along the curve.
 
     Raises
     ------
@@ -165,7 +167,7 @@ def correct_point(evaluate, w, tangent, unit, tolerance: float, *, is_fixed: boo
     Parameters
     ----------
     evaluate : callable
-        See `follow_curve`.
+        evaluate(x, p) -> PathEquations.
     w : (N + 1,) array
         Unknowns and parameter.
     tangent : (N + 1,) array

@@ -125,6 +125,7 @@ class HarmonicBalance:
         omega : float
             [rad/s].
         harmonics : int
+            Number of harmonics H.
         damping : (H + 1, n, n) array, optional
             Damping matrices [1/s]; default: that of the modes.
         has_springs : bool
@@ -150,6 +151,7 @@ class HarmonicBalance:
         omega : float
             [rad/s].
         linear : LinearPart
+            Transfer matrices of the linear part, and their change with omega.
         exciting : (H + 1, n) array
             Accelerations of the coordinates by the drive [m s-2].
         measured : (p, n) array
@@ -246,6 +248,7 @@ class HarmonicBalance:
         omega, level : float
             Frequency [rad/s] and amplitude [m s-2] of the drive.
         harmonics : int
+            Number of harmonics H.
         """
         equations = self.evaluate(np.zeros(self.rank * (2 * harmonics + 1)), omega, level)
         return -factor(equations.jacobian)(equations.residual)
@@ -303,6 +306,7 @@ def solve_damped(evaluate, x, is_solved, max_steps: int = MAX_STEPS) -> tuple | 
         is_solved(record, linearised residual after the last step, norm of x) -> whether x is a solution. The step also
         vanishes at a least-squares minimum that is none.
     max_steps : int
+        Largest number of Newton steps.
 
     Returns
     -------

@@ -76,7 +76,9 @@ def solve_recursion(decay, source):
     Parameters
     ----------
     decay : (M,) array
+        Factor from one node to the next.
     source : (M,) complex array
+        Source at each node, and z afterwards.
     """
     kept = 1.0
     now = 0.0 + 0.0j

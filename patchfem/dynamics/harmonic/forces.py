@@ -92,6 +92,7 @@ class LawGroup:
         Parameters
         ----------
         harmonics : int
+            Number of harmonics that are to be resolved.
         amplitudes : (i,) array, optional
             Amplitudes of the slides [m]; without them the corners are not resolved.
         """
@@ -137,6 +138,7 @@ class LawGroup:
         Parameters
         ----------
         q : (i, H + 1) array
+            Harmonics of the slides [m].
         omega : float
             [rad/s].
         samples : int

@@ -179,6 +179,7 @@ class Jenkins(Law):
         q, nodes : (k,) array
             Slides [m] after the last reversal in the memory up to the next one, and their columns in `out`.
         memory : list of _Reversal
+            Reversals that are not yet passed, the last one at the end.
         out : (3 + r, M) array
             Force, stiffness, stretch times limit, and derivatives by the slides at reversals.
         """

@@ -149,8 +149,11 @@ def make_cycle_response(motion: SteadyMotion, modes, drive, samples: int = 1000)
     Parameters
     ----------
     motion : SteadyMotion
+        Motion, with its level and frequency.
     modes : ModalBasis
-    drive
+        Modes of the structure without the contact.
+    drive : core.SineDrive
+        Drive of the motion.
     samples : int, optional
         Number of equal steps of the cycle.
     """

@@ -96,6 +96,7 @@ def find_static_motions(
     modes : ModalBasis
         Modes of the structure, without the contact.
     group : LawGroup
+        Laws of the interfaces.
     mode : int
         Index of the coordinate of the mode.
     amplitudes : array_like
@@ -146,6 +147,7 @@ def find_static_motions_from_loops(
     Parameters
     ----------
     modes : ModalBasis
+        Modes of the structure, without the contact.
     row : ndarray
         (n,) slide per coordinate.
     mode : int

@@ -44,8 +44,11 @@ def find_steady_motion(
     Parameters
     ----------
     modes : ModalBasis
+        Modes of the structure without the contact.
     drive : core.SineDrive
+        Frequency and level.
     group : LawGroup, or what `make_group` takes
+        Laws of the interfaces.
     harmonics : int, optional
         Number of harmonics; as many as the tolerance needs by default.
     tolerance : float, optional
@@ -114,8 +117,11 @@ def make_motion(balance: HarmonicBalance, x, drive, coarser=None, n_steps: int =
     Parameters
     ----------
     balance : HarmonicBalance
+        Balance that is solved.
     x : (N,) array
+        Packed slides [m] that solve it.
     drive : core.SineDrive
+        Frequency and level.
     coarser : (i, K + 1) array, optional
         Slides [m] of a coarser solution; the change from them is the error. Without them it is the size of as many further
         harmonics, which follow from the force.
@@ -150,8 +156,11 @@ def refine_steady_motion(motion: SteadyMotion, modes, drive) -> SteadyMotion:
     Parameters
     ----------
     motion : SteadyMotion
+        Motion that is the initial guess.
     modes : ModalBasis
+        Modes of the structure without the contact.
     drive : core.SineDrive
+        Frequency and level.
 
     Raises
     ------
@@ -228,6 +237,7 @@ def find_one_harmonic_roots(balance: HarmonicBalance, omega: float, level: float
     Parameters
     ----------
     balance : HarmonicBalance
+        Balance of modes and laws.
     omega, level : float
         Frequency [rad/s] and amplitude [m s-2] of the drive.
     """

@@ -52,6 +52,7 @@ def answer_files(
     before, after : Path
         Two traces or two scans.
     options : Options
+        What is known of the two surfaces.
     predicted : Path, optional
         Results folder of a run with [wear], whose depth is fitted to the measured depth.
     piece : str
@@ -89,7 +90,9 @@ def compare_with_scene(
     Parameters
     ----------
     before, after : Path
+        Two traces.
     options : Options
+        What is known of the two surfaces.
     run_surfaces : callable
         Receives the paths of both traces, limited to their common part, and runs the scene with each.
     folder : Path
@@ -157,9 +160,11 @@ def build(
     sources : list of str
         Files or folders before and after wear.
     words : Words
+        Verdict, warnings and notes.
     values, track : dict of str to Quantity
         Quantities of the whole surface, and of the longest track ({} without one).
     data : dict of str to Variable
+        Variables of the charts by name.
     details : dict
         Further content of compare.json.
     """

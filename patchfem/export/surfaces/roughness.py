@@ -45,6 +45,7 @@ def answer_files(paths: list[Path], units: tuple[str, str] | None = None, **opti
     Parameters
     ----------
     paths : list of Path
+        Files of traces or scans.
     units : tuple of str, optional
         Units of x (and y) and of z, for files that state none.
     **options

@@ -36,8 +36,11 @@ def make_answer(
     Parameters
     ----------
     sweep_scene : SweepScene
+        Scene with its table [sweep].
     cases : Cases
+        Cases that were asked for.
     table : SweepTable
+        Their results.
     case_folders : sequence of str
         Folders of the cases inside cases/; empty if there are none.
     """

@@ -27,6 +27,7 @@ class LocalExecutor:
         Parameters
         ----------
         work : WorkerData
+            What a worker needs to compute any case.
         next_chunk : callable
             Returns the case numbers of the next chunk, or None if none is left.
         say : callable, optional

@@ -46,6 +46,7 @@ class FutureExecutor:
         Parameters
         ----------
         work : WorkerData
+            What a worker needs to compute any case.
         next_chunk : callable
             Returns the case numbers of the next chunk, or None if none is available; takes `is_idle`, whether no other
             chunk is being computed.
