@@ -63,7 +63,7 @@ def _read_sweep(scene: Path, sets, what: CaseOptions) -> tuple:
     return parse_request.read_sweep(scene, sets, what.request())
 
 
-def _find_file_mistakes(tables, folder: Path, is_complete: bool, notes: list) -> list:
+def _find_file_mistakes(tables, folder: Path, is_complete: bool, notes: list[str]) -> list[str]:
     """Return the mistakes in the files that a scene names, and append notes on the run to `notes`.
 
     Without such files nothing is imported.

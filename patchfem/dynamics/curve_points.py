@@ -23,11 +23,14 @@ class CurvePoints(NamedTuple):
     """Increasing abscissas (k,) of a sampled curve, and the result computed at each of them."""
 
     abscissas: np.ndarray
-    results: list
+    results: list[tuple]
 
 
 def sample_adaptively(
-    compute: Callable, abscissas, tolerance: float = 0.01, max_points: int = 2000
+    compute: Callable[[float, tuple | None], tuple],
+    abscissas,
+    tolerance: float = 0.01,
+    max_points: int = 2000,
 ) -> CurvePoints:
     """Sample a curve at adaptive points until linear interpolation meets a tolerance.
 

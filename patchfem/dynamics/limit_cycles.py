@@ -101,7 +101,9 @@ def estimate_amplitude(modes: ModalBasis, row, limit: float, mode: int) -> float
     return 4 * limit * abs(row[mode]) / (np.pi * gives)
 
 
-def find_relay_cycles(modes: ModalBasis, row, slip_force: float, stick_force: float) -> list:
+def find_relay_cycles(
+    modes: ModalBasis, row, slip_force: float, stick_force: float
+) -> list[LimitCycle]:
     """Find the limit cycles under rigid friction in which the interface never sticks.
 
     After a reversal the force is constant: y(T/2) = E (y - e) + e = -y has one y for each half
@@ -183,7 +185,9 @@ def _make_flow(modes: ModalBasis, row, force: float) -> _ForcedFlow:
     return _ForcedFlow(modes, np.asarray(row, float), *np.linalg.eig(matrix), rest)
 
 
-def _find_mode_relay_cycles(modes: ModalBasis, row, forces: tuple, mode: int) -> list:
+def _find_mode_relay_cycles(
+    modes: ModalBasis, row, forces: tuple[float, float], mode: int
+) -> list[LimitCycle]:
     """Find the limit cycles under rigid friction whose frequency is close to that of a given mode.
 
     forces: kinetic and static friction [N].
@@ -204,7 +208,9 @@ def _find_mode_relay_cycles(modes: ModalBasis, row, forces: tuple, mode: int) ->
     return [cycle for cycle in cycles if cycle is not None]
 
 
-def trace_relay_backbone(modes: ModalBasis, row, forces: tuple, amplitudes, mode: int) -> list:
+def trace_relay_backbone(
+    modes: ModalBasis, row, forces: tuple[float, float], amplitudes, mode: int
+) -> list[tuple[LimitCycle, float] | None]:
     """Compute the backbone of a mode under rigid friction at prescribed amplitudes.
 
     A damping -g of every coordinate sustains the motion of `mode` (extended periodic motion: Krack
@@ -306,7 +312,9 @@ def _find_largest(times, motion, speeds) -> float:
     return float(max(np.abs(motion).max(), np.nanmax(np.abs(curve(turns)), initial=0.0)))
 
 
-def find_balance_cycles(modes: ModalBasis, group: LawGroup, row, limit: float) -> tuple:
+def find_balance_cycles(
+    modes: ModalBasis, group: LawGroup, row, limit: float
+) -> tuple[list[LimitCycle], float]:
     """Find the limit cycles of modes with one friction interface by harmonic balance.
 
     Each is solved again with twice the harmonics and samples. A law whose force decreases with the slide may have no free
@@ -347,7 +355,9 @@ def find_balance_cycles(modes: ModalBasis, group: LawGroup, row, limit: float) -
     return sorted(cycles), min_amplitude
 
 
-def _find_mode_cycles(modes: ModalBasis, group: LawGroup, mode: int, size: float) -> tuple:
+def _find_mode_cycles(
+    modes: ModalBasis, group: LawGroup, mode: int, size: float
+) -> tuple[list[LimitCycle], float]:
     """Return the limit cycles of one mode and the smallest amplitude [m] that was examined."""
     stuck_mode = modes.compute_stuck_mode(group.rows, group.stiffness(), mode)
     free_mode = (modes.omega[mode], np.eye(modes.omega.size)[mode])
@@ -388,8 +398,12 @@ def _find_mode_cycles(modes: ModalBasis, group: LawGroup, mode: int, size: float
 
 
 def _find_undamped_motions(
-    modes: ModalBasis, group: LawGroup, mode: int, path: tuple, harmonics: int
-) -> list | None:
+    modes: ModalBasis,
+    group: LawGroup,
+    mode: int,
+    path: tuple[np.ndarray, tuple[float, np.ndarray]],
+    harmonics: int,
+) -> list[LimitCycle] | None:
     """Find the limit cycles of a mode: free motions without damping; None if free motions are not found.
 
     path: amplitudes (k,) [m], and frequency [rad/s] and shape (n,) of the first motion.

@@ -332,7 +332,7 @@ def find_sizes(modes: ModalBasis, signal: Signal, drive, start=None) -> tuple[fl
     return speed / omega, speed
 
 
-def stack(arrays) -> tuple:
+def stack(arrays) -> tuple[np.ndarray, ...]:
     """Return records of arrays as one record with a leading axis of cases."""
     first = arrays[0]
     return type(first)(*(np.ascontiguousarray(np.stack(parts)) for parts in zip(*arrays)))

@@ -95,7 +95,7 @@ class Motion:
     case: Case
     status: Status
     message: str
-    values: dict
+    values: dict[str, float]
     extremes: np.ndarray
     phasors: np.ndarray
     rows: np.ndarray
@@ -144,7 +144,7 @@ class Motion:
         rows = np.concatenate([self.rows[:1], self.event_rows[is_own]])
         return np.stack([rows[:, 0], self._slides(rows)[:, interface]], axis=1)
 
-    def find_energies(self) -> dict:
+    def find_energies(self) -> dict[str, float]:
         """Return the energies [J] of the whole motion.
 
         - "work_in", "power": work of the drive and the sum of its magnitudes over the steps
@@ -260,7 +260,9 @@ def run_batch(
     return Batch(rigs, states, records, start, windows)
 
 
-def estimate_errors(values: dict, coarse: dict, rtol: float) -> dict:
+def estimate_errors(
+    values: dict[str, np.ndarray], coarse: dict[str, np.ndarray], rtol: float
+) -> dict[str, np.ndarray]:
     """Return the errors of measures from those of a run with larger steps.
 
     Parameters
@@ -338,7 +340,7 @@ def run_case(
     )
 
 
-def _fill_repeated_cycles(case: Case, cycles, samples, event_rows) -> tuple:
+def _fill_repeated_cycles(case: Case, cycles, samples, event_rows) -> tuple[np.ndarray, np.ndarray]:
     """Return samples and events with those of the cycles that repeat an earlier one and were not computed.
 
     Parameters

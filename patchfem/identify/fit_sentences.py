@@ -9,7 +9,7 @@ from .least_squares import MAX_EVALUATIONS, Fit
 MIN_SENSITIVITY = 1e-9
 
 
-def describe_fit(fit: Fit, names) -> list:
+def describe_fit(fit: Fit, names) -> list[str]:
     """Return sentences about parameters that a fit does not determine, and failures of its search.
 
     The sentences report parameters that are at a bound, without effect, determined only in combination with

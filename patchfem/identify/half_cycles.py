@@ -185,7 +185,9 @@ def _follow_half_cycles(time, value, middle: float, length: float) -> list[_Fitt
     return sines
 
 
-def _refine_half_cycles(time, value, sines: list, *, is_viscous: bool) -> list[_FittedSines]:
+def _refine_half_cycles(
+    time, value, sines: list[_FittedSines], *, is_viscous: bool
+) -> list[_FittedSines]:
     """Refit half cycles with half periods and decay rates estimated from their neighbours."""
     if len(sines) < 3:
         return sines

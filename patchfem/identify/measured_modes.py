@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..core import PatchfemError
-from ..response.decay_curve import HalfCycles, fit_decay_curve, fit_slopes
+from ..response.decay_curve import DecayCurve, HalfCycles, fit_decay_curve, fit_slopes
 from .decay import fit_decay
 from .driven_modes import DERIVATIVE_ORDERS, MAX_FITTED_SAMPLES, fit_driven_modes
 from .half_cycles import describe_missing_samples_at_end, find_half_cycles
@@ -37,10 +37,10 @@ class ListedModes:
 
     frequency: np.ndarray
     damping: np.ndarray
-    rows: dict
+    rows: dict[str, np.ndarray]
     mass: float | None
-    descriptions: list
-    notes: list = field(default_factory=list)
+    descriptions: list[str]
+    notes: list[str] = field(default_factory=list)
 
 
 class _ModeRows(NamedTuple):
@@ -51,12 +51,12 @@ class _ModeRows(NamedTuple):
     - notes: sentences for the user.
     """
 
-    rows: dict
+    rows: dict[str, np.ndarray]
     mass: float | None
-    notes: list
+    notes: list[str]
 
 
-def find_response_name(values: dict) -> str:
+def find_response_name(values: dict[str, np.ndarray]) -> str:
     """Return the name of the response in a record.
 
     Raises PatchfemError unless the record has exactly one.
@@ -188,7 +188,9 @@ def _convert_base_residues(modes: FittedModes) -> _ModeRows:
     return _ModeRows(rows, None, ["a response to base motion gives no modal mass: set moving_mass"])
 
 
-def _select_decay(values: dict, begin: float | None) -> tuple:
+def _select_decay(
+    values: dict[str, np.ndarray], begin: float | None
+) -> tuple[np.ndarray, np.ndarray]:
     """Return the times [s] and samples of a response from the start of its decay.
 
     The decay starts at the time `begin` [s]. Default: the largest deviation from the final value.
@@ -209,7 +211,9 @@ def _select_decay(values: dict, begin: float | None) -> tuple:
     return time[start:], value[start:]
 
 
-def compute_decay_curve(values: dict, begin: float | None = None) -> tuple:
+def compute_decay_curve(
+    values: dict[str, np.ndarray], begin: float | None = None
+) -> tuple[DecayCurve, list[str]]:
     """Compute frequency and damping ratio against amplitude from a measured free decay.
 
     The half cycles of a velocity or an acceleration are converted to those of a displacement by their own undamped
@@ -285,7 +289,7 @@ def _extend_to_ends(values: np.ndarray) -> np.ndarray:
     return np.concatenate([[first], values, [last]])
 
 
-def identify_decay_modes(values: dict, begin: float | None = None) -> ListedModes:
+def identify_decay_modes(values: dict[str, np.ndarray], begin: float | None = None) -> ListedModes:
     """Identify natural modes from a measured free decay.
 
     The decay starts at the time `begin` [s]. Default: the largest deviation from the final value.

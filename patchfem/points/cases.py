@@ -36,7 +36,7 @@ class CaseMarch(NamedTuple):
 
 def list_parameters(
     modes: ModalBasis, drive: SineDrive, load, cycles: int, window: int, start=None
-) -> tuple:
+) -> tuple[float | np.ndarray, ...]:
     """Return the columns of `Cases.parameters`, in the order of `Number`.
 
     Parameters
@@ -111,7 +111,7 @@ def march_cases(cases: Cases, steps: int, *, has_samples: bool = False) -> CaseM
         )
 
 
-def compute_measures(cases: Cases, now, seen, history) -> dict:
+def compute_measures(cases: Cases, now, seen, history) -> dict[str, np.ndarray]:
     """Return the measures (c,) of a sweep row by name.
 
     Parameters
@@ -162,7 +162,7 @@ def compute_measures(cases: Cases, now, seen, history) -> dict:
     return values | energies | _compute_harmonics(cases, now, seen, values["loop_area"], high - low)
 
 
-def _compute_energies(cases: Cases, now, mass) -> dict:
+def _compute_energies(cases: Cases, now, mass) -> dict[str, np.ndarray]:
     """Return the energies [J] of the whole run and the relative error of their balance."""
     columns = cases.parameters.T
     stored = 0.5 * (now[:, Now.VELOCITY] ** 2 + columns[Number.STIFFNESS] * now[:, Now.SLIDE] ** 2)
@@ -180,7 +180,7 @@ def _compute_energies(cases: Cases, now, mass) -> dict:
     }
 
 
-def _compute_harmonics(cases: Cases, now, seen, area, slide_range) -> dict:
+def _compute_harmonics(cases: Cases, now, seen, area, slide_range) -> dict[str, np.ndarray]:
     """Return the measures that follow from harmonics; integrals by parts give those of velocity and acceleration."""
     columns = cases.parameters.T
     omega = columns[Number.OMEGA]

@@ -86,7 +86,7 @@ class MarchCheckpoint:
         self.next_write = end + max(MIN_WRITE_INTERVAL, (end - start) / MAX_WRITE_FRACTION)
 
 
-def open_checkpoint(run, record, request: tuple) -> MarchCheckpoint:
+def open_checkpoint(run, record, request: tuple[int, ...]) -> MarchCheckpoint:
     """Open the checkpoint file of a new march; if the file exists, the march goes on from it.
 
     Parameters
@@ -121,7 +121,7 @@ def open_checkpoint(run, record, request: tuple) -> MarchCheckpoint:
     return MarchCheckpoint(path, key)
 
 
-def pack(value, arrays: list):
+def pack(value, arrays: list[np.ndarray]):
     """Return nested tuples and lists as lists for JSON; an array is appended to `arrays`, and becomes its number there."""
     if isinstance(value, np.ndarray):
         arrays.append(value)

@@ -9,6 +9,7 @@ from .. import compiled
 from .contacts import Contact
 from .march_rows import LISTS_FULL, N_PORT_COLUMNS, Sample, Total
 from .time_march import (
+    Snapshot,
     copy_system,
     enlarge_lists,
     load_kernels,
@@ -38,7 +39,7 @@ class SlideMotion(NamedTuple):
     mean: np.ndarray
     stored: np.ndarray
     losses: np.ndarray
-    snapshots: list
+    snapshots: list[Snapshot]
     n_unsolved: int
 
 

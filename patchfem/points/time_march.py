@@ -117,11 +117,11 @@ class Motion:
     window_work: float
     extremes: np.ndarray
     phasors: np.ndarray
-    ledger: dict
+    ledger: dict[str, float]
     outcome: Outcome | None
     message: str
     cycles_done: float
-    snapshots: list
+    snapshots: list[Snapshot]
     end: "March"
     log: None = None
     events: int = 0
@@ -682,7 +682,7 @@ class March:
             self.kernels, self.system, (*place, rest[Sample.HEAVE], rest[Sample.PITCH])
         )
 
-    def find_ledger(self, sample) -> dict:
+    def find_ledger(self, sample) -> dict[str, float]:
         """Return energies [J] and counters by name at a sample of the present state."""
         n = 2 * self.modes.omega.size
         totals = self.system.totals
@@ -767,7 +767,7 @@ def split_losses(samples, n: int, scale: float) -> np.ndarray:
     return np.where((losses < 0) & (losses > -noise), 0.0, losses)
 
 
-def make_snapshot(kernels, system: System, motion: tuple) -> Snapshot:
+def make_snapshot(kernels, system: System, motion: tuple[float, ...]) -> Snapshot:
     """Return the state of the points on the first port; `motion` has the first seven fields of Snapshot.
 
     Parameters
@@ -1011,7 +1011,7 @@ class Record:
             self.phasors += list(2 / max(size, 1) * (parts[:, 0] + 1j * parts[:, 1]))
             begin = end
 
-    def _keep(self, part: tuple) -> None:
+    def _keep(self, part: tuple[int, np.ndarray, np.ndarray]) -> None:
         """Keep all samples of the parts within a window of the last one, and of older parts those at equal distances."""
         self.recent.append(part)
         last = part[0] + len(part[1]) - 1

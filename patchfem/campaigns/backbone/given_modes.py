@@ -30,10 +30,10 @@ class PreparedModel(NamedTuple):
     """Model whose backbone is computed, and notes on what was ignored and assumed."""
 
     model: Model
-    notes: tuple
+    notes: tuple[str, ...]
 
 
-def prepare_model(build: Callable, modes: str | Iterable = "") -> PreparedModel:
+def prepare_model(build: Callable[..., Model], modes: str | Iterable = "") -> PreparedModel:
     """Build the model of a backbone from a scene, with its own modes or modes given beside it.
 
     Modes without `slide` get one with which the sticking joint contributes ASSUMED_JOINT_FRACTION of
@@ -93,7 +93,9 @@ def _find_sticking_stiffness(model: Model) -> float | None:
         return None
 
 
-def _assume_slides(modes: tuple, stiffness_per_mass: float) -> tuple:
+def _assume_slides(
+    modes: tuple[GivenMode, ...], stiffness_per_mass: float
+) -> tuple[GivenMode, ...]:
     """Return the modes; a missing `slide` is set according to the assumed joint stiffness.
 
     stiffness_per_mass: stiffness of the sticking contact over the modal mass [1/s2].
@@ -114,7 +116,9 @@ def _assumed_fraction(n_modes: int) -> float:
     return min(ASSUMED_JOINT_FRACTION, MAX_JOINT_FRACTION / n_modes)
 
 
-def _note_modes(modes: tuple, *, is_assumed: bool, is_stuck: bool) -> tuple:
+def _note_modes(
+    modes: tuple[GivenMode, ...], *, is_assumed: bool, is_stuck: bool
+) -> tuple[str, ...]:
     """Return notes on modes that are not given in the scene."""
     names = ", ".join(_describe_mode(mode) for mode in modes)
     place = "with the contact stuck" if is_stuck else "without the contact"
@@ -134,7 +138,7 @@ def _describe_mode(mode: GivenMode) -> str:
     return text if mode.slide is None else f"{text}, slide {mode.slide:.3g}"
 
 
-def _note_slides(n_modes: int, stiffness: float | None) -> tuple:
+def _note_slides(n_modes: int, stiffness: float | None) -> tuple[str, ...]:
     """Return a note on the assumed `slide` of modes.
 
     stiffness: of the sticking contact [N/m], or None if it is rigid.

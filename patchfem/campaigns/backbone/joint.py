@@ -220,7 +220,9 @@ class JointMode(NamedTuple):
         if reason:
             raise PatchfemError(f"{method} cannot be computed {reason}")
 
-    def spatial_discretization_errors(self, compute: Callable) -> np.ndarray | float:
+    def spatial_discretization_errors(
+        self, compute: Callable[["JointMode", LawGroup], np.ndarray]
+    ) -> np.ndarray | float:
         """Return the error estimates of a quantity for the mesh and the discrete sliders of a law.
 
         Parameters

@@ -111,7 +111,9 @@ def _compute_in_closed_form(joint: JointMode, amplitudes) -> Curve | None:
     return _select_rising_part(best, relative * np.abs(best))
 
 
-def _compute_from_loops(joint: JointMode, slides, loops: list) -> np.ndarray:
+def _compute_from_loops(
+    joint: JointMode, slides, loops: list[quasi_static.StaticLoops]
+) -> np.ndarray:
     """Compute amplitude, frequency, damping, loss and force (5, k) from hysteresis loops.
 
     The loops have displacement amplitudes (k,) [m].

@@ -185,7 +185,7 @@ def fit_rows(
 
 def make_residual(
     readings: Readings, model_readings: ModelReadings, training: np.ndarray
-) -> Callable:
+) -> Callable[[np.ndarray], np.ndarray]:
     """Return the function that computes the log ratios (r,) of readings from values of the free keys.
 
     A reading flagged U has no residual where the computed value is larger.

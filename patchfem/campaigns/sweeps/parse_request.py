@@ -110,7 +110,7 @@ def read_cases(sweep_scene: SweepScene, request: Request) -> Cases:
     # Cases of the file come first; the table [sweep] counts only if the request names no key.
     parts = []
     errors = []
-    file_axes: tuple = ()
+    file_axes: tuple[Axis, ...] = ()
     if request.file is not None:
         listed, errors = table.read_case_table(request.file)
         if listed is not None:
@@ -187,7 +187,7 @@ def _find_duplicate_keys(sweep_scene: SweepScene, keys: Sequence[str]) -> list[s
 
     Two keys are equivalent if they denote a mode by its name and by its index.
     """
-    first_keys: dict = {}
+    first_keys: dict[str, str] = {}
     errors = []
     for key in keys:
         first = first_keys.setdefault(sweep_scene.replace_mode_name(key), key)
@@ -217,7 +217,7 @@ def _check_cases(sweep_scene: SweepScene, cases: Cases) -> str:
     if not invalid:
         return ""
     if len(invalid) == len(numbers):
-        messages: dict = {}
+        messages: dict[str, str] = {}
         for message in chain.from_iterable(invalid):
             # Errors that differ only in their random values are reported once.
             kind = re.sub(NUMBER_PATTERN, "", message) if cases.is_random else message

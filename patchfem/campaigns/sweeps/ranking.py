@@ -117,7 +117,7 @@ def compute_grid_indices(values: np.ndarray) -> np.ndarray:
     return np.array([first, total, total, total])
 
 
-def estimate_random_indices(coordinates: np.ndarray, values: np.ndarray) -> list:
+def estimate_random_indices(coordinates: np.ndarray, values: np.ndarray) -> list[np.ndarray | None]:
     """Estimate the Sobol indices of measures from random cases.
 
     Parameters

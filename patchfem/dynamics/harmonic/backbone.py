@@ -176,7 +176,9 @@ class FreeBalance:
         free = FreeMotion(a, omega, zeta, slides, motion.contact.force, motion.modal)
         return FreeEquations(residual, jacobian, free)
 
-    def _find_condition(self, x, amplitude: float | None, output, slopes) -> tuple:
+    def _find_condition(
+        self, x, amplitude: float | None, output, slopes
+    ) -> tuple[float, np.ndarray]:
         """Return residual [m] and derivatives (N,) of the condition that selects the motion.
 
         output, slopes: harmonics (H + 1,) of the output [m] and their derivatives (H + 1, N).
@@ -315,7 +317,7 @@ def find_free_motions(
     equations: FreeBalance,
     amplitudes,
     small: float = 0.0,
-    starts: list | None = None,
+    starts: list[FreeSolution | None] | None = None,
     mode: tuple | None = None,
 ) -> list[FreeSolution | None]:
     """Find the free motions at increasing amplitudes (k,) [m] of the output; None where none is found.

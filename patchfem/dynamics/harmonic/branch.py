@@ -36,8 +36,8 @@ class Branch:
     - ended: see `continuation.CurvePath`
     """
 
-    points: tuple
-    folds: tuple
+    points: tuple[SteadyMotion, ...]
+    folds: tuple[float, ...]
     ended: str
 
 
@@ -45,7 +45,7 @@ def trace_over_frequency(
     modes,
     drive: SineDrive,
     group,
-    ends: tuple,
+    ends: tuple[float, float],
     harmonics: int | None = None,
     tolerance: float = 1e-3,
 ) -> Branch:
@@ -116,7 +116,9 @@ def _differentiate(balance: HarmonicBalance, drive: SineDrive):
     return evaluate
 
 
-def _pack_points(first: SteadyMotion, second: SteadyMotion, width: float) -> tuple:
+def _pack_points(
+    first: SteadyMotion, second: SteadyMotion, width: float
+) -> tuple[HarmonicBalance, np.ndarray, np.ndarray, np.ndarray]:
     """Return the balance of two points on a branch, both points (packed slides, omega), and their unit, (N + 1,) each."""
     balance = HarmonicBalance(first.group.modes, first.group, first.samples)
     packed = [balance.pack_slides(motion.slides) for motion in (first, second)]
@@ -178,7 +180,7 @@ def find_point_between(
     return make_motion(balance, w[:-1], replace(drive, omega=float(w[-1])))
 
 
-def find_branches(modes, drive: SineDrive, group, tolerance: float = 1e-3) -> list:
+def find_branches(modes, drive: SineDrive, group, tolerance: float = 1e-3) -> list[SteadyMotion]:
     """Find coexisting steady motions at one drive, starting from all roots of the balance with one harmonic.
 
     Parameters

@@ -32,7 +32,7 @@ class CurvePath:
 
     x: np.ndarray
     p: np.ndarray
-    folds: tuple
+    folds: tuple[float, ...]
     ended: str
 
 
@@ -69,7 +69,12 @@ class _PathPoint(NamedTuple):
 
 
 def follow_curve(
-    evaluate, x, p: float, bounds: tuple, forward: bool = True, settings: PathSettings | None = None
+    evaluate,
+    x,
+    p: float,
+    bounds: tuple[float, float],
+    forward: bool = True,
+    settings: PathSettings | None = None,
 ) -> CurvePath:
     """Trace a solution curve of r(x, p) = 0 within bounds of the parameter.
 
@@ -151,7 +156,7 @@ def _step_factor(n_newton: int) -> float:
     return 1.1 if n_newton <= 5 else 0.6
 
 
-def _make_border(evaluate, w, row, unit) -> tuple:
+def _make_border(evaluate, w, row, unit) -> tuple[np.ndarray, np.ndarray]:
     """Return the scaled residual (N,), and the scaled Jacobian with a further row, (N + 1, N + 1)."""
     residual, jacobian, by_p = evaluate(w[:-1], w[-1])
     matrix = np.empty((w.size, w.size))
@@ -219,7 +224,7 @@ def _make_point(evaluate, w, direction, unit) -> _PathPoint:
     return _PathPoint(w, tangent / np.linalg.norm(tangent))
 
 
-def _find_folds(first: _PathPoint, second: _PathPoint, length: float, width: float) -> list:
+def _find_folds(first: _PathPoint, second: _PathPoint, length: float, width: float) -> list[float]:
     """Return the parameter at a fold between two points at a distance along the first tangent.
 
     The parameter is a cubic of the distance along the first tangent; a fold is its extreme.

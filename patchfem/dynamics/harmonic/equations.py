@@ -117,7 +117,7 @@ class HarmonicBalance:
 
     def make_stiffness(
         self, omega: float, harmonics: int, damping=None, *, has_springs: bool = True
-    ) -> tuple:
+    ) -> tuple[np.ndarray, np.ndarray]:
         """Return P_k, or S_k without springs, and dS_k/d omega, (H + 1, n, n) each.
 
         Parameters
@@ -210,7 +210,9 @@ class HarmonicBalance:
             motion,
         )
 
-    def solve(self, x, omega: float, level: float, max_steps: int = MAX_STEPS) -> tuple:
+    def solve(
+        self, x, omega: float, level: float, max_steps: int = MAX_STEPS
+    ) -> tuple[np.ndarray, Equations, int]:
         """Solve the balance from unknowns x (N,).
 
         Returns

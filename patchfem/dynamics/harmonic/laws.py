@@ -171,7 +171,7 @@ class Jenkins(Law):
             memory.append(_Reversal(end, q[turns[end]], force, stretch, holds))
         return LawForce(out[0], out[1], 0.0, out[3:], self.limit, out[2])
 
-    def _follow_branches(self, q, nodes, memory: list, out) -> None:
+    def _follow_branches(self, q, nodes, memory: list[_Reversal], out) -> None:
         """Write the force between two reversals, and remove the reversals that are passed from the memory.
 
         Parameters
@@ -299,7 +299,9 @@ class FlowLaw(Law):
         limit = self.element.limit
         return LawForce(force, limit=limit, stretch=limit * stretch, states=states)
 
-    def differentiate(self, slides: Slides, row: int, states: FlowStates) -> tuple:
+    def differentiate(
+        self, slides: Slides, row: int, states: FlowStates
+    ) -> tuple[np.ndarray, np.ndarray]:
         """Return the derivatives of the harmonics of the force by those of the slide and by the frequency.
 
         Returns

@@ -115,7 +115,7 @@ def find_static_motions(
         raise PatchfemError(SPEED_MESSAGE)
     stiffness = group.stiffness()
 
-    def find_mode(slides, amplitude: float) -> tuple:
+    def find_mode(slides, amplitude: float) -> tuple[float, np.ndarray, list[StaticLoops]]:
         """Return frequency, coordinates at an amplitude, and loops of the mode with the secants at slides (i,) [m]."""
         loops = [find_loops(laws, u, samples) for u, laws in zip(slides, group.laws)]
         secants = [loop.tip / u if u > 0 else k for u, loop, k in zip(slides, loops, stiffness)]

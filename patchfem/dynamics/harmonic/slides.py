@@ -32,7 +32,7 @@ class Slides(NamedTuple):
     q: np.ndarray
     rate: np.ndarray
     is_sample: np.ndarray
-    reversals: list
+    reversals: list[np.ndarray]
 
     @property
     def widths(self) -> np.ndarray:

@@ -176,7 +176,7 @@ def refine_steady_motion(motion: SteadyMotion, modes, drive) -> SteadyMotion:
 # ---- search for a first solution
 
 
-def _solve_from_guesses(balance: HarmonicBalance, drive, h: int, slides) -> tuple:
+def _solve_from_guesses(balance: HarmonicBalance, drive, h: int, slides) -> tuple[np.ndarray, int]:
     """Solve a balance from several initial guesses in turn, and finally from weaker drives.
 
     Returns the unknowns, and the number of Newton steps.
@@ -228,7 +228,9 @@ def _follow_levels(balance: HarmonicBalance, omega: float, level: float, h: int)
     )
 
 
-def find_one_harmonic_roots(balance: HarmonicBalance, omega: float, level: float) -> list:
+def find_one_harmonic_roots(
+    balance: HarmonicBalance, omega: float, level: float
+) -> list[np.ndarray]:
     """Find the slides (i, 2) [m] of all solutions of the balance with one harmonic.
 
     The balance is evaluated at amplitudes of the linear motion. For one row the result is exact, because a phase turns
@@ -271,7 +273,7 @@ def find_one_harmonic_roots(balance: HarmonicBalance, omega: float, level: float
     return roots
 
 
-def _bracket_roots(function, grid, values) -> list:
+def _bracket_roots(function, grid, values) -> list[tuple[float, float]]:
     """Return intervals (a, b) that enclose the sign changes of a function on a grid (k,).
 
     A sample closer to zero than its neighbours may hide two roots; its minimum is then located.

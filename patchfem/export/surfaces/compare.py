@@ -151,7 +151,7 @@ def build(
     values: dict[str, Quantity],
     track: dict[str, Quantity],
     data: dict[str, Variable],
-    details: dict,
+    details: dict[str, object],
 ) -> Answer:
     """Return the answer of a comparison of two surfaces or runs.
 
@@ -202,7 +202,7 @@ def _is_repeated(name: str, values: dict[str, Quantity]) -> bool:
     return name == "track_area_gross" and area is not None and area[:3] == values[name][:3]
 
 
-def _describe_place(comparison: Comparison) -> dict:
+def _describe_place(comparison: Comparison) -> dict[str, object]:
     """Return how the second surface lies on the first one: `reference` and `registration` of compare.json."""
     placement = comparison.evidence.placement
     names = ("shift_x", "shift_y", "rotation") if comparison.is_areal else ("shift",)
@@ -214,7 +214,7 @@ def _describe_place(comparison: Comparison) -> dict:
     return {"reference": basis or None, "registration": registration}
 
 
-def _caption_band(comparison: Comparison) -> dict:
+def _caption_band(comparison: Comparison) -> dict[str, object]:
     """Return the caption of the band around the depth of traces, if the band is wide enough to be seen."""
     curves = comparison.evidence.curves
     if curves is None or comparison.is_areal:
@@ -225,7 +225,7 @@ def _caption_band(comparison: Comparison) -> dict:
     return {"captions": {"Worn depth": "Band: 95 % noise of a single depth."}}
 
 
-def _compare_roughness(comparison: Comparison) -> dict:
+def _compare_roughness(comparison: Comparison) -> dict[str, object]:
     """Return the roughness inside and outside of the track: `roughness` of compare.json, and the rows of a table."""
     evidence = comparison.evidence
     content = {"cutoff": evidence.cutoff, "inside": None, "outside": None}

@@ -132,7 +132,9 @@ def _find_caution(members: list[RoughnessReport]) -> list[str]:
     return [SIZES_NOTE] if (sizes.max(axis=0) > MAX_SIZE_RATIO * sizes.min(axis=0)).any() else []
 
 
-def _means_to_dict(kind: str, count: int, means: dict[str, Mean], notes: list[str]) -> dict:
+def _means_to_dict(
+    kind: str, count: int, means: dict[str, Mean], notes: list[str]
+) -> dict[str, object]:
     """Return the means of one kind of files as an object of profile.json."""
     measures = sentences.to_json({name: mean.mean for name, mean in means.items()})
     for name, mean in means.items():
@@ -182,7 +184,7 @@ def describe_treatment(each: RoughnessReport) -> str:
     return f"{text}; without a cut-off there is no roughness profile{advice and ', '}{advice}."
 
 
-def report_to_dict(each: RoughnessReport) -> dict:
+def report_to_dict(each: RoughnessReport) -> dict[str, object]:
     """Return the roughness of a surface as an object of profile.json."""
     size, treatment = each.sampling, each.treatment
     content = {

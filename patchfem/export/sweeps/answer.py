@@ -90,7 +90,7 @@ def _make_command(sweep_scene: SweepScene, cases: Cases) -> str:
     return shlex.join([*words, *cases.arguments])
 
 
-def _make_details(table: SweepTable, analysis: SweepAnalysis) -> dict:
+def _make_details(table: SweepTable, analysis: SweepAnalysis) -> dict[str, object]:
     """Return the numbers of sweep.json."""
     ranking = {
         name: [index._asdict() for index in indices] for name, indices in analysis.ranking.items()
@@ -109,7 +109,7 @@ def _make_details(table: SweepTable, analysis: SweepAnalysis) -> dict:
     }
 
 
-def _make_peak_row(table: SweepTable, entry: PeakOnLine) -> dict:
+def _make_peak_row(table: SweepTable, entry: PeakOnLine) -> dict[str, object]:
     """Return a peak as a row of sweep.json."""
     unit = table.measures[entry.measure].unit
     row = {"measure": entry.measure, "case": describe_place(table, entry)}
@@ -117,7 +117,7 @@ def _make_peak_row(table: SweepTable, entry: PeakOnLine) -> dict:
     return row | {name: quantity.as_json() for name, quantity in quantities.items()}
 
 
-def _make_quantile_row(values: np.ndarray, unit: str) -> dict:
+def _make_quantile_row(values: np.ndarray, unit: str) -> dict[str, dict]:
     """Return quantiles as objects of sweep.json."""
     names = ("low", "median", "high")
     return {name: Quantity(value, unit).as_json() for name, value in zip(names, values.tolist())}

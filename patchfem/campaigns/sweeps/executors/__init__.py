@@ -20,7 +20,10 @@ class LocalExecutor:
     workers = 1
 
     def run(
-        self, work: WorkerData, next_chunk: Callable, say: Callable | None = None
+        self,
+        work: WorkerData,
+        next_chunk: Callable[..., list[int] | None],
+        say: Callable | None = None,
     ) -> Iterator[tuple]:
         """Compute the chunks that the callback `next_chunk` returns, and yield their results.
 
