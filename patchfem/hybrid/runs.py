@@ -234,9 +234,9 @@ def run_batch(
     """Run cases whose arrays have the same shapes in one compiled loop.
 
     Parameters
-        Rigs of equal shape, with their states at the start.
     ----------
     cases : sequence of Case
+        Rigs of equal shape, with their states at the start.
     n_events : int
         Number of events that a case can store.
     states : State, optional
