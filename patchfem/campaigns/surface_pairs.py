@@ -40,6 +40,7 @@ def read_pairs(table: Path) -> list[TableLine]:
     """
     path = Path(table)
     text = read_text(path, "the table")
+    # No column is a number; the call refuses a header without the columns of the files.
     find_factors(text, TableFormat({}, COLUMNS, ",".join(COLUMNS), "the table"))
 
     lines = []

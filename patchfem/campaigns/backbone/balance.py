@@ -10,7 +10,7 @@ import numpy as np
 
 from ...core import NotConverged, PatchfemError
 from ...dynamics import limit_cycles
-from ...dynamics.harmonic.backbone import find_free_motions, make_free_balance
+from ...dynamics.harmonic.backbone import FreeSolution, find_free_motions, make_free_balance
 from ...dynamics.harmonic.forces import LawGroup
 from ...response.errors import convergence_error
 from .joint import MIN_AMPLITUDE_FACTOR, JointMode
@@ -118,7 +118,7 @@ def tabulate_free_motions(
 
 def _find_motions(
     group: LawGroup, joint: JointMode, amplitudes, harmonics: int, excitation=None, starts=None
-) -> list:
+) -> list[FreeSolution | None]:
     """Find the free motions at amplitudes (k,) [m] of the output, from similar ones if they are given.
 
     excitation: matrix E of `FreeBalance`.
@@ -138,7 +138,11 @@ def _find_motions(
 
 
 def find_forces(
-    group: LawGroup, joint: JointMode, amplitudes, harmonics: int, motions: list
+    group: LawGroup,
+    joint: JointMode,
+    amplitudes,
+    harmonics: int,
+    motions: list[FreeSolution | None],
 ) -> np.ndarray:
     """Find the forces at the output that hold the phase resonance, from the motions of `tabulate_free_motions`.
 

@@ -14,6 +14,7 @@ from ...friction.cells import CELL_MERGES, join_cells
 from ...model.model import Model
 from ...response.errors import convergence_error
 from ...runs.joint import FreeRig, solve_without_joint
+from ...runs.patch.press import Patch
 from ...runs.plan import plan
 from ...runs.rig import decays
 from ...runs.rig.plan import stuck_stiffnesses
@@ -64,8 +65,8 @@ class JointMode(NamedTuple):
     """
 
     model: Model
-    patch: object
-    coarser: tuple
+    patch: Patch | None
+    coarser: tuple[Patch | None, ...]
     mode: int
     stuck_mode: StuckMode
     stiffness: np.ndarray
@@ -282,7 +283,7 @@ def build_joint(model: Model, name: str) -> JointMode:
 
     patch = None
     stiffer = None
-    coarser: tuple = (None,)
+    coarser: tuple[Patch | None, ...] = (None,)
     if model.patch is not None:
         model, (patch, *others), stiffer = solve_without_joint(model)
         coarser = (*others, None)

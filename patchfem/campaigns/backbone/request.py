@@ -4,6 +4,7 @@ from collections.abc import Callable, Iterable
 from typing import NamedTuple
 
 from ...core import PatchfemError
+from ...model.model import Model
 from ...model.source import Source
 from ...scene.assignments import Axis, read_assignments, read_positive_values
 from ...scene.scene import SceneError
@@ -49,7 +50,7 @@ class BackboneCases(NamedTuple):
 
 
 def compute_cases(
-    build: Callable, request: BackboneRequest, progress: Callable | None = None
+    build: Callable[..., Model], request: BackboneRequest, progress: Callable | None = None
 ) -> BackboneCases:
     """Compute the backbones that a request asks for.
 

@@ -43,7 +43,7 @@ SAME_ERROR = 0.1  # relative change of an error at which it is known
 # Smallest relative standard deviation of a value, which keeps its weight finite.
 MIN_SPREAD = 1e-6
 METHODS = ("balance", "quasi-static")  # Reference method and fast method.
-DEFAULT_STARTS = 6  # Number of starting points of a search by the fast method.
+DEFAULT_CURVE_STARTS = 6  # Number of starting points of a search by the fast method.
 PROGRESS_SECONDS = 10.0  # Time between two progress messages [s].
 SAME_AMPLITUDE = (
     1e-6  # largest relative difference of a measured amplitude and that of its computed point
@@ -342,7 +342,7 @@ def fit_curve(
     reasons = {}
     for method in reversed(METHODS):
         try:
-            first = curves.solve(measured, method, options.starts or DEFAULT_STARTS)
+            first = curves.solve(measured, method, options.starts or DEFAULT_CURVE_STARTS)
             break
         except NotConverged as reason:
             reasons[method] = reason

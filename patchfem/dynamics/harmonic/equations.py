@@ -26,7 +26,7 @@ from .series import find_harmonics, pack_harmonics, unpack_harmonics
 RANK_TOL = 1e-12  # singular values of dependent rows are below it, relative to the largest
 RESONANCE_TOL = 1e-10  # dynamic stiffness of an undamped resonance, relative to the largest
 SINGULAR_RATIO = 1e-13  # smallest pivot of a regular matrix, relative to the largest
-NEWTON_TOL = 1e-10  # change of the unknowns, relative to their size, at which Newton's method ends
+BALANCE_TOL = 1e-10  # change of the unknowns, relative to their size, at which Newton's method ends
 MIN_FRACTION = 0.02  # smallest fraction of a Newton step
 MAX_RESIDUAL = (
     1e-7  # residual after the last step, relative to the unknowns and the drive, that is round-off
@@ -323,7 +323,7 @@ def solve_damped(evaluate, x, is_solved, max_steps: int = MAX_STEPS) -> tuple | 
         size = float(np.linalg.norm(x))
         if not np.isfinite(length):
             return None
-        if length <= max(NEWTON_TOL * size, 1e-300):
+        if length <= max(BALANCE_TOL * size, 1e-300):
             residual = equations.residual + equations.jacobian @ step
             return (x + step, equations, count) if is_solved(equations, residual, size) else None
 

@@ -102,7 +102,7 @@ class Jenkins(Law):
 
     stiffness: np.ndarray
     limit_slide: np.ndarray
-    curve: tuple = ()
+    curve: tuple[np.ndarray, ...] = ()
 
     def __post_init__(self):
         k, w = (np.atleast_1d(np.asarray(v, float)) for v in (self.stiffness, self.limit_slide))

@@ -48,6 +48,7 @@ def make_answer(
     verdict = make_verdict(table, analysis)
     notes = [sweep_scene.note_bolted_joint()] if sweep_scene.note_bolted_joint() else []
 
+    # Programs read the verdict from sweep.json, which has no page around it.
     details = {"answer": verdict[0], "sentences": list(verdict)}
     details |= _make_details(table, analysis) | {"of": identify_sweep(sweep_scene, cases)}
     keys = " × ".join(key.key for key in table.keys)
