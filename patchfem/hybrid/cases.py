@@ -52,7 +52,7 @@ class Load(NamedTuple):
     omega: float = 0.0
     phase: float = 0.0
     stiffness: float = 0.0
-    heave: tuple = ()
+    heave: tuple[float, ...] = ()
 
     @property
     def varies(self) -> bool:

@@ -28,8 +28,8 @@ LEVELS = 5  # halvings of a step that contains an event
 TICKS = 1 << LEVELS  # shortest steps in a step
 # Number of terms of the exponential of a shortest step; the product of this step with any rate is below 0.1.
 TAYLOR_TERMS = 12
-MAX_ITERATIONS = 60  # Newton steps and bisections for the increment of a step
-RESIDUAL = 1e-10  # residual of a step relative to its increments
+MAX_TRIALS = 60  # Newton steps and bisections for the increment of a step
+CASE_RESIDUAL = 1e-10  # residual of a step relative to its increments
 GAUSS_POINT = (
     0.7745966692414834  # sqrt(3/5), distance of the outer points of Gauss's rule from the middle
 )
@@ -149,7 +149,7 @@ def solve_step(free, response, h, case, now, numbers, memory, j):
     mean = MeanForce(0.0, 0.0, 0.0, 0.0, 0.0)
 
     # Newton's method; the step falls back to bisection where it would leave the bracket.
-    for _ in range(MAX_ITERATIONS):
+    for _ in range(MAX_TRIALS):
         mean = mean_force(numbers, memory, j, load, Step(dq, h, start, end, gamma))
         force = mean.force
         time_mean = force
@@ -162,7 +162,7 @@ def solve_step(free, response, h, case, now, numbers, memory, j):
                 bend *= abs((start + end) / (start - end))
             time_mean += elastic / dq * bend
         residual = dq - free[0] + beta * time_mean + tilt * change
-        if abs(residual) <= RESIDUAL * (abs(free[0]) + abs(dq)):
+        if abs(residual) <= CASE_RESIDUAL * (abs(free[0]) + abs(dq)):
             break
         if residual > 0:
             high = dq

@@ -10,7 +10,7 @@ from ..friction import path_work
 from .case_kernels import LEVELS, TICKS
 from .case_rows import Cases, Now, Number, Seen
 
-FULL_STICK = 1e-12  # fraction of the time below which slip is round-off
+ALWAYS_STUCK = 1e-12  # fraction of the time below which slip is round-off
 MIN_ACCELERATION = 1e-9  # first harmonic [m s-2] below which it has no distortion
 MIN_SLIDE_RANGE = 1e-15  # range of the slide [m] below which the contact is at rest
 
@@ -149,7 +149,7 @@ def compute_measures(cases: Cases, now, seen, history) -> dict[str, np.ndarray]:
         "absolute_acceleration_peak": seen[:, Seen.MAX_ACCELERATION],
         "friction_force_peak": seen[:, Seen.MAX_FORCE],
         "slip_amplitude": (seen[:, Seen.MAX_SLIP] - seen[:, Seen.MIN_SLIP]) / 2,
-        "stick_fraction": np.where(stuck > 1 - FULL_STICK, 1.0, stuck),
+        "stick_fraction": np.where(stuck > 1 - ALWAYS_STUCK, 1.0, stuck),
         "slip_start_phase": path_work.mean_slip_phase(
             seen[:, Seen.STARTS], seen[:, Seen.START_COS], seen[:, Seen.START_SIN]
         ),

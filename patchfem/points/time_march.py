@@ -46,7 +46,7 @@ from .march_rows import (
 MAX_ANGLE = 0.5  # largest phase of the fastest mode in the step of a matrix exponential [rad]
 N_GAUSS = 8  # Gauss points of the integrals over that step
 RIGID_LEVELS = 20  # lengths of the steps with rigid points: whole steps and fifteen halvings
-LEVELS = 4  # lengths of other steps, which are halved if they do not converge
+SOFT_LEVELS = 4  # lengths of other steps, which are halved if they do not converge
 LIST_DAMPING = 1 / 16  # weight of the change of a shear increment for lists, whose forces jump
 REDUNDANT = 1e-10  # relative compliance of ports at rest that outnumber the modes
 FIRST_WIDTH = 1e-6  # width in bond lengths over which the initial bonds of several lists lie
@@ -261,7 +261,7 @@ def make_system(
     rows = np.array(rows, float).reshape(len(rows), n)
 
     laws = {law.numbers[0] for one in contact.point_sets for law in one.laws}
-    levels = RIGID_LEVELS if Law.COULOMB in laws else LEVELS
+    levels = RIGID_LEVELS if Law.COULOMB in laws else SOFT_LEVELS
     mass = 1.0 if modes is None else float(modes.mass)
 
     # Responses of the modes; a prescribed slide has none.
