@@ -54,7 +54,7 @@ class SurfaceRuns(NamedTuple):
             found[side] = np.array(surface.x), np.array(result.fields["normal_stress"][0])
         return found
 
-    def as_dict(self) -> dict:
+    def as_dict(self) -> dict[str, object]:
         """Return measures, outcomes, failures and warnings as a dict in SI units."""
         measures = {}
         for name in COMPARED_MEASURES:
@@ -90,6 +90,7 @@ def run_both_surfaces(
     Parameters
     ----------
     before, after : Model
+        Models of the same scene with the two surfaces.
     title : str
         Title of the scene.
     say : callable, optional

@@ -142,6 +142,7 @@ def _time_settings(settings: list[Setting], say: Callable | None) -> list[Cost]:
     """Run and time a model with each of some settings; settings that fail are left out."""
     # The first run includes imports and compilation, which the timings must not contain.
     _run_setting(settings[0], None)
+
     runs = []
     for setting in settings:
         # a short run is timed several times, and one that compiles once more
@@ -157,6 +158,7 @@ def _time_settings(settings: list[Setting], say: Callable | None) -> list[Cost]:
             timings.append((_measure_cpu_time() - begin[0], perf_counter() - begin[1]))
             has_compiled = compiled.COMPILE_SECONDS[0] > compile_seconds
             is_short = has_compiled or timings[-1][0] < MIN_SECONDS_TIMED_ONCE
+
         if result is None:
             continue
         runs.append(_make_cost(setting, timings, result))

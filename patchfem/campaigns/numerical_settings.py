@@ -109,7 +109,7 @@ def _find_count(model: Model, name: str) -> int:
     return getattr(model.wear if name == "jumps" else model.accuracy, name) or DEFAULT_COUNT
 
 
-def _scale_count(middle: int, factors: tuple, limits: tuple) -> list[int]:
+def _scale_count(middle: int, factors: tuple[float, ...], limits: tuple[float, float]) -> list[int]:
     """Return a count and its multiples within limits, in rising order."""
     low, high = limits
     scaled = (max(1, round(middle * factor)) for factor in factors)

@@ -40,12 +40,15 @@ def read_pairs(table: Path) -> list[TableLine]:
     """
     path = Path(table)
     text = read_text(path, "the table")
+    # No column is a number; the call refuses a header without the columns of the files.
     find_factors(text, TableFormat({}, COLUMNS, ",".join(COLUMNS), "the table"))
+
     lines = []
     for number, row in text.iterate_rows(skips_blank=True):
         cells = dict(zip(text.names, row))
         names = tuple(cells.pop(column) for column in COLUMNS)
         direction = cells.pop("direction", "")
+
         if not all(names):
             column = COLUMNS[names.index("")]
             raise PatchfemError(f"{path}:{number}: {column}: the name of a file is needed")
@@ -53,8 +56,10 @@ def read_pairs(table: Path) -> list[TableLine]:
             raise PatchfemError(
                 f"{path}:{number}: direction: must be x, y or empty, not '{direction[:40]}'"
             )
+
         paths = tuple(path.parent / name for name in names)
         lines.append(TableLine(number, names, paths, direction, cells))
+
     if not lines:
         raise PatchfemError(
             f"{path}: no pair below its header; a line such as `new.csv,worn.csv` is needed for each"

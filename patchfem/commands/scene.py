@@ -27,15 +27,18 @@ def check(scene: Path, /, *, set_: Sets = (), json_: Json = False):
     Example: patchfem check rig.toml
     """
     notes = []
+    # The files that the scene names add their notes as they are read.
     checked_scene = load_scene(
         scene, set_, lambda tables, folder, whole: _find_file_mistakes(tables, folder, whole, notes)
     )
     notes = [rewrite_powers_of_ten(text) for text in dict.fromkeys([*checked_scene.notes, *notes])]
+
     cases = len(_read_sweep(scene, set_, CaseOptions())[1]) if checked_scene.sweep else None
     for remark in checked_scene.remarks:
         print_message(f"{scene}: {remark}")
     for text in notes:
         note(text)
+
     if json_:
         print(
             json.dumps(
@@ -60,7 +63,7 @@ def _read_sweep(scene: Path, sets, what: CaseOptions) -> tuple:
     return parse_request.read_sweep(scene, sets, what.request())
 
 
-def _find_file_mistakes(tables, folder: Path, is_complete: bool, notes: list) -> list:
+def _find_file_mistakes(tables, folder: Path, is_complete: bool, notes: list[str]) -> list[str]:
     """Return the mistakes in the files that a scene names, and append notes on the run to `notes`.
 
     Without such files nothing is imported.
@@ -113,17 +116,20 @@ def _print_plan(plan_data: dict, is_solved: bool, verbose: bool) -> None:
     verbose: whether to list the effects that the scene does not have.
     """
     print(f"kind     {plan_data['kind']}, engine {plan_data['engine']}")
+
     sizes = []
     for name, count in plan_data["unknowns"].items():
         sizes.append(f"{count} {_format_size_name(name.removesuffix('s') if count == 1 else name)}")
     if sizes:
         print("sizes    " + ", ".join(sizes))
+
     for sentence in plan_data.get("probe", {}).get("sentences", ()):
         print(f"probe    {sentence}")
     for effect in plan_data["effects"]:
         print(f"  runs   {effect['effect']:<28} {effect['equations']}")
     for sentence in plan_data["verdict"]:
         print(f"says     {rewrite_powers_of_ten(sentence)}")
+
     bonded = any(
         law_has_trait(one["effect"].partition("law=")[2], "bonds") for one in plan_data["effects"]
     )
@@ -132,6 +138,8 @@ def _print_plan(plan_data: dict, is_solved: bool, verbose: bool) -> None:
         for name, link in plan_data["stiffness_chain"].items()
     ]
     print("chain    " + " -> ".join(links))
+
+    # A patch that was not solved has an upper estimate of its shear stiffness.
     is_upper_estimate = not is_solved and any(
         not isinstance(link, str)
         for name, link in plan_data["stiffness_chain"].items()
@@ -141,6 +149,7 @@ def _print_plan(plan_data: dict, is_solved: bool, verbose: bool) -> None:
         print(
             "         the shear stiffness of the pieces is an upper estimate; use --probe to compute it"
         )
+
     for one in plan_data.get("modes", ()):
         stuck_text = (
             ""
@@ -148,6 +157,7 @@ def _print_plan(plan_data: dict, is_solved: bool, verbose: bool) -> None:
             else f", {'at most ' * is_upper_estimate}{one['stuck_frequency']:.5g} Hz while the contact sticks"
         )
         print(f"mode     {one['name']} {one['free_frequency']:.5g} Hz without contact{stuck_text}")
+
     for name, value in plan_data["groups"].items():
         print(f"group    {_format_group(value, name)}")
     if verbose:

@@ -23,11 +23,14 @@ class CurvePoints(NamedTuple):
     """Increasing abscissas (k,) of a sampled curve, and the result computed at each of them."""
 
     abscissas: np.ndarray
-    results: list
+    results: list[tuple]
 
 
 def sample_adaptively(
-    compute: Callable, abscissas, tolerance: float = 0.01, max_points: int = 2000
+    compute: Callable[[float, tuple | None], tuple],
+    abscissas,
+    tolerance: float = 0.01,
+    max_points: int = 2000,
 ) -> CurvePoints:
     """Sample a curve at adaptive points until linear interpolation meets a tolerance.
 
@@ -74,7 +77,7 @@ def find_coarse_intervals(abscissas, values, tolerance: float) -> np.ndarray:
     abscissas, values : ndarray
         (n,); values may be nan.
     tolerance : float
-        See `sample_adaptively`.
+        Largest error of linear interpolation, relative to the larger value or MIN_VALUE_RATIO of the largest one.
 
     Returns
     -------

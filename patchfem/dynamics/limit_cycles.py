@@ -85,6 +85,7 @@ def estimate_amplitude(modes: ModalBasis, row, limit: float, mode: int) -> float
     Parameters
     ----------
     modes : ModalBasis
+        Modes of the structure without the contact.
     row : ndarray
         (n,) slide per coordinate.
     limit : float
@@ -100,7 +101,9 @@ def estimate_amplitude(modes: ModalBasis, row, limit: float, mode: int) -> float
     return 4 * limit * abs(row[mode]) / (np.pi * gives)
 
 
-def find_relay_cycles(modes: ModalBasis, row, slip_force: float, stick_force: float) -> list:
+def find_relay_cycles(
+    modes: ModalBasis, row, slip_force: float, stick_force: float
+) -> list[LimitCycle]:
     """Find the limit cycles under rigid friction in which the interface never sticks.
 
     After a reversal the force is constant: y(T/2) = E (y - e) + e = -y has one y for each half
@@ -182,7 +185,9 @@ def _make_flow(modes: ModalBasis, row, force: float) -> _ForcedFlow:
     return _ForcedFlow(modes, np.asarray(row, float), *np.linalg.eig(matrix), rest)
 
 
-def _find_mode_relay_cycles(modes: ModalBasis, row, forces: tuple, mode: int) -> list:
+def _find_mode_relay_cycles(
+    modes: ModalBasis, row, forces: tuple[float, float], mode: int
+) -> list[LimitCycle]:
     """Find the limit cycles under rigid friction whose frequency is close to that of a given mode.
 
     forces: kinetic and static friction [N].
@@ -203,7 +208,9 @@ def _find_mode_relay_cycles(modes: ModalBasis, row, forces: tuple, mode: int) ->
     return [cycle for cycle in cycles if cycle is not None]
 
 
-def trace_relay_backbone(modes: ModalBasis, row, forces: tuple, amplitudes, mode: int) -> list:
+def trace_relay_backbone(
+    modes: ModalBasis, row, forces: tuple[float, float], amplitudes, mode: int
+) -> list[tuple[LimitCycle, float] | None]:
     """Compute the backbone of a mode under rigid friction at prescribed amplitudes.
 
     A damping -g of every coordinate sustains the motion of `mode` (extended periodic motion: Krack
@@ -212,12 +219,15 @@ def trace_relay_backbone(modes: ModalBasis, row, forces: tuple, amplitudes, mode
     Parameters
     ----------
     modes : ModalBasis
+        Modes of the structure without the contact.
     row : ndarray
+        (n,) slide per coordinate.
     forces : tuple
-        Kinetic and static friction [N], see `find_relay_cycles`.
+        Kinetic and static friction [N].
     amplitudes : array_like
         (k,) amplitudes [m].
     mode : int
+        Index of the coordinate of the mode.
 
     Returns
     -------
@@ -302,7 +312,9 @@ def _find_largest(times, motion, speeds) -> float:
     return float(max(np.abs(motion).max(), np.nanmax(np.abs(curve(turns)), initial=0.0)))
 
 
-def find_balance_cycles(modes: ModalBasis, group: LawGroup, row, limit: float) -> tuple:
+def find_balance_cycles(
+    modes: ModalBasis, group: LawGroup, row, limit: float
+) -> tuple[list[LimitCycle], float]:
     """Find the limit cycles of modes with one friction interface by harmonic balance.
 
     Each is solved again with twice the harmonics and samples. A law whose force decreases with the slide may have no free
@@ -312,7 +324,9 @@ def find_balance_cycles(modes: ModalBasis, group: LawGroup, row, limit: float) -
     Parameters
     ----------
     modes : ModalBasis
+        Modes of the structure without the contact.
     group : LawGroup
+        Law of the interface.
     row : ndarray
         (n,) slide per coordinate.
     limit : float
@@ -341,10 +355,14 @@ def find_balance_cycles(modes: ModalBasis, group: LawGroup, row, limit: float) -
     return sorted(cycles), min_amplitude
 
 
-def _find_mode_cycles(modes: ModalBasis, group: LawGroup, mode: int, size: float) -> tuple:
+def _find_mode_cycles(
+    modes: ModalBasis, group: LawGroup, mode: int, size: float
+) -> tuple[list[LimitCycle], float]:
     """Return the limit cycles of one mode and the smallest amplitude [m] that was examined."""
     stuck_mode = modes.compute_stuck_mode(group.rows, group.stiffness(), mode)
     free_mode = (modes.omega[mode], np.eye(modes.omega.size)[mode])
+
+    # The path begins with the sticking contact, or with the sliding one if that fails.
     paths = (
         (np.geomspace(MIN_AMPLITUDE_RATIO, MAX_AMPLITUDE_RATIO, N_AMPLITUDES), stuck_mode, 0.0),
         (
@@ -353,6 +371,7 @@ def _find_mode_cycles(modes: ModalBasis, group: LawGroup, mode: int, size: float
             MIN_SLIDING_RATIO * size,
         ),
     )
+
     for ratios, start, min_amplitude in paths:
         found = [
             _find_undamped_motions(modes, group, mode, (size * ratios, start), harmonics)
@@ -360,23 +379,31 @@ def _find_mode_cycles(modes: ModalBasis, group: LawGroup, mode: int, size: float
         ]
         if None in found:
             continue
+
         coarse, fine = found
         if len(coarse) != len(fine):
             raise NotConverged(
                 f"{len(coarse)} limit cycles were found with {N_HARMONICS} harmonics but {len(fine)} limit "
                 f"cycles with {2 * N_HARMONICS + 1} harmonics"
             )
+
+        # The change with the number of harmonics bounds the error.
         cycles = []
         for other, cycle in zip(coarse, fine):
             change = abs(other.amplitude - cycle.amplitude)
             cycles.append(cycle._replace(error=2 * change + AMPLITUDE_TOL * cycle.amplitude))
         return cycles, min_amplitude
+
     raise NotConverged(NOT_FOLLOWED_MESSAGE)
 
 
 def _find_undamped_motions(
-    modes: ModalBasis, group: LawGroup, mode: int, path: tuple, harmonics: int
-) -> list | None:
+    modes: ModalBasis,
+    group: LawGroup,
+    mode: int,
+    path: tuple[np.ndarray, tuple[float, np.ndarray]],
+    harmonics: int,
+) -> list[LimitCycle] | None:
     """Find the limit cycles of a mode: free motions without damping; None if free motions are not found.
 
     path: amplitudes (k,) [m], and frequency [rad/s] and shape (n,) of the first motion.

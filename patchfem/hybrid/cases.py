@@ -52,7 +52,7 @@ class Load(NamedTuple):
     omega: float = 0.0
     phase: float = 0.0
     stiffness: float = 0.0
-    heave: tuple = ()
+    heave: tuple[float, ...] = ()
 
     @property
     def varies(self) -> bool:
@@ -120,10 +120,13 @@ def make_rig(
     modes : ModalBasis or None
         None for a bench, whose slide is the signal.
     signal : Signal
+        Drive of the rig, or slide of the bench.
     interfaces : sequence of Interface
+        Law, load and slide per modal coordinate of each interface.
     sizes : (float, float)
         Expected slide [m] and its speed [m/s].
     options : Options
+        Tolerance, steps and limits of the run.
     """
     # A bench has one mode without stiffness, which its slide replaces.
     n = 1 if modes is None else modes.omega.size
@@ -173,12 +176,15 @@ def make_rig(
     settings[Setting.REPEAT] = repeat
     settings[Setting.MAX_STEPS] = options.max_steps
     settings[Setting.HAS_RIGID] = faces[:, Face.RIGID].any()
+
     table = np.zeros((len(Mode), n))
     damping = np.zeros((n, n))
     if modes is not None:
         gauge = modes.output if modes.gauge is None else modes.gauge
         table = np.array([modes.omega**2, -modes.base, modes.output, gauge], float)
         damping = np.array(modes.damping_matrix, float, order="C")
+
+    # Friction work, slip and loss of each interface.
     for load in faces[:, Face.LOAD]:
         work = load * scales[0]
         scales += [work, scales[0], work]
@@ -194,6 +200,7 @@ def make_start(rig: Rig, interfaces, start=None) -> np.ndarray:
     rig : Rig
         Arrays of the rig.
     interfaces : sequence of Interface
+        Law, load and slide per modal coordinate of each interface.
     start : InitialState, optional
         Modal coordinates [m] and velocities [m/s].
     """
@@ -261,9 +268,11 @@ def make_rig_case(
     Parameters
     ----------
     rig : model.rig.Rig
+        Structure and drive.
     joints : sequence of (LawNumbers, Load)
         Law and load of each interface.
     schedule : Schedule
+        Cycles, window and samples.
     signal : optional
         Drive in place of that of the rig.
     rtol : float
@@ -304,7 +313,9 @@ def find_sizes(modes: ModalBasis, signal: Signal, drive, start=None) -> tuple[fl
     Parameters
     ----------
     modes : ModalBasis
+        Modes of the structure without the contact.
     signal : Signal
+        Pieces and tones of the drive.
     drive
         Drive of the signal.
     start : InitialState, optional
@@ -321,7 +332,7 @@ def find_sizes(modes: ModalBasis, signal: Signal, drive, start=None) -> tuple[fl
     return speed / omega, speed
 
 
-def stack(arrays) -> tuple:
+def stack(arrays) -> tuple[np.ndarray, ...]:
     """Return records of arrays as one record with a leading axis of cases."""
     first = arrays[0]
     return type(first)(*(np.ascontiguousarray(np.stack(parts)) for parts in zip(*arrays)))
@@ -333,6 +344,7 @@ def make_batch(cases, n_events: int = 0) -> tuple[Rig, State, Record]:
     Parameters
     ----------
     cases : sequence of Case
+        Rigs of equal shape, with their states at the start.
     n_events : int
         Number of events that a case can store.
     """

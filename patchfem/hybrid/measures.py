@@ -32,7 +32,7 @@ FACE_MEASURES = ("slip_amplitude", "stick_fraction", "friction_force_peak", "loo
 
 def compute_measures(
     rigs: Rig, states: State, records: Record, window: int, first, **model
-) -> dict:
+) -> dict[str, np.ndarray]:
     """Return the measures of a window as arrays (c,) by name.
 
     Parameters
@@ -96,7 +96,7 @@ def compute_measures(
     return values | {name: np.where(has_cycle, value, np.nan) for name, value in loop.items()}
 
 
-def _compute_energies(rigs, states, first, n_friction: int) -> dict:
+def _compute_energies(rigs, states, first, n_friction: int) -> dict[str, np.ndarray]:
     """Return the energies [J] of the whole run and the relative error of their balance."""
     n_faces = rigs.faces.shape[1]
     n = rigs.modes.shape[2]
@@ -122,7 +122,9 @@ def _compute_energies(rigs, states, first, n_friction: int) -> dict:
     return values | {"energy_balance": np.divide(gap, size, out=np.zeros_like(gap), where=size > 0)}
 
 
-def _compute_loop(rigs, records, window: int, span, values: dict, stiffness) -> dict:
+def _compute_loop(
+    rigs, records, window: int, span, values: dict[str, np.ndarray], stiffness
+) -> dict[str, np.ndarray]:
     """Return stiffness, damping and drift of the first interface, from its cycles in a window."""
     row = records.faces[:, window, 0]
     slide = row[:, Window.SLIDE_COS] - 1j * row[:, Window.SLIDE_SIN]

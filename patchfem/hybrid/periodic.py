@@ -284,7 +284,7 @@ class _Shooting:
         )
         return np.flatnonzero(np.concatenate([changed, memory.ravel()]))
 
-    def _differentiate(self, before: State) -> tuple:
+    def _differentiate(self, before: State) -> tuple[np.ndarray, ...]:
         """Return the unknowns' indices, change over a period, derivatives of the map, and their scales.
 
         The derivatives of the last correction are used again as long as `slopes` has them.

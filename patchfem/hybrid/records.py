@@ -351,7 +351,7 @@ class LawNumbers(NamedTuple):
     """A law of one interface: its name in `laws.LAWS`, its numbers, first states, scales of the states, length [m]."""
 
     law: str
-    numbers: tuple
-    states: tuple = ()
-    scales: tuple = ()
+    numbers: tuple[float, ...]
+    states: tuple[float, ...] = ()
+    scales: tuple[float, ...] = ()
     length: float = np.inf

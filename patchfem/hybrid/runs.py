@@ -95,7 +95,7 @@ class Motion:
     case: Case
     status: Status
     message: str
-    values: dict
+    values: dict[str, float]
     extremes: np.ndarray
     phasors: np.ndarray
     rows: np.ndarray
@@ -144,7 +144,7 @@ class Motion:
         rows = np.concatenate([self.rows[:1], self.event_rows[is_own]])
         return np.stack([rows[:, 0], self._slides(rows)[:, interface]], axis=1)
 
-    def find_energies(self) -> dict:
+    def find_energies(self) -> dict[str, float]:
         """Return the energies [J] of the whole motion.
 
         - "work_in", "power": work of the drive and the sum of its magnitudes over the steps
@@ -195,8 +195,10 @@ class Motion:
 
         slides = z @ rig.rows[0, :m].T
         slide_rates = rate @ rig.rows[0, :m].T
+        # The velocity of a rigid interface at rest is round-off.
         rests = (self._columns(rows, 2) == 0) & (rig.faces[:m, Face.RIGID] > 0)
         slide_rates[rests] = 0.0
+
         work = integrals[:, :m, 0]
         loss = integrals[:, :m, 2]
         slips = integrals[:, :m, 1] + self.case.y[:n] @ rig.rows[0, :m].T
@@ -205,6 +207,7 @@ class Motion:
                 [work.sum(1), (work - loss).sum(1), loss.sum(1), np.zeros(time.size)]
             )
         }
+
         if m and rig.faces[0, Face.SWING]:
             extra["normal_load"] = self._columns(rows, 1)[:, 0]
         if m > 1:
@@ -233,6 +236,7 @@ def run_batch(
     Parameters
     ----------
     cases : sequence of Case
+        Rigs of equal shape, with their states at the start.
     n_events : int
         Number of events that a case can store.
     states : State, optional
@@ -256,7 +260,9 @@ def run_batch(
     return Batch(rigs, states, records, start, windows)
 
 
-def estimate_errors(values: dict, coarse: dict, rtol: float) -> dict:
+def estimate_errors(
+    values: dict[str, np.ndarray], coarse: dict[str, np.ndarray], rtol: float
+) -> dict[str, np.ndarray]:
     """Return the errors of measures from those of a run with larger steps.
 
     Parameters
@@ -288,6 +294,7 @@ def run_case(
     Parameters
     ----------
     case : Case
+        Rig and state at the start.
     start : State, optional
         End of another motion of the same rig, from which the case goes on at t = 0; default: the start of the case.
     fills_histories : bool
@@ -333,16 +340,19 @@ def run_case(
     )
 
 
-def _fill_repeated_cycles(case: Case, cycles, samples, event_rows) -> tuple:
+def _fill_repeated_cycles(case: Case, cycles, samples, event_rows) -> tuple[np.ndarray, np.ndarray]:
     """Return samples and events with those of the cycles that repeat an earlier one and were not computed.
 
     Parameters
     ----------
     case : Case
+        Case that was run.
     cycles : (C, 12) array
+        Rows of the cycles.
     samples : (S, m) array
         NaN at times of these cycles.
     event_rows : (e, m) array
+        Rows of the events.
     """
     skipped = np.flatnonzero(cycles[:, Cycle.REPEATS])
     last = skipped[0] - 1

@@ -40,7 +40,7 @@ LAST_PROBES = 5  # row of `State.probes` of the last evaluation
 N_PARABOLAS = 6  # steps of the search for an extreme
 NEAR_EXTREME = 0.2  # extremes of a step that are further from those of the window are not located
 MIN_STICK = 1e-9  # duration of the shortest stick, relative to the period
-SAME_SLIDE_TOL = 1e-12  # relative difference of slides before and after an event
+EVENT_SLIDE_TOL = 1e-12  # relative difference of slides before and after an event
 
 
 @njit(**NJIT_KERNEL)
@@ -354,7 +354,7 @@ def observe_reversal(rig, state, fraction, cycle, sign, column):
     force = Probe.FACES + Probe.FORCE
     known = cycle[column]
     value = raise_extreme(rig, state, fraction, slide, sign, known)
-    size = SAME_SLIDE_TOL * abs(value)
+    size = EVENT_SLIDE_TOL * abs(value)
     if abs(state.probes[0, slide] - known) <= size and abs(value - known) <= size:
         cycle[column + 1] = 0.5 * (cycle[column + 1] + state.probes[0, force])
     elif value != known:
@@ -381,12 +381,14 @@ def add_stick(rig, state, fraction, i, row):
     """
     column = Probe.FACES + Probe.COUNT * i + Probe.SLIPPING
     h = state.clock[Clock.LENGTH]
+
     # A reversal without stick is a stick of a duration of round-off, after which slip does not start.
     shortest = MIN_STICK * rig.settings[Setting.PERIOD]
     sticks = state.probes[0, column] < 0
     duration = max(row[Window.STICKS], 0.0)
     if duration > shortest and not sticks:
         add_start(rig, state.clock, state.clock[Clock.TIME], row)
+
     for node in range(1, N_NODES):
         left = fraction * NODES[node - 1]
         right = fraction * NODES[node]

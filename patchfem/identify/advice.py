@@ -19,6 +19,7 @@ def advise_test(
     Parameters
     ----------
     fit : Fit
+        Fit of the present tests.
     names : sequence of str
         Names of the n parameters.
     information : (m, n, n) array

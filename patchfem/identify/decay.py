@@ -5,7 +5,7 @@ import numpy as np
 from ..core import PatchfemError
 from .sinusoids import FittedModes, Limits, SinusoidFit, SinusoidProblem
 
-MIN_SAMPLES = 32  # smallest number of samples of a record
+MIN_DECAY_SAMPLES = 32  # smallest number of samples of a record
 MAX_SINUSOIDS = 8  # largest number of sinusoids in one fit
 MIN_DECREASE = (
     0.36  # smallest reduction of the sum of squares by a further sinusoid that does not fit noise
@@ -33,9 +33,9 @@ def fit_decay(time, value) -> FittedModes:
     PatchfemError
         If there are too few samples, or no decaying oscillation.
     """
-    if time.size < MIN_SAMPLES:
+    if time.size < MIN_DECAY_SAMPLES:
         raise PatchfemError(
-            f"the free decay has {time.size} samples; at least {MIN_SAMPLES} are needed"
+            f"the free decay has {time.size} samples; at least {MIN_DECAY_SAMPLES} are needed"
         )
     time = time - time[0]
     problem = SinusoidProblem(time, value, [np.ones(time.size)])

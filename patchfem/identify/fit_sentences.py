@@ -9,7 +9,7 @@ from .least_squares import MAX_EVALUATIONS, Fit
 MIN_SENSITIVITY = 1e-9
 
 
-def describe_fit(fit: Fit, names) -> list:
+def describe_fit(fit: Fit, names) -> list[str]:
     """Return sentences about parameters that a fit does not determine, and failures of its search.
 
     The sentences report parameters that are at a bound, without effect, determined only in combination with
@@ -18,6 +18,7 @@ def describe_fit(fit: Fit, names) -> list:
     Parameters
     ----------
     fit : Fit
+        Best fit, with its intervals.
     names : sequence of str
         Names (n,) of the parameters.
 
@@ -31,10 +32,13 @@ def describe_fit(fit: Fit, names) -> list:
             sentences.append(
                 f"{name} is at its {side} bound {value:.6g}: widen the range, or try another law"
             )
+
+    # Parameters in an undetermined combination are reported with it, not one by one.
     intervals = fit.intervals
     sentences += [_describe_direction(row, names) for row in intervals.unknown]
     in_combination = intervals.unknown.any(axis=0)
     min_sensitivity = MIN_SENSITIVITY * max(float(np.max(intervals.sensitivity)), fit.rms)
+
     for i, name in enumerate(names):
         if np.isfinite(intervals.ends[i]).all():
             if intervals.open_ends[i].any() and not fit.at_bound[i]:
@@ -48,11 +52,13 @@ def describe_fit(fit: Fit, names) -> list:
             sentences.append(
                 f"{name} is not determined: its interval of 95 % reaches both ends of its range"
             )
+
     if fit.counts.failures:
         sentences.append(
             f"{fit.counts.failures} of {fit.counts.evaluations} evaluations failed and were skipped; the first "
             f"failed because: {fit.counts.reason}"
         )
+
     if fit.outcome is Outcome.NOT_CONVERGED:
         sentences.append(
             f"not converged: the best search did not settle within {MAX_EVALUATIONS} evaluations, and no search from "

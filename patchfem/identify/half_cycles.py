@@ -79,8 +79,11 @@ def find_half_cycles(time, value) -> HalfCycles:
         raise PatchfemError(
             f"the free decay has {time.size} samples; at least {4 * MIN_SAMPLES} are needed"
         )
+
     middle, length = _find_first_half_cycle(time, value)
     followed = _follow_half_cycles(time, value, middle, length)
+
+    # Sines without and with viscous decay are tried; the fit with less noise counts.
     candidates = []
     for is_viscous in (False, True):
         sines = followed
@@ -182,7 +185,9 @@ def _follow_half_cycles(time, value, middle: float, length: float) -> list[_Fitt
     return sines
 
 
-def _refine_half_cycles(time, value, sines: list, *, is_viscous: bool) -> list[_FittedSines]:
+def _refine_half_cycles(
+    time, value, sines: list[_FittedSines], *, is_viscous: bool
+) -> list[_FittedSines]:
     """Refit half cycles with half periods and decay rates estimated from their neighbours."""
     if len(sines) < 3:
         return sines

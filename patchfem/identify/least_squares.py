@@ -122,8 +122,8 @@ class Search:
 
     starts: int
     seed: int | None = None
-    before_descent: Callable = lambda: None
-    report: Callable = lambda: None
+    before_descent: Callable[[], None] = lambda: None
+    report: Callable[[], None] = lambda: None
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -136,7 +136,7 @@ class Problem:
     - start: parameters (n,) from which the first descent starts, NaN for the middle of a range; None without them.
     """
 
-    residual: Callable
+    residual: Callable[[np.ndarray], np.ndarray]
     low: Sequence
     high: Sequence
     start: Sequence | None = None
@@ -154,6 +154,7 @@ class Problem:
         Parameters
         ----------
         search : Search
+            Starting points and callbacks of the search.
         interval_kind : str
             Value of `IntervalKind`.
 

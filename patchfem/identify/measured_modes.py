@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..core import PatchfemError
-from ..response.decay_curve import HalfCycles, fit_decay_curve, fit_slopes
+from ..response.decay_curve import DecayCurve, HalfCycles, fit_decay_curve, fit_slopes
 from .decay import fit_decay
 from .driven_modes import DERIVATIVE_ORDERS, MAX_FITTED_SAMPLES, fit_driven_modes
 from .half_cycles import describe_missing_samples_at_end, find_half_cycles
@@ -37,10 +37,10 @@ class ListedModes:
 
     frequency: np.ndarray
     damping: np.ndarray
-    rows: dict
+    rows: dict[str, np.ndarray]
     mass: float | None
-    descriptions: list
-    notes: list = field(default_factory=list)
+    descriptions: list[str]
+    notes: list[str] = field(default_factory=list)
 
 
 class _ModeRows(NamedTuple):
@@ -51,12 +51,12 @@ class _ModeRows(NamedTuple):
     - notes: sentences for the user.
     """
 
-    rows: dict
+    rows: dict[str, np.ndarray]
     mass: float | None
-    notes: list
+    notes: list[str]
 
 
-def find_response_name(values: dict) -> str:
+def find_response_name(values: dict[str, np.ndarray]) -> str:
     """Return the name of the response in a record.
 
     Raises PatchfemError unless the record has exactly one.
@@ -114,16 +114,20 @@ def identify_driven_modes(
             "has " + ", ".join(values) + ": choose channels with --map, or use --decay for a free "
             "decay"
         )
+
     input_name = inputs[0]
     step = find_time_step(values["time"])
     excitation = values[input_name]
     response = values[response_name]
+    # The modes describe the motion relative to the base.
     if input_name == "base_acceleration" and response_name == "acceleration":
         response = response - excitation
+
     modes = fit_driven_modes(step, excitation, response, response_name, band)
     rows, mass, notes = (
         _convert_force_residues(modes) if input_name == "force" else _convert_base_residues(modes)
     )
+
     if modes.misfit > MAX_MISFIT:
         notes.append(
             f"the modes leave {100 * modes.misfit:.0f} % of the response (root mean square) unexplained: the "
@@ -134,6 +138,7 @@ def identify_driven_modes(
             f"the modes are fitted to the first {MAX_FITTED_SAMPLES} of {excitation.size} samples, a duration of "
             f"{MAX_FITTED_SAMPLES * step:.4g} s"
         )
+
     return ListedModes(
         frequency=modes.frequency,
         damping=modes.damping,
@@ -183,7 +188,9 @@ def _convert_base_residues(modes: FittedModes) -> _ModeRows:
     return _ModeRows(rows, None, ["a response to base motion gives no modal mass: set moving_mass"])
 
 
-def _select_decay(values: dict, begin: float | None) -> tuple:
+def _select_decay(
+    values: dict[str, np.ndarray], begin: float | None
+) -> tuple[np.ndarray, np.ndarray]:
     """Return the times [s] and samples of a response from the start of its decay.
 
     The decay starts at the time `begin` [s]. Default: the largest deviation from the final value.
@@ -204,7 +211,9 @@ def _select_decay(values: dict, begin: float | None) -> tuple:
     return time[start:], value[start:]
 
 
-def compute_decay_curve(values: dict, begin: float | None = None) -> tuple:
+def compute_decay_curve(
+    values: dict[str, np.ndarray], begin: float | None = None
+) -> tuple[DecayCurve, list[str]]:
     """Compute frequency and damping ratio against amplitude from a measured free decay.
 
     The half cycles of a velocity or an acceleration are converted to those of a displacement by their own undamped
@@ -233,6 +242,7 @@ def compute_decay_curve(values: dict, begin: float | None = None) -> tuple:
     half_cycles = find_half_cycles(time, value)
     order = DERIVATIVE_ORDERS[find_response_name(values)]
     curve = fit_decay_curve(_convert_to_displacement(half_cycles, order))
+
     notes = []
     is_certain = curve.damping_error <= MAX_ERROR_RATIO * np.abs(curve.damping)
     if curve.time.size and not is_certain.all():
@@ -246,6 +256,8 @@ def compute_decay_curve(values: dict, begin: float | None = None) -> tuple:
             f"of the damping ratio is wider than {MAX_ERROR_RATIO:g} times its value there"
         )
         curve = curve.select(is_certain)
+
+    # A decay that ends early for want of samples would look complete.
     reason = describe_missing_samples_at_end(time, half_cycles)
     if reason:
         notes.append(f"the decay is followed up to {half_cycles.middle[-1]:.4g} s only: {reason}")
@@ -277,7 +289,7 @@ def _extend_to_ends(values: np.ndarray) -> np.ndarray:
     return np.concatenate([[first], values, [last]])
 
 
-def identify_decay_modes(values: dict, begin: float | None = None) -> ListedModes:
+def identify_decay_modes(values: dict[str, np.ndarray], begin: float | None = None) -> ListedModes:
     """Identify natural modes from a measured free decay.
 
     The decay starts at the time `begin` [s]. Default: the largest deviation from the final value.

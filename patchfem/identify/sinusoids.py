@@ -186,7 +186,9 @@ class SinusoidProblem:
         )
         return self.solve(result.x.reshape(-1, 2))[0]
 
-    def fit(self, find_starts: Callable, limits: Limits) -> SinusoidFit:
+    def fit(
+        self, find_starts: Callable[[SinusoidFit], list[np.ndarray]], limits: Limits
+    ) -> SinusoidFit:
         """Add sinusoids one at a time, as long as each is distinct and fits more than noise.
 
         Parameters

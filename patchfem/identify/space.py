@@ -117,7 +117,13 @@ class UnitCubeResidual:
         Whether derivatives are one-sided differences.
     """
 
-    def __init__(self, residual: Callable, space: SearchSpace, *, is_expensive: bool = False):
+    def __init__(
+        self,
+        residual: Callable[[np.ndarray], np.ndarray],
+        space: SearchSpace,
+        *,
+        is_expensive: bool = False,
+    ):
         self.residual = residual
         self.space = space
         self.is_expensive = is_expensive

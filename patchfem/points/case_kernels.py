@@ -28,8 +28,8 @@ LEVELS = 5  # halvings of a step that contains an event
 TICKS = 1 << LEVELS  # shortest steps in a step
 # Number of terms of the exponential of a shortest step; the product of this step with any rate is below 0.1.
 TAYLOR_TERMS = 12
-MAX_ITERATIONS = 60  # Newton steps and bisections for the increment of a step
-RESIDUAL = 1e-10  # residual of a step relative to its increments
+MAX_TRIALS = 60  # Newton steps and bisections for the increment of a step
+CASE_RESIDUAL = 1e-10  # residual of a step relative to its increments
 GAUSS_POINT = (
     0.7745966692414834  # sqrt(3/5), distance of the outer points of Gauss's rule from the middle
 )
@@ -62,6 +62,8 @@ def write_responses(damping, stiffness, step, table):
         Responses, output.
     """
     shortest = step / TICKS
+
+    # Taylor series of the shortest step: y'' = u - damping y' - stiffness y, column by column.
     for column in range(5):
         # Derivatives of the motion that starts with a unit of this column.
         term = 1.0 if column == 0 else 0.0
@@ -75,6 +77,8 @@ def write_responses(damping, stiffness, step, table):
             factor *= shortest / k
             table[LEVELS, 0, column] += factor * term
             table[LEVELS, 1, column] += factor * rate
+
+    # Semigroup: the response of a step is that of its second half applied to the end of its first half.
     for level in range(LEVELS, 0, -1):
         h = step / (1 << level)
         half = table[level]
@@ -124,6 +128,7 @@ def solve_step(free, response, h, case, now, numbers, memory, j):
         Increment [m], velocity at the end [m/s], path-mean force [N], its time mean [N], and the distance of the path mean
         from the mean of the forces at both ends [N].
     """
+    # Increment and velocity per unit of a constant force, and of a force that changes as t/h - 1/2.
     mobility = case[Number.MOBILITY]
     beta = response[0, 2] * mobility
     gamma = response[1, 2] * mobility
@@ -132,6 +137,7 @@ def solve_step(free, response, h, case, now, numbers, memory, j):
     load = case[Number.LOAD]
     start = now[Now.VELOCITY]
     follows_path = numbers[0, j] != Law.TANH
+
     # The mean force is extrapolated from that of the last step and the force at its end.
     force = 2 * now[Now.FORCE] - now[Now.MEAN]
     dq = free[0] - beta * force
@@ -141,7 +147,9 @@ def solve_step(free, response, h, case, now, numbers, memory, j):
     change = 0.0
     time_mean = force
     mean = MeanForce(0.0, 0.0, 0.0, 0.0, 0.0)
-    for _ in range(MAX_ITERATIONS):
+
+    # Newton's method; the step falls back to bisection where it would leave the bracket.
+    for _ in range(MAX_TRIALS):
         mean = mean_force(numbers, memory, j, load, Step(dq, h, start, end, gamma))
         force = mean.force
         time_mean = force
@@ -154,7 +162,7 @@ def solve_step(free, response, h, case, now, numbers, memory, j):
                 bend *= abs((start + end) / (start - end))
             time_mean += elastic / dq * bend
         residual = dq - free[0] + beta * time_mean + tilt * change
-        if abs(residual) <= RESIDUAL * (abs(free[0]) + abs(dq)):
+        if abs(residual) <= CASE_RESIDUAL * (abs(free[0]) + abs(dq)):
             break
         if residual > 0:
             high = dq
@@ -169,6 +177,7 @@ def solve_step(free, response, h, case, now, numbers, memory, j):
             dq = 0.5 * (low + high) if high - low < inf else free[0] - beta * force
         # Velocity and displacement at the end differ from the free ones by the same mean force.
         end = free[1] - gamma / beta * (free[0] - dq - tilt * change) - velocity_tilt * change
+
     bend = mean.bend if not follows_path else force - now[Now.FORCE] - 0.5 * change
     return dq, end, force, time_mean, bend
 
@@ -216,6 +225,8 @@ def end_at_event(q, v, h, hold, case, now, numbers, memory, j):
         now[Now.VELOCITY] = mobility * (hold - memory[0, j] * slip_force) * rest
         now[Now.SLIDE] += 0.5 * now[Now.VELOCITY] * rest
         return
+
+    # The slip stops at a fraction of the step, in which the velocity falls linearly.
     fraction = now[Now.VELOCITY] / (now[Now.VELOCITY] - v)
     now[Now.EVENT] = fraction
     rest = (1 - fraction) * h
@@ -263,6 +274,8 @@ def try_step(waves, h, response, is_shortest, max_bend, case, now, numbers, memo
         Number of the point.
     """
     now[Now.EVENT] = -1.0
+
+    # Parabola of the drive through its three values, and the free motion at the end of the step.
     drive = case[Number.DRIVE]
     q = now[Now.SLIDE]
     v = now[Now.VELOCITY]
@@ -275,6 +288,7 @@ def try_step(waves, h, response, is_shortest, max_bend, case, now, numbers, memo
     free_velocity = (
         row[0] * q + row[1] * v + row[2] * constant + row[3] * slope + row[4] * curvature
     )
+
     is_rigid = numbers[0, j] == Law.COULOMB
     mobility = case[Number.MOBILITY]
     load = case[Number.LOAD]
@@ -292,6 +306,7 @@ def try_step(waves, h, response, is_shortest, max_bend, case, now, numbers, memo
             now[Now.MEAN] = 0.5 * (now[Now.FORCE] + hold)
             now[Now.TIME_MEAN] = (now[Now.FORCE] + 4 * middle + hold) / 6
             return True
+
         dq = free - response[0, 2] * mobility * force
         end = free_velocity - response[1, 2] * mobility * force
         time_mean = force
@@ -304,12 +319,15 @@ def try_step(waves, h, response, is_shortest, max_bend, case, now, numbers, memo
         turns = v * end < 0 and numbers[0, j] != Law.TANH
         if (turns or abs(bend) > max_bend) and not is_shortest:
             return False
+
+    # A slip of the other direction than that of its force stops or reverses inside the step.
     if is_rigid and memory[0, j] * end < 0:
         if is_shortest:
             hold = (drive * waves[2] - case[Number.STIFFNESS] * (q + dq)) / mobility
             now[Now.MEAN] = force
             end_at_event(q + dq, end, h, hold, case, now, numbers, memory, j)
         return is_shortest
+
     first = 0.0
     if v * end < 0 and numbers[0, j] != Law.TANH:
         # The extreme lies where a linear velocity is 0.
@@ -319,6 +337,7 @@ def try_step(waves, h, response, is_shortest, max_bend, case, now, numbers, memo
         advance(numbers, memory, j, load, Step(first, fraction * h, v, 0.0, 0.0))
         h -= fraction * h
         v = 0.0
+
     advance(numbers, memory, j, load, Step(dq - first, h, v, end, response[1, 2] * mobility))
     now[Now.SLIDE] = q + dq
     now[Now.VELOCITY] = end
@@ -439,6 +458,8 @@ def observe_extremes(h, law, start, now, seen, observes):
     """
     q = now[Now.SLIDE]
     force = now[Now.FORCE]
+
+    # The force at the extreme lies between those at both ends of the step.
     if start[1] * now[Now.VELOCITY] < 0 or (start[1] != 0 and now[Now.VELOCITY] == 0):
         fraction, q = find_turn(h, start, now)
         force = start[2] + fraction * (now[Now.FORCE] - start[2])
@@ -451,6 +472,7 @@ def observe_extremes(h, law, start, now, seen, observes):
             force = 0.5 * (start[2] + now[Now.FORCE])
         elif now[Now.VELOCITY] == 0:
             force = nan  # rigid friction at rest takes many values
+
     if q > now[Now.MAX]:
         now[Now.MAX] = q
         if observes:
@@ -606,6 +628,7 @@ def observe_stick(time, h, omega, is_rigid, start, now, seen):
     seen : (33,) array
         What was observed, in the rows of `case_rows.Seen`; changed in place.
     """
+    # Irreversible fraction of the path in the step, less one half.
     dq = now[Now.SLIDE] - start[0]
     event = now[Now.EVENT]
     path = abs(dq)
@@ -627,11 +650,15 @@ def observe_stick(time, h, omega, is_rigid, start, now, seen):
             excess += (1 - event) * min(slip - before, rest) / rest if rest > 0 else 0.0
         else:
             excess += slip / path
+
     centre = time + 0.5 * h
     elapsed = centre - seen[Seen.MIDDLE]
     last = seen[Seen.EXCESS]
     if seen[Seen.SPAN] == h:
+        # The first step of the window has no step before it.
         last = excess
+
+    # Time of stick between the middles of the last step and this one.
     sticking = 0.0
     if last < 0 and excess < 0:
         sticking = elapsed
@@ -650,6 +677,7 @@ def observe_stick(time, h, omega, is_rigid, start, now, seen):
             seen[Seen.STARTS] += 1
             seen[Seen.START_COS] += cos(angle)
             seen[Seen.START_SIN] += sin(angle)
+
     seen[Seen.STUCK] += sticking
     seen[Seen.STICK] = sticking + (seen[Seen.STICK] if last < 0 else 0.0)
     seen[Seen.LONGEST_STICK] = max(seen[Seen.LONGEST_STICK], seen[Seen.STICK])
@@ -862,7 +890,7 @@ def store_sample(sine, case, now, seen, samples):
     seen : (33,) array
         What was observed, in the rows of `case_rows.Seen`; changed in place.
     samples : (S, 5) array
-        Samples of the case, see `march_cases`.
+        Samples of the case; output.
     """
     row = int(seen[Seen.N_SAMPLES])
     if row >= samples.shape[0]:
@@ -888,7 +916,7 @@ def march_cycle(steps, table, waves, observes, case, now, numbers, memory, j, se
     table : (LEVELS + 1, 2, 5) array
         Responses of `write_responses`.
     waves : (2, k) array
-        Sines and cosines of the drive, see `march_cases`.
+        Sines and cosines of the drive at half steps of a cycle, and at half of the shortest steps of a step.
     observes : bool
         Whether the cycle is measured.
     case : (12,) array
@@ -904,7 +932,7 @@ def march_cycle(steps, table, waves, observes, case, now, numbers, memory, j, se
     seen : (33,) array
         What was observed, in the rows of `case_rows.Seen`; changed in place.
     samples : (S, 5) array
-        Samples of the case, see `march_cases`.
+        Samples of the case; output.
     """
     omega = case[Number.OMEGA]
     step = 2 * np.pi / omega / steps
@@ -977,10 +1005,18 @@ def march_cases(steps, waves, parameters, numbers, memory, nows, seens, historie
         Steps per cycle.
     waves : (2, 2 steps + 2 TICKS + 2) array
         Sines and cosines of the drive at half steps of a cycle, and at half of the shortest steps of a step.
-    parameters, numbers, memory
-        See `case_rows.Cases`; the memory is changed.
-    nows : (c, 20), seens : (c, 33), histories : (c, n, 4) array
-        State, observations, and extremes and phasor of every cycle; output.
+    parameters : (c, 12) array
+        Numbers of the cases, in the rows of `case_rows.Number`.
+    numbers : (k, c) array
+        Numbers of the laws; row 0 is the `Law`.
+    memory : (l, c) array
+        Memory of the laws; changed in place.
+    nows : (c, 20) array
+        States of the cases, in the rows of `case_rows.Now`; output.
+    seens : (c, 33) array
+        What was observed, in the rows of `case_rows.Seen`; output.
+    histories : (c, n, 4) array
+        Extremes and phasor of every cycle; output.
     samples : (c, S, 5) array
         Slide, velocity, irreversible slide, force and acceleration at the ends of the first S whole steps of the window;
         output.
@@ -997,6 +1033,8 @@ def march_cases(steps, waves, parameters, numbers, memory, nows, seens, historie
         write_responses(
             case[Number.DAMPING], case[Number.STIFFNESS], 2 * np.pi / omega / steps, table
         )
+
+        # Initial state; a rigid point that moves slips in the direction of its velocity.
         now[Now.SLIDE] = case[Number.SLIDE]
         now[Now.VELOCITY] = case[Number.VELOCITY]
         if numbers[0, j] == Law.COULOMB and now[Now.VELOCITY] != 0:
@@ -1005,6 +1043,7 @@ def march_cases(steps, waves, parameters, numbers, memory, nows, seens, historie
         now[Now.STORED] = 0.5 * (
             now[Now.VELOCITY] ** 2 + case[Number.STIFFNESS] * now[Now.SLIDE] ** 2
         )
+
         cycle = 0
         while cycle < n_cycles:
             observes = cycle >= first
@@ -1017,6 +1056,7 @@ def march_cases(steps, waves, parameters, numbers, memory, nows, seens, historie
             march_cycle(
                 steps, table, waves, observes, case, now, numbers, memory, j, seen, samples[j]
             )
+
             end_cycle(now, seen, histories[j, cycle])
             is_same = repeats(omega, now)
             cycle += 1
@@ -1032,6 +1072,7 @@ def march_cases(steps, waves, parameters, numbers, memory, nows, seens, historie
                 now[Now.FRICTION] += n_skipped * (now[Now.FRICTION] - sums[3])
                 cycle += n_skipped
                 first = cycle
+
         now[Now.ELASTIC] = read(numbers, memory, j, case[Number.LOAD]).energy
         if seen[Seen.EXCESS] < 0:
             # The second half of the last step

@@ -10,7 +10,7 @@ from ..friction import path_work
 from .case_kernels import LEVELS, TICKS
 from .case_rows import Cases, Now, Number, Seen
 
-FULL_STICK = 1e-12  # fraction of the time below which slip is round-off
+ALWAYS_STUCK = 1e-12  # fraction of the time below which slip is round-off
 MIN_ACCELERATION = 1e-9  # first harmonic [m s-2] below which it has no distortion
 MIN_SLIDE_RANGE = 1e-15  # range of the slide [m] below which the contact is at rest
 
@@ -36,7 +36,7 @@ class CaseMarch(NamedTuple):
 
 def list_parameters(
     modes: ModalBasis, drive: SineDrive, load, cycles: int, window: int, start=None
-) -> tuple:
+) -> tuple[float | np.ndarray, ...]:
     """Return the columns of `Cases.parameters`, in the order of `Number`.
 
     Parameters
@@ -44,11 +44,13 @@ def list_parameters(
     modes : ModalBasis
         Of one mode that moves the contact; its numbers may be arrays (c,).
     drive : SineDrive
+        Frequency and level, which may be arrays (c,).
     load : float or (c,)
         Normal load [N].
     cycles, window : int
         Number of cycles, and of the last of them that are measured.
     start : core.InitialState, optional
+        Slide and velocity at the start; at rest by default.
     """
     slide = modes.slide[0]
     output = modes.output[0]
@@ -80,6 +82,7 @@ def march_cases(cases: Cases, steps: int, *, has_samples: bool = False) -> CaseM
     has_samples : bool
         Whether the motion in the window is stored.
     """
+    # Half steps of the whole cycle, and of the finest level for the halving of steps.
     n = len(cases.parameters)
     columns = cases.parameters.T
     phase = (
@@ -108,14 +111,19 @@ def march_cases(cases: Cases, steps: int, *, has_samples: bool = False) -> CaseM
         )
 
 
-def compute_measures(cases: Cases, now, seen, history) -> dict:
+def compute_measures(cases: Cases, now, seen, history) -> dict[str, np.ndarray]:
     """Return the measures (c,) of a sweep row by name.
 
     Parameters
     ----------
     cases : Cases
-    now : (c, 20), seen : (c, 33), history : (c, n, 4) array
-        State at the end and observations, see `case_rows`.
+        The cases that were run.
+    now : (c, 20) array
+        States at the end, in the rows of `case_rows.Now`.
+    seen : (c, 33) array
+        What was observed, in the rows of `case_rows.Seen`.
+    history : (c, n, 4) array
+        Extremes and phasor of every cycle.
     """
     columns = cases.parameters.T
     omega = columns[Number.OMEGA]
@@ -124,19 +132,24 @@ def compute_measures(cases: Cases, now, seen, history) -> dict:
     count = seen[:, Seen.N_CYCLES]
     span = seen[:, Seen.SPAN]
     window = int(columns[Number.WINDOW].max(initial=1))
+
+    # Sums and extremes of the window.
     low = history[:, -window:, 0].min(axis=1)
     high = history[:, -window:, 1].max(axis=1)
     work = seen[:, Seen.WORK]
     stuck = seen[:, Seen.STUCK] / span
+
     energies = _compute_energies(cases, now, mass)
     gap = np.abs(seen[:, Seen.SAMPLED] - work)
     size = seen[:, Seen.PASSED] + mass * (now[:, Now.POWER] + now[:, Now.STORED])
+
+    # The relative displacement is that of the output; the loop area is that of one cycle.
     values = {
         "relative_displacement_amplitude": (high - low) / 2 * np.abs(ratio),
         "absolute_acceleration_peak": seen[:, Seen.MAX_ACCELERATION],
         "friction_force_peak": seen[:, Seen.MAX_FORCE],
         "slip_amplitude": (seen[:, Seen.MAX_SLIP] - seen[:, Seen.MIN_SLIP]) / 2,
-        "stick_fraction": np.where(stuck > 1 - FULL_STICK, 1.0, stuck),
+        "stick_fraction": np.where(stuck > 1 - ALWAYS_STUCK, 1.0, stuck),
         "slip_start_phase": path_work.mean_slip_phase(
             seen[:, Seen.STARTS], seen[:, Seen.START_COS], seen[:, Seen.START_SIN]
         ),
@@ -149,7 +162,7 @@ def compute_measures(cases: Cases, now, seen, history) -> dict:
     return values | energies | _compute_harmonics(cases, now, seen, values["loop_area"], high - low)
 
 
-def _compute_energies(cases: Cases, now, mass) -> dict:
+def _compute_energies(cases: Cases, now, mass) -> dict[str, np.ndarray]:
     """Return the energies [J] of the whole run and the relative error of their balance."""
     columns = cases.parameters.T
     stored = 0.5 * (now[:, Now.VELOCITY] ** 2 + columns[Number.STIFFNESS] * now[:, Now.SLIDE] ** 2)
@@ -167,7 +180,7 @@ def _compute_energies(cases: Cases, now, mass) -> dict:
     }
 
 
-def _compute_harmonics(cases: Cases, now, seen, area, slide_range) -> dict:
+def _compute_harmonics(cases: Cases, now, seen, area, slide_range) -> dict[str, np.ndarray]:
     """Return the measures that follow from harmonics; integrals by parts give those of velocity and acceleration."""
     columns = cases.parameters.T
     omega = columns[Number.OMEGA]
@@ -186,10 +199,13 @@ def _compute_harmonics(cases: Cases, now, seen, area, slide_range) -> dict:
     push = -columns[Number.MOBILITY] * push - v_jump - (turn + columns[Number.DAMPING]) * q_jump
     stiffness = columns[Number.STIFFNESS] + turn * (turn + columns[Number.DAMPING])
     third = v_jump + turn * (q_jump + turn * push / stiffness)
+
     ratio = columns[Number.OUTPUT]
     fundamental = np.abs(ratio * first - 1j * drive * columns[Number.BASE]) * 2 / span
     count = np.maximum(seen[:, Seen.N_CYCLES], 1)
     half_range = seen[:, Seen.RANGE] / count / 2
+
+    # Stiffness and damping of a point that hardly moves are NaN.
     n_secants = seen[:, Seen.N_SECANTS]
     moves = slide_range > MIN_SLIDE_RANGE
     damping = area / (2 * np.pi * cases.reference * half_range**2)

@@ -86,7 +86,7 @@ class MarchCheckpoint:
         self.next_write = end + max(MIN_WRITE_INTERVAL, (end - start) / MAX_WRITE_FRACTION)
 
 
-def open_checkpoint(run, record, request: tuple) -> MarchCheckpoint:
+def open_checkpoint(run, record, request: tuple[int, ...]) -> MarchCheckpoint:
     """Open the checkpoint file of a new march; if the file exists, the march goes on from it.
 
     Parameters
@@ -94,6 +94,7 @@ def open_checkpoint(run, record, request: tuple) -> MarchCheckpoint:
     run : time_march.March
         March at its start.
     record : time_march.Record
+        Its record, empty.
     request : tuple
         Numbers that identify what is marched; the first one is the number of steps.
 
@@ -120,7 +121,7 @@ def open_checkpoint(run, record, request: tuple) -> MarchCheckpoint:
     return MarchCheckpoint(path, key)
 
 
-def pack(value, arrays: list):
+def pack(value, arrays: list[np.ndarray]):
     """Return nested tuples and lists as lists for JSON; an array is appended to `arrays`, and becomes its number there."""
     if isinstance(value, np.ndarray):
         arrays.append(value)
@@ -152,10 +153,13 @@ def save_checkpoint(path: Path, key: str, run, record) -> None:
     Parameters
     ----------
     path : Path
+        File, which is replaced as a whole.
     key : str
         Identifies the march.
     run : time_march.March
+        March at its present state.
     record : time_march.Record
+        Its record.
 
     Raises
     ------
@@ -183,8 +187,14 @@ def load_checkpoint(path: Path, key: str, run, record) -> None:
 
     Parameters
     ----------
-    path, key, run, record
-        As in `save_checkpoint`; `run` and `record` are overwritten.
+    path : Path
+        Checkpoint file.
+    key : str
+        Identifies the march.
+    run : time_march.March
+        March at its start; overwritten.
+    record : time_march.Record
+        Its record; overwritten.
 
     Raises
     ------
@@ -195,11 +205,13 @@ def load_checkpoint(path: Path, key: str, run, record) -> None:
     try:
         with np.load(path, allow_pickle=False) as file:
             arrays = {name: file[name] for name in file.files}
+
         if str(arrays["key"]) != key:
             raise PatchfemError(
                 f"{folder}: the state saved there belongs to another scene or to another version of patchfem; "
                 f"{RETRY_ADVICE}"
             )
+
         form = json.loads(str(arrays["form"]))
         system, march_state, record_state, cycles = unpack(form, arrays)
         run.system = convert_to_tuples(system, run.system)

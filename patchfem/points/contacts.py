@@ -133,6 +133,7 @@ def convert_element(element: Element) -> list[PointLaw]:
         count = int(numbers[1])
         pairs = zip(numbers[2 : 2 + count], numbers[2 + count : 2 + 2 * count])
         return [make_jenkins(stiffness * length, length) for stiffness, length in pairs]
+
     rows = np.zeros(N_NUMBERS)
     memory = np.zeros(N_MEMORY)
     if element.form == "points":
@@ -141,6 +142,7 @@ def convert_element(element: Element) -> list[PointLaw]:
         rows[:9] = (Law.BONDS, limit, numbers[2], *numbers[3:8], element.memory[1])
         memory[:4] = element.memory[:4]
         return [PointLaw(rows, memory, 1.0)]
+
     if element.kernels in FLOW_LAWS:
         rows[0] = FLOW_LAWS[element.kernels]
         rows[1 : numbers.size] = numbers[1:]
@@ -160,6 +162,7 @@ def make_contact(elements, rows, springs=(), scale: float = 0.0) -> Contact:
     rows : (i, n) array
         Slide of each interface per modal coordinate.
     springs : sequence of PointSet
+        Springs of the rig, each with its row.
     scale : float
         Force by which residuals are measured where there is no friction [N].
     """
@@ -214,6 +217,7 @@ def make_bond_contact(
     Parameters
     ----------
     bonds : Bonds
+        Coefficient of friction, bond length and growth of the bonds.
     force : (m,) array or float
         Normal force of each point [N]; with `lower`, its area times the mean pressure.
     row : (n,) array
@@ -268,6 +272,8 @@ def make_pressed_contact(
     name = getattr(law, "law", "bonds")
     nodes = None if np.ndim(force) == 0 else np.arange(loads.size)
     length = 0.0
+
+    # Laws of the resultant make one point of the whole interface.
     if name in ("coulomb", "tanh"):
         kinetic = law.static if law.kinetic is None else law.kinetic
         make = make_coulomb if name == "coulomb" else make_tanh
@@ -275,6 +281,7 @@ def make_pressed_contact(
             make(law.static, kinetic if name == "coulomb" else law.reference_speed, loads.sum())
         ]
         nodes = None
+
     elif name != "bonds":
         length = law.bond_length or 0.0
         laws = [make_jenkins(law.static, length, load) for load in loads]
@@ -284,6 +291,7 @@ def make_pressed_contact(
     else:
         length = law.length
         laws = [make_list(law, load) for load in loads]
+
     points = PointSet(laws, row, nodes, shear)
     limit = (law.static or 1.0) * max(float(loads.sum()), 1e-9)
     return Contact([points], limit, length, bond_sum=bond_sum, preload=float(loads.sum()), **load)
@@ -295,7 +303,9 @@ def make_flank_contact(law, grooves: Grooves, load: float, row, shear=None, shar
     Parameters
     ----------
     law : Bonds, or keys `law`, `static` and `bond_length` of a table [friction]
+        Law of the points.
     grooves : Grooves
+        Geometry of the grooves and mass that they lift.
     load : float
         Vertical load [N].
     row : (n,) array

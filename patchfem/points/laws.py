@@ -126,6 +126,7 @@ def make_point_law(friction, load, bonds: Bonds | None = None) -> PointLaw:
     limit = friction.static * load
     kinetic = getattr(friction, "kinetic", None)
     kinetic = friction.static if kinetic is None else kinetic
+
     if name == "coulomb":
         return make_coulomb(friction.static, kinetic, load)
     if name == "tanh":
@@ -134,19 +135,24 @@ def make_point_law(friction, load, bonds: Bonds | None = None) -> PointLaw:
         has_length = friction.bond_length is not None
         length = friction.bond_length if has_length else limit / friction.stiffness
         return make_jenkins(friction.static, length, load)
+
     if name == "nonlocal":
         return make_bonds(bonds or Bonds(friction.static, friction.bond_length), load)
+
     if name == "iwan":
         chi = friction.chi
         beta = friction.beta
         length = max_yield_displacement(limit, friction.stiffness, chi, beta)
         memory = (*(0.0,) * Masing.VIRGIN, 1.0)
+
         size = Masing.STACK + 2 * REVERSALS
         return _pack(Law.MASING, (limit, length, chi + 1, beta), memory, load, size)
     if name == "bouc-wen":
         length = limit / friction.stiffness
         numbers = (friction.static, length, friction.exponent, friction.shape)
         return _pack(Law.BOUC_WEN, numbers, load=load)
+
+    # The kernels multiply stiffness and damping by the present load.
     per_load = (friction.stiffness / load, kinetic, friction.static, friction.stribeck_speed)
     damping = (friction.micro_damping / load, friction.viscous / load)
     return _pack(Law.LUGRE, (*per_load, *damping), load=load)

@@ -84,6 +84,7 @@ def solve_linear(matrix, vector, n):
     n : int
         Number of unknowns, the first of the arrays.
     """
+    # Elimination; the pivot is the largest entry of the column.
     for k in range(n):
         best = k
         for i in range(k + 1, n):
@@ -95,12 +96,15 @@ def solve_linear(matrix, vector, n):
             for c in range(k, n):
                 matrix[k, c], matrix[best, c] = matrix[best, c], matrix[k, c]
             vector[k], vector[best] = vector[best], vector[k]
+
         for i in range(k + 1, n):
             factor = matrix[i, k] / matrix[k, k]
             if factor != 0.0:
                 for c in range(k + 1, n):
                     matrix[i, c] -= factor * matrix[k, c]
                 vector[i] -= factor * vector[k]
+
+    # Back substitution.
     for k in range(n - 1, -1, -1):
         total = vector[k]
         for c in range(k + 1, n):
@@ -204,6 +208,7 @@ def move_freely(system, level, drive, row, fraction):
     size = state.shape[1]
     n = size // 2
     values = system.ports.values
+
     path = system.structure.path
     if path.size:
         # The displacement of port 0 is prescribed, at a constant velocity in a step.
@@ -218,6 +223,7 @@ def move_freely(system, level, drive, row, fraction):
         for k in range(size):
             total += response[i, k] * state[0, k]
         state[1, i] = total
+
     rows = system.ports.rows
     for p in range(rows.shape[0]):
         values[Port.SLIDE, p] = project(rows[p], state[0, :n])
@@ -236,11 +242,14 @@ def prepare_points(system, h):
     values = points.values
     options = system.options
     count = points.port.size
+
+    # Trials since the last accepted step may have changed the memory.
     if options.has_loads or system.totals[Total.IS_DIRTY] > 0:
         for k in range(points.memory.shape[0]):
             for j in range(count):
                 points.trial[k, j] = points.memory[k, j]
         system.totals[Total.IS_DIRTY] = 0.0
+
     if options.has_loads:
         for j in range(count):
             start = values[Point.START_LOAD, j]
@@ -251,6 +260,8 @@ def prepare_points(system, h):
             elif start != middle and points.node[j] != LOWER:
                 press(points.numbers, points.trial, j, start, middle)
         system.totals[Total.IS_DIRTY] = 1.0
+
+    # The rest time of bonds grows before they carry the force of the step.
     if options.has_growth:
         for j in range(count):
             v = system.ports.values[Port.VELOCITY, points.port[j]]
@@ -280,6 +291,8 @@ def write_forces(system, level, h):
     flank = system.flank
     count = points.port.size
     n_ports = moves.shape[1]
+
+    # Motion of the ports: the free one less the compliance times the port forces.
     for p in range(n_ports):
         dq = moves[Port.FREE, p]
         v = moves[Port.FREE_VELOCITY, p]
@@ -302,6 +315,7 @@ def write_forces(system, level, h):
 
     if not (system.options.is_plain and write_bond_forces(system)):
         write_point_forces(system, level, h)
+
     for p in range(n_ports):
         force = 0.0
         by_slide = 0.0
@@ -313,6 +327,8 @@ def write_forces(system, level, h):
         moves[Port.SUM, p] = force
         moves[Port.BY_SLIDE, p] = by_slide
         moves[Port.BY_VELOCITY, p] = by_velocity
+
+    # On a flank, F = V t + r f and dF/dq = K + r^2 df/ds with the ratio r of path to displacement.
     if flank.size:
         flank[Flank.TRIAL_FORCE] = moves[Port.SUM, 0]
         ratio = flank[Flank.RATIO]
@@ -321,6 +337,7 @@ def write_forces(system, level, h):
         moves[Port.SUM, 0] = vertical + ratio * moves[Port.SUM, 0]
         moves[Port.BY_SLIDE, 0] = stiffness + ratio * ratio * moves[Port.BY_SLIDE, 0]
         moves[Port.BY_VELOCITY, 0] *= ratio
+
     if system.structure.path.size:
         moves[Port.FORCE, 0] = moves[Port.SUM, 0]
 
@@ -373,13 +390,17 @@ def write_point_forces(system, level, h):
     ports = system.ports
     points = system.points
     values = points.values
+
     for j in range(points.port.size):
         if points.numbers[0, j] == Law.LIST:
             lists.write_list_mean(points.numbers, values, system.lists, j, h)
             continue
+
+        # The force of a rigid point at rest is unknown until its port is solved.
         if find_rest_limit(points.numbers, points.trial, j, 1.0) < np.inf:
             values[Point.FORCE, j] = values[Point.BY_SLIDE, j] = values[Point.BY_VELOCITY, j] = 0.0
             continue
+
         p = points.port[j]
         step = Step(
             values[Point.SLIDE, j],
@@ -414,9 +435,13 @@ def write_residual(system, level, h):
     n_ports = moves.shape[1]
     size = system.options.scale
     heave = int(ports.contact[0])
+
+    # A port force is the sum over its points.
     for p in range(n_ports):
         vector[p] = moves[Port.SUM, p] - moves[Port.FORCE, p]
         size = max(size, abs(moves[Port.FORCE, p]))
+
+    # Heave and pitch also carry the change of load and moment of the contact.
     if heave >= 0:
         pitch = int(ports.contact[1])
         increments = moves[Port.INCREMENT]
@@ -433,12 +458,15 @@ def write_residual(system, level, h):
         vector[heave] += ports.contact[2]
         vector[pitch] += ports.contact[3]
         size = max(size, abs(ports.contact[2]))
+
+    # Rigid points hold: the residual is the force that is left at their port, scaled by the velocity compliance.
     if system.options.is_rigid:
         for j in range(points.port.size):
             if find_rest_limit(points.numbers, points.trial, j, 1.0) < np.inf:
                 p = points.port[j]
                 vector[p] = moves[Port.END_VELOCITY, p] / ports.compliance[level, 1, p, p]
                 vector[p] -= system.options.redundant * moves[Port.FORCE, p]
+
     largest = 0.0
     tolerance = RESIDUAL * size
     for p in range(n_ports):
@@ -477,6 +505,7 @@ def write_matrix(system, level):
     compliance = ports.compliance[level]
     n_ports = moves.shape[1]
     n_points = points.port.size
+
     for p in range(n_ports):
         for k in range(n_ports):
             matrix[p, k] = -moves[Port.BY_SLIDE, p] * compliance[0, p, k]
@@ -484,6 +513,8 @@ def write_matrix(system, level):
         matrix[p, p] -= 1.0
         for k in range(points.stiffness.size):
             matrix[p, n_ports + k] = 0.0
+
+    # The contact couples heave and pitch by the derivatives of its load and moment.
     heave = int(ports.contact[0])
     if heave >= 0:
         pitch = int(ports.contact[1])
@@ -507,6 +538,8 @@ def write_matrix(system, level):
         matrix[p, row] = -ratio * slope
         for q in range(n_ports):
             matrix[row, q] = ratio * slope * compliance[0, p, q]
+
+    # Ports that hold have the derivative of their end velocity in place of that of a force.
     if not system.options.is_rigid:
         return
     for j in range(n_points):
@@ -710,6 +743,8 @@ def find_loads(system, row, fraction, is_solved):
     flank = system.flank
     moves = ports.values
     heave = int(ports.contact[0])
+
+    # The resultant follows from the normal contact, the flank or a prescribed history.
     resultant = 0.0
     if heave >= 0:
         pitch = int(ports.contact[1])
@@ -724,6 +759,7 @@ def find_loads(system, row, fraction, is_solved):
             - normal.compute_energy(system.sets, slot, h, t)[1],
             0.0,
         )
+
     elif flank.size:
         if is_solved:
             q = moves[Port.SLIDE, 0] + moves[Port.INCREMENT, 0]
@@ -731,8 +767,11 @@ def find_loads(system, row, fraction, is_solved):
                 flank, q, flank[Flank.TRIAL_FORCE], points.numbers[1, 0]
             )
         resultant = flank[Flank.NORMAL]
+
     elif loads.size:
         resultant = loads[row] + fraction * (loads[row + 1] - loads[row])
+
+    # Every point carries its share of the resultant, its nodal force or the pressure of the lower piece at its place.
     change = 0.0
     total = 1e-300
     for j in range(points.port.size):
@@ -788,6 +827,8 @@ def find_holds(system, state, drive):
     n = structure.modes.shape[1]
     values = ports.values
     n_ports = values.shape[1]
+
+    # Ports whose points do not hold carry the friction force of their points.
     for p in range(n_ports):
         values[Port.HOLD, p] = 0.0
         ports.vector[p] = 1.0
@@ -796,6 +837,7 @@ def find_holds(system, state, drive):
             ports.vector[points.port[j]] = 0.0
         else:
             values[Port.HOLD, points.port[j]] += read_point(system, j).force
+
     heave = int(ports.contact[0])
     if heave >= 0:
         pitch = int(ports.contact[1])
@@ -823,6 +865,7 @@ def find_holds(system, state, drive):
         for k in range(n_ports):
             ports.matrix[p, k] = ports.grip[p, k]
         ports.matrix[p, p] *= 1 + system.options.redundant
+
     solve_linear(ports.matrix, ports.vector, n_ports)
     for p in range(n_ports):
         values[Port.HOLD, p] = ports.vector[p]
@@ -887,9 +930,11 @@ def commit(system, h):
     options = system.options
     flank = system.flank
     count = points.port.size
+
     is_advanced = options.is_plain and not options.has_growth and advance_plain_bonds(system)
     for j in range(count):
         values[Point.TOTAL, j] += values[Point.SLIDE, j]
+
     for j in range(count if options.has_loads or not is_advanced else 0):
         p = points.port[j]
         slide = values[Point.SLIDE, j]
@@ -914,6 +959,7 @@ def commit(system, h):
                     values[Point.END_LOAD, j],
                 )
             values[Point.START_LOAD, j] = values[Point.END_LOAD, j]
+
     if options.is_rigid:
         for j in range(count):
             p = points.port[j]
@@ -922,10 +968,13 @@ def commit(system, h):
                 was_held = points.memory[0, j] == 0 and points.trial[0, j] == 0
                 ports.values[Port.FREE, p] = ports.values[Port.INCREMENT, p] if was_held else 0.0
                 values[Point.TOTAL, j] -= ports.values[Port.FREE, p]
+
     for k in range(points.memory.shape[0]):
         for j in range(count):
             points.memory[k, j] = points.trial[k, j]
     system.totals[Total.IS_DIRTY] = 0.0
+
+    # The rates of the last three steps extrapolate those of the next one.
     shear = points.shear
     for k in range(points.stiffness.size):
         shear[Shear.VALUE, k] += shear[Shear.TRIAL, k]
@@ -934,6 +983,7 @@ def commit(system, h):
         shear[Shear.LAST, k] = shear[Shear.TRIAL, k] / h
     if options.has_loads and not options.has_lists and points.stiffness.size:
         relax_pieces(system)
+
     for i in range(system.state.shape[1]):
         system.state[0, i] = system.state[2, i]
     # Held ports come back to rest, which may also move the holder.
@@ -942,6 +992,8 @@ def commit(system, h):
     if options.is_rigid and system.totals[Total.SLOT] >= 0:
         rest_ports(system)
         system.totals[Total.REST] = find_motion_energy(system) - energy
+
+    # The mean of the rise speed over the step is slope dq/h.
     if flank.size:
         rise = 2 * flank[Flank.SLOPE] * ports.values[Port.INCREMENT, 0] / h
         flank[Flank.RISE_SPEED] = rise - flank[Flank.RISE_SPEED]
@@ -967,10 +1019,13 @@ def relax_pieces(system):
     r = points.stiffness.size
     count = points.port.size
     tolerance = RESIDUAL * system.options.scale
+
     for j in range(count):
         points.trial[4, j] = points.memory[0, j]
     for k in range(r):
         shear[Shear.TRIAL, k] = 0.0
+
+    # Newton's method for the increments.
     for _ in range(MAX_RELAXATIONS):
         for j in range(count):
             values[Point.TRIAL_SLIDE, j] = 0.0
@@ -981,6 +1036,7 @@ def relax_pieces(system):
             mean = mean_force(points.numbers, points.trial, j, values[Point.END_LOAD, j], step)
             values[Point.TRIAL_FORCE, j] = mean.end
             values[Point.BY_SLIDE, j] = 2 * mean.by_increment
+
         for k in range(r):
             residual = points.stiffness[k] * (shear[Shear.VALUE, k] + shear[Shear.TRIAL, k])
             residual -= sum_products(points.shapes[k], values[Point.TRIAL_FORCE, :count])
@@ -991,15 +1047,19 @@ def relax_pieces(system):
                     points.shapes[k], points.shapes[l], values[Point.BY_SLIDE, :count]
                 )
             ports.matrix[k, k] += points.stiffness[k]
+
         if largest <= tolerance or not solve_linear(ports.matrix, ports.vector, r):
             break
         for k in range(r):
             shear[Shear.TRIAL, k] -= ports.vector[k]
+
+    # The points slide back for good, with the loss that follows.
     for j in range(count):
         slide = values[Point.TRIAL_SLIDE, j]
         values[Point.TOTAL, j] += slide
         step = Step(slide, 0.0, 0.0, 0.0, 0.0)
         advance(points.numbers, points.trial, j, values[Point.END_LOAD, j], step)
+
     for k in range(points.memory.shape[0]):
         for j in range(count):
             points.memory[k, j] = points.trial[k, j]
@@ -1097,11 +1157,14 @@ def rest_ports(system):
     state = system.state[0]
     n = state.size // 2
     n_ports = ports.rows.shape[0]
+
     is_held = False
     for j in range(points.port.size):
         is_held = is_held or find_rest_limit(points.numbers, points.memory, j, 1.0) < np.inf
     if not is_held:
         return
+
+    # Places and then velocities: grip . change = the deviation of the ports that hold.
     for first in (0, n):
         for p in range(n_ports):
             ports.matrix[p, :] = 0.0
@@ -1116,6 +1179,7 @@ def rest_ports(system):
                 for k in range(n_ports):
                     ports.matrix[p, k] = ports.grip[p, k]
                 ports.matrix[p, p] *= 1 + system.options.redundant
+
         solve_linear(ports.matrix, ports.vector, n_ports)
         for p in range(n_ports):
             for i in range(n):
@@ -1166,11 +1230,14 @@ def try_step(system, level, row, begin, end, drive):
             moves[Port.FORCE, p] = 3 * (force - moves[Port.LAST, p]) + moves[Port.EARLIER, p]
             moves[Port.EARLIER, p] = moves[Port.LAST, p]
             moves[Port.LAST, p] = force
+
     if options.has_lists:
         for j in range(points.port.size):
             values[Point.TRIAL_SLIDE, j] = np.nan
             if points.stiffness.size == 0:
                 values[Point.SPEED, j] = system.ports.values[Port.VELOCITY, points.port[j]]
+
+    # Loads that follow from the motion are iterated with it.
     is_solved = False
     for count in range(MAX_LOADS):
         if options.has_loads:
@@ -1184,6 +1251,8 @@ def try_step(system, level, row, begin, end, drive):
         is_solved = solve_forces(system, level, h)
         if not options.has_loads:
             break
+
+    # An event inside the step, or Newton's method without a solution, halves the step.
     write_trial(system, level)
     is_shortest = level == levels - 1
     if options.is_rigid and find_event(
@@ -1196,6 +1265,7 @@ def try_step(system, level, row, begin, end, drive):
             totals[Total.IS_DIRTY] = 1.0
             return False
         totals[Total.UNSOLVED] += 1
+
     for i in range(system.state.shape[1]):
         system.state[1, i] = system.state[0, i]
     commit(system, h)
@@ -1225,6 +1295,8 @@ def add_energies(system, level, drive):
     size = after.size
     n = size // 2
     mass = system.options.mass
+
+    # The step's inputs: state at the start, parabola of the drive and modal forces per mass.
     stored = 0.0
     for i in range(size):
         inputs[i] = system.state[1, i]
@@ -1237,12 +1309,15 @@ def add_energies(system, level, drive):
     inputs[size] = drive[0]
     inputs[size + 1] = drive[1]
     inputs[size + 2] = drive[2]
+
+    # Work is bilinear in drive and inputs, loss quadratic in the inputs.
     work = 0.0
     for i in range(3):
         work += drive[i] * sum_products(structure.work[level, i], inputs)
     loss = 0.0
     for i in range(inputs.size):
         loss += inputs[i] * sum_products(structure.loss[level, i], inputs)
+
     totals[Total.WORK_IN] += work
     totals[Total.POWER] += abs(work)
     totals[Total.VISCOUS] += loss
@@ -1271,6 +1346,8 @@ def write_sample(system, row, sample):
     n = size // 2
     if system.options.is_rigid:
         find_holds(system, system.state[0], structure.drive[row, 0])
+
+    # Displacements of the ports; their sums start at 0.
     energy = 0.0
     first = size + Sample.PORTS
     n_ports = ports.values.shape[1]
@@ -1283,6 +1360,8 @@ def write_sample(system, row, sample):
         sample[first + N_PORT_COLUMNS * p] = 0.0
         sample[first + N_PORT_COLUMNS * p + 1] = 0.0
         ports.vector[p] = 0.0
+
+    # Stored energy of pieces and points, and force and slip of each port.
     for k in range(points.stiffness.size):
         energy += 0.5 * points.stiffness[k] * points.shear[Shear.VALUE, k] ** 2
     for j in range(points.port.size):
@@ -1290,6 +1369,7 @@ def write_sample(system, row, sample):
         load = points.values[Point.END_LOAD, j]
         state = read_point(system, j)
         force = state.force
+
         if points.is_spring[j]:
             sample[size + Sample.SPRINGS] += state.energy
             sample[first + N_PORT_COLUMNS * p] += force
@@ -1305,12 +1385,14 @@ def write_sample(system, row, sample):
             points.values[Point.TOTAL, j] - state.stretch
         )
         ports.vector[p] += weight
+
     for p in range(n_ports):
         if ports.vector[p] > 0:
             sample[first + N_PORT_COLUMNS * p + 1] /= ports.vector[p]
         else:
             sample[first + N_PORT_COLUMNS * p + 1] = ports.values[Port.SLIDE, p]
     sample[size + Sample.LOAD] = structure.loads[row] if structure.loads.size else 0.0
+
     if flank.size:
         q = ports.values[Port.SLIDE, 0]
         t = flanks.find_slope(flank, q)
@@ -1321,6 +1403,7 @@ def write_sample(system, row, sample):
         sample[first + 1] = q - stretch / length
         sample[first] = flank[Flank.VERTICAL] * t + sample[first] * length
         sample[size + Sample.LOAD] = flank[Flank.VERTICAL]
+
     sample[size + Sample.ENERGY] = energy
     heave = int(ports.contact[0])
     if heave >= 0:
@@ -1361,6 +1444,7 @@ def march(system, steps, samples):
     ticks = 1 << (structure.responses.shape[0] - 1)
     h = system.options.step
     level = 0
+
     for i in range(steps + 1):
         write_sample(system, i, samples[i])
         for k in range(size):
@@ -1376,6 +1460,8 @@ def march(system, steps, samples):
         first_column = size + Sample.PORTS + 2
         for p in range(ports.values.shape[1]):
             samples[i, first_column + N_PORT_COLUMNS * p] = 0.0
+
+        # A step with an event is halved; steps double again once they end on a tick of the longer one.
         work = 0.0
         tick = 0
         while tick < ticks:

@@ -187,10 +187,13 @@ def _mean_tanh(limit, speed, step):
     slope = stiffness * (1 - last * last)
     change = step.end_velocity - step.start_velocity
     trapezoid = 0.5 * limit * (first + last)
+
     secant = slope
     if abs(change) > 1e-9 * speed:
         secant = limit * (last - first) / change
     x = step.mobility * secant
+
+    # Simpson's rule
     if x < 1:
         velocity = 1.5 * step.increment / step.duration
         middle = tanh((velocity - 0.25 * (step.start_velocity + step.end_velocity)) / speed)
@@ -203,6 +206,8 @@ def _mean_tanh(limit, speed, step):
             limit * last,
             force - trapezoid,
         )
+
+    # Theta method for a step that is long for the law
     decay = exp(-x)
     theta = 1 / (1 - decay) - 1 / x
     tangent = theta * slope
@@ -315,6 +320,8 @@ def _walk(numbers, memory, j, dq, commits):
     area = 0.0
     loss = 0.0
     is_slipping = False
+
+    # Each pass follows a branch up to the end of the slide or to its closure.
     while True:
         if n == 0 and virgin < 0:
             is_slipping = True
@@ -323,6 +330,7 @@ def _walk(numbers, memory, j, dq, commits):
             loss += direction * force * left
             q += direction * left
             break
+
         half = 0.5 if n > 0 else 1.0
         top = Masing.STACK + 2 * n - 2
         start = memory[top, j] if n > 0 else 0.0
@@ -342,11 +350,14 @@ def _walk(numbers, memory, j, dq, commits):
         is_slipping = x + half * piece >= numbers[2, j]
         q += direction * piece
         left -= piece
+
+        # A closed branch erases its two reversals (Madelung's rule).
         if left <= 0:
             break
         n -= 2
         if virgin > 0 and n == 1:
             n = 0
+
     if commits:
         if is_slipping:
             n = 0
@@ -409,6 +420,7 @@ def advance(numbers, memory, j, load, step):
     """
     law = numbers[0, j]
     dq = step.increment
+
     if law == Law.JENKINS:
         start = memory[0, j]
         springs = memory[1, j]
@@ -418,6 +430,7 @@ def advance(numbers, memory, j, load, step):
             # Springs beyond those of the load break as the point slips.
             slipped = 1 - (memory[0, j] - start) / move
             memory[1, j] = load + (springs - load) * exp(-slipped * abs(dq) / numbers[2, j])
+
     elif law == Law.BONDS:
         bonds = bond_step(memory[1, j], memory[2, j], memory[3, j], dq, load, memory[4, j])
         memory[1, j] = bonds.m
@@ -427,6 +440,7 @@ def advance(numbers, memory, j, load, step):
             v0 = step.start_velocity
             v1 = step.end_velocity
             memory[0, j] = grow(memory[0, j], v0, v1, abs(dq), step.duration, numbers[3:8, j])[0]
+
     elif law == Law.TANH:
         memory[0, j] = numbers[1, j] * load * tanh(step.end_velocity / numbers[2, j])
     elif law == Law.LUGRE:
@@ -458,6 +472,8 @@ def read(numbers, memory, j, load):
     law = numbers[0, j]
     mu = numbers[1, j]
     state = memory[0, j]
+
+    # Springs and bonds: force, stored energy and mean stretch.
     if law == Law.JENKINS:
         if memory[1, j] <= 0:
             return PointState(0.0, 0.0, 0.0)
@@ -468,10 +484,12 @@ def read(numbers, memory, j, load):
         stretch = memory[2, j] / m if m > 0 else 0.0
         stiffness = mu / numbers[2, j]
         return PointState(stiffness * memory[2, j], 0.5 * stiffness * memory[3, j], stretch)
+
     if law == Law.COULOMB:
         return PointState(state * numbers[2, j] * load, 0.0, 0.0)
     if law == Law.TANH:
         return PointState(state, 0.0, 0.0)
+
     if law == Law.MASING:
         return PointState(
             memory[Masing.FORCE, j], memory[Masing.ENERGY, j], memory[Masing.STRETCH, j]
@@ -479,10 +497,13 @@ def read(numbers, memory, j, load):
     if law == Law.BOUC_WEN:
         stretch = numbers[2, j] * state
         return PointState(mu * load * state, 0.5 * mu * load * state * stretch, stretch)
+
     if law == Law.LUGRE:
         return PointState(memory[1, j], 0.5 * mu * load * state * state, state)
     if law == Law.CUBIC:
         return PointState(mu * state**3, 0.25 * mu * state**4, 0.0)
+
+    # Interlocking: F = k/w sin(w q) with the wave number w, and the energy that belongs to it.
     turn = 6.283185307179586 / numbers[2, j]
     sine = sin(0.5 * turn * state)
     return PointState(mu / turn * sin(turn * state), 2 * mu * sine * sine / (turn * turn), 0.0)

@@ -9,6 +9,7 @@ from .. import compiled
 from .contacts import Contact
 from .march_rows import LISTS_FULL, N_PORT_COLUMNS, Sample, Total
 from .time_march import (
+    Snapshot,
     copy_system,
     enlarge_lists,
     load_kernels,
@@ -38,7 +39,7 @@ class SlideMotion(NamedTuple):
     mean: np.ndarray
     stored: np.ndarray
     losses: np.ndarray
-    snapshots: list
+    snapshots: list[Snapshot]
     n_unsolved: int
 
 
@@ -48,6 +49,7 @@ def follow(contact: Contact, time, slide, frames=(), say=None, report=None) -> S
     Parameters
     ----------
     contact : Contact
+        Laws and loads of the points.
     time, slide : (k,) array
         Samples of time [s] and slide [m].
     frames : sequence of int
@@ -64,6 +66,8 @@ def follow(contact: Contact, time, slide, frames=(), say=None, report=None) -> S
         kernels = load_kernels(contact, say)
     else:
         kernels = compiled.load("points.slide_kernels", say)
+
+    # Blocks of samples with one step each; a block ends at every sample whose state is asked for.
     time = np.asarray(time, float)
     slide = np.asarray(slide, float)
     last = slide.size - 1
@@ -75,9 +79,11 @@ def follow(contact: Contact, time, slide, frames=(), say=None, report=None) -> S
     ends = np.unique(
         np.concatenate([np.arange(0, last, BLOCK), np.asarray(frames, int), changes, [last]])
     )
+
     width = Sample.PORTS + N_PORT_COLUMNS * len(contact.point_sets)
     rows = np.zeros((slide.size, width))
     snapshots = []
+
     for begin, end in pairwise(ends):
         size = end - begin
         structure = system.structure._replace(
@@ -87,10 +93,13 @@ def follow(contact: Contact, time, slide, frames=(), say=None, report=None) -> S
             structure = structure._replace(
                 loads=np.asarray(contact.load(time[begin : end + 1]), float)
             )
+
         step = float(time[end] - time[begin]) / size
         options = system.options._replace(step=step if step > 0 else 1.0)
         system = system._replace(structure=structure, options=options)
         saved = copy_system(system) if options.has_lists else None
+
+        # A march whose lists are full is repeated with longer ones.
         while True:
             samples = np.zeros((size + 1, width))
             _, status = kernels.march(system, size, samples)
@@ -98,6 +107,7 @@ def follow(contact: Contact, time, slide, frames=(), say=None, report=None) -> S
                 break
             saved = enlarge_lists(saved, f"before sample {end} of the prescribed slide")
             system = copy_system(saved)
+
         rows[begin : end + 1] = samples
         if end in frames:
             force, slip = samples[-1, Sample.PORTS : Sample.PORTS + 2]
@@ -105,6 +115,7 @@ def follow(contact: Contact, time, slide, frames=(), say=None, report=None) -> S
             snapshots.append(make_snapshot(kernels, system, motion))
         if report is not None:
             report(end / last)
+
     return SlideMotion(
         rows[:, Sample.PORTS],
         rows[:, Sample.PORTS + 1],

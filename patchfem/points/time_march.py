@@ -46,7 +46,7 @@ from .march_rows import (
 MAX_ANGLE = 0.5  # largest phase of the fastest mode in the step of a matrix exponential [rad]
 N_GAUSS = 8  # Gauss points of the integrals over that step
 RIGID_LEVELS = 20  # lengths of the steps with rigid points: whole steps and fifteen halvings
-LEVELS = 4  # lengths of other steps, which are halved if they do not converge
+SOFT_LEVELS = 4  # lengths of other steps, which are halved if they do not converge
 LIST_DAMPING = 1 / 16  # weight of the change of a shear increment for lists, whose forces jump
 REDUNDANT = 1e-10  # relative compliance of ports at rest that outnumber the modes
 FIRST_WIDTH = 1e-6  # width in bond lengths over which the initial bonds of several lists lie
@@ -117,11 +117,11 @@ class Motion:
     window_work: float
     extremes: np.ndarray
     phasors: np.ndarray
-    ledger: dict
+    ledger: dict[str, float]
     outcome: Outcome | None
     message: str
     cycles_done: float
-    snapshots: list
+    snapshots: list[Snapshot]
     end: "March"
     log: None = None
     events: int = 0
@@ -238,14 +238,17 @@ def make_system(
     Parameters
     ----------
     contact : Contact
+        Laws and loads of the points.
     step : float
-        [s]
+        Duration of a whole step [s].
     modes : ModalBasis, optional
         Without modes the displacement of the first port is prescribed.
     travel : float
         Largest output [m].
     start : core.InitialState, optional
+        Modal coordinates and velocities; at rest by default.
     """
+    # Rows of the ports; heave and pitch of a normal contact are two more.
     n = 0 if modes is None else modes.omega.size
     rows = [
         np.zeros(n) if modes is None else np.asarray(one.row, float) for one in contact.point_sets
@@ -256,9 +259,12 @@ def make_system(
         press[:2] = len(rows), len(rows) + 1
         rows += [np.asarray(contact.heave, float), np.asarray(contact.pitch, float)]
     rows = np.array(rows, float).reshape(len(rows), n)
+
     laws = {law.numbers[0] for one in contact.point_sets for law in one.laws}
-    levels = RIGID_LEVELS if Law.COULOMB in laws else LEVELS
+    levels = RIGID_LEVELS if Law.COULOMB in laws else SOFT_LEVELS
     mass = 1.0 if modes is None else float(modes.mass)
+
+    # Responses of the modes; a prescribed slide has none.
     if modes is None:
         responses = Responses(*(np.zeros((levels, k, 3)) for k in (0, 3, 3)))
         shape = np.zeros((3, 0))
@@ -267,13 +273,17 @@ def make_system(
         responses = make_responses(modes, step, levels)
         shape = np.array([modes.omega**2, modes.base, modes.output], float)
         damping = np.array(modes.damping_matrix, float)
+
+    # Compliance of the ports: rows . response to modal forces . rows^T.
     by_force = responses.motion[:, :, 2 * n + 3 :]
     compliance = [[rows @ part[:n] @ rows.T, rows @ part[n:] @ rows.T] for part in by_force]
     points = _make_points(contact, 0 if contact.sets is None else contact.sets.x.size)
     lists = _make_lists(contact, points, modes is None)
+
     state = np.zeros((3, 2 * n))
     if start is not None:
         state[0] = [*start.z, *start.v]
+
     size = len(rows) + points.stiffness.size
     ports = Ports(
         rows,
@@ -285,10 +295,12 @@ def make_system(
         np.zeros(size),
         press,
     )
+
     size = 3 * n + 3
     structure = Structure(
         *responses, shape, damping, np.zeros((1, 3)), np.zeros(0), np.zeros(0), np.zeros(size)
     )
+
     has_lists = Law.LIST in laws
     options = Options(
         mass,
@@ -303,6 +315,7 @@ def make_system(
         int(((points.numbers[0] == Law.BONDS) & (points.numbers[3] >= 0)).any()),
         int(laws == {Law.BONDS} and len(contact.point_sets) == 1),
     )
+
     sets = _make_no_sets() if contact.sets is None else contact.sets.make_arrays()
     flank = _make_flank(contact)
     totals = np.zeros(len(Total))
@@ -325,6 +338,7 @@ def make_system(
 
 def _make_points(contact: Contact, n_nodes: int) -> Points:
     """Return the arrays of all points."""
+    # Numbers, memory and loads of the laws of all points.
     laws = [law for one in contact.point_sets for law in one.laws]
     counts = [len(one.laws) for one in contact.point_sets]
     numbers = np.zeros((N_NUMBERS, len(laws)))
@@ -336,11 +350,14 @@ def _make_points(contact: Contact, n_nodes: int) -> Points:
         values[[Point.START_LOAD, Point.LOAD, Point.END_LOAD], j] = law.load
         if law.numbers[0] == Law.BONDS:
             memory[4, j] = law.memory[0]  # bond length in the middle of a step
+
     resultant = contact.preload
     if contact.grooves is not None:
         resultant *= float(np.hypot(1.0, contact.grooves.slope(0.0)))
     # A single point carries a prescribed load that is 0 at the start.
     share = np.array([law.load / resultant if resultant > 0 else 1.0 for law in laws], float)
+
+    # Nodes, shares of the load and shear shapes of each set of points.
     nodes = np.full(len(laws), RESULTANT, np.int64)
     place = np.zeros(len(laws))
     shapes = np.zeros((0, len(laws)))
@@ -358,6 +375,7 @@ def _make_points(contact: Contact, n_nodes: int) -> Points:
             shapes[:, own] = np.asarray(one.shear.shape).T
             stiffness = np.array(one.shear.stiffness, float)
         first = first + count
+
     shear = np.zeros((len(Shear), stiffness.size))
     if stiffness.size:
         shear[Shear.SCALE] = 1 / np.sqrt((shapes**2).mean(axis=1))
@@ -393,6 +411,7 @@ def _make_lists(contact: Contact, points: Points, is_prescribed: bool) -> BondLi
     if count > 1:
         step = list_numbers.MAX_STRIPS_PER_LENGTH * int(min(reach, list_numbers.MAX_DAMAGE))
         capacity = min(capacity, FIRST_STRIPS + step)
+
     statuses = list_numbers.make_status(capacity, count)
     loads = np.where(points.numbers[0] == Law.LIST, points.values[Point.END_LOAD, :count], 0.0)
     statuses[:, STATUS.pressure] = statuses[:, STATUS.initial_pressure] = loads
@@ -663,12 +682,14 @@ class March:
             self.kernels, self.system, (*place, rest[Sample.HEAVE], rest[Sample.PITCH])
         )
 
-    def find_ledger(self, sample) -> dict:
+    def find_ledger(self, sample) -> dict[str, float]:
         """Return energies [J] and counters by name at a sample of the present state."""
         n = 2 * self.modes.omega.size
         totals = self.system.totals
         friction = float(totals[Total.FRICTION])
         sampled, passed, _ = self.work_sums
+
+        # Friction dissipates its work less the change of the energy stored in the interface.
         ledger = {
             "work_in": float(totals[Total.WORK_IN]),
             "viscous": float(totals[Total.VISCOUS]),
@@ -746,7 +767,7 @@ def split_losses(samples, n: int, scale: float) -> np.ndarray:
     return np.where((losses < 0) & (losses > -noise), 0.0, losses)
 
 
-def make_snapshot(kernels, system: System, motion: tuple) -> Snapshot:
+def make_snapshot(kernels, system: System, motion: tuple[float, ...]) -> Snapshot:
     """Return the state of the points on the first port; `motion` has the first seven fields of Snapshot.
 
     Parameters
@@ -794,10 +815,15 @@ def march(
     Parameters
     ----------
     modes : ModalBasis
+        Modes of the structure without the contact.
     drive : core.SineDrive or another drive
+        Acceleration of the base.
     contact : Contact
+        Laws and loads of the points.
     cycles : float
+        Number of cycles, whole or not.
     steps_per_cycle : int
+        Number of whole steps per cycle.
     window : int
         Number of last cycles whose samples are all kept.
     travel : float
@@ -824,6 +850,7 @@ def march(
         run.reset_balance()
     else:
         run = March(modes, drive, contact, steps_per_cycle, travel, start)
+
     n_steps = round(cycles * steps_per_cycle)
     record = Record(run, n_steps, min(window * steps_per_cycle, n_steps), keeps_samples)
     saved = checkpoint.open_checkpoint(run, record, (n_steps, steps_per_cycle, window, frames))
@@ -833,6 +860,8 @@ def march(
         and contact.load is None
         and not run.system.options.has_lists
     )
+
+    # Whole cycles at a time, except for the fraction at the start.
     while run.done < n_steps and run.outcome is None:
         n_left = n_steps - run.done
         n_early = n_left - record.n_window
@@ -840,10 +869,12 @@ def march(
         if size == steps_per_cycle and n_early > steps_per_cycle:
             most = min(MAX_CYCLES_AT_ONCE, MAX_STEPS_AT_ONCE // steps_per_cycle)
             size *= max(1, min(most, n_early // steps_per_cycle))
+
         totals = run.system.totals.copy()
         works = run.work_sums.copy()
         is_last = size == n_left
         record.add(*advance_with_frames(run, size, frames if is_last else 0))
+
         count = (n_steps - record.n_window - run.done) // size
         state = run.system.state[0]
         memory = np.concatenate(
@@ -862,11 +893,13 @@ def march(
                 run.done += count * size
                 run.system.totals[REPEATED] += count * (run.system.totals - totals)[REPEATED]
                 run.work_sums += count * (run.work_sums - works)
+
         record.before = now if size % steps_per_cycle == 0 else None
         if run.done < n_steps:
             saved.write_if_due(run, record)
         if progress is not None:
             progress(run.done / n_steps)
+
     run.check_steps()
     return record.make_motion()
 
@@ -978,7 +1011,7 @@ class Record:
             self.phasors += list(2 / max(size, 1) * (parts[:, 0] + 1j * parts[:, 1]))
             begin = end
 
-    def _keep(self, part: tuple) -> None:
+    def _keep(self, part: tuple[int, np.ndarray, np.ndarray]) -> None:
         """Keep all samples of the parts within a window of the last one, and of older parts those at equal distances."""
         self.recent.append(part)
         last = part[0] + len(part[1]) - 1
@@ -1009,6 +1042,7 @@ class Record:
 
     def make_motion(self) -> Motion:
         """Return the record of a finished march."""
+        # The last sample of a block is the first of the next one.
         run = self.run
         _, samples, sums = self.last
         last = samples[-1:]
@@ -1016,20 +1050,24 @@ class Record:
             (first + np.arange(len(one) - 1), one[:-1], energies[:, :-1])
             for first, one, energies in self.recent
         ]
+
         recent_numbers, recent_rows, recent_sums = zip(*parts)
         rows = np.concatenate([*self.rows, *recent_rows, last])
         numbers = np.concatenate([*self.numbers, *recent_numbers, [run.done]]).astype(int)
         energies = np.concatenate([*self.sums, *recent_sums, sums[:, -1:]], axis=1)
+
         if not self.keeps_samples:
             is_kept = numbers >= run.done - self.n_window
             rows = rows[is_kept]
             numbers = numbers[is_kept]
             energies = energies[:, is_kept]
+
         in_window = numbers >= run.done - self.n_window
         response = make_histories(run, rows, numbers, energies)
         n = 2 * run.modes.omega.size
         window_rows = rows[in_window][:-1]
         steps = run.steps
+
         return Motion(
             response,
             response.select(in_window),
@@ -1105,6 +1143,7 @@ def make_histories(run: March, rows, numbers, energies) -> Response:
     contact = run.contact
     time = numbers * run.step
     n = modes.omega.size
+
     z = rows[:, :n]
     rate = rows[:, n : 2 * n]
     first = 2 * n + Sample.PORTS
@@ -1112,10 +1151,12 @@ def make_histories(run: March, rows, numbers, energies) -> Response:
     columns = rows[:, first : first + N_PORT_COLUMNS * len(sets)]
     columns = columns.reshape(len(rows), len(sets), N_PORT_COLUMNS)
     port_rows = np.array([one.row for one in sets], float).reshape(len(sets), n)
+
     push = run.drive.values(time)
     forces = columns[..., 0]
     pull = forces @ port_rows
     work, dissipated, created = energies
+
     extra = {"ledger": np.stack([work, rows[:, 2 * n + Sample.ENERGY], dissipated, created])}
     press = rows[:, 2 * n + Sample.LOAD : 2 * n + Sample.PITCH + 1]
     if contact.sets is not None or contact.load is not None:
@@ -1124,6 +1165,7 @@ def make_histories(run: March, rows, numbers, energies) -> Response:
         # Less load accelerates the holder towards the contact.
         change = press[:, :2] - [contact.sets.load, contact.sets.moment]
         pull = pull - change @ np.array([contact.heave, contact.pitch])
+
     slides = z @ port_rows.T
     rates = rate @ port_rows.T
     is_interface = np.array([not one.is_spring for one in sets], bool)
@@ -1132,12 +1174,14 @@ def make_histories(run: March, rows, numbers, energies) -> Response:
         extra["spring_forces"] = forces[:, ~is_interface]
         if is_interface.any():
             extra |= {name: part[:, is_interface] for name, part in parts.items()}
+
     grooves = contact.grooves
     if grooves is not None and grooves.lifted_mass:
         sliding = find_accelerations(modes, push, z, rate, pull) @ modes.slide
         lift = grooves.slope(slides[:, 0]) * sliding
         lift = lift + grooves.slope_derivative(slides[:, 0]) * rates[:, 0] ** 2
         extra["normal_load"] = contact.preload + grooves.lifted_mass * lift
+
     if is_interface.any():
         own = int(np.flatnonzero(is_interface)[0])
         interface = slides[:, own], rates[:, own], forces[:, own], columns[:, own, 1]

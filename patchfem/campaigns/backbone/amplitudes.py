@@ -100,6 +100,7 @@ def refine_amplitudes(joint: JointMode, amplitudes) -> np.ndarray:
     Parameters
     ----------
     joint : JointMode
+        Mode and joint of the backbone.
     amplitudes : (k,) array
         Increasing [m].
 
@@ -110,8 +111,11 @@ def refine_amplitudes(joint: JointMode, amplitudes) -> np.ndarray:
     """
     if joint.is_linear:
         return amplitudes
+
     joint = joint._replace(has_force=False)
     known = estimate_curve(joint, amplitudes)
+
+    # A step that is too wide is divided at the geometric mean of its ends.
     for _ in range(MAX_REFINEMENTS):
         if known is None or known.amplitude.size < 2:
             break
@@ -122,6 +126,7 @@ def refine_amplitudes(joint: JointMode, amplitudes) -> np.ndarray:
         is_wide &= known.amplitude[1:] > MIN_SPACING**2 * known.amplitude[:-1]
         if not is_wide.any():
             break
+
         between = np.sqrt(known.amplitude[1:] * known.amplitude[:-1])[is_wide]
         added = estimate_curve(joint, between)
         if added is None:
@@ -143,6 +148,7 @@ def find_amplitudes_of_forces(joint: JointMode, forces) -> np.ndarray:
     Parameters
     ----------
     joint : JointMode
+        Mode and joint of the backbone.
     forces : (n,) array
         Amplitudes of the force [N], above 0.
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from ...core import NotConverged, PatchfemError
 from ...dynamics import limit_cycles
-from ...dynamics.harmonic.backbone import find_free_motions, make_free_balance
+from ...dynamics.harmonic.backbone import FreeSolution, find_free_motions, make_free_balance
 from ...dynamics.harmonic.forces import LawGroup
 from ...response.errors import convergence_error
 from .joint import MIN_AMPLITUDE_FACTOR, JointMode
@@ -35,7 +35,9 @@ def compute_balance_curve(
     Parameters
     ----------
     joint : JointMode
+        Mode and joint of the backbone.
     amplitudes : (k,) array
+        At the output [m], increasing.
     counts : tuple of int
         Numbers of harmonics that are tried in turn; with a single one the errors of the harmonics are not estimated.
     """
@@ -91,10 +93,13 @@ def tabulate_free_motions(
     Parameters
     ----------
     group : LawGroup
+        Laws of the interfaces on one mesh.
     joint : JointMode
+        Mode and joint of the backbone.
     amplitudes : (k,) array
         Increasing, at the output [m].
     harmonics : int
+        Number of harmonics of the motion.
 
     Returns
     -------
@@ -113,7 +118,7 @@ def tabulate_free_motions(
 
 def _find_motions(
     group: LawGroup, joint: JointMode, amplitudes, harmonics: int, excitation=None, starts=None
-) -> list:
+) -> list[FreeSolution | None]:
     """Find the free motions at amplitudes (k,) [m] of the output, from similar ones if they are given.
 
     excitation: matrix E of `FreeBalance`.
@@ -133,7 +138,11 @@ def _find_motions(
 
 
 def find_forces(
-    group: LawGroup, joint: JointMode, amplitudes, harmonics: int, motions: list
+    group: LawGroup,
+    joint: JointMode,
+    amplitudes,
+    harmonics: int,
+    motions: list[FreeSolution | None],
 ) -> np.ndarray:
     """Find the forces at the output that hold the phase resonance, from the motions of `tabulate_free_motions`.
 
@@ -170,6 +179,7 @@ def _compute_rigid_curve(joint: JointMode, amplitudes) -> Curve:
             "with rigid friction the free motion cannot be computed if the rig has a nonlinear "
             "spring or a mode of 0 Hz"
         )
+
     static = joint.friction_limit
     friction = model.friction
     kinetic = static
@@ -179,12 +189,15 @@ def _compute_rigid_curve(joint: JointMode, amplitudes) -> Curve:
     motions = limit_cycles.trace_relay_backbone(
         modes, row, (kinetic, static), amplitudes, joint.mode
     )
+
+    # Friction stops the motion in each cycle at the amplitudes that are left out.
     known = np.array([motion is not None for motion in motions])
     if not known.any():
         raise NotConverged(
             "at these amplitudes rigid friction stops the motion in each cycle, and only a motion "
             "that always slides can be computed; give larger amplitudes"
         )
+
     amplitude = np.asarray(amplitudes)[known]
     cycles, ratios = zip(*filter(None, motions))
     omega = np.array([cycle.omega for cycle in cycles])

@@ -22,7 +22,7 @@ class SteadyLoop(NamedTuple):
     change: change of each of LOOP_MEASURES by the later half of the cycles.
     """
 
-    run: object
+    run: bench.BenchRun
     model: Model
     steps: int
     change: list[float]

@@ -87,7 +87,7 @@ def compute_backbone(
     mode : str
         Name of the mode; "" for the first.
     amplitudes : (k,) array, optional
-        At the output [m]. By default a range around the onset of slip, as in `compute_backbones`.
+        At the output [m]. By default a range around the onset of slip.
     methods : sequence of str
         From METHODS.
     progress : callable, optional
@@ -127,14 +127,21 @@ def compute_backbones(
     ----------
     models : sequence of Model
         Models of rigs, such as those of one scene with several values of a key.
-    mode, methods, progress, errors
-        As for `compute_backbone`.
+    mode : str
+        Name of the mode; "" for the first.
+    methods : sequence of str
+        From METHODS.
+    progress : callable, optional
+        Takes the name of a method that begins.
+    errors : bool
+        Whether the force and the errors are computed.
     levels : Levels
+        Amplitudes, or forces at the output, of the points.
 
     Raises
     ------
     PatchfemError
-        As for `compute_backbone`, and for a force that no amplitude has.
+        If a scene has no rig, a rig does not have this mode, or no amplitude has one of the forces.
     """
     joints = []
     wanted = [np.asarray(levels.amplitudes, float)]
@@ -171,9 +178,12 @@ def _compute(joint: JointMode, mode: str, amplitudes, methods, progress) -> Back
             "travel of the flexure; give smaller amplitudes with --amplitudes",
             "structure.travel",
         )
+
+    # A rig with more modes shows the error of the modes that this one neglects.
     richer = None
     if joint.has_errors and model.rig.structure.richer_rig is not None:
         richer = build_joint(replace(model, rig=model.rig.structure.richer_rig), mode)
+
     curves = {}
     missing = {}
     for method in methods:
@@ -200,6 +210,7 @@ def _compute(joint: JointMode, mode: str, amplitudes, methods, progress) -> Back
         notes=(),
         band=make_band(curves) if joint.has_errors else None,
     )
+
     backbone = backbone._replace(notes=words.write_notes(joint, amplitudes, backbone))
     if joint.has_errors:
         backbone = backbone._replace(advice=words.write_advice(joint, backbone))
@@ -279,6 +290,8 @@ def _fit_exponents(joint: JointMode, curve: Curve | None) -> LossExponents:
         return LossExponents()
     amplitude = curve.amplitude
     loss = curve.loss
+
+    # Energy m v^2 of the mode with its largest speed v; a loss below the errors has no slope.
     speed = 2 * np.pi * curve.frequency * amplitude / joint.reach
     energy = joint.modes.mass * speed**2
     relative_error = words.MIN_LOSS_RATIO * 2 * np.pi * curve.damping_error
@@ -288,6 +301,7 @@ def _fit_exponents(joint: JointMode, curve: Curve | None) -> LossExponents:
         known & (amplitude < words.MAX_MICRO_SLIP_RATIO * slip),
         known & (amplitude > MIN_GROSS_SLIP_RATIO * slip),
     )
+
     slopes = []
     for points, first in zip(map(np.flatnonzero, ranges), (0, -2)):
         slope = None

@@ -30,10 +30,10 @@ class PreparedModel(NamedTuple):
     """Model whose backbone is computed, and notes on what was ignored and assumed."""
 
     model: Model
-    notes: tuple
+    notes: tuple[str, ...]
 
 
-def prepare_model(build: Callable, modes: str | Iterable = "") -> PreparedModel:
+def prepare_model(build: Callable[..., Model], modes: str | Iterable = "") -> PreparedModel:
     """Build the model of a backbone from a scene, with its own modes or modes given beside it.
 
     Modes without `slide` get one with which the sticking joint contributes ASSUMED_JOINT_FRACTION of
@@ -45,7 +45,8 @@ def prepare_model(build: Callable, modes: str | Iterable = "") -> PreparedModel:
         Function of `BackboneTables` that returns the model of the scene with these tables; with
         `is_written` that of the scene as written, before the changes by --set.
     modes : str or iterable
-        See `scene.backbone_scene.parse_modes`; "" for the modes of the scene.
+        Text such as "120 Hz:0.01, 170 Hz:0.02", or tuples of frequency, damping ratio and slide; "" for the modes of
+        the scene.
     """
     tables = BackboneTables(parse_modes(modes) if modes else (), stuck=False)
     model = build(tables, is_written=False)
@@ -53,6 +54,7 @@ def prepare_model(build: Callable, modes: str | Iterable = "") -> PreparedModel:
     if not tables.modes:
         return PreparedModel(model, notes)
     given_modes = tables.modes
+
     # The joint that was bolted in the modal test is that of the scene as written.
     stiffness = _find_sticking_stiffness(
         build(BackboneTables(given_modes, stuck=False), is_written=True)
@@ -61,12 +63,14 @@ def prepare_model(build: Callable, modes: str | Iterable = "") -> PreparedModel:
     if stiffness is not None:
         used_modes = _assume_slides(given_modes, stiffness / model.rig.modes.mass)
         model = build(BackboneTables(used_modes), is_written=False)
+
     notes += _note_modes(used_modes, is_assumed=tables.is_assumed, is_stuck=stiffness is not None)
     if tables.assumes_mass and not tables.is_assumed:
         notes += (
             f"the modal mass is assumed to be {ASSUMED_MASS}, so the effect of a given `slide` on frequency and "
             "damping holds for this mass only; give yours as structure.moving_mass",
         )
+
     if any(mode.slide is None for mode in given_modes):
         notes += _note_slides(len(given_modes), stiffness)
         if sum(mode.slide is None for mode in given_modes) > 1:
@@ -89,7 +93,9 @@ def _find_sticking_stiffness(model: Model) -> float | None:
         return None
 
 
-def _assume_slides(modes: tuple, stiffness_per_mass: float) -> tuple:
+def _assume_slides(
+    modes: tuple[GivenMode, ...], stiffness_per_mass: float
+) -> tuple[GivenMode, ...]:
     """Return the modes; a missing `slide` is set according to the assumed joint stiffness.
 
     stiffness_per_mass: stiffness of the sticking contact over the modal mass [1/s2].
@@ -110,7 +116,9 @@ def _assumed_fraction(n_modes: int) -> float:
     return min(ASSUMED_JOINT_FRACTION, MAX_JOINT_FRACTION / n_modes)
 
 
-def _note_modes(modes: tuple, *, is_assumed: bool, is_stuck: bool) -> tuple:
+def _note_modes(
+    modes: tuple[GivenMode, ...], *, is_assumed: bool, is_stuck: bool
+) -> tuple[str, ...]:
     """Return notes on modes that are not given in the scene."""
     names = ", ".join(_describe_mode(mode) for mode in modes)
     place = "with the contact stuck" if is_stuck else "without the contact"
@@ -130,7 +138,7 @@ def _describe_mode(mode: GivenMode) -> str:
     return text if mode.slide is None else f"{text}, slide {mode.slide:.3g}"
 
 
-def _note_slides(n_modes: int, stiffness: float | None) -> tuple:
+def _note_slides(n_modes: int, stiffness: float | None) -> tuple[str, ...]:
     """Return a note on the assumed `slide` of modes.
 
     stiffness: of the sticking contact [N/m], or None if it is rigid.

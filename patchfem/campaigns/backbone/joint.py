@@ -14,6 +14,7 @@ from ...friction.cells import CELL_MERGES, join_cells
 from ...model.model import Model
 from ...response.errors import convergence_error
 from ...runs.joint import FreeRig, solve_without_joint
+from ...runs.patch.press import Patch
 from ...runs.plan import plan
 from ...runs.rig import decays
 from ...runs.rig.plan import stuck_stiffnesses
@@ -64,8 +65,8 @@ class JointMode(NamedTuple):
     """
 
     model: Model
-    patch: object
-    coarser: tuple
+    patch: Patch | None
+    coarser: tuple[Patch | None, ...]
     mode: int
     stuck_mode: StuckMode
     stiffness: np.ndarray
@@ -220,7 +221,9 @@ class JointMode(NamedTuple):
         if reason:
             raise PatchfemError(f"{method} cannot be computed {reason}")
 
-    def spatial_discretization_errors(self, compute: Callable) -> np.ndarray | float:
+    def spatial_discretization_errors(
+        self, compute: Callable[["JointMode", LawGroup], np.ndarray]
+    ) -> np.ndarray | float:
         """Return the error estimates of a quantity for the mesh and the discrete sliders of a law.
 
         Parameters
@@ -277,23 +280,28 @@ def build_joint(model: Model, name: str) -> JointMode:
             "a backbone needs the scene of a rig; add the tables [structure] and [drive]",
             "structure",
         )
+
     patch = None
     stiffer = None
-    coarser: tuple = (None,)
+    coarser: tuple[Patch | None, ...] = (None,)
     if model.patch is not None:
         model, (patch, *others), stiffer = solve_without_joint(model)
         coarser = (*others, None)
+
     number = _find_mode(model.rig, name)
     modes = model.rig.modes
     free_mode = StuckMode(None, np.eye(modes.omega.size)[number])
     joint = JointMode(
         model, patch, coarser, number, free_mode, np.zeros(len(modes.interfaces)), stiffer=stiffer
     )
+
+    # The contact sticks at small amplitudes and adds its stiffness to the mode.
     if not joint.is_linear:
         planned = joint._replace(stiffness=stuck_stiffnesses(model.rig, plan(model).chain))
         stiffness = _stuck_stiffness(planned)
         stuck_mode = modes.compute_stuck_mode(modes.interfaces, stiffness, number)
         joint = joint._replace(stuck_mode=StuckMode(*stuck_mode), stiffness=stiffness)
+
     _check_mode(joint)
     return joint
 
@@ -304,22 +312,27 @@ def _check_mode(joint: JointMode) -> None:
     modes = joint.modes
     rig = model.rig
     has_friction = model.friction is not None or bool(rig.friction.interfaces)
+
     if not joint.friction_limit and rig.springs.is_nonlinear and has_friction:
         raise PatchfemError(
             "the load or the coefficient of friction is 0, so no friction acts; for the backbone "
             "without friction leave out [friction] and the normal load",
             "friction.static",
         )
+
     if not (modes.omega[joint.mode] or joint.stuck_mode.omega):
         raise PatchfemError(
             "this mode has 0 Hz and rigid friction acts on it, so the mode has no natural frequency"
         )
+
+    # A mode that moves neither contact nor output has no curve of damping over amplitude.
     moves_contact = np.abs(modes.interfaces @ joint.shape).max(initial=0.0) > 0
     if not (joint.is_linear or rig.springs.is_nonlinear or moves_contact):
         raise PatchfemError(
             "the mode does not move the contact, so no friction acts on the mode; choose another "
             "mode with --mode, or give this mode the key `slide`"
         )
+
     if not joint.reach > 0:
         raise PatchfemError(
             "the mode does not move the point of the output, so its amplitude there is 0; give the "

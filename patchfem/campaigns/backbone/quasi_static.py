@@ -33,6 +33,8 @@ def compute_static_curve(joint: JointMode, amplitudes) -> Curve:
             "rigid friction has no finite stiffness, so a static curve cannot be computed for the "
             "mode of the sticking contact"
         )
+
+    # A closed form comes first, then the laws of harmonic balance, then a bench, which is the slowest.
     curve = _compute_in_closed_form(joint, amplitudes)
     if curve is not None:
         return curve
@@ -47,6 +49,7 @@ def compute_static_curve(joint: JointMode, amplitudes) -> Curve:
         """Return amplitude, frequency, damping, loss and force (5, k) from the loops of a LawGroup."""
         return decays.compute_static_curve(group.modes, group, joint.mode, amplitudes, samples)
 
+    # The sampling error is the change from half the samples.
     best = tabulate(laws, N_SAMPLES)
     has_amplitude = np.abs(best[0] / amplitudes - 1) < AMPLITUDE_TOL
     best[0] = np.where(has_amplitude, amplitudes, best[0])
@@ -85,8 +88,10 @@ def _compute_in_closed_form(joint: JointMode, amplitudes) -> Curve | None:
     )
     if model.friction is None or is_soft or len(model.rig.friction.interfaces) > 1:
         return None
+
     load = joint.friction_limit / model.friction.static
     slides = joint.slides(amplitudes)
+
     for _ in range(MAX_STEPS):
         loops = [steady_loop(model.friction, load, float(slide)) for slide in slides]
         if None in loops:
@@ -99,13 +104,16 @@ def _compute_in_closed_form(joint: JointMode, amplitudes) -> Curve | None:
             break
         # The deflection shape differs from the stuck mode shape, so that the output amplitude is missed.
         slides = slides * amplitudes / best[0]
+
     best = np.where(has_amplitude, best, np.nan)
     best[0] = amplitudes
     relative = ROUND_OFF_ERROR + (AMPLITUDE_TOL if modes.omega.size > 1 else 0.0)
     return _select_rising_part(best, relative * np.abs(best))
 
 
-def _compute_from_loops(joint: JointMode, slides, loops: list) -> np.ndarray:
+def _compute_from_loops(
+    joint: JointMode, slides, loops: list[quasi_static.StaticLoops]
+) -> np.ndarray:
     """Compute amplitude, frequency, damping, loss and force (5, k) from hysteresis loops.
 
     The loops have displacement amplitudes (k,) [m].
@@ -124,6 +132,7 @@ def _compute_from_bench_loops(joint: JointMode, amplitudes) -> Curve:
     if joint.coarse is not None:
         patches.append(joint.coarse)
     frequency = joint.stuck_mode.omega / (2 * np.pi)
+
     loops = []
     loops_with_tip_error = []
     loops_with_area_error = []
@@ -138,10 +147,13 @@ def _compute_from_bench_loops(joint: JointMode, amplitudes) -> Curve:
         loops.append(loop)
         loops_with_tip_error.append(loop._replace(tip=loop.tip + stiffness_error * slide))
         loops_with_area_error.append(loop._replace(area=loop.area + area_error))
+
+    # The error is the sum of the changes by an error of the tip and one of the area.
     best = _compute_from_loops(joint, slides, loops)
     error = ROUND_OFF_ERROR * np.abs(best)
     for moved in (loops_with_tip_error, loops_with_area_error):
         error += np.abs(_compute_from_loops(joint, slides, moved) - best)
+
     if joint.stiffer is not None:
         # The stiffness of the joint that is subtracted from bolted modes has an error of its own.
         stiffer = joint.with_modes(joint.stiffer.model.rig.modes, joint.stiffness)

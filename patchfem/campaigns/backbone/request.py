@@ -4,6 +4,7 @@ from collections.abc import Callable, Iterable
 from typing import NamedTuple
 
 from ...core import PatchfemError
+from ...model.model import Model
 from ...model.source import Source
 from ...scene.assignments import Axis, read_assignments, read_positive_values
 from ...scene.scene import SceneError
@@ -49,7 +50,7 @@ class BackboneCases(NamedTuple):
 
 
 def compute_cases(
-    build: Callable, request: BackboneRequest, progress: Callable | None = None
+    build: Callable[..., Model], request: BackboneRequest, progress: Callable | None = None
 ) -> BackboneCases:
     """Compute the backbones that a request asks for.
 
@@ -59,6 +60,7 @@ def compute_cases(
         Function of `BackboneTables` that returns the model of the scene with these tables. With `is_written` it is that of
         the scene as written; with `sets`, a tuple of assignments "table.key=value", that of the changed scene.
     request : BackboneRequest
+        What is asked for.
     progress : callable, optional
         Takes the name of a method that begins.
 

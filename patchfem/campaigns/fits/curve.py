@@ -43,7 +43,7 @@ SAME_ERROR = 0.1  # relative change of an error at which it is known
 # Smallest relative standard deviation of a value, which keeps its weight finite.
 MIN_SPREAD = 1e-6
 METHODS = ("balance", "quasi-static")  # Reference method and fast method.
-DEFAULT_STARTS = 6  # Number of starting points of a search by the fast method.
+DEFAULT_CURVE_STARTS = 6  # Number of starting points of a search by the fast method.
 PROGRESS_SECONDS = 10.0  # Time between two progress messages [s].
 SAME_AMPLITUDE = (
     1e-6  # largest relative difference of a measured amplitude and that of its computed point
@@ -252,6 +252,7 @@ class CurveModel(FreeKeys):
         Parameters
         ----------
         measured : MeasuredCurve
+            Frequency and damping ratio with their errors.
         method : str
             From METHODS.
         starts : int
@@ -275,6 +276,7 @@ def compute_points(model: Model, amplitudes: np.ndarray, method: str) -> np.ndar
     Parameters
     ----------
     model : Model
+        Model of a rig.
     amplitudes : (k,) array
         [m]
     method : str
@@ -315,6 +317,7 @@ def fit_curve(
     Parameters
     ----------
     scene : Scene
+        Scene of a rig.
     curve_file : Path
         File of the measured curve, in the format of `read_damping_curve`.
     ranges : sequence of Range
@@ -339,7 +342,7 @@ def fit_curve(
     reasons = {}
     for method in reversed(METHODS):
         try:
-            first = curves.solve(measured, method, options.starts or DEFAULT_STARTS)
+            first = curves.solve(measured, method, options.starts or DEFAULT_CURVE_STARTS)
             break
         except NotConverged as reason:
             reasons[method] = reason
@@ -349,6 +352,8 @@ def fit_curve(
             f"no curve of frequency and damping could be computed within the ranges of --free; {listed}; leave out "
             "the rows with the largest damping, or change the ranges of --free"
         )
+
+    # Assumed errors follow the deviations of the fit (iteratively reweighted least squares).
     for _ in range(MAX_REWEIGHTINGS if measured.assumed.any() else 0):
         before = measured.error
         measured = measured.scale_assumed_errors(curves.compute(first.values, method), len(ranges))
@@ -365,6 +370,7 @@ def fit_curve(
         reference = method
         fit = curves.solve(measured, reference, kind="series", start=first.values)
     fit = fit.count_earlier_search(first)
+
     fitted = curves.compute(fit.values, reference)
     widened, mode_note = _widen_by_missing_modes(fit, curves, measured, reference)
     beyond, advice = extrapolate_curve(curves, measured, widened, reference)
@@ -457,14 +463,18 @@ def _widen_by_missing_modes(
     Parameters
     ----------
     fit : Fit
+        Fit by `method`.
     curves : CurveModel
+        Models of the scene, with the values of the keys.
     measured : MeasuredCurve
+        Curve to which the keys are fitted.
     method : str
         Method of the fitted curve.
 
     Returns
     -------
     fit : Fit
+        With wider intervals.
     note : str
         "" if no mode is neglected.
     """

@@ -211,6 +211,7 @@ def fit_hysteresis_loop(
     Parameters
     ----------
     scene : Scene
+        Scene of a bench.
     loop_file : Path
         File of the measured loop.
     ranges : sequence of Range
@@ -320,12 +321,15 @@ def _warn_of_doubtful_fit(fitted: FittedLoop) -> list[str]:
     n_used = np.count_nonzero(~fitted.held_out)
     n_independent = fitted.keys.fit.intervals.rows
     warnings = []
+
     if fitted.rms > MIN_RMS * peak and n_independent < MIN_INDEPENDENT * n_used:
         warnings.append(
             "the deviations of neighbouring rows are correlated, so the intervals are computed as "
             f"if the {n_used} rows were {max(n_independent, 1):.3g} independent rows; a part of the deviation "
             "is systematic"
         )
+
+    # A law with memory carries no force before its first slide.
     first_force = abs(loop.reading[0])
     starts_at_rest = fitted.held_out[0] or law_has_trait(scene.friction.law, "memoryless")
     if first_force > MAX_FIRST_FORCE * peak and not starts_at_rest:
@@ -334,6 +338,7 @@ def _warn_of_doubtful_fit(fitted: FittedLoop) -> list[str]:
             "starts without force: repeat the rows of the first cycle before the record, with a column of labels, and hold "
             "out this cycle, as --hold cycle=1, or give a record that begins at rest"
         )
+
     if fitted.step_error > scene.accuracy.tolerance * peak:
         warnings.append(
             "if the time steps are halved, the force of the model changes by "

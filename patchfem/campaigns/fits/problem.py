@@ -153,7 +153,7 @@ class FreeKeys:
                 f"{len(self.ranges)} values and their intervals"
             )
 
-    def make_problem(self, residual: Callable) -> Problem:
+    def make_problem(self, residual: Callable[[np.ndarray], np.ndarray]) -> Problem:
         """Return the least-squares problem of a residual, a function of the values (n,) [SI] of the keys."""
         low = [bound.low for bound in self.ranges]
         high = [bound.high for bound in self.ranges]

@@ -37,12 +37,15 @@ def fit_measurement(
     Parameters
     ----------
     scene : Scene
+        Its kind decides which measurements can be fitted.
     to : str
         File of the measurement, or a measured depth.
     free : sequence of str
         Free keys with their ranges, "table.key=low..high".
     options : FitOptions
+        Options of the search and of the rows.
     listener : Listener
+        Told the progress.
 
     Returns
     -------

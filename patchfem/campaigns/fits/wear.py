@@ -118,6 +118,8 @@ def _read_depth_file(path: Path) -> MeasuredDepth:
         raise PatchfemError(
             f"{path}: this is not the JSON file that compare writes ({error})"
         ) from None
+
+    # Of several depths in the file the first in the order of QUANTITIES is fitted.
     measures = content.get("measures", content) if isinstance(content, dict) else {}
     for name in QUANTITIES:
         try:
@@ -127,6 +129,7 @@ def _read_depth_file(path: Path) -> MeasuredDepth:
         if np.isfinite(numbers).all() and numbers[0] > 0:
             value, low, high = numbers
             return MeasuredDepth(name, value, max(low, 0.0), high, str(path))
+
     raise PatchfemError(
         f"{path}: the file contains no worn depth above zero; compare writes a depth only if the "
         "traces have a common reference"
@@ -165,6 +168,7 @@ def fit_wear(
             f"--free: in a scene with [wear] only {COEFFICIENT_KEY} can be fitted, for example {COEFFICIENT_KEY}=1e-16 "
             "m^2/N..1e-12 m^2/N"
         )
+
     bounds = ranges[0]
     target = read_measured_depth(measured_depth)
     if model.patch is None:
@@ -176,6 +180,7 @@ def fit_wear(
             f"fit {COEFFICIENT_KEY}: the fit must start from unworn pieces; leave out wear.start",
             "wear.start",
         )
+
     # The contact of the unworn pieces does not depend on the coefficient.
     patch = mesh_levels.solve_with_coarser(model.patch, model.accuracy.tolerance, False)[0]
 
@@ -199,6 +204,7 @@ def fit_wear(
         curve.depth[is_growing], curve.fraction[is_growing], extrapolate=False
     )
     value = float(bounds.high * inverse(target.value))
+
     n_runs = 1
     while n_runs < MAX_RUNS:
         n_runs += 1
@@ -212,11 +218,13 @@ def fit_wear(
             f"fit {COEFFICIENT_KEY}: after {MAX_RUNS} runs the fit has reached only {target.name} = "
             f"{computed_depth:.6g} in place of {target.value:.6g}"
         )
+
     if value < bounds.low:
         raise PatchfemError(
             f"--free {COEFFICIENT_KEY}: {target.name} = {target.value:.4g} needs a coefficient of {value:.4g} "
             f"m^2/N, which is below the low bound {bounds.low:.4g}; lower this bound"
         )
+
     low, high = inverse(np.minimum([target.low, target.high], max_depth)) / inverse(target.value)
     return FittedCoefficient(
         value=float(value),

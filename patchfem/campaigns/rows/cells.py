@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from ...core import PatchfemError, frozen_array
-from ...inputs.measured import read_table
+from ...inputs.measured import MeasuredRow, read_table
 from ...scene.keys.quantities import parse_quantity
 
 # Lower limit of a displacement [m] in a log ratio: the resolution of the printed table, 0.01 mil.
@@ -44,7 +44,7 @@ class Readings:
     """
 
     path: Path
-    rows: tuple
+    rows: tuple[MeasuredRow, ...]
     row: np.ndarray
     is_acceleration: np.ndarray
     measured: np.ndarray
@@ -53,16 +53,16 @@ class Readings:
     condition: np.ndarray
 
     @property
-    def row_names(self) -> list:
+    def row_names(self) -> list[str]:
         """Name of each row: its frequency, followed by "repeat" for a repeated measurement."""
         return [f"{row.frequency:.6g} Hz" + " repeat" * ("R" in row.flag) for row in self.rows]
 
     @property
-    def empty_rows(self) -> list:
+    def empty_rows(self) -> list[int]:
         """Indices of the rows without any reading."""
         return sorted(set(range(len(self.rows))) - set(self.row.tolist()))
 
-    def column_values(self, name: str) -> list:
+    def column_values(self, name: str) -> list[float | str]:
         """Return the value (n,) of a table column for each reading.
 
         Raises PatchfemError for a column other than "frequency", "input", "flag" and "run".
@@ -207,6 +207,7 @@ def compute_rms_scores(readings: Readings, log_ratios, selected) -> dict | None:
     Parameters
     ----------
     readings : Readings
+        Readings of a table of measured responses.
     log_ratios : (n,) array
         ln(computed/measured).
     selected : (n,) bool
@@ -225,7 +226,7 @@ def compute_rms_scores(readings: Readings, log_ratios, selected) -> dict | None:
         "displacement": ~readings.is_acceleration,
         "all": True,
     }
-    out: dict = {}
+    out: dict[str, float | None] = {}
     for name, is_of_kind in kinds.items():
         selected_logs = log_ratios[is_of_kind & selected]
         is_known = selected_logs.size and not np.isnan(selected_logs).any()

@@ -44,6 +44,7 @@ class ConditionModels(FreeKeys):
         self, scene: Scene, conditions: np.ndarray, ranges: Sequence[Range], measured: Path
     ):
         _require_sines_of_base(scene, ranges, measured)
+
         sets = []
         notes = []
         if scene.measured is None and any(bound.key.startswith("measured.") for bound in ranges):
@@ -60,6 +61,7 @@ class ConditionModels(FreeKeys):
                     "'harmonic'"
                 )
         super().__init__(scene, ranges, sets, notes)
+
         self.instrument = self.base.scene.measured
         self.model_parameters = [k for k, bound in enumerate(ranges) if bound.key not in GAIN_KEYS]
         self.rigs = []

@@ -104,6 +104,7 @@ def fit_rows(
     Parameters
     ----------
     scene : Scene
+        Scene of a rig.
     measured : Path
         File of the table.
     ranges : sequence of Range
@@ -184,7 +185,7 @@ def fit_rows(
 
 def make_residual(
     readings: Readings, model_readings: ModelReadings, training: np.ndarray
-) -> Callable:
+) -> Callable[[np.ndarray], np.ndarray]:
     """Return the function that computes the log ratios (r,) of readings from values of the free keys.
 
     A reading flagged U has no residual where the computed value is larger.
@@ -192,7 +193,9 @@ def make_residual(
     Parameters
     ----------
     readings : Readings
+        Measured readings (n,).
     model_readings : ModelReadings
+        Computes the readings of the model.
     training : (n,) bool
         Mask of the r readings.
     """
@@ -238,12 +241,15 @@ def _warn_of_doubtful_fit(readings: Readings, search: Descents, logs: np.ndarray
             f"{len(readings.empty_rows)} of {len(readings.rows)} rows have no reading and are left out: rows "
             f"{numbers}"
         )
+
     n_unstable = int(readings.unstable.sum())
     if n_unstable:
         warnings.append(
             f"{n_unstable} readings flagged U (unstable) count in the fit as lower bounds; scores_stable leaves these "
             "readings out"
         )
+
+    # A motion that is not bounded has the largest log ratio in place of a reading.
     unbounded = set()
     for k in readings.row[np.abs(logs) >= MAX_LOG_RATIO]:
         unbounded.add(f"{readings.rows[k].frequency:.6g} Hz, {readings.rows[k].input:.4g} m/s^2")
@@ -252,6 +258,7 @@ def _warn_of_doubtful_fit(readings: Readings, search: Descents, logs: np.ndarray
             f"no bounded motion is found at {'; '.join(sorted(unbounded))}: each row at these inputs "
             f"counts as if the model were wrong by a factor of {np.exp(MAX_LOG_RATIO):.0f}"
         )
+
     if search.n_best == 1 and search.rms.size > 1:
         warnings.append(
             f"only one of {search.rms.size} searches ended within 1 % of the best training score, so "

@@ -45,8 +45,8 @@ class ModelReadings:
 
     def reset_motions(self) -> None:
         """Discard the stored motions, so that the next computations start from rest."""
-        self.last_motions: dict = {}
-        self.last_values: tuple = ()
+        self.last_motions: dict[int, object] = {}
+        self.last_values: tuple[float, ...] = ()
         self.last_readings: dict[int, tuple[float, float]] = {}
 
     def predict(self, values: Sequence[float], conditions: Iterable[int]) -> np.ndarray:

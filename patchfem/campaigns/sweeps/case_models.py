@@ -45,7 +45,7 @@ class SweepScene:
 
     path: Path
     text: str
-    sets: tuple = ()
+    sets: tuple[str, ...] = ()
     n_written: int = 0
 
     def read_scene(self, sets: Sequence[str]) -> Scene:
@@ -84,7 +84,11 @@ class SweepScene:
             ) from error
 
     def make_similar_models(
-        self, keys: Sequence[str], values: np.ndarray, sets: Callable, cases: np.ndarray
+        self,
+        keys: Sequence[str],
+        values: np.ndarray,
+        sets: Callable[[int], Sequence[str]],
+        cases: np.ndarray,
     ) -> SimilarModels | None:
         """Return the models of cases that differ only in the numbers of some keys.
 
@@ -93,6 +97,7 @@ class SweepScene:
         Parameters
         ----------
         keys : sequence of str
+            The k keys, as "table.key".
         values : (n, k) array
             Values of the keys [SI].
         sets : callable

@@ -61,21 +61,21 @@ class Cases:
         return len(self.axes[0].texts) if self.is_table else prod(self.shape)
 
     @property
-    def shape(self) -> tuple:
+    def shape(self) -> tuple[int, ...]:
         """Number of values of each axis; the number of cases for a table."""
         return (len(self),) if self.is_table else tuple(len(axis.texts) for axis in self.axes)
 
-    def axis_indices(self, numbers: int | Sequence[int]) -> tuple:
+    def axis_indices(self, numbers: int | Sequence[int]) -> tuple[int | np.ndarray, ...]:
         """Return for each axis the index of the value of a case, or the indices of several cases."""
         if self.is_table:
             return (np.asarray(numbers),) * len(self.axes)
         return np.unravel_index(numbers, self.shape)
 
-    def texts(self, number: int) -> tuple:
+    def texts(self, number: int) -> tuple[str, ...]:
         """Return the values of a case as strings from the request, one per axis."""
         return tuple(axis.texts[k] for axis, k in zip(self.axes, self.axis_indices(number)))
 
-    def assignments(self, number: int) -> tuple:
+    def assignments(self, number: int) -> tuple[str, ...]:
         """Return the `table.key=value` strings of a case."""
         return tuple(f"{axis.key}={text}" for axis, text in zip(self.axes, self.texts(number)))
 

@@ -132,6 +132,7 @@ def _find_limit_on_line(
     name : str
         Measure.
     key : SweptKey
+        Key that changes along the line.
     sizes : (m,) array
         Increasing values of the key [SI].
     values, errors : (m,) array

@@ -61,6 +61,7 @@ def read_sweep(path: Path, sets: Sequence[str], request: Request) -> tuple[Sweep
     sets : sequence of str
         ``table.key=value`` strings for all cases.
     request : Request
+        Which cases are asked for.
 
     Returns
     -------
@@ -105,14 +106,17 @@ def read_cases(sweep_scene: SweepScene, request: Request) -> Cases:
                 "must be whole numbers >= 0, and Sobol's sequence needs at least one case"
             ]
         )
+
+    # Cases of the file come first; the table [sweep] counts only if the request names no key.
     parts = []
     errors = []
-    file_axes: tuple = ()
+    file_axes: tuple[Axis, ...] = ()
     if request.file is not None:
         listed, errors = table.read_case_table(request.file)
         if listed is not None:
             parts.append(listed)
             file_axes = listed.axes
+
     axes, axis_errors = read_assignments(request.over, RANDOM if request.count else LISTS)
     errors += axis_errors
     if not request.over and request.file is None:
@@ -122,17 +126,21 @@ def read_cases(sweep_scene: SweepScene, request: Request) -> Cases:
             errors.append(
                 f"{sweep_scene.path}: no key to sweep is given; add --over table.key=v1,v2,... or a table [sweep]"
             )
+
     for key in sorted({axis.key for axis in file_axes} & {axis.key for axis in axes}):
         errors.append(
             f"--over {key}: {request.file} sets this key already; remove the key from the file or leave out "
             "this --over"
         )
+
     every_axis = [*axes, *file_axes]
+    # Errors of the scene are reported with those of the request, for the first value of each axis.
     errors = errors or _find_duplicate_keys(sweep_scene, [axis.key for axis in every_axis])
     if errors:
         listed_axes = [axis for axis in every_axis if isinstance(axis, Axis)]
         first_case = [f"{axis.key}={axis.texts[0]}" for axis in listed_axes]
         raise SceneError([*sweep_scene.find_errors(first_case), *errors])
+
     count = prod(map(len, parts))
     count *= request.count or prod(len(axis.texts) for axis in axes)
     if count > MAX_CASES:
@@ -142,10 +150,12 @@ def read_cases(sweep_scene: SweepScene, request: Request) -> Cases:
                 "give fewer values for each key, or draw N cases from the ranges with --sobol N"
             ]
         )
+
     if request.count and axes:
         parts.append(samples.draw_cases(axes, request.count, request.seed, sobol=request.sobol))
     elif axes:
         parts.append(Cases(tuple(axes)))
+
     cases = combine_cases(parts)
     warning = _check_cases(sweep_scene, cases)
     arguments = _format_arguments(request, sweep_scene.path.parent)
@@ -177,7 +187,7 @@ def _find_duplicate_keys(sweep_scene: SweepScene, keys: Sequence[str]) -> list[s
 
     Two keys are equivalent if they denote a mode by its name and by its index.
     """
-    first_keys: dict = {}
+    first_keys: dict[str, str] = {}
     errors = []
     for key in keys:
         first = first_keys.setdefault(sweep_scene.replace_mode_name(key), key)
@@ -207,7 +217,7 @@ def _check_cases(sweep_scene: SweepScene, cases: Cases) -> str:
     if not invalid:
         return ""
     if len(invalid) == len(numbers):
-        messages: dict = {}
+        messages: dict[str, str] = {}
         for message in chain.from_iterable(invalid):
             # Errors that differ only in their random values are reported once.
             kind = re.sub(NUMBER_PATTERN, "", message) if cases.is_random else message

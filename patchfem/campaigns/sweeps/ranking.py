@@ -117,7 +117,7 @@ def compute_grid_indices(values: np.ndarray) -> np.ndarray:
     return np.array([first, total, total, total])
 
 
-def estimate_random_indices(coordinates: np.ndarray, values: np.ndarray) -> list:
+def estimate_random_indices(coordinates: np.ndarray, values: np.ndarray) -> list[np.ndarray | None]:
     """Estimate the Sobol indices of measures from random cases.
 
     Parameters
@@ -125,6 +125,7 @@ def estimate_random_indices(coordinates: np.ndarray, values: np.ndarray) -> list
     coordinates : (n, keys) array
         Coordinates of the cases, uniform in [0, 1].
     values : (n, measures) array
+        The measures of the cases.
 
     Returns
     -------

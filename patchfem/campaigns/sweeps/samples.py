@@ -20,9 +20,11 @@ def draw_cases(
     Parameters
     ----------
     axes : sequence of Axis or Range
+        Range or values of each key.
     count : int
         Number of cases.
     seed : int
+        Seed of the generator, >= 0.
     sobol : bool
         Whether to use a scrambled Sobol sequence (Owen 1995) instead of independent samples. It is
         most uniform if `count` is a power of two.

@@ -72,6 +72,7 @@ def compute_chunk(
     Parameters
     ----------
     work : WorkerData
+        What a worker needs to compute any case.
     numbers : sequence of int
         Numbers of the cases.
     say : callable, optional
@@ -223,6 +224,7 @@ def iterate_chunks(
     Parameters
     ----------
     work : WorkerData
+        What a worker needs to compute any case.
     numbers : sequence of int
         Numbers of the cases.
     executor : object

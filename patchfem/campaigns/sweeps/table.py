@@ -15,7 +15,7 @@ from .cases import Cases
 
 # Name of the first result column of a sweep.csv; this and all later columns are ignored.
 OUTCOME_COLUMN = "outcome"
-HEADER = "contact.load [lbf],contact.tilt.angle [mrad]"
+CASE_HEADER = "contact.load [lbf],contact.tilt.angle [mrad]"
 
 
 def read_case_table(path: Path) -> tuple[Cases | None, list[str]]:
@@ -34,7 +34,7 @@ def read_case_table(path: Path) -> tuple[Cases | None, list[str]]:
     keys = table.names[: [*table.names, OUTCOME_COLUMN].index(OUTCOME_COLUMN)]
     if not all(keys) or not keys or not lines:
         return None, [
-            f"{path}:1: the first line must be a header such as `{HEADER}`, and each line after it must give one case"
+            f"{path}:1: the first line must be a header such as `{CASE_HEADER}`, and each line after it must give one case"
         ]
     doubled = [key for key, count in Counter(keys).items() if count > 1]
     errors = [f"{path}:1: {key}: two columns have this key; remove one of them" for key in doubled]

@@ -108,6 +108,7 @@ class FreeBalance:
         omega : float
             Frequency of the mode [rad/s].
         shape : (n,) array
+            Shape of the mode by its coordinates.
         amplitude : float
             At the output [m].
         """
@@ -158,6 +159,8 @@ class FreeBalance:
             [motion.by_unknowns, np.stack([motion.by_omega * self.omega, by_zeta, by_a], axis=2)],
             axis=2,
         )
+
+        # Equations: slides, amplitude and phase of the coordinate, and the condition of the motion.
         r = balance.rank
         residual = np.empty(x.size)
         jacobian = np.zeros((x.size, x.size))
@@ -173,7 +176,9 @@ class FreeBalance:
         free = FreeMotion(a, omega, zeta, slides, motion.contact.force, motion.modal)
         return FreeEquations(residual, jacobian, free)
 
-    def _find_condition(self, x, amplitude: float | None, output, slopes) -> tuple:
+    def _find_condition(
+        self, x, amplitude: float | None, output, slopes
+    ) -> tuple[float, np.ndarray]:
         """Return residual [m] and derivatives (N,) of the condition that selects the motion.
 
         output, slopes: harmonics (H + 1,) of the output [m] and their derivatives (H + 1, N).
@@ -201,6 +206,7 @@ class FreeBalance:
         x : (N,) array
             Unknowns of a similar motion.
         amplitude : float or None
+            At the output [m]; None for a motion without damping.
         max_steps : int
             Number of Newton steps.
 
@@ -282,10 +288,19 @@ def make_free_balance(
     Parameters
     ----------
     modes : ModalBasis
+        Modes of the structure without the contact.
     group : LawGroup
-    mode, harmonics, excitation, output
-        See `FreeBalance`.
+        Laws of the interfaces.
+    mode : int
+        Index of the coordinate of the mode.
+    harmonics : int
+        Number of harmonics.
+    excitation : (n, n) array, optional
+        Matrix E of the exciting force 2 zeta omega m E z'; default: a negative damping of all coordinates.
+    output : (n,) array, optional
+        Row of the displacement to which amplitudes belong; default: the coordinate.
     max_amplitude : float
+        At the output [m]; it decides how many samples resolve the corners of the force.
     factor : int, optional
         Samples per cycle, relative to those that the laws need.
     """
@@ -302,7 +317,7 @@ def find_free_motions(
     equations: FreeBalance,
     amplitudes,
     small: float = 0.0,
-    starts: list | None = None,
+    starts: list[FreeSolution | None] | None = None,
     mode: tuple | None = None,
 ) -> list[FreeSolution | None]:
     """Find the free motions at increasing amplitudes (k,) [m] of the output; None where none is found.
@@ -314,7 +329,9 @@ def find_free_motions(
     Parameters
     ----------
     equations : FreeBalance
+        Equations of the mode.
     amplitudes : (k,) array
+        At the output [m], increasing.
     small : float, optional
         Amplitude [m] at which the linear mode is nearly exact.
     starts : list, optional
@@ -345,6 +362,7 @@ def find_free_motions(
         except NotConverged:
             return None
 
+    # Motions are followed upwards, then downwards to those that are missing.
     out: list[FreeSolution | None] = [None] * len(amplitudes)
     for k, amplitude in enumerate(map(float, amplitudes)):
         out[k] = solve_near(starts[k] if starts else None, amplitude)
@@ -352,6 +370,7 @@ def find_free_motions(
         out[k] = out[k] or solve_linear_mode(amplitude)
         if out[k] is None and 0 < small < amplitude and not any(out):
             out[k] = solve_near(solve_linear_mode(small), amplitude)
+
     for k in range(len(amplitudes) - 2, -1, -1):
         out[k] = out[k] or solve_near(out[k + 1], float(amplitudes[k]))
     return out

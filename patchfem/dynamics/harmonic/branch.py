@@ -36,8 +36,8 @@ class Branch:
     - ended: see `continuation.CurvePath`
     """
 
-    points: tuple
-    folds: tuple
+    points: tuple[SteadyMotion, ...]
+    folds: tuple[float, ...]
     ended: str
 
 
@@ -45,7 +45,7 @@ def trace_over_frequency(
     modes,
     drive: SineDrive,
     group,
-    ends: tuple,
+    ends: tuple[float, float],
     harmonics: int | None = None,
     tolerance: float = 1e-3,
 ) -> Branch:
@@ -54,8 +54,11 @@ def trace_over_frequency(
     Parameters
     ----------
     modes : ModalBasis
+        Modes of the structure without the contact.
     drive : SineDrive
+        Its level is that of all points.
     group : LawGroup, or what `steady.make_group` takes
+        Laws of the interfaces.
     ends : tuple of float
         First and last frequency [Hz].
     harmonics : int, optional
@@ -113,7 +116,9 @@ def _differentiate(balance: HarmonicBalance, drive: SineDrive):
     return evaluate
 
 
-def _pack_points(first: SteadyMotion, second: SteadyMotion, width: float) -> tuple:
+def _pack_points(
+    first: SteadyMotion, second: SteadyMotion, width: float
+) -> tuple[HarmonicBalance, np.ndarray, np.ndarray, np.ndarray]:
     """Return the balance of two points on a branch, both points (packed slides, omega), and their unit, (N + 1,) each."""
     balance = HarmonicBalance(first.group.modes, first.group, first.samples)
     packed = [balance.pack_slides(motion.slides) for motion in (first, second)]
@@ -129,6 +134,7 @@ def measure_distance(first: SteadyMotion, second: SteadyMotion, width: float) ->
     Parameters
     ----------
     first, second : SteadyMotion
+        Points on the branch.
     width : float
         Frequency step [rad/s] that counts as 1.
     """
@@ -145,12 +151,16 @@ def find_point_between(
 
     Parameters
     ----------
-    modes, drive
+    modes : ModalBasis
+        Modes of the structure without the contact.
+    drive : SineDrive
+        Its level is that of the branch.
     first, second : SteadyMotion
+        Points at the ends of the step.
     fraction : float
         Fraction of the step.
     width : float
-        See `measure_distance`.
+        Frequency step [rad/s] that counts as 1.
 
     Raises
     ------
@@ -170,15 +180,19 @@ def find_point_between(
     return make_motion(balance, w[:-1], replace(drive, omega=float(w[-1])))
 
 
-def find_branches(modes, drive: SineDrive, group, tolerance: float = 1e-3) -> list:
+def find_branches(modes, drive: SineDrive, group, tolerance: float = 1e-3) -> list[SteadyMotion]:
     """Find coexisting steady motions at one drive, starting from all roots of the balance with one harmonic.
 
     Parameters
     ----------
     modes : ModalBasis
+        Modes of the structure without the contact.
     drive : SineDrive
+        Frequency and level.
     group : LawGroup, or what `steady.make_group` takes
+        Laws of the interfaces.
     tolerance : float, optional
+        Relative error of each motion.
 
     Returns
     -------

@@ -32,7 +32,7 @@ class CurvePath:
 
     x: np.ndarray
     p: np.ndarray
-    folds: tuple
+    folds: tuple[float, ...]
     ended: str
 
 
@@ -69,7 +69,12 @@ class _PathPoint(NamedTuple):
 
 
 def follow_curve(
-    evaluate, x, p: float, bounds: tuple, forward: bool = True, settings: PathSettings | None = None
+    evaluate,
+    x,
+    p: float,
+    bounds: tuple[float, float],
+    forward: bool = True,
+    settings: PathSettings | None = None,
 ) -> CurvePath:
     """Trace a solution curve of r(x, p) = 0 within bounds of the parameter.
 
@@ -78,6 +83,7 @@ def follow_curve(
     evaluate : callable
         evaluate(x, p) -> PathEquations.
     x : array_like
+        Initial guess of the unknowns (N,).
     p : float
         Initial guess of the first point, which is corrected first.
     bounds : tuple
@@ -85,6 +91,7 @@ def follow_curve(
     forward : bool, optional
         Whether p increases at first.
     settings : PathSettings, optional
+        Tolerance and steps along the curve.
 
     Raises
     ------
@@ -102,11 +109,14 @@ def follow_curve(
         raise NotConverged(
             "accuracy.method: the first point of the curve was not found near the given start"
         )
+
     point = _make_point(evaluate, first[0], along if forward else -along, unit)
     points = [point]
     folds = []
     step = settings.first_step
     ended = "points"
+
+    # A step without a solution is halved.
     while len(points) < settings.max_points:
         if not settings.size:
             unit[:-1] = max(unit[0], 0.5 * float(np.linalg.norm(point.w[:-1])))
@@ -134,6 +144,7 @@ def follow_curve(
         points.append(point)
         folds += _find_folds(previous, point, step, unit[-1])
         step = min(step * _step_factor(n_newton), settings.max_step)
+
     path = np.array([point.w for point in points])
     return CurvePath(path[:, :-1], path[:, -1], tuple(folds), ended)
 
@@ -145,7 +156,7 @@ def _step_factor(n_newton: int) -> float:
     return 1.1 if n_newton <= 5 else 0.6
 
 
-def _make_border(evaluate, w, row, unit) -> tuple:
+def _make_border(evaluate, w, row, unit) -> tuple[np.ndarray, np.ndarray]:
     """Return the scaled residual (N,), and the scaled Jacobian with a further row, (N + 1, N + 1)."""
     residual, jacobian, by_p = evaluate(w[:-1], w[-1])
     matrix = np.empty((w.size, w.size))
@@ -161,7 +172,7 @@ def correct_point(evaluate, w, tangent, unit, tolerance: float, *, is_fixed: boo
     Parameters
     ----------
     evaluate : callable
-        See `follow_curve`.
+        evaluate(x, p) -> PathEquations.
     w : (N + 1,) array
         Unknowns and parameter.
     tangent : (N + 1,) array
@@ -213,7 +224,7 @@ def _make_point(evaluate, w, direction, unit) -> _PathPoint:
     return _PathPoint(w, tangent / np.linalg.norm(tangent))
 
 
-def _find_folds(first: _PathPoint, second: _PathPoint, length: float, width: float) -> list:
+def _find_folds(first: _PathPoint, second: _PathPoint, length: float, width: float) -> list[float]:
     """Return the parameter at a fold between two points at a distance along the first tangent.
 
     The parameter is a cubic of the distance along the first tangent; a fold is its extreme.

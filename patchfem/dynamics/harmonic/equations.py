@@ -26,7 +26,7 @@ from .series import find_harmonics, pack_harmonics, unpack_harmonics
 RANK_TOL = 1e-12  # singular values of dependent rows are below it, relative to the largest
 RESONANCE_TOL = 1e-10  # dynamic stiffness of an undamped resonance, relative to the largest
 SINGULAR_RATIO = 1e-13  # smallest pivot of a regular matrix, relative to the largest
-NEWTON_TOL = 1e-10  # change of the unknowns, relative to their size, at which Newton's method ends
+BALANCE_TOL = 1e-10  # change of the unknowns, relative to their size, at which Newton's method ends
 MIN_FRACTION = 0.02  # smallest fraction of a Newton step
 MAX_RESIDUAL = (
     1e-7  # residual after the last step, relative to the unknowns and the drive, that is round-off
@@ -117,7 +117,7 @@ class HarmonicBalance:
 
     def make_stiffness(
         self, omega: float, harmonics: int, damping=None, *, has_springs: bool = True
-    ) -> tuple:
+    ) -> tuple[np.ndarray, np.ndarray]:
         """Return P_k, or S_k without springs, and dS_k/d omega, (H + 1, n, n) each.
 
         Parameters
@@ -125,6 +125,7 @@ class HarmonicBalance:
         omega : float
             [rad/s].
         harmonics : int
+            Number of harmonics H.
         damping : (H + 1, n, n) array, optional
             Damping matrices [1/s]; default: that of the modes.
         has_springs : bool
@@ -150,6 +151,7 @@ class HarmonicBalance:
         omega : float
             [rad/s].
         linear : LinearPart
+            Transfer matrices of the linear part, and their change with omega.
         exciting : (H + 1, n) array
             Accelerations of the coordinates by the drive [m s-2].
         measured : (p, n) array
@@ -208,7 +210,9 @@ class HarmonicBalance:
             motion,
         )
 
-    def solve(self, x, omega: float, level: float, max_steps: int = MAX_STEPS) -> tuple:
+    def solve(
+        self, x, omega: float, level: float, max_steps: int = MAX_STEPS
+    ) -> tuple[np.ndarray, Equations, int]:
         """Solve the balance from unknowns x (N,).
 
         Returns
@@ -246,6 +250,7 @@ class HarmonicBalance:
         omega, level : float
             Frequency [rad/s] and amplitude [m s-2] of the drive.
         harmonics : int
+            Number of harmonics H.
         """
         equations = self.evaluate(np.zeros(self.rank * (2 * harmonics + 1)), omega, level)
         return -factor(equations.jacobian)(equations.residual)
@@ -303,6 +308,7 @@ def solve_damped(evaluate, x, is_solved, max_steps: int = MAX_STEPS) -> tuple | 
         is_solved(record, linearised residual after the last step, norm of x) -> whether x is a solution. The step also
         vanishes at a least-squares minimum that is none.
     max_steps : int
+        Largest number of Newton steps.
 
     Returns
     -------
@@ -317,7 +323,7 @@ def solve_damped(evaluate, x, is_solved, max_steps: int = MAX_STEPS) -> tuple | 
         size = float(np.linalg.norm(x))
         if not np.isfinite(length):
             return None
-        if length <= max(NEWTON_TOL * size, 1e-300):
+        if length <= max(BALANCE_TOL * size, 1e-300):
             residual = equations.residual + equations.jacobian @ step
             return (x + step, equations, count) if is_solved(equations, residual, size) else None
 

@@ -48,13 +48,18 @@ def solve_cycle(numbers, q, velocity, dt, stretch, steps, force, slopes):
             )
             kept *= steps[0, i]
             largest = max(largest, abs(now))
+
+        # The cycle is closed if the gap is small beside the part of the stretch that fades in a cycle.
         gap = abs(now - start)
         is_closed = gap <= CLOSED_RATIO * largest * min(1 - kept, 1.0)
         if is_closed or (cycle > 2 and gap > 0.5 * last):
             break
+
         last = gap
+        # Newton step of end(start) - start, with the derivative `kept` of end.
         fades = cycle > 0 and kept < 1 - MIN_FADING
         start += (now - start) / (1 - kept) if fades else now - start
+
     for i in range(n):
         rates = law.rate_equation(
             numbers, stretch[i], velocity[i], 1.0 if velocity[i] > 0 else -1.0
@@ -71,7 +76,9 @@ def solve_recursion(decay, source):
     Parameters
     ----------
     decay : (M,) array
+        Factor from one node to the next.
     source : (M,) complex array
+        Source at each node, and z afterwards.
     """
     kept = 1.0
     now = 0.0 + 0.0j

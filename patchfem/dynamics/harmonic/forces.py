@@ -43,6 +43,8 @@ class LawGroup:
             is_pair = isinstance(part, tuple) and not isinstance(part, Element)
             row, law = part if is_pair else (0, part)
             law = make_law(law) if law is None or isinstance(law, Element) else law
+
+            # Equal rows and equal numbers share a key, as their laws act side by side on one slide.
             if np.ndim(row):
                 vector = np.asarray(row, float)
                 key = vector.tobytes()
@@ -54,8 +56,10 @@ class LawGroup:
                     )
                 vector = modes.interfaces[row]
                 key = int(row)
+
             rows[key] = vector
             laws.setdefault(key, []).append(law)
+
         if not rows:
             raise PatchfemError("harmonic balance needs a friction law on at least one interface")
         self.modes = modes
@@ -88,6 +92,7 @@ class LawGroup:
         Parameters
         ----------
         harmonics : int
+            Number of harmonics that are to be resolved.
         amplitudes : (i,) array, optional
             Amplitudes of the slides [m]; without them the corners are not resolved.
         """
@@ -133,6 +138,7 @@ class LawGroup:
         Parameters
         ----------
         q : (i, H + 1) array
+            Harmonics of the slides [m].
         omega : float
             [rad/s].
         samples : int

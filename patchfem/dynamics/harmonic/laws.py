@@ -102,7 +102,7 @@ class Jenkins(Law):
 
     stiffness: np.ndarray
     limit_slide: np.ndarray
-    curve: tuple = ()
+    curve: tuple[np.ndarray, ...] = ()
 
     def __post_init__(self):
         k, w = (np.atleast_1d(np.asarray(v, float)) for v in (self.stiffness, self.limit_slide))
@@ -171,7 +171,7 @@ class Jenkins(Law):
             memory.append(_Reversal(end, q[turns[end]], force, stretch, holds))
         return LawForce(out[0], out[1], 0.0, out[3:], self.limit, out[2])
 
-    def _follow_branches(self, q, nodes, memory: list, out) -> None:
+    def _follow_branches(self, q, nodes, memory: list[_Reversal], out) -> None:
         """Write the force between two reversals, and remove the reversals that are passed from the memory.
 
         Parameters
@@ -179,6 +179,7 @@ class Jenkins(Law):
         q, nodes : (k,) array
             Slides [m] after the last reversal in the memory up to the next one, and their columns in `out`.
         memory : list of _Reversal
+            Reversals that are not yet passed, the last one at the end.
         out : (3 + r, M) array
             Force, stiffness, stretch times limit, and derivatives by the slides at reversals.
         """
@@ -298,7 +299,9 @@ class FlowLaw(Law):
         limit = self.element.limit
         return LawForce(force, limit=limit, stretch=limit * stretch, states=states)
 
-    def differentiate(self, slides: Slides, row: int, states: FlowStates) -> tuple:
+    def differentiate(
+        self, slides: Slides, row: int, states: FlowStates
+    ) -> tuple[np.ndarray, np.ndarray]:
         """Return the derivatives of the harmonics of the force by those of the slide and by the frequency.
 
         Returns

@@ -7,7 +7,7 @@ import numpy as np
 from ...core import Response
 from ...structure.histories import make_response
 from .forces import LawGroup
-from .laws import Interlock, Jenkins
+from .laws import Interlock, Jenkins, LawForce
 from .series import half_range
 from .slides import Slides, make_slides
 
@@ -53,7 +53,7 @@ class SteadyMotion:
         """Return the slides of a cycle; samples: samples per cycle, 0 for those of the motion."""
         return make_slides(self.slides, self.omega, samples or self.samples)
 
-    def find_reversals(self) -> tuple:
+    def find_reversals(self) -> tuple[tuple[float, float, float], ...]:
         """Return displacement [m], friction force [N] and slip [m] of the first row at its lowest and highest reversal.
 
         The result is () for an interface at rest.
@@ -70,7 +70,7 @@ class SteadyMotion:
         return tuple((float(q[k]), float(friction[k]), float(slip[k])) for k in ends)
 
 
-def sum_friction(laws: tuple, forces: list) -> np.ndarray:
+def sum_friction(laws: tuple[object, ...], forces: list[LawForce]) -> np.ndarray:
     """Return the friction force (M,) [N] of an interface row.
 
     The interlock of [structure.bonded] is a spring parallel to the contact, so its force is not friction.
@@ -79,7 +79,7 @@ def sum_friction(laws: tuple, forces: list) -> np.ndarray:
     return sum(friction or [force.force for force in forces])
 
 
-def find_slip(q, forces: list) -> np.ndarray:
+def find_slip(q, forces: list[LawForce]) -> np.ndarray:
     """Return the slip (M,) [m] of an interface row: its slide less the mean elastic stretch; 0 without friction."""
     limit = sum(force.limit for force in forces)
     return q - sum(force.stretch for force in forces) / limit if limit > 0 else 0 * q
@@ -114,7 +114,7 @@ def find_regime(motion: SteadyMotion) -> str:
     return "slides" if slipping > (1 - 1e-12) * total else "partial slip"
 
 
-def find_cycle_energies(motion: SteadyMotion, modes) -> dict:
+def find_cycle_energies(motion: SteadyMotion, modes) -> dict[str, float]:
     """Return the drive work, viscous loss and friction work per cycle [J] of a motion, by Parseval's theorem.
 
     `balance` is the imbalance of these energies relative to the work of the drive [1]. A spring among the laws adds
@@ -149,8 +149,11 @@ def make_cycle_response(motion: SteadyMotion, modes, drive, samples: int = 1000)
     Parameters
     ----------
     motion : SteadyMotion
+        Motion, with its level and frequency.
     modes : ModalBasis
-    drive
+        Modes of the structure without the contact.
+    drive : core.SineDrive
+        Drive of the motion.
     samples : int, optional
         Number of equal steps of the cycle.
     """
@@ -164,12 +167,15 @@ def make_cycle_response(motion: SteadyMotion, modes, drive, samples: int = 1000)
         chosen = values[..., slides.is_sample][..., ::stride]
         return np.concatenate([chosen, chosen[..., :1]], axis=-1).T
 
+    # Modal motion z = Re sum z_k exp(i k omega t) and its rate.
     k = np.arange(len(motion.modal))[:, None]
     waves = np.exp(1j * k * np.linspace(0, 2 * np.pi, samples + 1))
     z = (motion.modal.T @ waves).real.T
     rate = ((1j * k * omega * motion.modal).T @ waves).real.T
+
     total = select(np.array([sum(force.force for force in row) for row in forces]))
     time = np.arange(samples + 1) * (2 * np.pi / omega / samples)
+
     interface = (
         slides.q[0],
         omega * slides.rate[0],

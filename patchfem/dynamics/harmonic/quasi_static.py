@@ -96,6 +96,7 @@ def find_static_motions(
     modes : ModalBasis
         Modes of the structure, without the contact.
     group : LawGroup
+        Laws of the interfaces.
     mode : int
         Index of the coordinate of the mode.
     amplitudes : array_like
@@ -114,7 +115,7 @@ def find_static_motions(
         raise PatchfemError(SPEED_MESSAGE)
     stiffness = group.stiffness()
 
-    def find_mode(slides, amplitude: float) -> tuple:
+    def find_mode(slides, amplitude: float) -> tuple[float, np.ndarray, list[StaticLoops]]:
         """Return frequency, coordinates at an amplitude, and loops of the mode with the secants at slides (i,) [m]."""
         loops = [find_loops(laws, u, samples) for u, laws in zip(slides, group.laws)]
         secants = [loop.tip / u if u > 0 else k for u, loop, k in zip(slides, loops, stiffness)]
@@ -146,6 +147,7 @@ def find_static_motions_from_loops(
     Parameters
     ----------
     modes : ModalBasis
+        Modes of the structure, without the contact.
     row : ndarray
         (n,) slide per coordinate.
     mode : int

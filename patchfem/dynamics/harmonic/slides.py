@@ -11,7 +11,7 @@ import numpy as np
 from .series import evaluate_series
 
 MIN_RATE = 1e-13  # smallest velocity that has a direction, relative to the largest of the cycle
-MAX_STEPS = 60  # largest number of steps to a reversal
+MAX_REVERSAL_STEPS = 60  # largest number of steps to a reversal
 ANGLE_TOL = 1e-14  # change of the angle of a reversal that is round-off [rad]
 
 
@@ -32,7 +32,7 @@ class Slides(NamedTuple):
     q: np.ndarray
     rate: np.ndarray
     is_sample: np.ndarray
-    reversals: list
+    reversals: list[np.ndarray]
 
     @property
     def widths(self) -> np.ndarray:
@@ -104,7 +104,7 @@ def find_reversals(x, rate) -> np.ndarray:
 
     # Newton's method on the velocity, or bisection where it leaves the interval.
     k = np.arange(x.size)
-    for _ in range(MAX_STEPS):
+    for _ in range(MAX_REVERSAL_STEPS):
         waves = np.exp(1j * np.outer(at, k)) * x
         speed = (waves @ (1j * k)).real
         bend = -(waves @ (k * k)).real

@@ -35,7 +35,9 @@ def add_stability(motion: SteadyMotion, modes, cells: int = 0) -> SteadyMotion:
     Parameters
     ----------
     motion : SteadyMotion
+        Solution of the harmonic balance.
     modes : ModalBasis
+        Modes of the structure without the contact.
     cells : int
         Number of cells of the cycle; 0 for MIN_CELLS, or for the samples of the motion if they are more.
     """
@@ -56,9 +58,11 @@ def find_monodromy(motion: SteadyMotion, modes, cells: int = 0) -> np.ndarray:
     Parameters
     ----------
     motion : SteadyMotion
+        Solution of the harmonic balance.
     modes : ModalBasis
+        Modes of the structure without the contact.
     cells : int
-        See `add_stability`.
+        Number of cells of the cycle; 0 for MIN_CELLS, or for the samples of the motion if they are more.
 
     Returns
     -------

@@ -44,8 +44,11 @@ def find_steady_motion(
     Parameters
     ----------
     modes : ModalBasis
+        Modes of the structure without the contact.
     drive : core.SineDrive
+        Frequency and level.
     group : LawGroup, or what `make_group` takes
+        Laws of the interfaces.
     harmonics : int, optional
         Number of harmonics; as many as the tolerance needs by default.
     tolerance : float, optional
@@ -61,6 +64,7 @@ def find_steady_motion(
     """
     group = make_group(modes, group)
     slides = start.slides if isinstance(start, SteadyMotion) else start
+
     motion = None
     for h in _choose_counts(drive, group, harmonics, start):
         # Corners of the force are resolved once the amplitude is known.
@@ -72,11 +76,13 @@ def find_steady_motion(
             if isinstance(failure, Unbounded) or h == HARMONIC_COUNTS[-1] or harmonics:
                 raise
             continue
+
         known = None if motion is None else motion.slides
         motion = make_motion(balance, x, drive, known, count)
         if motion.error <= tolerance and known is not None and not harmonics:
             break
         slides = motion.slides
+
     if not harmonics and motion.error > tolerance:
         raise NotConverged(
             f"accuracy.tolerance: with {HARMONIC_COUNTS[-1]} harmonics the motion still has an error of "
@@ -111,8 +117,11 @@ def make_motion(balance: HarmonicBalance, x, drive, coarser=None, n_steps: int =
     Parameters
     ----------
     balance : HarmonicBalance
+        Balance that is solved.
     x : (N,) array
+        Packed slides [m] that solve it.
     drive : core.SineDrive
+        Frequency and level.
     coarser : (i, K + 1) array, optional
         Slides [m] of a coarser solution; the change from them is the error. Without them it is the size of as many further
         harmonics, which follow from the force.
@@ -147,8 +156,11 @@ def refine_steady_motion(motion: SteadyMotion, modes, drive) -> SteadyMotion:
     Parameters
     ----------
     motion : SteadyMotion
+        Motion that is the initial guess.
     modes : ModalBasis
+        Modes of the structure without the contact.
     drive : core.SineDrive
+        Frequency and level.
 
     Raises
     ------
@@ -164,7 +176,7 @@ def refine_steady_motion(motion: SteadyMotion, modes, drive) -> SteadyMotion:
 # ---- search for a first solution
 
 
-def _solve_from_guesses(balance: HarmonicBalance, drive, h: int, slides) -> tuple:
+def _solve_from_guesses(balance: HarmonicBalance, drive, h: int, slides) -> tuple[np.ndarray, int]:
     """Solve a balance from several initial guesses in turn, and finally from weaker drives.
 
     Returns the unknowns, and the number of Newton steps.
@@ -216,7 +228,9 @@ def _follow_levels(balance: HarmonicBalance, omega: float, level: float, h: int)
     )
 
 
-def find_one_harmonic_roots(balance: HarmonicBalance, omega: float, level: float) -> list:
+def find_one_harmonic_roots(
+    balance: HarmonicBalance, omega: float, level: float
+) -> list[np.ndarray]:
     """Find the slides (i, 2) [m] of all solutions of the balance with one harmonic.
 
     The balance is evaluated at amplitudes of the linear motion. For one row the result is exact, because a phase turns
@@ -225,6 +239,7 @@ def find_one_harmonic_roots(balance: HarmonicBalance, omega: float, level: float
     Parameters
     ----------
     balance : HarmonicBalance
+        Balance of modes and laws.
     omega, level : float
         Frequency [rad/s] and amplitude [m s-2] of the drive.
     """
@@ -246,6 +261,7 @@ def find_one_harmonic_roots(balance: HarmonicBalance, omega: float, level: float
     def find_mismatch(log: float) -> float:
         return abs(find_drive(log)) - 1
 
+    # An amplitude of the slide is a root if it needs the given drive; its phase turns that of the drive to 0.
     grid = np.log(size) + np.linspace(*np.log(ROOT_RANGE), N_ROOT_AMPLITUDES)
     values = [find_mismatch(log) for log in grid]
     roots = []
@@ -257,7 +273,7 @@ def find_one_harmonic_roots(balance: HarmonicBalance, omega: float, level: float
     return roots
 
 
-def _bracket_roots(function, grid, values) -> list:
+def _bracket_roots(function, grid, values) -> list[tuple[float, float]]:
     """Return intervals (a, b) that enclose the sign changes of a function on a grid (k,).
 
     A sample closer to zero than its neighbours may hide two roots; its minimum is then located.

@@ -119,7 +119,7 @@ def _choose_form(out: Path, settings: EstimateOptions, *, zero: bool) -> str:
     return form
 
 
-def _write_table(file: Path, out: Path, requests: Iterable[str], zero: bool) -> dict:
+def _write_table(file: Path, out: Path, requests: Iterable[str], zero: bool) -> dict[str, object]:
     """Write measured records as a table."""
     found = laboratory.read_records(file, records.parse_requests(requests))
     values = records.shift_to_zero(found.values) if zero else found.values
@@ -131,7 +131,9 @@ def _write_table(file: Path, out: Path, requests: Iterable[str], zero: bool) -> 
     return {"rows": rows, "units": units, "notes": found.notes, "told": told}
 
 
-def _write_decay(values: dict, out: Path, begin: float | None, notes: list[str]) -> dict:
+def _write_decay(
+    values: dict[str, np.ndarray], out: Path, begin: float | None, notes: list[str]
+) -> dict[str, object]:
     """Write frequency and damping ratio of a measured decay as a table."""
     curve, curve_notes = measured_modes.compute_decay_curve(values, begin)
     columns = [
@@ -155,7 +157,7 @@ def _write_decay(values: dict, out: Path, begin: float | None, notes: list[str])
 
 def _write_modes(
     modes: measured_modes.ListedModes, out: Path, source: str, notes: list[str]
-) -> dict:
+) -> dict[str, object]:
     """Write identified modes as tables of a scene."""
     write_text(out, format_structure(modes, source))
     columns = (modes.frequency.tolist(), modes.damping.tolist(), modes.descriptions)

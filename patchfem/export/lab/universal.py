@@ -64,6 +64,7 @@ def make_dataset(
     function : int
         LOOP, HISTORY, RESPONSE or COHERENCE.
     x, y : Column
+        Abscissa and ordinate.
     **entries
         Further entries of the dataset; pyuff has default values.
     """
@@ -98,11 +99,13 @@ def write_histories(
     Parameters
     ----------
     path : Path
+        File that is written.
     columns : sequence of Column
         The time comes first; without it there are only loops.
     loops : sequence of (Column, Column)
         Slide and force.
     title : str
+        Fourth line of identification.
 
     Raises
     ------

@@ -52,6 +52,7 @@ def answer_files(
     before, after : Path
         Two traces or two scans.
     options : Options
+        What is known of the two surfaces.
     predicted : Path, optional
         Results folder of a run with [wear], whose depth is fitted to the measured depth.
     piece : str
@@ -89,7 +90,9 @@ def compare_with_scene(
     Parameters
     ----------
     before, after : Path
+        Two traces.
     options : Options
+        What is known of the two surfaces.
     run_surfaces : callable
         Receives the paths of both traces, limited to their common part, and runs the scene with each.
     folder : Path
@@ -115,6 +118,7 @@ def make_answer(comparison: Comparison) -> Answer:
     surfaces = (comparison.before, comparison.after)
     file_notes = [note for surface in surfaces for note in surface.notes]
     track = comparison.track
+
     answer = build(
         sources=[surface.source for surface in surfaces],
         words=words._replace(notes=(*words.notes, *file_notes)),
@@ -133,6 +137,7 @@ def make_answer(comparison: Comparison) -> Answer:
             "notes": file_notes,
         },
     )
+    # A mean depth is meaningless without the region of the mean.
     if sentences.is_known(comparison.values.get("worn_depth_mean")):
         region = sentences.describe_region(comparison).removeprefix("the ")
         answer.details["worn_depth_mean"]["over"] = region
@@ -146,7 +151,7 @@ def build(
     values: dict[str, Quantity],
     track: dict[str, Quantity],
     data: dict[str, Variable],
-    details: dict,
+    details: dict[str, object],
 ) -> Answer:
     """Return the answer of a comparison of two surfaces or runs.
 
@@ -155,16 +160,20 @@ def build(
     sources : list of str
         Files or folders before and after wear.
     words : Words
+        Verdict, warnings and notes.
     values, track : dict of str to Quantity
         Quantities of the whole surface, and of the longest track ({} without one).
     data : dict of str to Variable
+        Variables of the charts by name.
     details : dict
         Further content of compare.json.
     """
+    # Values are shown once on the page; compare.json has them all.
     values = values | {name_in_track(name): value for name, value in track.items()}
     shown = [
         name for name in values if name not in SHOWN_ELSEWHERE and not _is_repeated(name, values)
     ]
+
     content = {
         "patchfem": __version__,
         "verdict": words.verdict[0],
@@ -174,6 +183,7 @@ def build(
         **to_json(values),
         "track": to_json(track) or None,
     }
+
     return Answer(
         kind="compare",
         title=" and ".join(Path(source).name for source in sources),
@@ -192,7 +202,7 @@ def _is_repeated(name: str, values: dict[str, Quantity]) -> bool:
     return name == "track_area_gross" and area is not None and area[:3] == values[name][:3]
 
 
-def _describe_place(comparison: Comparison) -> dict:
+def _describe_place(comparison: Comparison) -> dict[str, object]:
     """Return how the second surface lies on the first one: `reference` and `registration` of compare.json."""
     placement = comparison.evidence.placement
     names = ("shift_x", "shift_y", "rotation") if comparison.is_areal else ("shift",)
@@ -204,7 +214,7 @@ def _describe_place(comparison: Comparison) -> dict:
     return {"reference": basis or None, "registration": registration}
 
 
-def _caption_band(comparison: Comparison) -> dict:
+def _caption_band(comparison: Comparison) -> dict[str, object]:
     """Return the caption of the band around the depth of traces, if the band is wide enough to be seen."""
     curves = comparison.evidence.curves
     if curves is None or comparison.is_areal:
@@ -215,7 +225,7 @@ def _caption_band(comparison: Comparison) -> dict:
     return {"captions": {"Worn depth": "Band: 95 % noise of a single depth."}}
 
 
-def _compare_roughness(comparison: Comparison) -> dict:
+def _compare_roughness(comparison: Comparison) -> dict[str, object]:
     """Return the roughness inside and outside of the track: `roughness` of compare.json, and the rows of a table."""
     evidence = comparison.evidence
     content = {"cutoff": evidence.cutoff, "inside": None, "outside": None}

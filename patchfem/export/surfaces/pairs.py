@@ -55,7 +55,7 @@ def answer_pairs(
     return make_answer(rows, Path(table).name)
 
 
-def _compare_line(line: TableLine, options: Options) -> dict:
+def _compare_line(line: TableLine, options: Options) -> dict[str, object]:
     """Return the content of compare.json for the pair of a line, with the cells of the line."""
     cells = {"line": line.line, "before": line.names[0], "after": line.names[1]}
     cells["labels"] = dict(line.labels)

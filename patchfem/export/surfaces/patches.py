@@ -18,7 +18,7 @@ class PatchRun(NamedTuple):
     """Run of a patch: its answer, the tables of its scene, and the state of its surface at the end."""
 
     answer: Answer
-    tables: dict
+    tables: dict[str, dict]
     state: PatchState
 
     @property

@@ -47,6 +47,7 @@ def add_predicted(answer: Answer, comparison: Comparison, folder: Path, piece: s
     values = {name: sentences.to_answer(value) for name, value in numbers.items()}
     sentence = describe(fitted)
     notes = describe_reliability(fitted)
+
     entry = {
         "coefficient": values["wear_coefficient"].as_json(),
         "patch_centre": values["patch_centre"].as_json(),
@@ -124,6 +125,8 @@ def read_history(folder: Path, piece: str = "") -> WearHistory:
     wear = run.tables.get("wear", {})
     upper_share = float(wear.get("upper_share", 0.0))
     share = {"lower": 1 - upper_share, "upper": upper_share, "": 0.5}.get(piece, 0.0)
+
+    # A run that cannot be that of the traces is refused with the reason.
     checks = (
         (
             not wear,
@@ -141,6 +144,7 @@ def read_history(folder: Path, piece: str = "") -> WearHistory:
         ),
         (not share > 0, f"no piece '{piece}' wears; give --piece upper or --piece lower"),
     )
+
     for applies, text in checks:
         if applies:
             raise PatchfemError(f"compare --predicted {folder}: {text}")

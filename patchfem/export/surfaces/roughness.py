@@ -45,6 +45,7 @@ def answer_files(paths: list[Path], units: tuple[str, str] | None = None, **opti
     Parameters
     ----------
     paths : list of Path
+        Files of traces or scans.
     units : tuple of str, optional
         Units of x (and y) and of z, for files that state none.
     **options
@@ -71,6 +72,7 @@ def make_answer(reports: list[RoughnessReport]) -> Answer:
             continue
         values = {value.name: value for value in members[0].values}
         state = ""
+        # Several surfaces of one kind give means, with a caution where these are of limited use.
         if len(members) > 1:
             averages = _average(members)
             caution = _find_caution(members)
@@ -130,7 +132,9 @@ def _find_caution(members: list[RoughnessReport]) -> list[str]:
     return [SIZES_NOTE] if (sizes.max(axis=0) > MAX_SIZE_RATIO * sizes.min(axis=0)).any() else []
 
 
-def _means_to_dict(kind: str, count: int, means: dict[str, Mean], notes: list[str]) -> dict:
+def _means_to_dict(
+    kind: str, count: int, means: dict[str, Mean], notes: list[str]
+) -> dict[str, object]:
     """Return the means of one kind of files as an object of profile.json."""
     measures = sentences.to_json({name: mean.mean for name, mean in means.items()})
     for name, mean in means.items():
@@ -180,7 +184,7 @@ def describe_treatment(each: RoughnessReport) -> str:
     return f"{text}; without a cut-off there is no roughness profile{advice and ', '}{advice}."
 
 
-def report_to_dict(each: RoughnessReport) -> dict:
+def report_to_dict(each: RoughnessReport) -> dict[str, object]:
     """Return the roughness of a surface as an object of profile.json."""
     size, treatment = each.sampling, each.treatment
     content = {
@@ -221,6 +225,7 @@ def _make_data(reports: list[RoughnessReport]) -> dict[str, Variable]:
     data |= make_variables("material_ratio", "1", material_ratio=curves[0][0])
     heights = np.array([height for _, height in curves])
     data["abbott"] = Variable(("file", "material_ratio"), heights, "m", "height")
+    # Only Abbott curves can be compared over files.
     if len(reports) > 1:
         return data
 

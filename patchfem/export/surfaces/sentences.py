@@ -244,7 +244,7 @@ def describe_waves(ratio: Quantity | None) -> list[str]:
     return [f"The waves from 60 to 110 um have {text} times their amplitude before wear: {change}."]
 
 
-def _format_numbers(numbers: dict, is_areal: bool) -> dict[str, str]:
+def _format_numbers(numbers: dict[str, float | str | None], is_areal: bool) -> dict[str, str]:
     """Return the numbers of a finding as text by name."""
     fields = defaultdict(lambda: NO_LIMIT)
     for name, number in numbers.items():

@@ -83,6 +83,8 @@ def make_answer(runs: tuple[PatchRun, PatchRun], wear: Wear) -> Answer:
         outcome = run.answer.details.get("outcome")
         sides[side] = {"outcome": outcome, "cycles": run.cycles, "measures": measures}
         warnings += [f"{side}: {text}" for text in run.answer.remarks.warnings]
+
+    # Wear only removes material, so the later run cannot be less worn.
     if float(wear.depth.min()) < -wear.error:
         warnings.append(
             f"at {_find_place(runs[1], np.argmin(wear.depth))} the later run is worn by "
@@ -91,6 +93,7 @@ def make_answer(runs: tuple[PatchRun, PatchRun], wear: Wear) -> Answer:
 
     zero = to_json({"shift": Quantity(0.0, 0.0, 0.0, "m", "")})
     names = [name for name in MEASURES if any(name in side["measures"] for side in sides.values())]
+
     return build(
         sources=[run.state.source for run in runs],
         words=sentences.Words(verdict, tuple(warnings), (NOTE,)),
@@ -133,6 +136,7 @@ def describe(runs: tuple[PatchRun, PatchRun], wear: Wear) -> tuple[str, ...]:
     )
 
     verdict = [headline, f"{loss}."]
+    # A part that hardly counts is not stated.
     if values["hidden_wear"].value > MIN_HIDDEN_RATIO * values["worn_depth_mean"].value:
         hidden = format_value("hidden_wear", values["hidden_wear"])
         measurement = "trace" if after.state.y is None else "scan"
@@ -171,9 +175,12 @@ def _make_data(runs: tuple[PatchRun, PatchRun], wear: Wear) -> dict[str, Variabl
         line = np.interp(state.x, state.x[[0, -1]], wear.hidden)
         data = make_variables("x", x=state.x, gap_before=before, gap_after=after)
         data |= make_variables("x", depth=wear.depth, hidden_depth=line)
+
     if wear.track:
         ends = np.array([wear.track[name].value for name in ("from", "to")])
         data |= make_variables("track_end", track_end=ends)
+
+    # Pressure of the last frame, and the loop of a patch without strips.
     for side, run in zip(SIDES, runs, strict=True):
         own, x = run.answer.data, f"x_pressed_{side}"
         pressure = own["normal_stress"].values[-1]

@@ -36,17 +36,23 @@ def make_answer(
     Parameters
     ----------
     sweep_scene : SweepScene
+        Scene with its table [sweep].
     cases : Cases
+        Cases that were asked for.
     table : SweepTable
+        Their results.
     case_folders : sequence of str
         Folders of the cases inside cases/; empty if there are none.
     """
     analysis = analyse(table)
     verdict = make_verdict(table, analysis)
     notes = [sweep_scene.note_bolted_joint()] if sweep_scene.note_bolted_joint() else []
+
+    # Programs read the verdict from sweep.json, which has no page around it.
     details = {"answer": verdict[0], "sentences": list(verdict)}
     details |= _make_details(table, analysis) | {"of": identify_sweep(sweep_scene, cases)}
     keys = " × ".join(key.key for key in table.keys)
+
     return Answer(
         kind="sweep",
         title=f"Sweep of {keys} ({sweep_scene.path.stem})",
@@ -85,7 +91,7 @@ def _make_command(sweep_scene: SweepScene, cases: Cases) -> str:
     return shlex.join([*words, *cases.arguments])
 
 
-def _make_details(table: SweepTable, analysis: SweepAnalysis) -> dict:
+def _make_details(table: SweepTable, analysis: SweepAnalysis) -> dict[str, object]:
     """Return the numbers of sweep.json."""
     ranking = {
         name: [index._asdict() for index in indices] for name, indices in analysis.ranking.items()
@@ -104,7 +110,7 @@ def _make_details(table: SweepTable, analysis: SweepAnalysis) -> dict:
     }
 
 
-def _make_peak_row(table: SweepTable, entry: PeakOnLine) -> dict:
+def _make_peak_row(table: SweepTable, entry: PeakOnLine) -> dict[str, object]:
     """Return a peak as a row of sweep.json."""
     unit = table.measures[entry.measure].unit
     row = {"measure": entry.measure, "case": describe_place(table, entry)}
@@ -112,7 +118,7 @@ def _make_peak_row(table: SweepTable, entry: PeakOnLine) -> dict:
     return row | {name: quantity.as_json() for name, quantity in quantities.items()}
 
 
-def _make_quantile_row(values: np.ndarray, unit: str) -> dict:
+def _make_quantile_row(values: np.ndarray, unit: str) -> dict[str, dict]:
     """Return quantiles as objects of sweep.json."""
     names = ("low", "median", "high")
     return {name: Quantity(value, unit).as_json() for name, value in zip(names, values.tolist())}
@@ -124,6 +130,8 @@ def _make_quantities(table: SweepTable, analysis: SweepAnalysis) -> Quantities:
     if len(analysis.peaks) == 1:
         unit = table.measures[analysis.peaks[0].measure].unit
         quantities |= make_peak_quantities(analysis.peaks[0], unit)
+
+    # A limit without a value gives the reason.
     for limit in analysis.limits:
         reason = "" if np.isfinite(limit.value) else "the cases do not show where it lies"
         quantities[f"limit_{limit.measure}"] = Quantity(
@@ -133,6 +141,7 @@ def _make_quantities(table: SweepTable, analysis: SweepAnalysis) -> Quantities:
             high=limit.high,
             reason="it is reached in no case" if limit.is_never_reached else reason,
         )
+
     for name, low, high, _ in analysis.ranges[:MAX_RANGES]:
         column = table.measures[name]
         for word, case in (("smallest", low), ("largest", high)):

@@ -57,6 +57,8 @@ def _describe_change(table: SweepTable, analysis: SweepAnalysis) -> str:
             f"With {varied[0].key}, {_label(name)} changes most: from {low} at {places[0]} "
             f"to {high} at {places[1]}."
         )
+
+    # With several keys the largest total index of Sobol names the main one.
     share = ""
     for index in analysis.ranking.get(name, ())[:1]:
         share = f", mainly with {index.key} ({100 * index.total:.0f} % of its variance)"

@@ -20,13 +20,17 @@ class LocalExecutor:
     workers = 1
 
     def run(
-        self, work: WorkerData, next_chunk: Callable, say: Callable | None = None
+        self,
+        work: WorkerData,
+        next_chunk: Callable[..., list[int] | None],
+        say: Callable | None = None,
     ) -> Iterator[tuple]:
         """Compute the chunks that the callback `next_chunk` returns, and yield their results.
 
         Parameters
         ----------
         work : WorkerData
+            What a worker needs to compute any case.
         next_chunk : callable
             Returns the case numbers of the next chunk, or None if none is left.
         say : callable, optional

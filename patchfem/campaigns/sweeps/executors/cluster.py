@@ -92,7 +92,7 @@ class Cluster(FutureExecutor):
             self.end()
             raise
 
-    def _require_same_versions(self, here: dict, worker: dict) -> None:
+    def _require_same_versions(self, here: dict[str, dict], worker: dict[str, dict]) -> None:
         """Raise Missing if a worker has other versions than this machine; both are answers of Dask."""
         for name in COMPARED_VERSIONS:
             own, other = ({**node["host"], **node["packages"]}[name] for node in (here, worker))
@@ -114,7 +114,7 @@ class Cluster(FutureExecutor):
             )
             self.executor = self.client.get_executor(pure=False)
 
-    def submit(self, chunk: list) -> Future:
+    def submit(self, chunk: list[int]) -> Future:
         """Submit a chunk; raise Missing if the connection to the scheduler is lost."""
         with self._report_lost_connection():
             return self.executor.submit(_compute_on_worker, self.shared, chunk, self.common_data)
@@ -141,7 +141,7 @@ def _identity(work: WorkerData) -> WorkerData:
     return work
 
 
-def _compute_on_worker(work: WorkerData, chunk: list[int], common_data: str) -> tuple:
+def _compute_on_worker(work: WorkerData, chunk: list[int], common_data: str) -> tuple[float, tuple]:
     """Compute a chunk of case numbers on a Dask worker; return the result of `compute_chunk`.
 
     Raises Missing if the files of the scene differ from those of the process that started the sweep, whose hash is

@@ -39,13 +39,17 @@ class FutureExecutor:
     name = ""
 
     def run(
-        self, work: WorkerData, next_chunk: Callable, say: Callable | None = None
+        self,
+        work: WorkerData,
+        next_chunk: Callable[..., list[int] | None],
+        say: Callable | None = None,
     ) -> Iterator[tuple]:
         """Compute the chunks that the callback `next_chunk` returns, and yield their results.
 
         Parameters
         ----------
         work : WorkerData
+            What a worker needs to compute any case.
         next_chunk : callable
             Returns the case numbers of the next chunk, or None if none is available; takes `is_idle`, whether no other
             chunk is being computed.
@@ -78,7 +82,7 @@ class FutureExecutor:
         finally:
             self.end()
 
-    def receive(self, future: Future) -> tuple:
+    def receive(self, future: Future) -> tuple[float, tuple | WorkerDeath]:
         """Return seconds and answer of a finished future; 0 s and a WorkerDeath if its worker died or failed.
 
         Raises Missing if the connection to the workers is lost, or if a worker lacks something.
@@ -135,7 +139,7 @@ class Pool(FutureExecutor):
         self.processes = _OwnProcesses()
         self.last_chunks: dict[ProcessPoolExecutor, Future] = {}
 
-    def submit(self, chunk: list) -> Future:
+    def submit(self, chunk: list[int]) -> Future:
         """Submit a chunk to an idle process, or to a new one; raise Missing if none can be started."""
         idle = [executor for executor, future in self.last_chunks.items() if future.done()]
         for executor in idle:
@@ -185,7 +189,7 @@ def _worker_environment() -> Iterator[None]:
 
 
 # Data of the sweep in a worker process, and the function that prints a line of text.
-_PROCESS_DATA: list = []
+_PROCESS_DATA: list[WorkerData | Callable | None] = []
 
 
 def _begin_process(work: WorkerData, say: Callable | None) -> None:
@@ -204,7 +208,7 @@ def _end_with_parent() -> None:
     os._exit(1)
 
 
-def _compute_in_process(chunk: list) -> tuple:
+def _compute_in_process(chunk: list[int]) -> tuple[float, tuple]:
     """Compute a chunk in a worker process; return the result of `compute_chunk`."""
     work, say = _PROCESS_DATA
     return compute_chunk(work, chunk, say)
