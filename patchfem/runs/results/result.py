@@ -308,8 +308,8 @@ def collect_used_settings(result) -> dict:
 
     These are the engine, the steps per cycle or the harmonics, the cycles of the window, shear modes
     or elements of the pieces, the summation method for bonds, nodes and strips of the patch, and
-    the averaging length [m] of its profile. map: "events" or "yields", the map by which the steady
-    motion was found.
+    the averaging length [m] of its profile. map: "shooting" if the steady motion was found by Newton's
+    method on the map of a period.
     """
     patch = result.patch
 
