@@ -106,7 +106,7 @@ def advance_list(numbers, values, lists, j, v0, v1, dt):
     before = status[STATUS.energy]
     has_room = list_step(values[Point.SLIDE, j], bonds, v0, v1, dt)
     if values[Point.END_LOAD, j] <= 0.0:
-        break_bonds(0, bonds)
+        break_bonds(bonds)
     loss = values[Point.FORCE, j] * values[Point.SLIDE, j]
     loss -= static * (status[STATUS.energy] - before)
     if bonds.law[LAW.form] == FORM_STRETCH:

@@ -55,7 +55,6 @@ PUBLIC = {
         "Friction",
         "Structure",
         "Tables",
-        "Temperature",
     ),
     "keys.types": ("Key", "list_keys"),
     "lines": (
