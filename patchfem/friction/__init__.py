@@ -51,7 +51,6 @@ PUBLIC = {
         "short_bond_mean",
         "short_bond_step",
     ),
-    "bonds.points_kernels": ("point_list",),
     "bonds.spread": ("carried_fraction",),
     "grooves": ("Grooves",),
     "laws.bouc_wen_kernels": ("follow_path",),
