@@ -455,9 +455,9 @@ def cost(
     return answer.details
 
 
-def _save(make_answer: Callable[[Path], Any], out: str | Path, *, resume: bool = False) -> Any:
+def _save(make_answer: Callable[[Path], Any], out: str | Path) -> Any:
     """Write the answer of a function of the results folder with its page into this folder, and return it."""
-    with Folder(Path(out), resume) as folder:
+    with Folder(Path(out)) as folder:
         answer = make_answer(folder.path)
         store.write(answer, folder.path)
         page.write_page(folder.path)
@@ -832,7 +832,7 @@ def fit(
     listener = fit_requests.Listener(_print_to_stderr if say is None else say)
     compute = partial(fits.compute_answer, loaded, data_path, ranges, options, listener)
     if out is not None:
-        return _save(compute, out, resume=options.resume).details
+        return _save(compute, out).details
     with TemporaryDirectory() as temporary_folder:
         return compute(Path(temporary_folder)).details
 

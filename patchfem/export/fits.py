@@ -61,7 +61,7 @@ def compute_answer(
     listener: Listener,
     folder: Path,
 ) -> Answer:
-    """Fit keys of a scene to a measurement; starts of the search and the fitted scene are written into a folder.
+    """Fit keys of a scene to a measurement; the fitted scene is written into a folder.
 
     Parameters
     ----------

@@ -34,5 +34,5 @@ PUBLIC = {
     ),
     "laws": ("make_point_law",),
     "time_march": ("March", "Motion", "Snapshot", "count_list_bytes", "load_kernels", "march"),
-    "slides": ("follow",),
+    "slides": ("BLOCK", "follow"),
 }

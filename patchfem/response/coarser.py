@@ -6,12 +6,13 @@ runs and the rule that estimates errors from their measures (`errors`). Each run
 Out: errors by source and measure name.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Hashable
 from functools import partial
 from time import perf_counter
 from typing import NamedTuple
 
 from .errors import MAX_ORDER, convergence_errors
+from .measures import Values
 
 # Rule of CoarserRuns for a coarser mesh or fewer shear modes.
 second_order_errors = partial(convergence_errors, order=MAX_ORDER)
@@ -28,10 +29,13 @@ class CoarserRuns(NamedTuple):
       "own" if no key of a scene sets it.
     """
 
-    runs: tuple
-    rule: Callable
-    reference: object = None
+    runs: tuple[Hashable, ...]
+    rule: Callable[..., Values]
+    reference: Hashable = None
     source: str = "own"
+
+
+ComparisonRuns = list[CoarserRuns]  # one for each source of error
 
 
 class StepRun(NamedTuple):
@@ -44,10 +48,10 @@ class StepRun(NamedTuple):
 
     steps: int
     seconds: float
-    values: dict
+    values: Values
 
 
-def estimate_errors(solve: Callable, fine: dict, coarse_runs, solved_runs: dict) -> tuple:
+def estimate_errors(solve: Callable, fine: Values, coarse_runs, solved_runs: dict) -> tuple:
     """Compute coarser runs, and estimate the errors of the measures by source.
 
     Parameters
@@ -57,6 +61,7 @@ def estimate_errors(solve: Callable, fine: dict, coarse_runs, solved_runs: dict)
     fine : dict
         Measures of the fine run by name.
     coarse_runs : sequence of CoarserRuns
+        Settings of the coarse runs and rule of their error, by source.
     solved_runs : dict
         Known runs by settings; new runs are added.
 
@@ -69,7 +74,7 @@ def estimate_errors(solve: Callable, fine: dict, coarse_runs, solved_runs: dict)
     """
     begin = perf_counter()
 
-    def solve_values(settings) -> dict:
+    def solve_values(settings) -> Values:
         """Return the measures of a run with given settings, computed only once."""
         if settings not in solved_runs:
             solved_runs[settings] = solve(settings)

@@ -16,27 +16,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
-from .measures import find_reversal_steps
+from .measures import ArrayPair, find_reversal_steps
 
 # Candidate spans of a fit: number of half cycles on either side of a point.
-SPAN_LENGTHS = (
-    1,
-    2,
-    3,
-    4,
-    6,
-    8,
-    12,
-    16,
-    24,
-    32,
-    48,
-    64,
-    96,
-    128,
-    192,
-    256,
-)
+SPAN_LENGTHS = (1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64, 96, 128, 192, 256)
 # Largest difference between the slopes fitted over two spans, in standard deviations.
 MAX_SLOPE_DIFFERENCE = 2.0
 # Half-width of a 95 % interval in standard deviations; above 1.96, because the span of the fit is
@@ -131,7 +114,7 @@ class DecayCurve(NamedTuple):
         )
 
 
-def locate_reversals(time, position, speed) -> tuple:
+def locate_reversals(time, position, speed) -> ArrayPair:
     """Return the times (k,) [s] and positions (k,) [m] of the reversals of a motion.
 
     They are computed on the cubics through the samples on both sides.
@@ -164,7 +147,7 @@ def measure_last_cycle_amplitude(time, position, speed, period: float) -> float 
     Parameters
     ----------
     time, position, speed : (n,)
-        Samples, as in `locate_reversals`.
+        Samples of time [s], position [m] and speed [m/s] at any spacing.
     period : float
         Period [s].
 
@@ -182,6 +165,7 @@ def measure_last_cycle_amplitude(time, position, speed, period: float) -> float 
     reversal_positions = []
     direction = 0
     farthest = float(position[-1])
+
     for reversal in locate_reversals(time, position, speed)[1][::-1].tolist():
         if direction == 0:
             if abs(reversal - farthest) > MAX_RIPPLE * last_range:
@@ -193,14 +177,10 @@ def measure_last_cycle_amplitude(time, position, speed, period: float) -> float 
             reversal_positions.append(farthest)
             farthest = reversal
             direction = -direction
+
         if len(reversal_positions) == 3:
-            return (
-                max(
-                    abs(reversal_positions[0] - reversal_positions[1]),
-                    abs(reversal_positions[1] - reversal_positions[2]),
-                )
-                / 2
-            )
+            return float(np.abs(np.diff(reversal_positions)).max()) / 2
+
     return None
 
 
@@ -238,17 +218,23 @@ def fit_decay_curve(half_cycles: HalfCycles) -> DecayCurve:
     """
     if half_cycles.size.size < 3:
         return DecayCurve(*np.empty((6, 0)))
+
+    # The slopes of ln S_k and of t_k give decrement and half period (module docstring).
     log_sizes = np.log(half_cycles.size)
     decrements = fit_slopes(
         log_sizes, _limit_noise(half_cycles.size_noise / half_cycles.size, log_sizes)
     )
     noise = _limit_noise(half_cycles.middle_noise, half_cycles.middle)
     half_periods = fit_slopes(half_cycles.middle, noise)
+
+    # Points of noisy curves with the same data in their spans would repeat one another.
     selected = np.arange(half_periods.span.size)
     if noise.any():
         selected = _select_overlapping_spans(np.minimum(half_periods.span, decrements.span))
     half_periods = half_periods.select(selected)
     decrements = decrements.select(selected)
+
+    # With delta = -d ln S/dk: zeta = delta/(pi^2 + delta^2)^(1/2), and its derivative is pi^2/(pi^2 + delta^2)^(3/2).
     decay_per_radian = np.hypot(np.pi, decrements.slope)
     curve = DecayCurve(
         time=half_cycles.middle[1 + selected],
@@ -258,6 +244,7 @@ def fit_decay_curve(half_cycles: HalfCycles) -> DecayCurve:
         damping=-decrements.slope / decay_per_radian,
         damping_error=decrements.error * np.pi**2 / decay_per_radian**3,
     )
+
     return _add_damping_error(curve) if curve.time.size > 1 else curve
 
 
@@ -323,21 +310,29 @@ def fit_slopes(values, noise) -> Slopes:
     shorter_change = np.full(count, np.nan)
     span = np.zeros(count, int)
     is_growing = np.ones(count, bool)
-    shorter_fits: list = []
+    shorter_fits: list[ArrayPair] = []
+
     for m in SPAN_LENGTHS:
         if 2 * m >= values.size or not is_growing.any():
             break
-        weight = np.arange(-m, m + 1) / np.sum(np.arange(-m, m + 1) ** 2)
+
+        # Slope of the least-squares line over 2 m + 1 values, and its standard deviation.
+        offsets = np.arange(-m, m + 1)
+        weight = offsets / np.sum(offsets**2)
         inside = slice(m - 1, count - m + 1)
         candidate, candidate_noise = np.full((2, count), np.nan)
         candidate[inside] = np.correlate(values, weight, "valid")
         candidate_noise[inside] = np.sqrt(np.correlate(noise**2, weight**2, "valid"))
+
+        # The noise of a difference of two nested fits has the difference of their variances.
         exists = is_growing & ~np.isnan(candidate)
         is_consistent = exists.copy()
         for shorter_slope, shorter_noise in shorter_fits:
             excess = np.sqrt(np.maximum(shorter_noise**2 - candidate_noise**2, 0.0))
             limit = MAX_SLOPE_DIFFERENCE * excess + VALUE_ROUND_OFF * np.abs(shorter_slope)
             is_consistent &= ~(np.abs(candidate - shorter_slope) > limit)
+
+        # A span that is too long shows the bias b m^2 of the longest accepted one.
         change = np.abs(candidate - slope)
         stops = exists & ~is_consistent
         bias[stops] = change[stops]
@@ -345,11 +340,13 @@ def fit_slopes(values, noise) -> Slopes:
         shorter_change[is_longer] = np.maximum(change - spread, 0.0)[is_longer]
         is_noisy = stops & (spread > 0)
         bias[is_noisy] /= (m / span[is_noisy]) ** 2 - 1
+
         slope[is_consistent] = candidate[is_consistent]
         spread[is_consistent] = candidate_noise[is_consistent]
         span[is_consistent] = m
         is_growing = is_consistent
         shorter_fits.append((candidate, candidate_noise))
+
     lacks_longer_span = np.isnan(bias)
     bias[lacks_longer_span] = shorter_change[lacks_longer_span]
     # At the first and the last inner point, only the shortest span exists. There, the bias of values without

@@ -9,9 +9,10 @@ import numpy as np
 
 from ..core import Response
 from .events import slips_and_displacements
+from .measures import Values
 
 
-def estimate_window_error(window: Response, period: float, offset: float) -> dict:
+def estimate_window_error(window: Response, period: float, offset: float) -> Values:
     """Return the changes of the measures if the window is shifted by a number of time steps.
 
     The peak of a measure changes only if it lies at an end of the window.
@@ -27,12 +28,14 @@ def estimate_window_error(window: Response, period: float, offset: float) -> dic
     """
     if abs(offset) < 1e-9 or window.time.size < 4:
         return {}
+
     offset = abs(offset)
-    span = window.time[-1] - window.time[0]
-    cycles = span / period
+    cycles = (window.time[-1] - window.time[0]) / period
     slips, slides = slips_and_displacements(window)
     forces = window.extra.get("forces", window.force[:, None])
     step_works = (forces[1:] + forces[:-1]) / 2 * np.diff(slides, axis=0)
+
+    # A shift by one step adds the last step and, in a window of fixed length, removes the first one.
     changes = {
         "relative_displacement_amplitude": _change_of_maximum_at_end(window.output) / 2
         + _change_of_maximum_at_end(-window.output) / 2,
@@ -41,6 +44,7 @@ def estimate_window_error(window: Response, period: float, offset: float) -> dic
         "friction_work": abs(float(step_works[-1].sum())),
     }
     changes["energy_dissipated"] = changes["friction_work"]
+
     for k in range(slides.shape[1]):
         suffix = f"_{k + 1}" if k else ""
         changes |= {
@@ -50,6 +54,7 @@ def estimate_window_error(window: Response, period: float, offset: float) -> dic
             + _change_of_maximum_at_end(-slips[:, k]) / 2,
             f"stick_fraction{suffix}": 1 / (window.time.size - 1),
         }
+
     return {name: offset * change for name, change in changes.items()}
 
 

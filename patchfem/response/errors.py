@@ -16,6 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..core import ErrorCauses, Measure
+from .measures import Measures, Values
 from .rows import AMPLITUDE, error_floor, find_definition, select_names
 
 # Roache's safety factor for two runs; it also covers runs outside the asymptotic range.
@@ -35,7 +36,7 @@ PHASES = select_names("phase")  # Angles modulo pi.
 MEAN_ROUND_OFF = 1e-13
 
 
-def signed_change(fine: dict, coarse: dict) -> dict:
+def signed_change(fine: Values, coarse: Values) -> Values:
     """Return the difference of each measure, fine minus coarse; that of phases is reduced modulo pi."""
     changes = {name: fine[name] - coarse[name] for name in fine if name in coarse}
     for name in PHASES:
@@ -44,7 +45,7 @@ def signed_change(fine: dict, coarse: dict) -> dict:
     return changes
 
 
-def absolute_change(fine: dict, coarse: dict) -> dict:
+def absolute_change(fine: Values, coarse: Values) -> Values:
     """Return the absolute difference of each measure between two runs; phases are modulo pi."""
     return {name: abs(difference) for name, difference in signed_change(fine, coarse).items()}
 
@@ -99,8 +100,8 @@ def convergence_error(change, *coarser_changes, ratio: float = 2.0, order: float
 
 
 def convergence_errors(
-    *values: dict, ratio: float = 2.0, order: float = MIN_ORDER, steps: int | None = None
-) -> dict:
+    *values: Values, ratio: float = 2.0, order: float = MIN_ORDER, steps: int | None = None
+) -> Values:
     """Estimate the error of each measure from two or more successive runs (`convergence_error`).
 
     Parameters
@@ -135,7 +136,7 @@ def convergence_errors(
     return errors
 
 
-def finer_errors(values: dict, finer: dict, *coarser: dict) -> dict:
+def finer_errors(values: Values, finer: Values, *coarser: Values) -> Values:
     """Estimate the error of each measure from a run with more harmonics, modes or bond strips.
 
     The finer run has twice as many of them, and the coarser run half as many. The truncation error of
@@ -163,7 +164,7 @@ def finer_errors(values: dict, finer: dict, *coarser: dict) -> dict:
     return errors
 
 
-def merged_cell_errors(fine: dict, *coarse: dict) -> dict:
+def merged_cell_errors(fine: Values, *coarse: Values) -> Values:
     """Estimate the error of each measure from runs with merged cells of a slider density.
 
     The force of a density divided into cells is exact at the ends of each cell; its error between them is
@@ -211,7 +212,7 @@ class FrictionScale(NamedTuple):
     cycle_work: float
 
 
-def friction_errors(values: dict, fraction: float, scale: FrictionScale) -> dict:
+def friction_errors(values: Values, fraction: float, scale: FrictionScale) -> Values:
     """Return the errors of the measures caused by a relative error of the friction force.
 
     The error of a measure is `fraction` times a reference value: the friction limit, the bond
@@ -225,6 +226,7 @@ def friction_errors(values: dict, fraction: float, scale: FrictionScale) -> dict
     fraction : float
         Error of the friction force relative to the friction limit [1].
     scale : FrictionScale
+        Reference values of force, length and work.
     """
     errors = {}
     for name, value in values.items():
@@ -234,7 +236,7 @@ def friction_errors(values: dict, fraction: float, scale: FrictionScale) -> dict
     return errors
 
 
-def observed_orders(*values: dict) -> dict:
+def observed_orders(*values: Values) -> Values:
     """Return the observed order of convergence of each measure with the time step, at most 2.
 
     Parameters
@@ -264,13 +266,13 @@ def observed_orders(*values: dict) -> dict:
 
 
 def add_errors(
-    values: dict,
+    values: Values,
     errors=(),
     step_values=(),
     *,
     min_relative_error: float = 0.0,
     size: float = np.inf,
-) -> dict:
+) -> Measures:
     """Return the measures with given values, with total errors from their errors by source.
 
     The error of a measure is the sum of the errors by source plus the fraction `min_relative_error`
@@ -280,12 +282,14 @@ def add_errors(
     ----------
     values : dict
         Values by name.
-    errors, step_values
-        See `split_errors`.
+    errors : sequence of (str, dict)
+        Error sources with errors by name (`coarser.estimate_errors`).
+    step_values : sequence of dict
+        Values of the runs with decreasing numbers of time steps, from fine to coarse.
     min_relative_error : float
         Relative error that is added [1].
     size : float
-        Displacement caused by the drive alone [m], as in `rows.error_floor`.
+        Displacement caused by the drive alone [m], which limits the floors of displacements.
     """
     measures = {}
     amplitude = values.get(AMPLITUDE, 0.0)
@@ -299,7 +303,7 @@ def add_errors(
     return measures
 
 
-def split_errors(values: dict, errors, step_values=()) -> dict:
+def split_errors(values: Values, errors, step_values=()) -> dict[str, ErrorCauses]:
     """Return the contributions to the error of each measure, and its order of convergence.
 
     If a measure is missing in a coarse run, its error is its absolute value.
@@ -323,7 +327,9 @@ def split_errors(values: dict, errors, step_values=()) -> dict:
     return causes
 
 
-def add_run_error_estimates(measures: dict, error_estimates: dict, end_errors: dict) -> dict:
+def add_run_error_estimates(
+    measures: Measures, error_estimates: Values, end_errors: Values
+) -> Measures:
     """Add the error estimates of a run itself to the errors of its measures.
 
     Parameters
@@ -358,6 +364,7 @@ def total_error(name: str, value, parts, min_relative_error: float, size):
     Parameters
     ----------
     name : str
+        Name of the measure.
     value : float or (n,)
         Value of the measure.
     parts : sequence

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .measures import slip_round_off
+from .measures import ArrayPair, slip_round_off
 
 # Kinds of events, as indices of EVENT_KIND_NAMES.
 STOP = 0
@@ -58,12 +58,13 @@ def classify_changes(before, after) -> np.ndarray:
     return np.where(after == 0, STOP, np.where(after > 0, upwards, downwards))
 
 
-def join_events(parts: list[Events], shifts: list) -> Events:
+def join_events(parts: list[Events], shifts: list[float]) -> Events:
     """Join the events of successive runs, with a border between segments of the drive at each start.
 
     Parameters
     ----------
     parts : list of Events
+        Events of each run, in chronological order.
     shifts : list of float
         Start times of the runs relative to the first one [s].
     """
@@ -73,7 +74,7 @@ def join_events(parts: list[Events], shifts: list) -> Events:
     return sort_events(rows)
 
 
-def slips_and_displacements(response) -> tuple:
+def slips_and_displacements(response) -> ArrayPair:
     """Return the slip and the relative displacement (k, i) [m] of each interface."""
     extra = response.extra
     if "slides" in extra:
@@ -81,7 +82,7 @@ def slips_and_displacements(response) -> tuple:
     return response.slip[:, None], response.slide[:, None]
 
 
-def find_segment_borders(drive) -> list:
+def find_segment_borders(drive) -> list[float]:
     """Return the times [s] at which a drive changes from one segment to the next."""
     return [segment.start for segment in drive.segments[1:]]
 
@@ -91,6 +92,5 @@ def is_all_stuck(window, max_stick_slip: float) -> bool:
 
     The limit applies to half the range of the slip, and is at least its round-off.
     """
-    slips = slips_and_displacements(window)[0]
-    slips = np.column_stack([window.slip, slips])
+    slips = np.column_stack([window.slip, slips_and_displacements(window)[0]])
     return bool(np.ptp(slips, axis=0).max() / 2 <= max(max_stick_slip, slip_round_off(window)))

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 from ..core import Outcome
 from ..formatting import format_length
+from .measures import Values
 from .rows import AMPLITUDE, select_names
 
 LEVEL_MEASURES = select_names("level")
@@ -30,8 +31,8 @@ class Level:
 
     drive: float
     stuck: bool
-    values: dict
-    errors: dict
+    values: Values
+    errors: Values
     unit: str = "m s-2"
     outcome: str = ""
 
@@ -76,8 +77,9 @@ def bracket_onset(levels, is_above_onset: Callable[[Level], bool]) -> tuple | No
     Parameters
     ----------
     levels : sequence of Level
+        Levels in chronological order.
     is_above_onset : callable
-        Function that returns whether a level lies above the onset (see `make_onset_test`).
+        Function that returns whether a level lies above the onset.
 
     Returns
     -------

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..effects import law_has_trait
-from .measures import COORDINATE_ROUND_OFF, find_reversal_steps
+from .measures import COORDINATE_ROUND_OFF, Values, find_reversal_steps
 
 EVENT_TIME_TOL = 1e-9  # Largest time between two samples at the same event, in periods.
 # Largest rate at which an interface counts as at rest, relative to the largest rate.
@@ -32,7 +32,7 @@ class Reversal(NamedTuple):
     force: float | None
 
 
-def cycle_spans(time, period: float) -> list:
+def cycle_spans(time, period: float) -> list[tuple[float, float]]:
     """Return the start and end times [s] of the complete cycles in a window, oldest first.
 
     Cycles are counted from the end, so that an incomplete cycle at the start is omitted.
@@ -57,7 +57,9 @@ def reversal_force_rule(model) -> str:
     )
 
 
-def find_reversals(time, slide, rate, force, period: float, rule: str = "rate") -> list:
+def find_reversals(
+    time, slide, rate, force, period: float, rule: str = "rate"
+) -> list[tuple[Reversal, ...]]:
     """Return the smallest and the largest `Reversal` of the displacement in each cycle.
 
     Parameters
@@ -94,7 +96,7 @@ def find_reversals(time, slide, rate, force, period: float, rule: str = "rate") 
     return reversals
 
 
-def _find_largest(time, y, v, time_tolerance: float) -> tuple:
+def _find_largest(time, y, v, time_tolerance: float) -> tuple[int, float, float]:
     """Find the maximum of a quantity on the cubics through its values and rates.
 
     Returns the index of the preceding sample, the maximum, and its position as a fraction of the step.
@@ -111,7 +113,7 @@ def _find_largest(time, y, v, time_tolerance: float) -> tuple:
     return best
 
 
-def _find_velocity_zero(v, sample: int, *, first: bool) -> tuple:
+def _find_velocity_zero(v, sample: int, *, first: bool) -> tuple[int | None, float]:
     """Find the zero of a decreasing sampled velocity (k,) next to a given sample.
 
     The zero is sought in the step before the sample if `first`, else in the step after it. Returns the index
@@ -179,7 +181,9 @@ def secant_stiffness(reversals) -> float | None:
     return float(np.mean(stiffnesses)) if stiffnesses else None
 
 
-def interface_loop(amplitude: float, q: complex, f: complex, work: float, stiffness: float) -> dict:
+def interface_loop(
+    amplitude: float, q: complex, f: complex, work: float, stiffness: float
+) -> Values:
     """Return loop area, equivalent stiffness and equivalent damping of an interface as a dict.
 
     The equivalent stiffness is Re(F1/q1), as in harmonic balance.
@@ -259,9 +263,8 @@ def time_mean(time, value, rate, begin: float, end: float) -> float:
     y = value[span]
     v = rate[span]
     step = np.diff(t)
-    first_time = t[0]
     y = y - y[0]
     area = float(np.sum(step * (y[1:] + y[:-1]) / 2 + step**2 * (v[:-1] - v[1:]) / 12))
     # between the ends of the span and the nearest samples, the value is that of the samples
-    area += float(y[-1]) * (end - t[-1]) + float(y[0]) * (first_time - begin)
+    area += float(y[-1]) * (end - t[-1]) + float(y[0]) * (t[0] - begin)
     return float(value[span][0]) + area / (end - begin)

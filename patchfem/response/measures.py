@@ -8,8 +8,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..core import Response
+from ..core import Measure, Response
 from ..friction import path_work
+
+Values = dict[str, float]  # values of measures or their errors by name, in SI units
+Measures = dict[str, Measure]  # by name
+ArrayPair = tuple[np.ndarray, np.ndarray]  # two arrays of one shape
 
 # Largest irreversible fraction of a change of displacement at which an interface counts as stuck.
 SLIP_FRACTION = 0.5
@@ -24,7 +28,7 @@ MIN_SLIDE_RANGE = 1e-15  # Largest range of the relative displacement [m] of an 
 MAX_SMOOTH_RATIO = 4.0
 
 
-def energy_balance(energies: dict):
+def energy_balance(energies: Values):
     """Return the relative error of the energy balance [1] of one run, or (n,) of n runs.
 
     The error is |work in - stored - dissipated| / (integral |power in| + peak stored). Differences up to
@@ -114,7 +118,7 @@ def largest_distance(x) -> float:
     return float(interpolate_ranges(x[:, None])[0][0])
 
 
-def compute_slip_measures(window: Response, drive, steps_per_cycle: int) -> dict:
+def compute_slip_measures(window: Response, drive, steps_per_cycle: int) -> Values:
     """Return slip amplitude [m], stick fraction [1] and phase of slip onset [rad].
 
     The interface sticks while less than SLIP_FRACTION of the change of its relative displacement is
@@ -128,15 +132,18 @@ def compute_slip_measures(window: Response, drive, steps_per_cycle: int) -> dict
     drive
         Drive with `period` [s].
     steps_per_cycle : int
+        Number of samples per cycle.
     """
     if largest_distance(window.slide) <= MIN_SLIDE_RANGE:
         # The slip of a law without stiffness changes with its traction, even at constant displacement.
         return {"slip_amplitude": 0.0, "stick_fraction": 1.0}
+
     slip = window.slip
     measures = {"slip_amplitude": largest_distance(slip) / 2}
     # A single sample, or a slip within round-off, counts as stick.
     if slip.size < 2 or 2 * measures["slip_amplitude"] <= slip_round_off(window):
         return measures | {"stick_fraction": 1.0}
+
     cycles = max(1, (slip.size - 1) // steps_per_cycle)
     last_cycles = (
         slice(-cycles * steps_per_cycle - 1, None) if slip.size > steps_per_cycle else slice(None)
@@ -146,17 +153,20 @@ def compute_slip_measures(window: Response, drive, steps_per_cycle: int) -> dict
     time = window.time[last_cycles]
     is_at_rest = slide_steps <= COORDINATE_ROUND_OFF * np.abs(window.slide).max(initial=0.0)
     excess = compute_slip_excess(slip_steps, slide_steps, is_at_rest)
+
+    # The excess is known at the midpoints of the steps and linear in between.
     before = excess[:-1]
     after = excess[1:]
-    rise = np.abs(after - before)
     below = compute_negative_fraction(before, after)
     middles = (time[1:] + time[:-1]) / 2
     measures["stick_fraction"] = (
         float(np.average(below, weights=np.diff(middles))) if below.size else float(excess[0] < 0)
     )
+
     onsets = np.flatnonzero((before < 0) & (after >= 0))
     if onsets.size:
-        onset_times = middles[onsets] - before[onsets] / rise[onsets] * np.diff(middles)[onsets]
+        rise = (after - before)[onsets]
+        onset_times = middles[onsets] - before[onsets] / rise * np.diff(middles)[onsets]
         measures |= slip_start_measure(2 * np.pi / drive.period * onset_times)
     return measures
 
@@ -190,7 +200,7 @@ def slip_round_off(window: Response) -> float:
     return COORDINATE_ROUND_OFF * float(np.abs(window.modal).max(initial=0.0))
 
 
-def slip_start_measure(phases) -> dict:
+def slip_start_measure(phases) -> Values:
     """Return the mean phase of the drive [rad] at the onsets of slip, as a dict.
 
     The dict is empty if the onsets have different phases.
@@ -201,7 +211,7 @@ def slip_start_measure(phases) -> dict:
     return {} if np.isnan(phase) else {"slip_start_phase": float(phase)}
 
 
-def compute_ledger_measures(ledger) -> dict:
+def compute_ledger_measures(ledger) -> Values:
     """Return the final friction work and energies [J] of a run, as a dict."""
     names = ("friction_work", "energy_stored", "energy_dissipated", "energy_created")
     return {name: float(row[-1]) for name, row in zip(names, ledger)}
@@ -239,7 +249,7 @@ def compute_peak(values) -> float:
     return float(interpolate_peaks(np.abs(values)[:, None])[0][0])
 
 
-def interpolate_peaks(magnitude) -> tuple:
+def interpolate_peaks(magnitude) -> ArrayPair:
     """Return the largest values of n curves, and bounds on the errors due to sampling.
 
     If a curve is smooth, its peak is the vertex of the parabola through the largest sample and its
@@ -280,7 +290,7 @@ def interpolate_peaks(magnitude) -> tuple:
     return np.where(is_peak, vertex, value), errors
 
 
-def interpolate_ranges(values) -> tuple:
+def interpolate_ranges(values) -> ArrayPair:
     """Return the ranges of n curves between their peaks, and bounds on the errors due to sampling.
 
     Parameters
@@ -300,7 +310,7 @@ def interpolate_ranges(values) -> tuple:
     return rises + falls - (high - low), rise_errors + fall_errors
 
 
-def peak_sampling_errors(window: Response) -> dict:
+def peak_sampling_errors(window: Response) -> Values:
     """Return bounds on the errors of peaks and ranges due to sampling, by measure.
 
     Runs with fewer steps may not show these errors, because they contain some of the same instants.
@@ -313,12 +323,12 @@ def peak_sampling_errors(window: Response) -> dict:
     window : Response
         Equally spaced samples.
     """
-    forces = window.extra.get("forces", window.force[:, None])
-    forces = np.abs(forces)
+    forces = np.abs(window.extra.get("forces", window.force[:, None]))
     slips = window.extra.get("slips", window.slip[:, None])
     errors = {
         "absolute_acceleration_peak": interpolate_peaks(np.abs(window.acceleration)[:, None])[1][0]
     }
+
     for name, sampling_errors in (
         ("friction_force_peak", interpolate_peaks(forces)[1]),
         ("slip_amplitude", interpolate_ranges(slips)[1] / 2),
@@ -326,6 +336,8 @@ def peak_sampling_errors(window: Response) -> dict:
         for k, error in enumerate(sampling_errors):
             errors[f"{name}_{k + 1}" if k else name] = error
     errors = {name: float(error) for name, error in errors.items() if error > 0}
+
+    # A parabola through three samples of distance h exceeds the middle one by at most an eighth of h^2 y''.
     load = window.extra.get("normal_load")
     if load is not None and len(load) > 2:
         for name, index in (
@@ -415,7 +427,7 @@ def window_amplitudes(extremes, window: int) -> np.ndarray:
     return (complete_windows[:, :, 1].max(axis=1) - complete_windows[:, :, 0].min(axis=1)) / 2
 
 
-def window_end_values(extremes, phasors, window: int) -> tuple:
+def window_end_values(extremes, phasors, window: int) -> ArrayPair:
     """Return amplitude [m] and phasor [m] of the last cycle of each window.
 
     Parameters

@@ -12,6 +12,7 @@ import numpy as np
 from ..core import Measure, Outcome, compute_allowed_error
 from ..structure import drive_sizes
 from . import stationary
+from .measures import Measures
 from .rows import AMPLITUDE, STEADY_AMPLITUDE
 from .settling import (
     CLASSES,
@@ -39,12 +40,12 @@ AMPLITUDE_ROUND_OFF = 1e-12
 
 def judge_outcome(
     solution,
-    measures: dict,
+    measures: Measures,
     tolerance: float,
     drive,
     level_cycles: float = 0.0,
     min_decay_rate: float = 0.0,
-) -> tuple:
+) -> tuple[Outcome, Measures]:
     """Classify the motion of a run, and estimate the amplitude at which it becomes steady.
 
     - Periodic drive, or last level of a drive in levels: the outcome follows from the amplitudes of
@@ -63,11 +64,13 @@ def judge_outcome(
     Parameters
     ----------
     solution : Solution
+        Amplitudes and extremes of the cycles, and the window.
     measures : dict
         Measures by name; they are not changed.
     tolerance : float
         Relative tolerance of the scene.
     drive
+        Drive of the last cycles.
     level_cycles : float
         Number of cycles per level; 0 without levels.
     min_decay_rate : float
@@ -85,15 +88,18 @@ def judge_outcome(
         and is_still_loading(solution.window, drive.period, tolerance)
     ):
         return Outcome.TRANSIENT, {}
+
     limits = (tolerance, min_decay_rate)
     is_ringing = not level_cycles and find_ringing(solution, measures, limits, drive) > 0
     if solution.outcome is not None and not is_ringing:
         return solution.outcome, {}
+
     if hasattr(drive, "band"):
         is_stationary = stationary.is_stationary(solution.window, drive)
         return Outcome.DONE if is_stationary else Outcome.TRANSIENT, {}
     if not drive.segments and drive_sizes.count_repeat_cycles(drive) is None:
         return Outcome.TRANSIENT, {}
+
     # for several tones, each window contains whole beats
     floor = (
         AMPLITUDE_ROUND_OFF
@@ -102,12 +108,16 @@ def judge_outcome(
     )
     if not drive.segments and not drive_sizes.is_periodic(drive):
         return classify(solution.amplitudes, tolerance, floor), {}
+
     amplitudes = solution.amplitudes
     extremes = solution.extremes
-    window = max(1, round((solution.window.time[-1] - solution.window.time[0]) / drive.period))
+    window = _count_window_cycles(solution, drive)
+
+    # The levels before the last one have other amplitudes.
     if level_cycles:
         amplitudes = amplitudes[-max(1, int(level_cycles / window)) :]
         extremes = None if extremes is None else extremes[-int(level_cycles) :]
+
     if not drive_sizes.is_periodic(drive):
         outcome = Outcome.STEADY
         if amplitudes[-1] > max(floor, measures[AMPLITUDE].floor):
@@ -117,6 +127,7 @@ def judge_outcome(
         if outcome is Outcome.GROWS and not drive.segments[-1].constant and min_decay_rate >= 0:
             outcome = Outcome.TRANSIENT
         return outcome, {}
+
     number, steady, error = (
         one[0]
         for one in classify_periodic(
@@ -128,11 +139,13 @@ def judge_outcome(
             solution.bounded,
         )
     )
+
     outcome = _reject_drifting(CLASSES[number], measures, tolerance)
     if is_ringing:
         outcome = Outcome.TRANSIENT
     if outcome is Outcome.GROWS or np.isnan(steady):
         return outcome, {}
+
     base = measures[AMPLITUDE]
     if outcome is not Outcome.TRANSIENT and not is_still_changing(
         steady, error, base.value, tolerance
@@ -141,6 +154,12 @@ def judge_outcome(
     total = steady_estimate_error(steady, error, base.value, base.error or 0.0)
     measure = Measure(float(steady), "m", float(total), base.floor)
     return outcome, {STEADY_AMPLITUDE: measure}
+
+
+def _count_window_cycles(solution, drive) -> int:
+    """Return the number of cycles in the window of a run."""
+    time = solution.window.time
+    return max(1, round((time[-1] - time[0]) / drive.period))
 
 
 def is_drifting(drift, error, amplitude, tolerance, floor) -> np.ndarray:
@@ -153,6 +172,7 @@ def is_drifting(drift, error, amplitude, tolerance, floor) -> np.ndarray:
     amplitude : float or (n,)
         Amplitude to which the tolerance refers [m].
     tolerance : float
+        Relative tolerance of the scene.
     floor : float or (n,)
         Largest drift that is round-off [m].
     """
@@ -180,7 +200,7 @@ def _midpoint_drift(extremes, window: int) -> float:
 
 
 def _reject_drifting(
-    outcome: Outcome, measures: dict, tolerance: float, window_drift: float = np.inf
+    outcome: Outcome, measures: Measures, tolerance: float, window_drift: float = np.inf
 ) -> Outcome:
     """Return TRANSIENT instead of STEADY if the midpoint of the motion drifts.
 
@@ -201,7 +221,7 @@ def _reject_drifting(
     return Outcome.TRANSIENT if drifts else outcome
 
 
-def remove_errors(measures: dict) -> dict:
+def remove_errors(measures: Measures) -> Measures:
     """Return the measures by name with their values, but without errors, because these are unknown."""
     return {name: replace(measure, error=None) for name, measure in measures.items()}
 
@@ -228,7 +248,7 @@ def classify_periodic(
     limits : tuple
         Tolerance, floor [m], and logarithmic decay of the slowest mode over a window [1]; numbers or (n,).
     bounded : bool or (n,)
-        Whether a bounded motion is known to exist (see `Solution`).
+        Whether a bounded motion is known to exist.
 
     Returns
     -------
@@ -269,6 +289,7 @@ def is_still_changing(steady, error, amplitude, tolerance) -> np.ndarray:
     amplitude : float or (n,)
         Amplitude of the last cycles [m].
     tolerance : float
+        Relative tolerance of the scene.
     """
     return np.abs(steady - amplitude) + error > ESTIMATE_TOL * tolerance * np.abs(amplitude)
 
@@ -296,15 +317,17 @@ def is_still_loading(window, period: float, tolerance: float) -> bool:
     Parameters
     ----------
     window : Response
+        Last cycles of the motion.
     period : float
         Period of the drive [s].
     tolerance : float
+        Relative tolerance of the scene.
     """
     time = window.time
     forces = np.column_stack([window.extra.get("forces", window.force)])
-    largest_force = np.abs(forces).max(axis=0)
+    magnitude = np.abs(forces)
+    largest_force = magnitude.max(axis=0)
     if time[-1] - time[0] < 1.5 * period:
-        magnitude = np.abs(forces)
         is_increasing = np.all(np.diff(magnitude, axis=0) >= -1e-9 * largest_force, axis=0)
         return bool(
             np.any(is_increasing & (magnitude[-1] - magnitude[0] > tolerance * largest_force))
@@ -329,6 +352,7 @@ def check_piece_length(
     Parameters
     ----------
     outcome : Outcome or None
+        Outcome of the motion so far.
     max_displacement : float
         Largest absolute relative displacement in the run [m].
     length : float
@@ -339,17 +363,19 @@ def check_piece_length(
     return outcome
 
 
-def find_ringing(solution, measures: dict, limits: tuple, drive) -> float:
+def find_ringing(solution, measures: Measures, limits: tuple[float, float], drive) -> float:
     """Return the free vibration [m] of a rig whose interfaces stick under a periodic drive; 0 if none is visible.
 
     Parameters
     ----------
     solution : Solution
+        Outcome, extremes of the cycles and window.
     measures : dict
         Measure by name.
     limits : tuple
         Tolerance, and decay rate of the slowest mode [1/s].
     drive
+        Drive of the last cycles.
     """
     tolerance, min_decay_rate = limits
     amplitude = measures[AMPLITUDE]
@@ -357,7 +383,7 @@ def find_ringing(solution, measures: dict, limits: tuple, drive) -> float:
         return 0.0
     if not drive_sizes.is_periodic(drive) or not amplitude.value:
         return 0.0
-    window = max(1, round((solution.window.time[-1] - solution.window.time[0]) / drive.period))
+    window = _count_window_cycles(solution, drive)
     decay = min_decay_rate * drive.period
     ringing = float(remaining_ringing(np.asarray(solution.extremes), window, decay))
     sizes = (amplitude.value, amplitude.error or 0.0, amplitude.floor)
@@ -396,7 +422,7 @@ def remaining_ringing(extremes, window: int, decay):
     return np.maximum(free_motion, np.abs(amplitudes[..., -1] - amplitudes[..., -2]))
 
 
-def describe_ringing(ratio: float, limits: tuple, cycles: float) -> str:
+def describe_ringing(ratio: float, limits: tuple[float, float], cycles: float) -> str:
     """Return a warning that a sticking interface still vibrates freely, with the cycles after which this has decayed.
 
     Parameters
@@ -424,7 +450,7 @@ def describe_ringing(ratio: float, limits: tuple, cycles: float) -> str:
     )
 
 
-def note_on_changing_drive(outcome: Outcome, drive) -> list:
+def note_on_changing_drive(outcome: Outcome, drive) -> list[str]:
     """Return a list with a note if the drive changes until the end of the run.
 
     The list is empty for all other drives.
@@ -451,6 +477,7 @@ def estimate_steady(drive, amplitudes, phasors) -> tuple:
     Parameters
     ----------
     drive
+        Drive of the last cycles.
     amplitudes : (w,)
         Amplitudes of successive windows [m].
     phasors : (w,)

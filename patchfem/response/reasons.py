@@ -11,6 +11,7 @@ import numpy as np
 from ..core import Measure, Outcome
 from ..formatting import format_number
 from ..structure import drive_sizes
+from .measures import Measures
 from .rows import STEADY_AMPLITUDE, TABLE
 
 ACCELERATIONS = ("absolute_acceleration_fundamental", "acceleration_distortion")
@@ -45,7 +46,7 @@ OPEN_LOOP_REASON = (
 
 def find_missing(
     values, window, drive, has_loaded_interface: bool, other_modes_fraction: float = 0.0
-) -> dict:
+) -> Measures:
     """Return the measures for which a run has no value, each with the reason, by name.
 
     Parameters
@@ -55,6 +56,7 @@ def find_missing(
     window : Response
         Last cycles.
     drive
+        Drive of the last cycles.
     has_loaded_interface : bool
         Whether an interface carries a load.
     other_modes_fraction : float
@@ -72,11 +74,14 @@ def find_missing(
         )
     if has_loaded_interface:
         reasons["slip_start_phase"] = _reason_for_missing_phase(values, drive)
-    names = [name for name in reasons if name not in values]
-    return {name: _make_missing_measure(name, reasons[name]) for name in names}
+    return {
+        name: _make_missing_measure(name, reason)
+        for name, reason in reasons.items()
+        if name not in values
+    }
 
 
-def find_missing_secant(values) -> dict:
+def find_missing_secant(values) -> Measures:
     """Return a secant stiffness without a value if the friction force is not unique.
 
     The force of rigid friction is undetermined if the interface sticks at the largest displacement.
@@ -100,7 +105,7 @@ def find_missing_secant(values) -> dict:
     return {"secant_stiffness": _remove_value(secant, STICKS_AT_REVERSAL_REASON)}
 
 
-def find_missing_steady(values, outcome: Outcome, drive) -> dict:
+def find_missing_steady(values, outcome: Outcome, drive) -> Measures:
     """Return a steady amplitude without a value if the transient cannot be extrapolated.
 
     Parameters
@@ -108,15 +113,17 @@ def find_missing_steady(values, outcome: Outcome, drive) -> dict:
     values : dict
         Measure by name.
     outcome : Outcome
+        Outcome of the run.
     drive
+        Drive of the last cycles.
 
     Returns
     -------
     dict
         Measure by name; {} if the value exists or the drive is not periodic.
     """
-    is_known = STEADY_AMPLITUDE in values
-    if is_known or outcome is not Outcome.TRANSIENT or not drive_sizes.is_periodic(drive):
+    is_transient = outcome is Outcome.TRANSIENT and drive_sizes.is_periodic(drive)
+    if STEADY_AMPLITUDE in values or not is_transient:
         return {}
     return {STEADY_AMPLITUDE: _make_missing_measure(STEADY_AMPLITUDE, CHANGE_NOT_RESOLVED_REASON)}
 
@@ -132,7 +139,7 @@ def _remove_value(measure: Measure, reason: str) -> Measure:
     return replace(measure, value=None, error=None, reason=reason)
 
 
-def find_missing_drift(values, drive) -> dict:
+def find_missing_drift(values, drive) -> Measures:
     """Return a drift without a value if the drive is not periodic.
 
     Without a period, mean values differ even if there is no drift.
@@ -142,6 +149,7 @@ def find_missing_drift(values, drive) -> dict:
     values : dict
         Measure by name.
     drive
+        Drive of the last cycles.
 
     Returns
     -------
@@ -155,7 +163,7 @@ def find_missing_drift(values, drive) -> dict:
     return {"drift_per_cycle": _remove_value(drift, reason)}
 
 
-def find_missing_unbounded(values) -> dict:
+def find_missing_unbounded(values) -> Measures:
     """Return all measures except the load without values, for an unbounded motion."""
     out = {name: _remove_value(measure, UNBOUNDED_REASON) for name, measure in values.items()}
     if "normal_load" in values:
@@ -163,7 +171,7 @@ def find_missing_unbounded(values) -> dict:
     return out
 
 
-def find_missing_loops(values, window, drive) -> dict:
+def find_missing_loops(values, window, drive) -> Measures:
     """Return the areas of the friction loops without values if the loops are not closed.
 
     The area of a closed loop is the dissipated energy. In a motion that is not periodic, as after a
@@ -179,6 +187,7 @@ def find_missing_loops(values, window, drive) -> dict:
     window : Response
         Last cycles.
     drive
+        Drive of the last cycles.
     """
     ledger = window.extra.get("ledger")
     loop = values.get("loop_area")

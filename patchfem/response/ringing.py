@@ -28,7 +28,7 @@ class VibratingMode(NamedTuple):
     displacement: float
 
 
-def compute_stuck_vibration(modes, stiffness, motion) -> list:
+def compute_stuck_vibration(modes, stiffness, motion) -> list[VibratingMode]:
     """Return the free vibration of each mode while all interfaces stick.
 
     The motion must not contain a response to a sinusoidal drive.
@@ -69,7 +69,7 @@ def compute_stuck_vibration(modes, stiffness, motion) -> list:
     ]
 
 
-def select_strongest(modes: list) -> VibratingMode:
+def select_strongest(modes: list[VibratingMode]) -> VibratingMode:
     """Return the mode with the largest time integral of the squared displacement in the stick interval."""
 
     def energy(mode: VibratingMode) -> float:

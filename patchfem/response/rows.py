@@ -25,6 +25,8 @@ from .loops import (
 )
 from .measures import (
     MIN_SLIDE_RANGE,
+    Measures,
+    Values,
     compute_ledger_measures,
     compute_peak,
     compute_slip_measures,
@@ -58,7 +60,7 @@ class LastCycles:
     window: Response
     drive: object
     extremes: np.ndarray
-    run_energies: dict
+    run_energies: Values
     load: float | None
     stiffness: float
     is_sine: bool
@@ -80,14 +82,16 @@ class LastCycles:
         return drive_sizes.has_full_cycle(self.span, self.drive)
 
     @cached_property
-    def slip_measures(self) -> dict:
+    def slip_measures(self) -> Values:
         """Slip amplitude [m], stick fraction [1] and phase of slip onset [rad] as a dict."""
         if self.load is None:
             return {}
         if self.integrated.loops:
             loop = self.integrated.loops[0]
-            values = {"slip_amplitude": loop.slip_range / 2}
-            return values | {"stick_fraction": stick_fraction(loop.stuck_time, self.span)}
+            return {
+                "slip_amplitude": loop.slip_range / 2,
+                "stick_fraction": stick_fraction(loop.stuck_time, self.span),
+            }
         window = self.window
         steps = max(1, round((window.time.size - 1) * self.drive.period / self.span))
         values = compute_slip_measures(window, self.drive, steps)
@@ -96,7 +100,7 @@ class LastCycles:
         return values
 
     @cached_property
-    def reversals(self) -> list:
+    def reversals(self) -> list[tuple[Reversal, ...]]:
         """Smallest and largest `Reversal` of the displacement in each complete cycle."""
         if self.integrated.reversals:
             return [tuple(Reversal(*end) for end in pair) for pair in self.integrated.reversals]
@@ -121,7 +125,7 @@ class LastCycles:
         )
 
     @cached_property
-    def loop_measures(self) -> dict:
+    def loop_measures(self) -> Values:
         """Measures of the friction loop as a dict; empty without friction or a complete cycle.
 
         loop_area [J]; under sinusoidal drive also equivalent_stiffness and secant_stiffness [N/m]
@@ -140,7 +144,7 @@ class LastCycles:
         return measures | {"secant_stiffness": secant_stiffness(self.reversals)}
 
     @cached_property
-    def acceleration_measures(self) -> dict:
+    def acceleration_measures(self) -> Values:
         """Harmonic measures of the acceleration as a dict; empty unless the drive ends as a sinusoid.
 
         absolute_acceleration_fundamental [m s-2] and, if there is an acceleration,
@@ -151,12 +155,12 @@ class LastCycles:
         return make_acceleration_measures(*find_acceleration_harmonics(self.window, self.drive))
 
     @cached_property
-    def final_energies(self) -> dict:
+    def final_energies(self) -> Values:
         """Friction work and energies [J] at the end of the run by name; empty if not recorded."""
         return {} if self.ledger is None else compute_ledger_measures(self.ledger)
 
     @cached_property
-    def random_response_measures(self) -> dict:
+    def random_response_measures(self) -> Values:
         """Measures of the response to a stationary random drive as a dict."""
         if not hasattr(self.drive, "band"):
             return {}
@@ -167,11 +171,12 @@ class LastCycles:
                 del measures[name]
         return measures
 
-    def further_interfaces(self) -> list:
+    def further_interfaces(self) -> "list[LastCycles]":
         """Return the last cycles of each interface after the first one."""
         extra = self.window.extra
         if self.load is None or self.is_single_interface or "slides" not in extra:
             return []
+
         slips = extra.get("slips", extra["slides"])
         count = extra["slides"].shape[1]
         interfaces = []
@@ -183,6 +188,8 @@ class LastCycles:
                 force=extra["forces"][:, k],
                 slip=slips[:, k],
             )
+
+            # The area is the only measure of the loops of further interfaces, so that they need no harmonics.
             work = float(np.trapezoid(window.force, window.slide))
             interfaces.append(
                 replace(
@@ -193,9 +200,10 @@ class LastCycles:
                     loop=(0j, 0j, work * self.drive.period / max(self.span, 1e-300)),
                 )
             )
+
         return interfaces
 
-    def evaluate_load(self, function: Callable) -> float | None:
+    def evaluate_load(self, function: Callable[[np.ndarray], float]) -> float | None:
         """Return the value of a function of the normal load (k,) [N]; None for a constant load.
 
         function: function that is applied to the load history in the window.
@@ -204,7 +212,7 @@ class LastCycles:
         return None if load is None or self.load is None else float(function(load))
 
 
-def _drift_scale(values: dict):
+def _drift_scale(values: Values):
     """Return the amplitude [m] with which the drift of an interface is compared.
 
     The scale is the slip amplitude, or without slip the amplitude of the motion.
@@ -220,29 +228,30 @@ def _drift_scale(values: dict):
 
 def _random_rows(
     name: str, unit: str, floor: float, definition: str, group: str = "motion"
-) -> tuple:
+) -> tuple[MeasureDefinition, MeasureDefinition]:
     """Return the rows of a measure under a random drive and of its statistical scatter."""
     scatter = f"{name}_scatter"
-    return (
-        MeasureDefinition(
-            name,
-            unit,
-            floor,
-            definition,
-            lambda s: s.random_response_measures.get(name),
-            group=group,
-        ),
-        MeasureDefinition(
-            scatter,
-            unit,
-            floor,
-            f"half-width of the 95 % interval of {name}: the scatter between "
-            "random drives of the same length with different seeds",
-            lambda s: s.random_response_measures.get(scatter),
-            group=group,
-            larger_term=(name, lambda values: np.abs(values.get(name, 0.0))),
-        ),
+    value_row = MeasureDefinition(
+        name,
+        unit,
+        floor,
+        definition,
+        lambda s: s.random_response_measures.get(name),
+        group=group,
     )
+
+    # The tolerance of a scatter refers to its measure, because the scatter itself may be near 0.
+    scatter_row = MeasureDefinition(
+        scatter,
+        unit,
+        floor,
+        f"half-width of the 95 % interval of {name}: the scatter between "
+        "random drives of the same length with different seeds",
+        lambda s: s.random_response_measures.get(scatter),
+        group=group,
+        larger_term=(name, lambda values: np.abs(values.get(name, 0.0))),
+    )
+    return value_row, scatter_row
 
 
 AMPLITUDE = "relative_displacement_amplitude"  # measure on which a run is refined
@@ -611,7 +620,7 @@ INTERFACE_MEASURES = select_names("interface")
 MAX_DISPLACEMENT_FLOOR = 1e-5
 
 
-def compute_measures(last_cycles: LastCycles) -> dict:
+def compute_measures(last_cycles: LastCycles) -> Values:
     """Compute the measures of a run from its last cycles as a dict, in SI units.
 
     Measures without a value are omitted. The INTERFACE_MEASURES of further interfaces have the number of the
@@ -657,6 +666,7 @@ def error_floor(name: str, size=np.inf):
     Parameters
     ----------
     name : str
+        Name of the measure, with the number of an interface.
     size : float or (n,)
         Displacement caused by the drive alone [m]; 0 or inf without a drive.
     """
@@ -669,12 +679,13 @@ def error_floor(name: str, size=np.inf):
     )
 
 
-def larger_term(name: str, values: dict):
+def larger_term(name: str, values: Values):
     """Return the size of the terms if a measure is a difference, in the unit of the measure.
 
     Parameters
     ----------
     name : str
+        Name of the measure, with the number of an interface.
     values : dict
         Values by name of one run, or (n,) of n runs; those of the same interface are used.
 
@@ -694,7 +705,7 @@ def larger_term(name: str, values: dict):
     return row.larger_term[1](own_values)
 
 
-def set_final_floors(measures: dict, tolerance: float) -> dict:
+def set_final_floors(measures: Measures, tolerance: float) -> Measures:
     """Return measures with error floors of at least `tolerance` times the terms of a difference.
 
     The INTERNAL_VALUES among the measures are used and left out.

@@ -7,6 +7,7 @@ steady, grows), extrapolated steady amplitudes with errors, and the remaining fr
 import numpy as np
 
 from ..core import Outcome
+from .measures import ArrayPair
 
 CLASSES = Outcome.TRANSIENT, Outcome.STEADY, Outcome.GROWS
 STEADY_CLASS = 1  # Index of Outcome.STEADY in CLASSES.
@@ -28,6 +29,7 @@ def classify(amplitudes, tolerance: float, floor: float = 0.0) -> Outcome:
     amplitudes : (w,)
         Amplitudes of successive windows [m].
     tolerance : float
+        Relative tolerance of the scene.
     floor : float
         Largest amplitude that is round-off [m].
 
@@ -50,6 +52,7 @@ def classify_motions(amplitudes, tolerance: float, floor=0.0) -> np.ndarray:
     amplitudes : (n, w)
         Amplitudes of successive windows [m].
     tolerance : float
+        Relative tolerance of the scene.
     floor : float or (n,)
         Largest change that is round-off [m].
 
@@ -90,7 +93,7 @@ def geometric_remainders(values):
     return np.where(converges, change * ratio / np.where(converges, 1 - ratio, 1.0), np.nan)[()]
 
 
-def extrapolate_steady_amplitude(amplitudes, phasors) -> tuple:
+def extrapolate_steady_amplitude(amplitudes, phasors) -> tuple[float | None, ...]:
     """Extrapolate the window amplitudes of a motion to its steady amplitude and error [m].
 
     Return (None, None) if no bounded limit can be estimated.
@@ -101,7 +104,7 @@ def extrapolate_steady_amplitude(amplitudes, phasors) -> tuple:
     return tuple(None if np.isnan(number) else float(number) for (number,) in estimates)
 
 
-def extrapolate_steady_amplitudes(amplitudes, phasors) -> tuple:
+def extrapolate_steady_amplitudes(amplitudes, phasors) -> ArrayPair:
     """Extrapolate the window amplitudes of n motions to steady amplitudes and errors.
 
     In a linear rig, the remaining free motion is multiplied by a complex factor per window, and the phasors
@@ -131,16 +134,8 @@ def extrapolate_steady_amplitudes(amplitudes, phasors) -> tuple:
     magnitude = np.abs(phasors)
     is_moving = np.all(magnitude[:, -5:] > 0, axis=1)
     waveform = amplitudes[:, -2:] / np.where(magnitude[:, -2:] > 0, magnitude[:, -2:], 1.0)
-    aitken_limits = np.stack(
-        [
-            np.abs(
-                phasors[:, n_windows - 1 - k]
-                + geometric_remainders(phasors[:, n_windows - 3 - k : n_windows - k])
-            )
-            for k in range(3)
-        ],
-        axis=1,
-    )
+
+    # The ratio of amplitude to |phasor| approaches its limit as the phasors do.
     previous_change = np.abs(phasors[:, -2] - phasors[:, -3])
     change = np.abs(phasors[:, -1] - phasors[:, -2])
     decay_factor = np.minimum(
@@ -148,16 +143,9 @@ def extrapolate_steady_amplitudes(amplitudes, phasors) -> tuple:
         0.9995,
     )
     waveform_change = (waveform[:, -1] - waveform[:, -2]) * decay_factor / (1 - decay_factor)
-    map_limits = np.stack(
-        [
-            np.abs(
-                phasors[:, n_windows - 1 - k]
-                + plane_map_remainders(phasors[:, n_windows - 4 - k : n_windows - k])
-            )
-            for k in range(2)
-        ],
-        axis=1,
-    )
+
+    aitken_limits = _extrapolate_magnitudes(phasors, geometric_remainders, 3, 3)
+    map_limits = _extrapolate_magnitudes(phasors, plane_map_remainders, 4, 2)
     has_map_limit = ~np.isnan(map_limits).any(axis=1)
     limit = np.where(has_map_limit, map_limits[:, 0], aitken_limits[:, 0])
     spread = np.where(
@@ -166,15 +154,28 @@ def extrapolate_steady_amplitudes(amplitudes, phasors) -> tuple:
         + np.abs(map_limits[:, 0] - aitken_limits[:, 0]),
         6 * (aitken_limits.max(axis=1) - aitken_limits.min(axis=1)),
     )
+
+    # With w = amplitude/|phasor|: value = limit w, error = spread w + 2 |dw| limit.
     value = limit * (waveform[:, -1] + waveform_change)
     error = spread * waveform[:, -1] + 2 * np.abs(waveform_change) * limit + 1e-9 * value
-    extrapolated_change = np.abs(value - amplitudes[:, -1])
     is_known = (
         is_moving
-        & (error < np.maximum(extrapolated_change, 1e-6 * value))
+        & (error < np.maximum(np.abs(value - amplitudes[:, -1]), 1e-6 * value))
         & (value < 20 * amplitudes[:, -1])
     )
     return np.where(is_known, value, np.nan), np.where(is_known, error, np.nan)
+
+
+def _extrapolate_magnitudes(phasors, find_remainders, n_points: int, n_limits: int) -> np.ndarray:
+    """Return the magnitudes (n, l) [m] of extrapolated phasors from the last windows.
+
+    Column k follows from the `n_points` phasors that end k windows before the last one.
+    """
+    ends = phasors.shape[1] - np.arange(n_limits)
+    limits = [
+        phasors[:, end - 1] + find_remainders(phasors[:, end - n_points : end]) for end in ends
+    ]
+    return np.abs(np.stack(limits, axis=1))
 
 
 def plane_map_remainders(p) -> np.ndarray:
@@ -202,7 +203,7 @@ def plane_map_remainders(p) -> np.ndarray:
     )
 
 
-def window_amplitude_means(extremes, window: int) -> tuple:
+def window_amplitude_means(extremes, window: int) -> ArrayPair:
     """Return the amplitude [m] of each window, and the mean amplitude [m] of its cycles.
 
     Parameters
@@ -252,7 +253,10 @@ def remaining_free_motion(extremes, window: int, decay=0.0):
     count = amplitude.shape[-1]
     if count < MIN_WINDOWS:
         return np.zeros(amplitude.shape[:-1])[()]
+
     n_third = max(1, count // 3)
+
+    # A beat within a window: its excess is free motion unless it persists while the modes decay.
     excess = amplitude - mean
     previous_excess = excess[..., -2 * n_third : -n_third].max(axis=-1)
     last_excess = excess[..., -n_third:].max(axis=-1)
@@ -260,6 +264,8 @@ def remaining_free_motion(extremes, window: int, decay=0.0):
     persists = (decayed_fraction > PERIODIC_TOL) & (
         last_excess > (1 - decayed_fraction / 2) * previous_excess
     )
+
+    # A beat over several windows: the last difference times its ratio to the one before.
     differences = np.abs(amplitude[..., :-1] - amplitude[..., -1:])
     previous_difference = differences[..., -2 * n_third : -n_third].max(axis=-1, initial=0.0)
     last_difference = differences[..., -n_third:].max(axis=-1)
@@ -273,10 +279,11 @@ def remaining_free_motion(extremes, window: int, decay=0.0):
         ),
     )
     ratio = np.maximum(ratio, 1 - decayed_fraction)
+
     return (last_difference * ratio + np.where(persists, 0.0, excess[..., -1]))[()]
 
 
-def beat_mean_amplitudes(extremes, window: int) -> tuple:
+def beat_mean_amplitudes(extremes, window: int) -> ArrayPair:
     """Return the mean amplitudes [m] of motions with short beats, and their errors [m].
 
     The amplitude is the mean over the last third of the windows. The error is the sum of the largest
@@ -300,7 +307,7 @@ def beat_mean_amplitudes(extremes, window: int) -> tuple:
     if n_third < 2:
         return np.full(len(mean), np.nan), np.full(len(mean), np.nan)
     last_means = mean[:, -n_third:]
-    value = mean[:, -n_third:].mean(axis=1)
+    value = last_means.mean(axis=1)
     beat = (amplitude - mean)[:, -n_third:].max(axis=1)
     half_difference = np.abs(
         last_means[:, : n_third // 2].mean(axis=1) - last_means[:, n_third // 2 :].mean(axis=1)

@@ -7,6 +7,8 @@ instrument indicates. An instrument evaluates the computed motion and does not c
 
 import numpy as np
 
+from .measures import ArrayPair, Values
+
 MIN_HARMONIC = 1e-4  # Smallest first harmonic [m s-2] of an output that counts as moving.
 READINGS = ("peak", "fundamental", "rms", "lowpass")
 N_FILTER_HARMONICS = 64  # Number of harmonics of the filtered signal.
@@ -16,7 +18,7 @@ GAUSS_POINTS = (1 + _GAUSS_RULE[0]) / 2  # Positions of the Gauss points in a st
 GAUSS_WEIGHTS = _GAUSS_RULE[1] / 2  # Weights of the Gauss points in a step of length 1.
 
 
-def harmonic_weights(time, omega: float) -> tuple:
+def harmonic_weights(time, omega: float) -> ArrayPair:
     """Return the weights of values and rates in a Fourier coefficient of a piecewise cubic motion.
 
     With four Gauss points per step, the only error of the coefficient is that of the cubic: h^4/384 times
@@ -121,6 +123,7 @@ def absolute_harmonic(window, drive, n: int) -> complex:
     window : Response
         Complete cycles of a drive that ends as a sinusoid.
     drive
+        Its last segment is the sinusoid.
     n : int
         Number of the harmonic, from 1.
     """
@@ -142,7 +145,7 @@ def find_acceleration_harmonics(window, drive) -> tuple[float, float]:
     )
 
 
-def make_acceleration_measures(first_harmonic: float, third_harmonic: float) -> dict:
+def make_acceleration_measures(first_harmonic: float, third_harmonic: float) -> Values:
     """Return fundamental [m s-2] and distortion [1] of the acceleration as a dict.
 
     The distortion is None if the output does not move.
@@ -173,6 +176,7 @@ def friction_harmonic(window, modes, drive) -> complex:
     modes
         Modal basis with one interface.
     drive
+        Its last segment is the sinusoid.
     """
     segment = _find_last_segment(window, drive)
     time = window.time
@@ -199,6 +203,7 @@ def read_instrument(
     window : Response
         Complete cycles of the drive.
     drive : core.SineDrive
+        Amplitude [m s-2] and angular frequency [rad/s].
     peak : float
         Peak acceleration [m s-2].
     kind : str

@@ -18,6 +18,7 @@ from scipy.interpolate import CubicHermiteSpline
 from scipy.optimize import least_squares
 from scipy.special import stdtrit
 
+from .measures import Measures, Values
 from .welch import CrossDensities, Segments, average_segments, transform_segments
 
 SEGMENTS_PER_RECORD = 16  # Ratio of the record length to the segment length.
@@ -78,7 +79,7 @@ def make_record(window, drive) -> Record:
     )
 
 
-def random_response_measures(window, drive) -> dict:
+def random_response_measures(window, drive) -> Values:
     """Return the measures of the response to a stationary random drive, by name."""
     record = make_record(window, drive)
     measures = {}
@@ -99,7 +100,7 @@ def random_response_measures(window, drive) -> dict:
     return {name: float(value) for name, value in measures.items() if np.isfinite(value)}
 
 
-def warn_if_short(measures: dict, window) -> list:
+def warn_if_short(measures: Measures, window) -> list[str]:
     """Return a list with a warning if the record is short relative to the decay time of the mode.
 
     Parameters
@@ -107,6 +108,7 @@ def warn_if_short(measures: dict, window) -> list:
     measures : dict
         Measure by name.
     window : Response
+        Record without its initial transient.
     """
     names = "response_frequency", "response_damping"
     if any(name not in measures or not measures[name].value for name in names):
@@ -151,7 +153,7 @@ def rms_scatter(values) -> float:
     return float(np.sqrt(mean) * np.expm1(relative_half_width / 2))
 
 
-def mean_power(time, work) -> tuple:
+def mean_power(time, work) -> tuple[float, float]:
     """Return the mean power [W] and its confidence half-width [W] from the cumulative work.
 
     The half-width comes from the means over N_GROUPS parts of equal length.
@@ -209,12 +211,13 @@ def compute_spectra(window, drive) -> Spectra:
     )
 
 
-def fit_peak(record: Record, band: tuple) -> tuple | None:
+def fit_peak(record: Record, band: tuple[float, float]) -> tuple | None:
     """Fit natural frequency [Hz] and damping ratio to the largest peak of H1, with half-widths.
 
     Parameters
     ----------
     record : Record
+        Equally spaced samples of drive and output.
     band : tuple
         Lowest and highest frequency of the drive [Hz].
 
@@ -226,12 +229,16 @@ def fit_peak(record: Record, band: tuple) -> tuple | None:
     """
     if record.displacement.size < 2 * MIN_SEGMENT_SAMPLES:
         return None
+
+    # A Hann window mixes lines within a distance of two, so that the ends of the band are left out.
     frequency, (drive_transforms, displacement_transforms, _) = transform_record(record)
-    span = 1 / (frequency[1])
     line = frequency[1]
+    span = 1 / line
     inside = np.flatnonzero((frequency >= band[0] + 2 * line) & (frequency <= band[1] - 2 * line))
     if inside.size < 5 or len(drive_transforms) < N_GROUPS:
         return None
+
+    # H1 = G_ax/G_aa, averaged over the segments.
     drive_powers = (np.abs(drive_transforms) ** 2)[:, inside]
     cross = (drive_transforms.conj() * displacement_transforms)[:, inside]
     f = frequency[inside]
@@ -239,11 +246,14 @@ def fit_peak(record: Record, band: tuple) -> tuple | None:
     peak = int(np.argmax(np.abs(gain)))
     if peak in (0, f.size - 1) or not np.abs(gain[peak]) > 0:
         return None
+
+    # The initial damping follows from the half-power width 2 zeta f.
     outside_peak = np.flatnonzero(np.abs(gain) < np.abs(gain[peak]) / np.sqrt(2))
     left = outside_peak[outside_peak < peak].max(initial=0)
     right = outside_peak[outside_peak > peak].min(initial=f.size - 1)
     width = float(f[right] - f[left])
     theta = np.log([2 * np.pi * f[peak], max(0.3 * width, 0.05 * line) / (2 * f[peak])])
+
     for _ in range(3):  # the fitted band is adapted to the width of the peak
         frequency_fit = np.exp(theta[0]) / (2 * np.pi)
         half_width = np.exp(theta.sum()) / (2 * np.pi)
@@ -255,6 +265,8 @@ def fit_peak(record: Record, band: tuple) -> tuple | None:
         or theta[1] > 0
     ):
         return None
+
+    # Jackknife: the fit is repeated without each group, and var = (g - 1)/g sum (theta_i - mean)^2.
     group_of_segment = np.arange(len(drive_transforms)) * N_GROUPS // len(drive_transforms)
     estimates = []
     for group in range(N_GROUPS):
@@ -263,6 +275,7 @@ def fit_peak(record: Record, band: tuple) -> tuple | None:
             :, in_fit_band
         ].sum(axis=0)
         estimates.append(np.exp(_fit_mode(f[in_fit_band], partial_gain, span, theta)))
+
     scale = np.array([1 / (2 * np.pi), 1.0])
     half_widths = np.sqrt((N_GROUPS - 1) * np.var(estimates, axis=0)) * stdtrit(N_GROUPS - 1, 0.975)
     return np.exp(theta) * scale, half_widths * scale

@@ -82,8 +82,7 @@ def onset(worn, cycles: int, pair=None) -> float:
     model = build(scene.loads(text, SCENE))
     patch = solve_patch_contact(model.patch, pair, worn)
     found = solve.solve_rig(model, choose_numerics(model), patch)
-    is_slipping = make_onset_test("slip")
-    return levels.find_onset(found.levels, found.run_level, 3e-3, is_slipping)[0] / G_N
+    return levels.find_onset(found.levels, found.run_level, 3e-3, make_onset_test("slip"))[0] / G_N
 
 
 def _worn_rig(coefficient: float, cycles: int, motion: int, tolerance: str) -> Row:

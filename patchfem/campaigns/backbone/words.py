@@ -180,7 +180,7 @@ def describe_band_width(backbone: Backbone) -> str:
     if any(match_amplitudes(curve, other)[0].size for other in others):
         content += " and the difference of the two methods"
     ends = np.array([band.damping_low, band.damping_high, curve.damping])[:, k].tolist()
-    low, high, best = (format_number(value, 6) for value in ends)
+    low, high, best = (format_number(value, 4) for value in ends)
     return (
         f"Its band is {content}; it is widest at {format_length(curve.amplitude[k], 3)}, where the damping ratio is "
         f"{low} to {high} beside {best}, and the frequency is "

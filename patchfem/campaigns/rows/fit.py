@@ -85,10 +85,10 @@ class FittedRows:
             "held_out": (self.logs, self.held_out),
             "left_out": (self.left_out_logs, ~np.isnan(self.left_out_logs)),
         }
-        return {
-            name: compute_rms_scores(self.cells, logs, counts & is_in_group)
-            for name, (logs, is_in_group) in groups.items()
-        }
+        scores = {}
+        for name, (logs, is_in_group) in groups.items():
+            scores[name] = compute_rms_scores(self.cells, logs, counts & is_in_group)
+        return scores
 
 
 def fit_rows(
@@ -185,9 +185,16 @@ def fit_rows(
 def make_residual(
     readings: Readings, model_readings: ModelReadings, training: np.ndarray
 ) -> Callable:
-    """Return the function that computes the log ratios of the readings of a mask (n,) from values of the free keys.
+    """Return the function that computes the log ratios (r,) of readings from values of the free keys.
 
     A reading flagged U has no residual where the computed value is larger.
+
+    Parameters
+    ----------
+    readings : Readings
+    model_readings : ModelReadings
+    training : (n,) bool
+        Mask of the r readings.
     """
     conditions = sorted(set(readings.condition[training].tolist()))
     is_lower_bound = readings.unstable[training]

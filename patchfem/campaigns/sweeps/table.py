@@ -36,11 +36,8 @@ def read_case_table(path: Path) -> tuple[Cases | None, list[str]]:
         return None, [
             f"{path}:1: the first line must be a header such as `{HEADER}`, and each line after it must give one case"
         ]
-    errors = [
-        f"{path}:1: {key}: two columns have this key; remove one of them"
-        for key, count in Counter(keys).items()
-        if count > 1
-    ]
+    doubled = [key for key, count in Counter(keys).items() if count > 1]
+    errors = [f"{path}:1: {key}: two columns have this key; remove one of them" for key in doubled]
     axes = []
     for column, (key, unit) in enumerate(zip(keys, table.units)):
         axis, wrong_cells = _parse_column(key, unit, [cells[column] for _, cells in lines])

@@ -57,9 +57,7 @@ class BenchRun:
     engine: BenchEngine
 
 
-def run_bench(
-    model, patch, steps: int, frames: int = 0, path=None, choice=None, springs=None, **callbacks
-) -> BenchRun:
+def run_bench(model, patch, steps: int, frames: int = 0, path=None, **settings) -> BenchRun:
     """Compute the friction response of a model to its prescribed displacement.
 
     Parameters
@@ -73,12 +71,9 @@ def run_bench(
         Number of output frames of the fields.
     path : tuple, optional
         Displacement path in the form of `SlidePath.samples`; default: the path of the model.
-    choice : EngineChoice, optional
-        Method of bond summation; default: chosen by the tolerance.
-    springs : callable, optional
-        See `BenchEngine`.
-    **callbacks
-        Fields `say` and `progress` of `SlideTask`.
+    **settings
+        Fields `choice` and `springs` of `BenchEngine`, by default chosen by the tolerance and unchanged, and fields `say`
+        and `progress` of `SlideTask`.
 
     Returns
     -------
@@ -97,9 +92,10 @@ def run_bench(
         start = time[first]
         time, slide = model.point.refine_samples(model.slide, time, slide, steps)
         first = int(np.searchsorted(time, start))
-    engine = replace(choose_bench_engine(model, slide, choice), springs=springs)
+    engine = choose_bench_engine(model, slide, settings.pop("choice", None))
+    engine = replace(engine, springs=settings.pop("springs", None))
     stored = _choose_frames(slide.size, frames)
-    histories = follow_path(SlideTask(model, patch, time, slide, stored, engine, **callbacks))
+    histories = follow_path(SlideTask(model, patch, time, slide, stored, engine, **settings))
     jumps = reversal_force_rule(model) == "jumps"
     values = _compute_measures(model, histories, first)
     values |= _compute_loop_measures(model, time, slide, histories, first, omega) if omega else {}

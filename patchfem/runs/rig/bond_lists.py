@@ -19,10 +19,7 @@ from ...friction.bonds import engines
 from ...friction.bonds.list_numbers import sum_form
 from ...friction.bonds.list_rows_kernels import FORM_GROWING
 from ...model.model import Model
-from ...structure.drive_sizes import (
-    find_drive_omega,
-    find_max_acceleration,
-)
+from ...structure.drive_sizes import find_drive_omega, find_max_acceleration
 from ..bench import engine as bench_engine
 from .numerics import Numerics
 
@@ -162,7 +159,9 @@ def is_bond_list_too_long(model: Model, numerics: Numerics, counters: dict) -> b
     Parameters
     ----------
     model : Model
+        Model with bonds.
     numerics : Numerics
+        Cycles and steps per cycle of the run.
     counters : dict
         Counters of the run, including "strips".
     """
@@ -174,7 +173,7 @@ def is_bond_list_too_long(model: Model, numerics: Numerics, counters: dict) -> b
     return strips > MAX_STRIPS_PER_STEP * numerics.cycles * numerics.steps
 
 
-def has_doubling_failed(counters: dict, errors: list) -> bool:
+def has_doubling_failed(counters: dict, errors: list[float]) -> bool:
     """Return whether two doublings of the steps have not reduced the error of a bond list.
 
     The list of a released block that reverses in almost every step depends on the step size: errors

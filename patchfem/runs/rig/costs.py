@@ -17,10 +17,7 @@ from ...core import Missing
 from ...effects import law_has_trait
 from ...model import patch as patch_model
 from ...model.model import Model
-from ...structure.drive_sizes import (
-    find_max_acceleration,
-    find_max_frequency_ratio,
-)
+from ...structure.drive_sizes import find_max_acceleration, find_max_frequency_ratio
 
 # Largest CPU time [s] of a motion from event to event if a time integration, which has larger errors, takes less.
 MAX_HYBRID_SECONDS = 5.0
@@ -127,7 +124,7 @@ def estimate_element_count_and_stiffness(model: Model) -> tuple:
             n_elements = patch_model.TYPICAL_N_NODES
             if not patch.mesh.is_automatic:
                 n_elements = round(patch.pieces.length / patch.uniform_element_size) + 1
-        count = count + n_elements
+        count += n_elements
         max_stiffness = max(max_stiffness, stiffness if stiffness < inf else 0.0)
     return count, max_stiffness
 
@@ -147,10 +144,8 @@ def count_intervals_by_cause(model: Model) -> tuple:
     )
     rate = damping / 2 + sqrt(damping**2 / 4 + float(modes.omega.max()) ** 2 + stiff * inverse_mass)
     n_rows = _count_rows_per_cycle(model)
-    vibration = (
-        max(rate * drive.period, 2 * pi * find_max_frequency_ratio(drive)) / MAX_INTERVAL_PHASE
-    )
     quick = find_max_frequency_ratio(drive)
+    vibration = max(rate * drive.period, 2 * pi * quick) / MAX_INTERVAL_PHASE
     events = 2 * max(count, n_interfaces) * quick + 2 + n_rows
     return vibration, events
 
@@ -204,6 +199,7 @@ def _estimate_stiff_fraction(model: Model, limit: float) -> float:
     Parameters
     ----------
     model : Model
+        Drive and modes; friction must depend on speed.
     limit : float
         Largest friction force [N].
     """

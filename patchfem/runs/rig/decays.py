@@ -97,6 +97,7 @@ def make_laws_on_mesh(model, patch, meshed: tuple = ()):
     Parameters
     ----------
     model : Model
+        Rig with its interfaces.
     patch : Patch or None
         Patch of [contact].
     meshed : tuple
@@ -129,6 +130,7 @@ def make_laws_on_coarse_meshes(model, coarse, stiffer=None) -> list:
     Parameters
     ----------
     model : Model
+        Rig with its interfaces.
     coarse : Patch or None
         Patch of [contact] on a coarser mesh.
     stiffer : joint.FreeRig, optional
@@ -155,6 +157,7 @@ def compute_static_curve(modes, laws, mode_index: int, amplitudes, samples: int)
     modes
         Modal basis.
     laws : LawGroup
+        Friction laws of the interfaces.
     mode_index : int
         Index of the mode.
     amplitudes : (k,)
@@ -224,6 +227,7 @@ def estimate_decay_mesh_errors(model, patch, coarse, amplitudes, find_mode, stif
     Parameters
     ----------
     model : Model
+        Rig with its interfaces.
     patch, coarse : Patch or None
         Patch of [contact], and the same on a coarser mesh.
     amplitudes : (k,)
@@ -244,9 +248,12 @@ def estimate_decay_mesh_errors(model, patch, coarse, amplitudes, find_mode, stif
     zero_errors = np.zeros((2, len(amplitudes)))
     if not (model.partial_slip or rig.friction.has_partial_slip):
         return zero_errors, ""
+
     moves = (model.grooves is not None, rig.friction.load_varies, rig.friction.strips_slide_apart)
     if any(moves):
         return zero_errors, UNSUPPORTED_CONTACTS[moves.index(True)]
+
+    # Static loops on both meshes differ by what the mesh resolves, unlike decays (module docstring).
     try:
         fine = make_laws_on_mesh(model, patch)
         mode_index = find_mode(fine)
@@ -254,13 +261,14 @@ def estimate_decay_mesh_errors(model, patch, coarse, amplitudes, find_mode, stif
             fine,
             make_laws_on_coarse_meshes(model, coarse, stiffer),
             lambda laws: compute_static_curve(
-                laws.modes, laws, mode_index, amplitudes, balance.SAMPLES_PER_CYCLE
+                laws.modes, laws, mode_index, amplitudes, balance.BALANCE_SAMPLES_PER_CYCLE
             )[1:3],
         )
     except NotConverged as reason:
         return zero_errors, str(reason)
     except PatchfemError:
         return zero_errors, NO_LOOP_REASON
+
     known = np.isfinite(error).all(axis=0)
     if not known.any():
         return zero_errors, NO_STATIC_CURVE_REASON
@@ -286,6 +294,7 @@ def estimate_stuck_mode_mesh_errors(
     frequency : float
         [Hz].
     model : Model
+        Rig with its interfaces.
     patch, coarse : Patch or None
         Patch of [contact], and the same on a coarser mesh.
     stiffer : joint.FreeRig, optional

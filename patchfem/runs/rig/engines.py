@@ -15,13 +15,9 @@ import numpy as np
 from ...effects import NO_WAVEFORM, law_has_trait
 from ...hybrid import runs as hybrid_runs
 from ...model.model import Model
-from ...response.coarser import CoarserRuns, second_order_errors
-from ...response.errors import (
-    FrictionScale,
-    convergence_errors,
-    finer_errors,
-    friction_errors,
-)
+from ...response.coarser import CoarserRuns, ComparisonRuns, second_order_errors
+from ...response.errors import FrictionScale, convergence_errors, finer_errors, friction_errors
+from ...response.measures import Measures, Values
 from ...response.rows import find_definition
 from ...scene.rules import methods
 from ...scene.rules.accuracy import has_effect, list_fixed_settings
@@ -59,15 +55,15 @@ class Engine(NamedTuple):
 
     name: str
     method: str
-    coarser_in_time: Callable
-    coarser_in_space: Callable
+    coarser_in_time: Callable[..., ComparisonRuns]
+    coarser_in_space: Callable[..., ComparisonRuns]
     min_relative_error: float = 1e-9
     max_balance_error: float | None = BALANCE_ROUND_OFF
-    summary_numbers: tuple = ()
+    summary_numbers: tuple[str, ...] = ()
     saves_state: bool = False
     finds_periodic_motion: bool = False
 
-    def list_runs_with_other_modes(self, model: Model, numerics) -> list:
+    def list_runs_with_other_modes(self, model: Model, numerics) -> ComparisonRuns:
         """List the comparison runs with other modes of a reduced structure, if modes are neglected.
 
         One has more modes, another one half of them. Those of a time integration have a quarter of
@@ -138,7 +134,7 @@ def choose_steady_method(model: Model) -> SteadyMethod:
     return STEADY_METHODS["shooting" if is_shot else "balance"]
 
 
-def _no_comparison_runs(*_) -> list:
+def _no_comparison_runs(*_) -> ComparisonRuns:
     """Return an empty list for engines that need no comparison runs of a kind."""
     return []
 
@@ -149,7 +145,7 @@ INSTANT_SAMPLING_ERROR = 0.005
 MOTION_SAMPLING_ERROR = 1e-9  # Relative error of all other measures, which are interpolated.
 
 
-def estimate_sampling_errors(values: dict) -> dict:
+def estimate_sampling_errors(values: Values) -> Values:
     """Estimate the errors of measures due to sampling with 400 samples per cycle."""
     errors = {}
     for name, value in values.items():
@@ -176,13 +172,13 @@ def _divide_steps(numerics, divisor: int):
     return replace(numerics, steps=max(1, numerics.steps // divisor))
 
 
-def _list_march_time_runs(model: Model, numerics) -> list:
+def _list_march_time_runs(model: Model, numerics) -> ComparisonRuns:
     """List the comparison runs of a time integration with half and with a quarter of its steps."""
     runs = (_divide_steps(numerics, 2), _divide_steps(numerics, 4))
     return [CoarserRuns(runs, partial(convergence_errors, steps=numerics.steps), source="steps")]
 
 
-def _list_march_space_runs(model: Model, numerics, patch, coarse, solution) -> list:
+def _list_march_space_runs(model: Model, numerics, patch, coarse, solution) -> ComparisonRuns:
     """List the comparison runs of a time integration with another spatial discretization.
 
     Each has a quarter of the steps of the run and is compared with a run that has as many:
@@ -211,7 +207,7 @@ def _list_march_space_runs(model: Model, numerics, patch, coarse, solution) -> l
     return [*coarser_runs, *_list_bond_sum_runs(model, quarter, patch, solution)]
 
 
-def _list_bond_sum_runs(model: Model, quarter, patch, solution) -> list:
+def _list_bond_sum_runs(model: Model, quarter, patch, solution) -> ComparisonRuns:
     """List the comparison runs from which the error of a bond list is estimated.
 
     The first entry is the error bound of the sum on forces and energies. If bonds are merged or a
@@ -238,7 +234,9 @@ def _list_bond_sum_runs(model: Model, quarter, patch, solution) -> list:
     return coarser_runs
 
 
-def _estimate_bond_sum_errors(model: Model, patch, fraction: float, values: dict, solution) -> dict:
+def _estimate_bond_sum_errors(
+    model: Model, patch, fraction: float, values: Values, solution
+) -> Values:
     """Estimate the errors of the measures due to truncation of the sum over bonds."""
     friction = model.friction
     load = patch.pressure.load if patch is not None else model.point.load
@@ -255,7 +253,7 @@ def _estimate_bond_sum_errors(model: Model, patch, fraction: float, values: dict
     return friction_errors(values, fraction, scale)
 
 
-def _list_engine_errors(model: Model, numerics, patch, coarse, solution) -> list:
+def _list_engine_errors(model: Model, numerics, patch, coarse, solution) -> ComparisonRuns:
     """Return the error estimates that the engine provides, in the form of comparison runs.
 
     For harmonic balance these are the residual and the change with twice the harmonics, for the
@@ -264,7 +262,7 @@ def _list_engine_errors(model: Model, numerics, patch, coarse, solution) -> list
     return [CoarserRuns((), lambda fine: {name: solution.errors.get(name, 0.0) for name in fine})]
 
 
-def _list_steady_space_runs(model: Model, numerics, patch, coarse, solution) -> list:
+def _list_steady_space_runs(model: Model, numerics, patch, coarse, solution) -> ComparisonRuns:
     """List the comparison runs of a steady motion on coarser meshes, and the errors by its engine."""
     coarser_runs = _list_engine_errors(model, numerics, patch, coarse, solution)
     if choose_steady_method(model).name == "shooting":
@@ -272,7 +270,7 @@ def _list_steady_space_runs(model: Model, numerics, patch, coarse, solution) -> 
     return coarser_runs
 
 
-def _list_hybrid_time_runs(model: Model, numerics) -> list:
+def _list_hybrid_time_runs(model: Model, numerics) -> ComparisonRuns:
     """List the comparison run of the engine `hybrid` with larger steps."""
     coarse = replace(
         numerics,
@@ -280,7 +278,7 @@ def _list_hybrid_time_runs(model: Model, numerics) -> list:
         steps=numerics.steps / hybrid_runs.COARSE_STEP,
     )
 
-    def find_errors(values: dict, coarse_values: dict) -> dict:
+    def find_errors(values: Values, coarse_values: Values) -> Values:
         """Return the errors of the measures that both runs have."""
         shared = {name: value for name, value in values.items() if name in coarse_values}
         return hybrid_runs.estimate_errors(shared, coarse_values, numerics.local)
@@ -288,7 +286,7 @@ def _list_hybrid_time_runs(model: Model, numerics) -> list:
     return [CoarserRuns((coarse,), find_errors)]
 
 
-def _list_hybrid_space_runs(model: Model, numerics, patch, coarse, solution) -> list:
+def _list_hybrid_space_runs(model: Model, numerics, patch, coarse, solution) -> ComparisonRuns:
     """List the comparison runs of the engine `hybrid` on coarser meshes.
 
     The mesh matters only for patches that slip part by part, for the loads of strips, and for the slip force of an
@@ -337,7 +335,7 @@ HARMONIC = Engine(
 ENGINES = {engine.name: engine for engine in (HYBRID, MARCH, HARMONIC)}
 
 
-def describe_balance_error(engine: Engine, measures: dict) -> str:
+def describe_balance_error(engine: Engine, measures: Measures) -> str:
     """Return a message if the energy balance is too inaccurate for the engine of a run, else "".
 
     `measures` are the measures of the run by name, with their errors.
@@ -373,7 +371,7 @@ def choose_engine(model: Model) -> Engine:
     return HYBRID if is_only_engine or not explain_time_steps(model) else MARCH
 
 
-def describe_unused_settings(model: Model, engine: str) -> list:
+def describe_unused_settings(model: Model, engine: str) -> list[str]:
     """Return sentences on the settings in [accuracy] that the engine of a rig does not use."""
     used = engine
     if ENGINES[engine].finds_periodic_motion:

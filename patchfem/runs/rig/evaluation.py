@@ -13,6 +13,7 @@ from ...response.events import is_all_stuck
 from ...response.levels import LEVEL_MEASURES, Level
 from ...response.loops import reversal_force_rule
 from ...response.measures import (
+    Values,
     relative_gap,
     window_amplitudes,
     window_end_values,
@@ -20,7 +21,13 @@ from ...response.measures import (
 from ...response.outcome import estimate_steady
 from ...response.rows import AMPLITUDE, LastCycles, compute_measures
 from ...structure.drive_sizes import is_sinusoidal
-from .solution import Solution, find_release_amplitude, first_interface_load, first_mode_stiffness
+from .solution import (
+    Fields,
+    Solution,
+    find_release_amplitude,
+    first_interface_load,
+    first_mode_stiffness,
+)
 
 
 class RunEvaluator:
@@ -75,17 +82,21 @@ class RunEvaluator:
         """
         return IntegratedMeasures()
 
-    def collect_cycle_data(self, run, drive, *, stuck: bool) -> dict:
+    def collect_cycle_data(self, run, drive, *, stuck: bool) -> Fields:
         """Return fields of `LastCycles` that the engine computes more accurately than from samples.
 
         Parameters
         ----------
-        run, drive, stuck
-            See `compute_integrated_measures`.
+        run
+            Run of the engine, or its mark at the end of a drive level.
+        drive
+            Drive of the run.
+        stuck : bool
+            Whether the interface is stuck during the last cycles.
         """
         return {}
 
-    def evaluate_measures(self, run, drive=None, ledger=None, *, stuck: bool = False) -> dict:
+    def evaluate_measures(self, run, drive=None, ledger=None, *, stuck: bool = False) -> Values:
         """Compute the measures of a run from its last cycles.
 
         Parameters
@@ -95,7 +106,7 @@ class RunEvaluator:
         drive : optional
             Drive of the run; default: that of the model.
         ledger : (4, k), optional
-            See `LastCycles`.
+            Friction work and energies over time [J].
         stuck : bool
             Whether the interface is stuck during the last cycles.
         """
@@ -108,6 +119,8 @@ class RunEvaluator:
         }
         if self.has_friction:
             fields |= {"reversal_rule": reversal_force_rule(model), "ledger": ledger}
+
+        # What the engine knows better replaces what follows from samples.
         fields |= self.collect_cycle_data(run, drive, stuck=stuck)
         window = fields["window"]
         n_cycles = min(self.numerics.window, len(run.extremes))
@@ -119,7 +132,10 @@ class RunEvaluator:
             is_sine=is_sinusoidal(drive),
             **fields,
         )
+
         values = compute_measures(last_cycles)
+
+        # The amplitude of a decay is that of a cycle, not of the whole window.
         if model.rig.drive.kind == "free":
             values[AMPLITUDE] = find_release_amplitude(window, drive.period, values[AMPLITUDE])
         return values
@@ -130,7 +146,7 @@ class RunEvaluator:
             return False
         return is_all_stuck(run.window, self.stick_tolerance)
 
-    def estimate_run_errors(self, run, drive, values: dict) -> dict:
+    def estimate_run_errors(self, run, drive, values: Values) -> Values:
         """Estimate the errors of the measures without coarse runs.
 
         Parameters
@@ -144,7 +160,7 @@ class RunEvaluator:
         """
         return {}
 
-    def collect_solution_fields(self, run, drive) -> dict:
+    def collect_solution_fields(self, run, drive) -> Fields:
         """Return fields of the Solution that only this engine provides."""
         return {}
 
@@ -171,6 +187,7 @@ class RunEvaluator:
         n_cycles = self.numerics.window
         stuck = self.is_stuck(run)
         values = self.evaluate_measures(run, drive, run.response.extra.get("ledger"), stuck=stuck)
+
         ends = window_end_values(run.extremes, run.phasors, n_cycles)
         fields = {
             "message": getattr(run, "message", ""),
@@ -179,6 +196,8 @@ class RunEvaluator:
             "steady": estimate_steady(drive, *ends),
         }
         fields |= self.collect_solution_fields(run, drive)
+
+        # Without an early end, the outcome stays open until the errors are known.
         return Solution(
             values=values,
             response=run.response,
@@ -228,7 +247,7 @@ def thin_samples(window):
     return window.select(is_retained)
 
 
-def compute_sampled_work(response) -> dict:
+def compute_sampled_work(response) -> Values:
     """Return a dict with the friction work and the integral of its absolute value [J].
 
     Both follow from the samples of all interfaces by the trapezoidal rule.
@@ -240,7 +259,7 @@ def compute_sampled_work(response) -> dict:
     return {"sampled": sampled, "passed": sum(float(abs(part).sum()) for part in parts)}
 
 
-def compute_work_check(energies: dict) -> float:
+def compute_work_check(energies: Values) -> float:
     """Return the relative difference of the friction work from samples and from the energy balance.
 
     Parameters

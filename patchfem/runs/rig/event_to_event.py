@@ -32,8 +32,8 @@ from ...response.events import (
     find_segment_borders,
     sort_events,
 )
-from ...response.measures import MIN_SLIDE_RANGE, compute_harmonic
-from ...response.ringing import compute_stuck_vibration, select_strongest
+from ...response.measures import MIN_SLIDE_RANGE, Values, compute_harmonic
+from ...response.ringing import VibratingMode, compute_stuck_vibration, select_strongest
 from ...response.rows import AMPLITUDE, find_definition, select_names
 from ...structure.drive_sizes import (
     choose_samples_per_cycle,
@@ -47,10 +47,10 @@ from . import strips
 from .evaluation import RunEvaluator, compute_sampled_work, compute_work_check, thin_samples
 from .hybrid_laws import Joints, make_joints
 from .levels import remove_incomplete_cycle, run_levels
-from .solution import Solution, describe_escape, find_travel, first_mode_stiffness
+from .solution import Fields, Solution, describe_escape, find_travel, first_mode_stiffness
 
-SAMPLES_PER_CYCLE = 400  # samples of each of the last cycles
-MIN_SAMPLES = 101  # samples of the last cycles of a run shorter than a cycle
+LATE_SAMPLES_PER_CYCLE = 400  # samples of each of the last cycles
+MIN_WINDOW_SAMPLES = 101  # samples of the last cycles of a run shorter than a cycle
 MAX_EARLY_SAMPLES = 8_000  # samples of equal distances before the last cycles
 EARLY_SAMPLES_PER_CYCLE = 40
 SAME_TIME_TOL = 1e-9  # distance of samples that are one, in cycles
@@ -87,6 +87,19 @@ class ElementSnapshot(NamedTuple):
     faces: list
 
 
+class SampleTimes(NamedTuple):
+    """Times of the samples of a run [s].
+
+    - samples (k,): all of them.
+    - snapshots (f,): those at which the elements are stored, in the last cycle.
+    - window_start: start of the window.
+    """
+
+    samples: np.ndarray
+    snapshots: np.ndarray
+    window_start: float
+
+
 @dataclass(frozen=True, eq=False, slots=True)
 class LumpedRun:
     """Run of the engine with histories.
@@ -104,19 +117,19 @@ class LumpedRun:
     - repeats: whether the motion repeats after each cycle.
     """
 
-    values: dict
+    values: Values
     response: Response
     window: Response
     extremes: np.ndarray
     phasors: np.ndarray
-    ledger: dict
+    ledger: Values
     outcome: Outcome | None
     message: str
     end: State
     cycles_done: float
     events: int
     log: Events | None = None
-    snapshots: list = field(default_factory=list)
+    snapshots: list[ElementSnapshot] = field(default_factory=list)
     repeats: bool = False
 
 
@@ -128,7 +141,9 @@ def run_from_event_to_event(
     Parameters
     ----------
     model : Model
+        Rig, drive and friction laws.
     numerics : Numerics
+        Step tolerance, cycles and window.
     patch : Patch or None
         None under [normal] or between masses.
     frames : int
@@ -152,6 +167,8 @@ def run_from_event_to_event(
         """Integrate the motion under a drive from the end of another run, None for the start of the rig."""
         state = None if before is None else before.end
         run = evaluator.integrate(drive, cycles, state, frames if is_last else 0)
+
+        # Measures of the whole run add up from level to level.
         for name in select_names("run"):
             if before is not None and name in before.values:
                 run.values[name] += before.values[name]
@@ -177,7 +194,7 @@ class LumpedEvaluator(RunEvaluator):
 
     def __init__(self, model, numerics, patch, joints: Joints):
         super().__init__(
-            model, numerics, patch, joints.contact, joints.stick_tolerance, SAMPLES_PER_CYCLE
+            model, numerics, patch, joints.contact, joints.stick_tolerance, LATE_SAMPLES_PER_CYCLE
         )
         self.joints = joints
         self.is_rigid = bool(joints.laws) and all(is_rigid(law.law) for law, _ in joints.laws)
@@ -189,7 +206,9 @@ class LumpedEvaluator(RunEvaluator):
         Parameters
         ----------
         drive
+            Acceleration of the base or force over the modal mass, over time.
         cycles : float
+            Number of cycles of the drive.
         state : State or None
             End of another run from which the motion goes on; None for the start of the rig.
         frames : int
@@ -197,7 +216,7 @@ class LumpedEvaluator(RunEvaluator):
         """
         travel = find_travel(self.model.rig)
         times = self._choose_times(drive, cycles, frames)
-        motion = self._run(drive, cycles, np.concatenate(times[:2]), travel, state)
+        motion = self._run(drive, cycles, times.samples, travel, state)
         outcome = EARLY_ENDS.get(motion.status)
         message = self._explain_end(motion, travel) if outcome is not None else ""
         if motion.status not in (Status.DONE, *EARLY_ENDS):
@@ -206,7 +225,7 @@ class LumpedEvaluator(RunEvaluator):
             # Only a run with a known end has the measures and samples of its last cycles.
             cycles = motion.time / drive.period
             times = self._choose_times(drive, cycles, 0)
-            motion = self._run(drive, cycles, np.concatenate(times[:2]), np.inf, state)
+            motion = self._run(drive, cycles, times.samples, np.inf, state)
         run = self._make_run(motion, drive, cycles, times, state)
         return replace(run, outcome=outcome, message=message)
 
@@ -254,12 +273,14 @@ class LumpedEvaluator(RunEvaluator):
         )
         return find_stable_amplitude(motion)
 
-    def _choose_times(self, drive, cycles: float, frames: int) -> tuple:
-        """Return the times [s] of samples before the last cycles, in the last cycles, and of snapshots."""
+    def _choose_times(self, drive, cycles: float, frames: int) -> SampleTimes:
+        """Choose the times of the samples and of `frames` snapshots."""
         period = drive.period
         end = cycles * period
         window_start = max(0.0, end - self.numerics.window * period)
         first = max(0.0, min(window_start, end - MIN_SAMPLED_CYCLES * period))
+
+        # Before the last cycles the distances are equal, unless the run omits this part.
         even = choose_samples_per_cycle(drive, cycles)
         count = even or max(1, min(EARLY_SAMPLES_PER_CYCLE, MAX_EARLY_SAMPLES // max(cycles, 1)))
         if not self.numerics.whole:
@@ -268,36 +289,45 @@ class LumpedEvaluator(RunEvaluator):
         early = np.zeros(0)
         if count:
             early = np.arange(0.0, first - 1e-9 * period, period / count)
+
+        # Each of the last cycles has LATE_SAMPLES_PER_CYCLE samples.
         late = [
             _divide(begin, stop, period, minimum)
-            for begin, stop, minimum in ((first, window_start, 2), (window_start, end, MIN_SAMPLES))
+            for begin, stop, minimum in (
+                (first, window_start, 2),
+                (window_start, end, MIN_WINDOW_SAMPLES),
+            )
             if stop > begin
         ]
         late = np.unique(np.concatenate(late))
+
+        # A snapshot is taken at a sample, where all histories have a value.
         begin = max(0.0, end - period)
         at = begin + (end - begin) * (1 + np.arange(frames)) / max(frames, 1)
         nearest = np.abs(late[:, None] - at).argmin(axis=0)
-        return early, late, late[nearest], window_start
+        return SampleTimes(np.append(early, late), late[nearest], window_start)
 
     def _make_run(
-        self, motion, drive, cycles: float, times: tuple, start: State | None
+        self, motion, drive, cycles: float, times: SampleTimes, start: State | None
     ) -> LumpedRun:
         """Return the histories, energies and events of a motion."""
         time = motion.rows[:, 0]
         if hasattr(drive, "band"):
             # Spectra need samples of equal distances.
-            is_kept = np.isin(time, np.concatenate(times[:2]))
+            is_kept = np.isin(time, times.samples)
         else:
             # Differences of samples at nearly the same time are round-off, except at a jump of the force; the last sample
             # is kept.
             is_late = np.diff(time) > SAME_TIME_TOL * drive.period
             is_late |= motion.rows[1:, -1] == Margin.AFTER
             is_kept = np.append(is_late, True)
+
         motion = replace(motion, rows=motion.rows[is_kept])
         response = motion.make_response(self.model.rig.modes, drive)
         if self.model.grooves is not None and self.model.grooves.lifted_mass:
             response = self._add_vertical_force(response, drive)
-        window = response.select(response.time >= times[3] * (1 - 1e-15))
+        window = response.select(response.time >= times.window_start * (1 - 1e-15))
+
         run = LumpedRun(
             values=dict(motion.values),
             response=response,
@@ -311,11 +341,13 @@ class LumpedEvaluator(RunEvaluator):
             cycles_done=cycles,
             events=len(motion.event_rows),
             log=self._list_events(motion, drive),
-            snapshots=self._list_snapshots(motion, response, times[2], start),
+            snapshots=self._list_snapshots(motion, response, times.snapshots, start),
             repeats=motion.repeats,
         )
         if not self.strips_slide_apart:
             return run
+
+        # The histories of independent strips are averages, weighted by their loads.
         loads = strips.compute_strip_loads(self.patch)
         offsets = self.patch.strips.offsets
         return replace(
@@ -368,8 +400,11 @@ class LumpedEvaluator(RunEvaluator):
         """
         if not len(times) or self.is_rigid or not self.joints.elements:
             return []
+
         slides = response.extra.get("slides", response.slide[:, None])
         at = np.searchsorted(response.time, times)
+
+        # Between two reversals all elements move alike, so that the reversals determine their stretches.
         stretches = []
         for i, (_, limit) in enumerate(self.joints.elements):
             reversals = motion.list_reversals(i)
@@ -396,8 +431,12 @@ class LumpedEvaluator(RunEvaluator):
 
         Parameters
         ----------
-        run, drive, stuck
-            See `RunEvaluator.compute_integrated_measures`.
+        run
+            Run of the engine, or its mark at the end of a drive level.
+        drive
+            Drive of the run.
+        stuck : bool
+            Whether the interface is stuck during the last cycles.
         """
         values = {
             name: None if np.isnan(value) else float(value) for name, value in run.values.items()
@@ -405,7 +444,7 @@ class LumpedEvaluator(RunEvaluator):
         if not is_sinusoidal(drive):
             values |= dict.fromkeys(select_names("sine"))
         if self.has_friction:
-            values |= self._limit_loop_measures(run, values)
+            values |= self._limit_loop_measures(run)
             work = run.window.extra["ledger"][0]
             energies = run.ledger | compute_sampled_work(run.window)
             values["work_check"] = compute_work_check(energies | {"booked": work[-1] - work[0]})
@@ -418,7 +457,7 @@ class LumpedEvaluator(RunEvaluator):
         values.pop("energy_stored", None)
         return IntegratedMeasures(values)
 
-    def _limit_loop_measures(self, run, values: dict) -> dict:
+    def _limit_loop_measures(self, run) -> dict[str, None]:
         """Return the measures of a loop that have no value, because the interface hardly moves or moves in several modes."""
         missing = {}
         if np.ptp(run.window.slide) <= MIN_SLIDE_RANGE:
@@ -428,17 +467,21 @@ class LumpedEvaluator(RunEvaluator):
             missing = {"equivalent_damping": None}
         return missing
 
-    def collect_cycle_data(self, run, drive, *, stuck: bool) -> dict:
+    def collect_cycle_data(self, run, drive, *, stuck: bool) -> Fields:
         """Return whether the interfaces are strips of a single one.
 
         Parameters
         ----------
-        run, drive, stuck
-            See `RunEvaluator.collect_cycle_data`.
+        run
+            Run of the engine, or its mark at the end of a drive level.
+        drive
+            Drive of the run.
+        stuck : bool
+            Whether the interface is stuck during the last cycles.
         """
         return {"is_single_interface": self.strips_slide_apart}
 
-    def _find_stuck_vibration(self, run, motion: Response, drive) -> list:
+    def _find_stuck_vibration(self, motion: Response, drive) -> list[VibratingMode]:
         """Return the free vibration of the modes in a part of the motion in which no interface slips; [] if one does."""
         springs = self.joints.springs
         if not springs.size or motion.time.size < 2 or is_periodic(drive) or not drive.segments:
@@ -448,7 +491,7 @@ class LumpedEvaluator(RunEvaluator):
             return []
         return compute_stuck_vibration(self.model.rig.modes, springs, motion)
 
-    def collect_solution_fields(self, run, drive) -> dict:
+    def collect_solution_fields(self, run, drive) -> Fields:
         """Return the vibration that remains after the last slip of a release."""
         if self.model.rig.drive.kind != "free" or not self.joints.springs.size:
             return {}
@@ -458,16 +501,20 @@ class LumpedEvaluator(RunEvaluator):
         if not moves.size:
             return {}
         after = response.select(response.time >= response.time[moves[-1] + 1])
-        vibration = self._find_stuck_vibration(run, after, drive)
+        vibration = self._find_stuck_vibration(after, drive)
         return {"tail": select_strongest(vibration)} if vibration else {}
 
-    def estimate_run_errors(self, run, drive, values: dict) -> dict:
+    def estimate_run_errors(self, run, drive, values: Values) -> Values:
         """Estimate the errors of the samples of a random motion.
 
         Parameters
         ----------
-        run, drive, values
-            See `RunEvaluator.estimate_run_errors`.
+        run
+            Run of the engine.
+        drive
+            Drive of the run.
+        values : dict of float
+            Measures by name.
         """
         if not hasattr(drive, "band"):
             return {}
@@ -505,6 +552,7 @@ def may_still_change(extremes, window: int, tolerance: float, decay: float) -> b
     window : int
         Number of cycles in a window.
     tolerance : float
+        Relative tolerance of the scene.
     decay : float
         Exponent of the decay of the slowest free motion per cycle [1].
     """
@@ -517,8 +565,8 @@ def may_still_change(extremes, window: int, tolerance: float, decay: float) -> b
 
 
 def _divide(begin: float, end: float, period: float, minimum: int) -> np.ndarray:
-    """Return times (k,) [s] of equal distances from begin to end, SAMPLES_PER_CYCLE in a period."""
-    count = round((end - begin) / period * SAMPLES_PER_CYCLE) + 1
+    """Return times (k,) [s] of equal distances from begin to end, LATE_SAMPLES_PER_CYCLE in a period."""
+    count = round((end - begin) / period * LATE_SAMPLES_PER_CYCLE) + 1
     return np.linspace(begin, end, max(minimum, count))
 
 

@@ -27,9 +27,13 @@ def collect_interface_fields(model, numerics, patch, solution) -> dict:
     Parameters
     ----------
     model : Model
+        Friction law and partial slip of the interface.
     numerics : Numerics
+        Window, and whether every node has its own bonds.
     patch : Patch
+        Patch of [contact], whose nodes have the fields.
     solution : Solution
+        Snapshots of the last cycle, or the window of a motion of one point.
     """
     sigma = patch.pressure.sigma_n
     f = model.friction
@@ -55,6 +59,7 @@ def collect_interface_fields(model, numerics, patch, solution) -> dict:
     rule = SlipRule()
     has_node_bonds = numerics.per_point and model.grooves is None and not needs_bond_list(f)
     has_points = is_march and snapshots[0].forces.size > 1
+
     if model.partial_slip and model.grooves is not None:
         tau, local = bench_shear.compute_groove_fields(patch, solution.contact, snapshots)
     elif has_points and law_has_trait(f.law, "bonds") and (model.partial_slip or has_node_bonds):
@@ -67,6 +72,7 @@ def collect_interface_fields(model, numerics, patch, solution) -> dict:
     else:
         tau = np.array([one.force / patch.pressure.load * sigma for one in snapshots])
         local = np.array([np.full(sigma.size, one.slip) for one in snapshots])
+
     time = np.array([one.time for one in snapshots])
     slide = np.array([one.slide for one in snapshots])
     return make_interface_frames(patch, time, tau, local, slide, rule)
@@ -85,9 +91,11 @@ def _collect_varying_load_fields(patch, solution) -> dict:
     nodal = np.stack([patch.pressure.sigma_n * weight, *(one.nodal for one in snapshots)])
     lift = np.array([0.0, *(one.heave for one in snapshots)])[:, None]
     turn = np.array([0.0, *(one.pitch for one in snapshots)])[:, None]
+
     gap = np.maximum(sets.opening + lift + turn * sets.x + nodal @ sets.c, 0.0)
     gap[nodal > 0] = 0.0
     gap[0] = patch.pressure.gap
+
     tau = np.zeros_like(nodal)
     local = np.zeros_like(nodal)
     for k, one in enumerate(snapshots, 1):
@@ -98,6 +106,7 @@ def _collect_varying_load_fields(patch, solution) -> dict:
             total = nodal[k].sum()
             tau[k] = one.force / total * nodal[k] if total > 0 else 0.0
             local[k] = slide[k]
+
     return {
         "time": time,
         "normal_stress": nodal / weight,

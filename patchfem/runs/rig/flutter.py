@@ -4,6 +4,7 @@ In: a `postprocessing.CoupledRun` with such a mode. Out: `flutter_amplitude`, th
 largest unstable limit cycle (`dynamics.limit_cycles`), and notes.
 """
 
+from math import tau
 from typing import NamedTuple
 
 from ...core import Measure, NotConverged, Outcome, PatchfemError
@@ -51,6 +52,7 @@ def compute_flutter_amplitude(run) -> tuple:
     unit = TABLE[FLUTTER_MEASURE].unit
     floor = TABLE[FLUTTER_MEASURE].floor
     cycles, reason, smallest_amplitude = _find_limit_cycles(model, run.numerics, run.patch)
+
     end_notes = []
     outcome = run.solution.outcome
     if outcome is Outcome.EXCEEDS_TRAVEL and model.rig.springs.travel == MAX_TRAVEL:
@@ -58,10 +60,13 @@ def compute_flutter_amplitude(run) -> tuple:
         end_notes.append(
             f"the run ended after {end_time:.4g} s, when the motion exceeded {MAX_TRAVEL:g} m"
         )
+
     unstable_cycles = [cycle for cycle in cycles if not cycle.is_stable]
     if not unstable_cycles:
         return {FLUTTER_MEASURE: Measure(None, unit, None, floor, reason=reason)}, end_notes
     limit = unstable_cycles[-1]
+
+    # Motions below the unstable cycle approach the largest stable one inside it, or decay.
     inner = [cycle for cycle in cycles if cycle.is_stable and cycle.amplitude < limit.amplitude]
     decay_text = "smaller amplitude"
     if inner:
@@ -78,9 +83,10 @@ def compute_flutter_amplitude(run) -> tuple:
         decay_text += f" decays, at least to {lowest} (smaller motions could not be followed)"
     else:
         decay_text += " decays"
+
     return {FLUTTER_MEASURE: Measure(limit.amplitude, unit, limit.error, floor)}, [
         "a mode of negative damping gains energy: without a drive this mode has an unstable steady oscillation of "
-        f"{format_length(limit.amplitude, 4)} at the output, at {limit.omega / 6.283185307179586:.4g} "
+        f"{format_length(limit.amplitude, 4)} at the output, at {limit.omega / tau:.4g} "
         "Hz; a free oscillation of "
         f"{decay_text}, and a free oscillation of larger amplitude grows",
         *end_notes,
@@ -107,15 +113,19 @@ def _find_limit_cycles(model, numerics, patch) -> LimitCycles:
     f = model.friction
     if len(rig.friction.interfaces) != 1 or f is None:
         return LimitCycles([], "limit cycles can be computed for one interface only")
+
     modes = rig.modes
-    row = rig.modes.interfaces[0]
+    row = modes.interfaces[0]
     if not row[limit_cycles.find_unstable_modes(modes)].any():
         return LimitCycles([], NO_INTERFACE_NOTE)
+
     load = patch.pressure.load if patch is not None else model.point.load
     if reason := find_obstacle_of_map("harmonic", model):
         return LimitCycles([], f"limit cycles cannot be computed {reason}")
+
     element = make_single_law(model, numerics, patch)
     try:
+        # Rigid friction is a relay: the force has one magnitude during slip.
         if element is not None and element.form == "rigid":
             if rig.springs.is_nonlinear:
                 return LimitCycles([], f"{RIGID_LAW_REASON} a nonlinear spring")
@@ -124,6 +134,8 @@ def _find_limit_cycles(model, numerics, patch) -> LimitCycles:
             static, kinetic = element.numbers[1:3]
             cycles = limit_cycles.find_relay_cycles(modes, row, kinetic, static)
             return LimitCycles(cycles, NO_SLIDING_NOTE)
+
+        # All other laws have smooth loops, which harmonic balance finds.
         finder = BalanceFinder(model, numerics, patch)
         cycles, smallest_amplitude = limit_cycles.find_balance_cycles(
             modes, finder.group, row, f.static * load

@@ -55,16 +55,20 @@ def make_joints(model: Model, numerics: Numerics, patch) -> Joints:
     Parameters
     ----------
     model : Model
+        Rig with its interfaces.
     numerics : Numerics
+        Names the interfaces with a coarser mesh.
     patch : Patch or None
         None without [contact].
     """
     rig = model.rig
     if model.friction is None:
         return Joints()
+
     speed = rig.speed_scale
     listed = joints.list_joints(model, patch, numerics.meshed)
     is_soft = bool(model.partial_slip or rig.friction.has_partial_slip)
+
     if not (is_soft or rig.friction.names or rig.friction.strips_slide_apart):
         laws = [_make_whole_law(model, patch)]
     else:
@@ -117,6 +121,7 @@ def list_elements(model: Model, numerics: Numerics, patch) -> list[tuple[np.ndar
     Parameters
     ----------
     model : Model
+        Rig with its interfaces.
     numerics : Numerics
         Names the interfaces with a coarser mesh.
     patch : Patch or None

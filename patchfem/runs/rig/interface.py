@@ -35,7 +35,9 @@ def make_contact(model: Model, numerics: Numerics, patch) -> contacts.Contact:
     Parameters
     ----------
     model : Model
+        Rig, springs and friction laws.
     numerics : Numerics
+        Numbers of shear modes, method of bond summation and coarser meshes.
     patch : Patch or None
         None under [normal].
     """
@@ -59,13 +61,12 @@ def make_contact(model: Model, numerics: Numerics, patch) -> contacts.Contact:
 
 def _make_own_contact(model: Model, numerics: Numerics, patch, row) -> contacts.Contact:
     """Return the contact points of the only interface, of the slide `row` (n,) per coordinate."""
+    load = patch.pressure.load if patch is not None else model.point.load
     if model.grooves is not None:
-        load = patch.pressure.load if patch is not None else model.point.load
         return shear.make_flank_contact(model, load, patch, numerics.shear_modes)
     if model.rig.friction.load_varies:
         return _make_varying_contact(model, numerics, patch, row)
     law = model.friction.law
-    load = patch.pressure.load if patch is not None else model.point.load
     if law_has_trait(law, "bonds"):
         choice = choose_bond_summation(model, numerics)
         if model.partial_slip or choice.engine != "recursion" or numerics.per_point:
@@ -83,7 +84,9 @@ def make_single_law(model: Model, numerics: Numerics, patch) -> Element | None:
     Parameters
     ----------
     model : Model
+        Friction law and load of the interface.
     numerics : Numerics
+        Method of bond summation and coarser meshes.
     patch : Patch or None
         None under [normal].
     """
@@ -154,21 +157,27 @@ def _make_varying_contact(model: Model, numerics: Numerics, patch, row) -> conta
         if needs_bond_list(f):
             choice = choose_bond_summation(model, numerics)
             bond_sum = contacts.BondSum(law, choice.reach(f.order), choice.merge)
+
+    # A single point follows the load of the scene and has no contact set.
     if patch is None:
         preload = float(model.point.evaluate(np.zeros(1))[0])
         return contacts.make_pressed_contact(
             law, preload, row, bond_sum=bond_sum, load=model.point.evaluate
         )
+
+    # Heave and pitch of the upper piece change the contact set of a patch.
     sets = make_contact_sets(patch, model.patch.loading.rotational_stiffness)
     weight = patch.pieces.interface.weight
     force = patch.pressure.sigma_n * weight
     mean = force.sum() * weight / weight.sum()
     measure = force + mean * MIN_PRESSURE_FRACTION
+
     modes_of_pieces = None
     if model.partial_slip:
         modes_of_pieces = choose_shear_modes(
             model, patch, law, force, measure, numerics.shear_modes
         )
+
     still = np.zeros(modes.omega.size)
     return contacts.make_pressed_contact(
         law,
@@ -191,6 +200,7 @@ def make_contact_sets(patch, spring: float = 0.0) -> "contact_sets.ContactSets":
     Parameters
     ----------
     patch : Patch
+        Patch with its static solution.
     spring : float
         Rotational stiffness of the holder [N m/rad], 0 for a rigid one.
     """
@@ -212,8 +222,11 @@ def choose_shear_modes(model: Model, patch, law, force, measure, count: int | No
     Parameters
     ----------
     model : Model
+        Its tolerance sets the number of modes.
     patch : Patch
+        Patch with the shear compliance of its pieces.
     law : Bonds, or the keys of an elastic-plastic law
+        Static friction, and the length over which the force grows.
     force, measure : (m,) array
         Nodal forces of the preload [N], without and with the fraction of the mean pressure.
     count : int or None

@@ -57,6 +57,7 @@ def list_joints(model: Model, patch, meshed: tuple = ()) -> list[Joint]:
     Parameters
     ----------
     model : Model
+        Rig with its interfaces.
     patch : Patch or None
         None under [normal] and between masses.
     meshed : tuple of int

@@ -11,12 +11,7 @@ import numpy as np
 
 from ...core import Measure, SineDrive
 from ...response.events import join_events
-from ...response.levels import (
-    Level,
-    bracket_onset,
-    make_no_onset_reason,
-    make_onset_test,
-)
+from ...response.levels import Level, bracket_onset, make_no_onset_reason, make_onset_test
 from ...response.rows import TABLE
 from ...structure.drive_sizes import find_drive_omega
 
@@ -34,7 +29,9 @@ def add_level_errors(levels, coarser_runs: list, solutions: dict) -> tuple:
     Parameters
     ----------
     levels : sequence of Level
+        Levels of the run, in chronological order.
     coarser_runs : list of CoarserRuns
+        Settings of the coarse runs by source of error.
     solutions : dict
         Solution of each coarse run by its Numerics.
     """
@@ -71,12 +68,14 @@ def find_onset(levels, run_level, tolerance: float, is_past_onset) -> tuple | No
     Parameters
     ----------
     levels : sequence of Level
+        Levels of the run, in chronological order.
     run_level : callable
         Function (index, level) -> Level that runs a level [m s-2] from the final state of the level
         with this index, or from rest for the index -1.
     tolerance : float
+        Largest width of the bracket relative to the level.
     is_past_onset : callable
-        Function of a Level that returns whether the onset is reached, see `make_onset_test`.
+        Function of a Level that returns whether the onset is reached.
 
     Returns
     -------
@@ -111,6 +110,7 @@ def measure_onset_level(rig, solution, tolerance: float) -> Measure:
     solution : Solution
         The difference of the onset levels of its coarse runs is added to the error.
     tolerance : float
+        Largest width of the bracket relative to the level.
     """
     unit = _find_level_unit(rig)
     is_past_onset = make_onset_test(*rig.drive.levels.onset)
@@ -156,6 +156,7 @@ def run_levels(evaluator, integrate, state, find_end_state, progress=None) -> tu
     Parameters
     ----------
     evaluator : RunEvaluator
+        Evaluates each level; its model has the levels of the drive.
     integrate : callable
         Function (sine, state, watch, is_last) that returns a run.
     state
@@ -163,6 +164,7 @@ def run_levels(evaluator, integrate, state, find_end_state, progress=None) -> tu
     find_end_state : callable
         Function of a run that returns its final state.
     progress : callable, optional
+        Callback for the completed fraction of all levels.
 
     Returns
     -------
@@ -172,6 +174,8 @@ def run_levels(evaluator, integrate, state, find_end_state, progress=None) -> tu
     rig = evaluator.model.rig
     omega = find_drive_omega(rig.drive.signal)
     moving = rig.drive.signal.moving
+
+    # Level k starts from states[k], and a further level after it from states[k + 1].
     states = [state]
     runs = []
     level_results = []
@@ -195,6 +199,7 @@ def run_levels(evaluator, integrate, state, find_end_state, progress=None) -> tu
         states.append(find_end_state(run))
         if run.outcome is not None:
             break
+
     joined = join_runs(runs, rig.drive.levels.cycles * rig.drive.signal.period)
     return joined, {"levels": tuple(level_results), "run_level": run_level}
 
@@ -234,7 +239,7 @@ def join_runs(runs: list, duration: float):
     )
 
 
-def _join_histories(histories: list, shifts: list):
+def _join_histories(histories: list, shifts: list[float]):
     """Join the histories of successive runs and shift them by their start times [s]."""
     last = histories[-1]
     # The last sample of a run equals the first sample of the next run.

@@ -15,7 +15,7 @@ from ...core import IntegratedMeasures, Outcome
 from ...effects import law_has_trait
 from ...points import time_march as engine
 from ...response.ends import estimate_window_error
-from ...response.measures import compute_step_harmonic, peak_sampling_errors
+from ...response.measures import Values, compute_step_harmonic, peak_sampling_errors
 from ...response.spectrum import friction_harmonic, motion_harmonic
 from ...structure.drive_sizes import (
     estimate_peak_speed,
@@ -31,6 +31,7 @@ from .evaluation import RunEvaluator, compute_work_check
 from .interface import make_contact
 from .solution import (
     CycleLoop,
+    Fields,
     Solution,
     compute_sampled_loop,
     describe_escape,
@@ -43,22 +44,20 @@ END_ERROR_FACTOR = 1.5
 
 
 def march_in_time(model, numerics, patch, frames: int = 0, say=None, progress=None) -> Solution:
-    """Integrate the motion of a rig in time steps and evaluate its measures.
+    """Integrate the motion of a rig in time steps and evaluate its measures, without errors from coarse runs.
 
     Parameters
     ----------
     model : Model
+        Rig, drive and friction laws.
     numerics : Numerics
+        Steps per cycle, cycles and window.
     patch : Patch or None
+        None under [normal] and between masses.
     frames : int
         Number of snapshots of the interface in the last cycle.
     say, progress : callable, optional
         Callbacks for a line of text and for the completed fraction.
-
-    Returns
-    -------
-    Solution
-        Without errors from coarse runs.
     """
     rig = model.rig
     begin = perf_counter()
@@ -114,7 +113,7 @@ class MarchEvaluator(RunEvaluator):
             stick_tolerance = 1e-3 * contact.length
         super().__init__(model, numerics, patch, contact, stick_tolerance)
 
-    def collect_solution_fields(self, run, drive) -> dict:
+    def collect_solution_fields(self, run, drive) -> Fields:
         """Return drive levels, bond summation and errors due to an end between two steps."""
         late = {}
         n_steps = self.numerics.cycles * self.numerics.steps
@@ -122,16 +121,19 @@ class MarchEvaluator(RunEvaluator):
             period = self.model.rig.drive.signal.period
             changes = estimate_window_error(run.window, period, n_steps - round(n_steps))
             late = {name: END_ERROR_FACTOR * change for name, change in changes.items()}
-        fields = {"bond_summation": self.choose_bond_summation(), "extra": {"late": late}}
-        return fields
+        return {"bond_summation": self.choose_bond_summation(), "extra": {"late": late}}
 
-    def estimate_run_errors(self, run, drive, values: dict) -> dict:
+    def estimate_run_errors(self, run, drive, values: Values) -> Values:
         """Estimate how far the peaks of a motion exceed its samples.
 
         Parameters
         ----------
-        run, drive, values
-            See `RunEvaluator.estimate_run_errors`.
+        run
+            Run of the engine.
+        drive
+            Drive of the run.
+        values : dict of float
+            Measures by name.
         """
         return peak_sampling_errors(run.window)
 
@@ -147,8 +149,12 @@ class MarchEvaluator(RunEvaluator):
 
         Parameters
         ----------
-        run, drive, stuck
-            See `RunEvaluator.compute_integrated_measures`.
+        run
+            Run of the engine, or its mark at the end of a drive level.
+        drive
+            Drive of the run.
+        stuck : bool
+            Whether the interface is stuck during the last cycles.
         """
         if not self.has_friction:
             return IntegratedMeasures()
@@ -159,7 +165,7 @@ class MarchEvaluator(RunEvaluator):
             values |= {"slip_start_phase": None, "stick_fraction": 1.0}
         return IntegratedMeasures(values)
 
-    def _compute_energies(self, run, drive, *, stuck: bool) -> dict:
+    def _compute_energies(self, run, drive, *, stuck: bool) -> Values:
         """Return the energies of a run, with a scale for the round-off of a stuck rigid interface.
 
         This scale is the kinetic energy at the peak speed of the drive.
@@ -170,13 +176,17 @@ class MarchEvaluator(RunEvaluator):
         moving = rig.modes.mass * estimate_peak_speed(drive, rig.start) ** 2
         return run.ledger | {"power": run.ledger["power"] + moving}
 
-    def collect_cycle_data(self, run, drive, *, stuck: bool) -> dict:
+    def collect_cycle_data(self, run, drive, *, stuck: bool) -> Fields:
         """Return the friction loop and the energies of the last cycles.
 
         Parameters
         ----------
-        run, drive, stuck
-            See `RunEvaluator.collect_cycle_data`.
+        run
+            Run of the engine, or its mark at the end of a drive level.
+        drive
+            Drive of the run.
+        stuck : bool
+            Whether the interface is stuck during the last cycles.
         """
         if not self.has_friction:
             return {}
@@ -196,6 +206,7 @@ class MarchEvaluator(RunEvaluator):
         window = run.window
         omega = find_drive_omega(drive)
         rig = self.model.rig
+
         work = getattr(run, "window_work", None)
         work = run.work if work is None else work
         # The friction of strips that yaw does more work than follows from the mean displacement.
@@ -203,8 +214,11 @@ class MarchEvaluator(RunEvaluator):
         # The friction work of this interface excludes other interfaces and impacts at stops.
         if len(rig.friction.names) > 1 or together:
             work = float(run.step_force @ np.diff(window.slide))
+
         span = window.time[-1] - window.time[0]
         work *= drive.period / span if span > 0 else 0.0
+
+        # The equation of motion gives the force from the motion only if no other force acts.
         alone = len(rig.modes.interfaces) == 1 and not (
             (rig.friction.load_varies and not self.model.load_varies)
             or rig.friction.strips_slide_apart
@@ -213,6 +227,7 @@ class MarchEvaluator(RunEvaluator):
         if alone and is_sinusoidal(drive) and has_full_cycle(span, drive):
             slide = motion_harmonic(window.time, window.slide, window.slide_rate, omega)
             return CycleLoop(slide, friction_harmonic(window, rig.modes, drive), work)
+
         force = 0j
         if span > 0:
             force = compute_step_harmonic(window.time, run.step_force, omega)

@@ -36,17 +36,17 @@ SINGLE_POINT_WARNING = (
 )
 
 
-def collect_warnings(run) -> list:
+def collect_warnings(run) -> list[str]:
     """Return the warnings of a run on its friction law, load and engine."""
     model = run.model
     patch = run.patch
     solution = run.solution
     measures = run.measures
     book = solution.book
-    harmonics = solution.extra.get("harmonics")
     steps = solution.extra.get("steps_per_cycle")
     if "steps_per_cycle" in ENGINES[run.numerics.engine].summary_numbers:
         steps = run.numerics.steps
+
     warnings = [
         *model.rig.structure.notes,
         *_warn_of_single_point(model, patch, run.numerics),
@@ -55,24 +55,22 @@ def collect_warnings(run) -> list:
         speed = float(np.abs(solution.window.slide_rate).max())
         warnings += warn_of_bonds(model, speed, measures, run.outcome)
     warnings += warn_of_created_energy(model, book.get("created", 0.0), book.get("passed", 0.0))
-    if (
-        patch is not None
-        and model.rig.friction.load_varies
-        and solution.contact is not None
-        and solution.contact.reduction is not None
-    ):
-        warnings += note_on_shear_modes(
-            model, solution.contact.reduction.stiffness.size, solution.contact.sets.x.size
-        )
+
+    # The shear modes of a patch replace its nodes if its load varies, or on grooves.
+    reduction = getattr(solution.contact, "reduction", None)
+    if patch is not None and model.rig.friction.load_varies and reduction is not None:
+        n_nodes = solution.contact.sets.x.size
+        warnings += note_on_shear_modes(model, reduction.stiffness.size, n_nodes)
     if model.grooves is not None and model.partial_slip:
-        warnings += note_on_shear_modes(
-            model, solution.contact.reduction.stiffness.size, solution.contact.reduction.points.size
-        )
+        warnings += note_on_shear_modes(model, reduction.stiffness.size, reduction.points.size)
+
     warnings += [
-        *warn_of_work_check(measures, steps, harmonics),
+        *warn_of_work_check(measures, steps, solution.extra.get("harmonics")),
         *note_on_changing_drive(run.outcome, run.drive),
         *solution.notes,
     ]
+
+    # A stuck interface dissipates nothing, so that free vibration of the structure may remain.
     if not model.rig.drive.levels.amplitudes:
         tolerance = model.accuracy.tolerance
         rate = find_min_decay_rate(model.rig.modes)
@@ -81,6 +79,8 @@ def collect_warnings(run) -> list:
             limits = (tolerance, rate * run.drive.period)
             ratio = ringing / measures[AMPLITUDE].value
             warnings.append(describe_ringing(ratio, limits, run.numerics.cycles))
+
+    # An end at the grooves is reported by a note.
     if solution.message and solution.outcome is not Outcome.LEAVES_GROOVES:
         warnings.append(solution.message)
     warnings += _warn_of_peak_at_sweep_end(run)
@@ -92,14 +92,14 @@ def collect_warnings(run) -> list:
     return warnings
 
 
-def _warn_of_interface_patch(face, response) -> list:
+def _warn_of_interface_patch(face, response) -> list[str]:
     """Return the warnings on the patch of one interface; `_warn_of_single_point` tells that of [contact]."""
     is_point = face.name and not face.partial_slip
     warnings = [SINGLE_POINT_WARNING] if is_point else []
     return [*warnings, *warn_of_large_slide(face.patch, face.slide(response))]
 
 
-def _warn_of_peak_at_sweep_end(run) -> list:
+def _warn_of_peak_at_sweep_end(run) -> list[str]:
     """Return a list with a warning if the largest response is at an end of the sweep."""
     peak = run.measures.get("peak_frequency")
     if peak is None or not peak.value or not run.measures[AMPLITUDE].value > 0:
@@ -116,19 +116,23 @@ def _warn_of_peak_at_sweep_end(run) -> list:
     return []
 
 
-def collect_notes(run) -> list:
+def collect_notes(run) -> list[str]:
     """Return the notes of a run on its friction law, engine, fields and end of motion."""
     model = run.model
     solution = run.solution
     rig = run.model.rig
+
+    # An end at the grooves follows from the model; it is no defect of the run.
     end_notes = _note_on_lateral_motion(run)
     if solution.message and solution.outcome is Outcome.LEAVES_GROOVES:
         end_notes.append(solution.message)
+
     if run.patch is not None and run.patch.strips is not None and model.partial_slip:
         return [
             "strips that slip part by part have no common shear stress, so the fields contain only the pressure",
             *end_notes,
         ]
+
     notes = [
         *_note_on_bond_growth(model, run.patch, solution),
         *note_on_groove_slope(model, run.patch),
@@ -150,7 +154,7 @@ def collect_notes(run) -> list:
     ]
 
 
-def _note_on_release(run) -> list:
+def _note_on_release(run) -> list[str]:
     """Return a list with a note on the time interval of the measures of a release."""
     rig = run.model.rig
     window = run.solution.window
@@ -169,7 +173,7 @@ def _note_on_release(run) -> list:
     ]
 
 
-def _note_on_lateral_motion(run) -> list:
+def _note_on_lateral_motion(run) -> list[str]:
     """Return a list with a note on the neglected lateral motion of strips that yaw."""
     if not run.model.rig.friction.strips_slide_apart:
         return []
@@ -178,7 +182,7 @@ def _note_on_lateral_motion(run) -> list:
     ]
 
 
-def note_on_creep(friction) -> list:
+def note_on_creep(friction) -> list[str]:
     """Return a list with a note on a friction law that never sticks."""
     if friction is None or not law_has_trait(friction.law, "creeps"):
         return []
@@ -189,7 +193,7 @@ def note_on_creep(friction) -> list:
     ]
 
 
-def _warn_of_single_point(model, patch, numerics) -> list:
+def _warn_of_single_point(model, patch, numerics) -> list[str]:
     """Return a list with a warning if a patch moves exactly like a single point."""
     f = model.friction
     can_move = model.rig.friction.load_varies or model.rig.friction.strips_slide_apart
@@ -205,7 +209,7 @@ def _warn_of_single_point(model, patch, numerics) -> list:
     return [SINGLE_POINT_WARNING]
 
 
-def _note_on_bond_growth(model, patch, solution) -> list:
+def _note_on_bond_growth(model, patch, solution) -> list[str]:
     """Return the notes on bonds that grow with contact time."""
     if model.friction is None:
         return []
@@ -216,7 +220,7 @@ def _note_on_bond_growth(model, patch, solution) -> list:
     return note_on_growth(model, peak)
 
 
-def _note_on_elements(run) -> list:
+def _note_on_elements(run) -> list[str]:
     """Return a list with a note on the method that computes the motion of friction elements."""
     if find_obstacle_of_map("piecewise", run.model):
         return []
@@ -227,7 +231,7 @@ def _note_on_elements(run) -> list:
     return []
 
 
-def _note_on_marched_elements(run) -> list:
+def _note_on_marched_elements(run) -> list[str]:
     """Return a list with a note if friction elements are integrated in time steps to save CPU time."""
     model = run.model
     if model.accuracy.method != "auto" or "steps_per_cycle" in run.numerics.pinned:
@@ -239,7 +243,7 @@ def _note_on_marched_elements(run) -> list:
     ]
 
 
-def _note_on_elements_without_slip(run) -> list:
+def _note_on_elements_without_slip(run) -> list[str]:
     """Return a list with a note on a steady motion in which some elements never slip."""
     if run.solution.outcome not in (Outcome.STEADY, Outcome.STUCK):
         return []
@@ -258,12 +262,13 @@ def _note_on_elements_without_slip(run) -> list:
     return []
 
 
-def note_on_shear_modes(model, n_modes: int, n_nodes: int) -> list:
+def note_on_shear_modes(model, n_modes: int, n_nodes: int) -> list[str]:
     """Return a list with a note on the shear modes of a patch under varying normal load.
 
     Parameters
     ----------
     model : Model
+        Its `partial_slip` begins the sentence.
     n_modes, n_nodes : int
         Number of shear modes, and number of nodes of the patch.
     """

@@ -21,7 +21,7 @@ WHOLE_CYCLE_TOL = 1e-6
 # Number of decay times after which a transient is neglected; its mean square is then reduced to
 # e^-6.
 N_DECAY_TIMES = 3.0
-MIN_SAMPLES = 100  # Smallest number of samples of a run with a non-sinusoidal drive.
+MIN_RUN_SAMPLES = 100  # Smallest number of samples of a run with a non-sinusoidal drive.
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,6 +78,7 @@ def choose_numerics(model: Model) -> Numerics:
     Parameters
     ----------
     model : Model
+        Its table [accuracy] sets what is not chosen here.
 
     Raises
     ------
@@ -95,15 +96,17 @@ def choose_numerics(model: Model) -> Numerics:
         rate = find_min_decay_rate(rig.modes) * drive.signal.period
         start = min(cycles / 4, N_DECAY_TIMES / rate if rate else np.inf)
         window = int(max(1, cycles - start + WHOLE_CYCLE_TOL))
+
     beat_cycles = count_repeat_cycles(drive.signal) or 0.0
     if 1 < beat_cycles <= cycles:  # The window contains complete periods of the beat.
         window = int(beat_cycles * max(1, min(10, cycles // (10 * beat_cycles))) + WHOLE_CYCLE_TOL)
     if drive.levels.amplitudes:
         window = min(window, int(drive.levels.cycles + WHOLE_CYCLE_TOL))
+
     steps = steps_per_cycle(model)
     if not is_sinusoidal(drive.signal) and accuracy.steps_per_cycle is None:
-        steps = max(steps, int(np.ceil(MIN_SAMPLES / cycles)))
-    pinned = {key for key in MARCH_SETTINGS if getattr(accuracy, key) is not None}
+        steps = max(steps, int(np.ceil(MIN_RUN_SAMPLES / cycles)))
+    pinned = frozenset(key for key in MARCH_SETTINGS if getattr(accuracy, key) is not None)
     numerics = Numerics(
         engine.name,
         steps,
@@ -111,8 +114,9 @@ def choose_numerics(model: Model) -> Numerics:
         window,
         accuracy.shear_modes,
         model.side == "lower",
-        frozenset(pinned),
+        pinned,
     )
+
     if engine is HYBRID:
         # A linear rig needs few steps.
         is_exact = accuracy.method == "exact" or model.friction is None

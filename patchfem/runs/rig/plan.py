@@ -24,6 +24,7 @@ RESONANCE_TOL = 0.02
 # Smallest ratio of link stiffness to modal stiffness at which the link holds the block nearly at
 # rest.
 MIN_STIFF_LINK_RATIO = 10.0
+Chain = dict[str, float | str]  # stiffness [N/m] of each link by name, or why it has none
 
 
 def structure_stiffnesses(rig) -> dict:
@@ -33,7 +34,7 @@ def structure_stiffnesses(rig) -> dict:
     )
 
 
-def stuck_interface_stiffness(chain: dict, index: int = 0) -> float:
+def stuck_interface_stiffness(chain: Chain, index: int = 0) -> float:
     """Return the tangential stiffness [N/m] of a stuck interface, whose links act in series.
 
     It is inf if all links are rigid, and 0 for a law that creeps.
@@ -57,7 +58,7 @@ def stuck_interface_stiffness(chain: dict, index: int = 0) -> float:
     return 1 / soft if soft else inf
 
 
-def stuck_stiffnesses(rig, chain: dict) -> np.ndarray:
+def stuck_stiffnesses(rig, chain: Chain) -> np.ndarray:
     """Return the tangential stiffness (i,) [N/m] of each stuck interface of a rig.
 
     Strips have the stiffness of their patch. Without friction the stiffness is inf. A patch that was
@@ -74,14 +75,14 @@ def stuck_stiffnesses(rig, chain: dict) -> np.ndarray:
     return stiffness
 
 
-def mode_frequencies(rig, chain: dict) -> list:
+def mode_frequencies(rig, chain: Chain) -> list:
     """Return name, free and stuck frequency [Hz] of each mode as a list of dicts.
 
     The stuck frequency is that with stuck interfaces. It is None without friction and if no link of
     the stiffness chain is compliant.
     """
     modes = rig.modes
-    rows = rig.modes.interfaces
+    rows = modes.interfaces
     stiffness = stuck_stiffnesses(rig, chain)
     has_names = rig.structure.lists_modes and modes.shapes is None
     frequencies = []
@@ -141,16 +142,21 @@ def compute_dimensionless_groups(model: Model) -> dict:
     limits = [law.friction_limits(find_interface_load(model, law)) for law in laws]
     limit = sum(static for static, _ in limits)
     kinetic = sum(sliding for _, sliding in limits)
+
+    # D of (2.3): both forces as they act on the first mode.
     drive_force = drive.force or rig.first_mode.mass * find_max_acceleration(drive.signal)
     participation = _find_participation_ratio(rig)
     if drive_force > 0:
         sizes["D"] = participation * limit / drive_force
         if kinetic != limit:
             sizes["D_kinetic"] = participation * kinetic / drive_force
+
+    # At resonance, friction balances a drive up to 4/pi F, the first harmonic of its square wave.
     ratio = rig.first_mode.frequency * drive.signal.period if drive.frequency else inf
     if abs(ratio - 1) < 0.2:
         bound = 4 / pi * kinetic * participation
         sizes |= {"knee_force": bound} if drive.force else {"knee": bound / rig.first_mode.mass}
+
     if f is not None and f.bond_length and f.stiffness is None and drive.signal.moving:
         sizes["drive_amplitude_over_bond_length"] = (
             find_max_acceleration(drive.signal)
@@ -195,7 +201,7 @@ def _find_participation_ratio(rig) -> float:
     return slide / base if rig.structure.lists_modes and base > 0 else 1.0
 
 
-def describe_stick(rig, sizes: dict, chain: dict) -> list:
+def describe_stick(rig, sizes: dict, chain: Chain) -> list[str]:
     """Describe in sentences for a plan whether friction stops a driven block.
 
     For a single mode, they say from D whether the block sticks, and whether friction bounds its
@@ -204,6 +210,7 @@ def describe_stick(rig, sizes: dict, chain: dict) -> list:
     Parameters
     ----------
     rig : Rig
+        Modes and drive.
     sizes : dict
         Groups of `compute_dimensionless_groups`.
     chain : dict
@@ -218,9 +225,11 @@ def describe_stick(rig, sizes: dict, chain: dict) -> list:
         or rig.drive.kind == "free"
     ):
         return []
+
     limit = MIN_STIFF_LINK_RATIO * rig.first_mode.stiffness
     links = {name: link for name, link in chain.items() if not isinstance(link, str)}
     compliant_links = [name for name, link in links.items() if name != "mode" and link < limit]
+
     if friction_ratio >= 1 and compliant_links:
         return [
             f"D = {friction_ratio:.3g} >= 1, but the block still moves, because the interface is elastic: its stiffness "
@@ -229,6 +238,7 @@ def describe_stick(rig, sizes: dict, chain: dict) -> list:
         ]
     if friction_ratio >= 1:
         return [f"D = {friction_ratio:.3g} >= 1: friction should hold the block, so that it sticks"]
+
     if "D_kinetic" in sizes:  # The kinetic friction limit acts while the block slides.
         sliding = sizes["D_kinetic"]
         return [

@@ -13,6 +13,7 @@ from ...model.rig import MAX_TRAVEL
 from ...response import reasons, stationary
 from ...response.decay_curve import DecayCurve
 from ...response.errors import add_run_error_estimates
+from ...response.measures import Measures
 from ...response.outcome import judge_outcome, remove_errors
 from ...structure.drive_sizes import find_decay_rate
 from ..patch import faces
@@ -21,7 +22,7 @@ from ..results.travel import check_pieces_overlap
 from . import decays, flutter, levels
 from .engines import ENGINES, describe_balance_error
 from .numerics import Numerics
-from .solution import Solution
+from .solution import Fields, Solution
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -39,10 +40,10 @@ class CoupledRun:
     inputs: RunInputs
     numerics: Numerics
     solution: Solution
-    measures: dict
+    measures: Measures
     outcome: Outcome | None = None
     decay: DecayCurve | None = None
-    notes: tuple = ()
+    notes: tuple[str, ...] = ()
 
     @property
     def model(self):
@@ -95,11 +96,13 @@ def add_outcome_and_errors(run: CoupledRun) -> CoupledRun:
         message = solution.message or text
         solution = replace(solution, outcome=Outcome.NOT_CONVERGED, message=message)
         run = replace(run, solution=solution)
+
     rig = run.model.rig
     end_errors = solution.extra.get("late", {})
     measures = add_run_error_estimates(run.measures, solution.run_errors, end_errors)
     if not run.has_errors:
         measures = remove_errors(measures)
+
     outcome, steady = judge_outcome(
         solution,
         measures,
@@ -108,6 +111,7 @@ def add_outcome_and_errors(run: CoupledRun) -> CoupledRun:
         rig.drive.levels.cycles,
         find_decay_rate(rig.modes),
     )
+
     # Without a stop in the scene, the motion has not hit anything: it exceeded the limit of the
     # program.
     if outcome is Outcome.EXCEEDS_TRAVEL and rig.springs.travel == MAX_TRAVEL:
@@ -144,6 +148,8 @@ def add_decay_curve(run: CoupledRun) -> CoupledRun:
     has_partial_slip = model.partial_slip or model.rig.friction.has_partial_slip
     if run.decay is None or not has_partial_slip:
         return run
+
+    # Below the slip of the first node, two meshes have the same decay, so that static loops give the mesh error.
     decay = run.decay
     coarse = run.inputs.coarse[0]
     stiffer = run.inputs.stiffer
@@ -154,6 +160,7 @@ def add_decay_curve(run: CoupledRun) -> CoupledRun:
         frequency_error=np.fmax(decay.frequency_error, errors[0]),
         damping_error=np.fmax(decay.damping_error, errors[1]),
     )
+
     if not reason:
         return replace(run, decay=decay)
     engine = ENGINES[run.numerics.engine]
@@ -180,12 +187,13 @@ def find_final_outcome(run: CoupledRun) -> Outcome:
     return outcome
 
 
-def collect_summary_data(run: CoupledRun, measures: dict, notes: list) -> dict:
+def collect_summary_data(run: CoupledRun, measures: Measures, notes: list[str]) -> Fields:
     """Collect settings, levels, events, energies and notes of a run for its Result.
 
     Parameters
     ----------
     run : CoupledRun
+        Completed run.
     measures : dict
         Final measures by name.
     notes : list
@@ -198,6 +206,7 @@ def collect_summary_data(run: CoupledRun, measures: dict, notes: list) -> dict:
     extra = {"engine": numerics.engine, "cycles": numerics.cycles}
     extra |= solution.extra | {"window": numerics.window}
     extra |= {name: numbers[name] for name in ENGINES[numerics.engine].summary_numbers}
+
     if solution.levels:
         extra["levels"] = levels.convert_to_scene_units(rig, solution.levels)
     snapshots = solution.snapshots
@@ -205,14 +214,18 @@ def collect_summary_data(run: CoupledRun, measures: dict, notes: list) -> dict:
         extra["shots"] = snapshots
     if solution.log is not None:
         extra["events"] = solution.log
+
+    # A patch that slips part by part is a set of elements, or of shear modes if its load varies.
     reduced = getattr(solution.contact, "reduction", None)
     if reduced is not None:
         name = "elements" if hasattr(reduced, "yield_displacement") else "shear_modes"
         extra[name] = int(np.size(reduced.stiffness))
+
     if solution.bond_summation is not None:
         extra["quadrature"] = solution.bond_summation.engine
     if rig.drive.waveform.is_random:
         extra["spectra"] = stationary.compute_spectra(solution.window, rig.drive.signal)
         notes = [*notes, *stationary.warn_if_short(measures, solution.window)]
+
     extra |= {"book": solution.book, "period": run.drive.period, "notes": notes}
     return extra if run.decay is None else extra | {"decay": run.decay}

@@ -11,7 +11,7 @@ from math import ceil
 import numpy as np
 
 from ...core import Outcome, PatchfemError
-from ...response.coarser import CoarserRuns
+from ...response.coarser import CoarserRuns, ComparisonRuns
 from ...response.errors import absolute_change, add_errors
 from ...response.reasons import find_missing_unbounded
 from ...response.rows import AMPLITUDE, set_final_floors
@@ -47,6 +47,7 @@ def run_rig(inputs: RunInputs) -> Result:
     Parameters
     ----------
     inputs : RunInputs
+        Plan, Patch with its coarser mesh, and callbacks of the run.
 
     Raises
     ------
@@ -62,9 +63,12 @@ def run_rig(inputs: RunInputs) -> Result:
             "the drive excites no mode, so nothing moves; give a mode the key `base` or `output`",
             "drive.kind",
         )
+
     numerics = choose_numerics(model)
     refuse_long_run(model, numerics)
     run = run_refined(inputs, numerics)
+
+    # The reasons of missing values depend on the outcome, so that they come after it.
     if run.solution.levels and run.has_friction:
         run = postprocessing.add_onset_level(run)
     run = postprocessing.add_outcome_and_errors(run)
@@ -73,11 +77,14 @@ def run_rig(inputs: RunInputs) -> Result:
         run = postprocessing.add_decay_curve(run)
     if run.has_friction and find_decay_rate(rig.modes) < 0:
         run = postprocessing.add_flutter_amplitude(run)
+
+    # Warnings and notes see the measures before their floors are raised to the tolerance.
     warnings = collect_warnings(run)
     notes = [*collect_notes(run), *run.notes]
     measures = set_final_floors(run.measures, model.accuracy.tolerance)
     if ENGINES[run.numerics.engine].finds_periodic_motion and run.outcome is Outcome.GROWS:
         measures = find_missing_unbounded(measures)
+
     solution = run.solution
     fields = {}
     if inputs.patch is not None:
@@ -110,6 +117,7 @@ def run_refined(inputs: RunInputs, numerics: Numerics) -> CoupledRun:
     Parameters
     ----------
     inputs : RunInputs
+        Plan, Patch with its coarser mesh, and callbacks of the run.
     numerics : Numerics
         Numerical settings of the first run.
     """
@@ -119,19 +127,24 @@ def run_refined(inputs: RunInputs, numerics: Numerics) -> CoupledRun:
     runner = Runner(inputs, numerics)
     solution = runner.solve(numerics)
     inputs.seconds.update({"march": solution.seconds} | (solution.prepare or {}))
+
+    # On a belt, the window must contain a complete stick-slip period, which the first run shows.
     n_cycles = _count_slip_period_cycles(model, numerics, solution)
     if n_cycles > numerics.window:
         numerics = replace(numerics, window=n_cycles)
         solution = runner.solve(numerics)
+
     if not inputs.estimate or solution.outcome is Outcome.NOT_CONVERGED:
         measures = add_errors(solution.values, size=size) | compute_peak_frequency(solution)
         return CoupledRun(inputs, numerics, solution, measures)
+
     space_runs = [
         *engine.coarser_in_space(model, numerics, inputs.patch, inputs.coarse[0], solution),
         *engine.list_runs_with_other_modes(model, numerics),
     ]
     space_runs += _list_joint_runs(inputs, space_runs)
     space_errors = runner.estimate_errors(space_runs, solution)
+
     displacement_errors = []  # Error of the displacement [m] of each run, from coarse to fine.
     excesses = []  # Largest ratio of an error to the allowed error, where the displacement meets it.
     while True:
@@ -146,17 +159,22 @@ def run_refined(inputs: RunInputs, numerics: Numerics) -> CoupledRun:
             min_relative_error=engine.min_relative_error,
             size=size,
         )
+
         if solution.levels or model.rig.drive.kind == "free":
             solution = _add_level_errors(solution, coarser_runs, runner.solutions)
+
         displacement_errors.append(measures[AMPLITUDE].error or 0.0)
         run = CoupledRun(inputs, numerics, solution, measures)
         if not time_runs or _is_finest(run, displacement_errors) or _meets_tolerance(run, excesses):
             break
+
+        # A run with twice the steps is compared with this one.
         runner.solutions[numerics] = solution
         runner.error_seconds += solution.seconds
         numerics = numerics.finer()
         solution = runner.solve(numerics)
         inputs.seconds["march"] = solution.seconds
+
     if runner.error_seconds:
         inputs.seconds["error"] = runner.error_seconds
     measures |= compute_peak_frequency(solution, runner.solutions.values())
@@ -164,7 +182,7 @@ def run_refined(inputs: RunInputs, numerics: Numerics) -> CoupledRun:
     return replace(run, solution=solution, measures=measures)
 
 
-def _list_joint_runs(inputs: RunInputs, space_runs: list) -> list:
+def _list_joint_runs(inputs: RunInputs, space_runs: ComparisonRuns) -> ComparisonRuns:
     """List the comparison run with a stiffer joint, if a joint was subtracted from the modes.
 
     Its stiffness is larger by the error of the stiffness that was subtracted, so that the change of a
@@ -215,7 +233,7 @@ def _find_step_excess(run: CoupledRun) -> float:
     return largest
 
 
-def _meets_tolerance(run: CoupledRun, excesses: list) -> bool:
+def _meets_tolerance(run: CoupledRun, excesses: list[float]) -> bool:
     """Return whether the measures meet the tolerance as far as more steps can help.
 
     The displacement must meet it. Other measures are refined while the work of the run is at most
@@ -224,6 +242,7 @@ def _meets_tolerance(run: CoupledRun, excesses: list) -> bool:
     Parameters
     ----------
     run : CoupledRun
+        Run with the errors from its coarse runs.
     excesses : list
         Result of `_find_step_excess` of the coarser runs; that of the run is added.
     """
@@ -248,12 +267,13 @@ def _meets_tolerance(run: CoupledRun, excesses: list) -> bool:
     return work > MAX_REFINED_WORK
 
 
-def _is_finest(run: CoupledRun, displacement_errors: list) -> bool:
+def _is_finest(run: CoupledRun, displacement_errors: list[float]) -> bool:
     """Return whether no finer run is possible.
 
     Parameters
     ----------
     run : CoupledRun
+        Run with its numerical settings.
     displacement_errors : list
         Errors of the displacement [m] of all runs up to this one.
     """
@@ -272,13 +292,17 @@ def _is_finest(run: CoupledRun, displacement_errors: list) -> bool:
     )
 
 
-def _add_level_errors(solution: Solution, coarser_runs: list, solutions: dict) -> Solution:
+def _add_level_errors(
+    solution: Solution, coarser_runs: ComparisonRuns, solutions: dict[Numerics, Solution]
+) -> Solution:
     """Add errors from coarse runs to the drive levels of a Solution.
 
     Parameters
     ----------
     solution : Solution
+        Solution of the finest run.
     coarser_runs : list of CoarserRuns
+        Settings of the coarse runs by source of error.
     solutions : dict
         Solution of each coarse run by its Numerics.
     """

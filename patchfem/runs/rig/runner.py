@@ -7,7 +7,7 @@ Each coarse run is solved only once.
 from dataclasses import replace
 from time import process_time
 
-from ...response.coarser import StepRun, estimate_errors
+from ...response.coarser import ComparisonRuns, StepRun, estimate_errors
 from ..results.result import N_FRAMES, RunInputs
 from .numerics import Numerics
 from .solution import Solution
@@ -39,9 +39,9 @@ class Runner:
     def __init__(self, inputs: RunInputs, numerics: Numerics):
         self.inputs = inputs
         self.model = inputs.plan.model
-        self.solutions: dict = {}
+        self.solutions: dict[Numerics, Solution] = {}
         self.error_seconds = 0.0
-        self.cpu_seconds: dict = {}
+        self.cpu_seconds: dict[Numerics, float] = {}
         # Steps per cycle of all runs: expected and completed ones; and the largest reported fraction.
         self._expected_steps = numerics.steps * (COARSE_RUNS_RATIO if inputs.estimate else 1.0)
         self._steps_done = 0.0
@@ -53,6 +53,7 @@ class Runner:
         Parameters
         ----------
         numerics : Numerics
+            Settings of this run.
         coarser_model : Model, optional
             Model of a coarse run, which needs no fields; default: the model of the run itself.
         """
@@ -76,7 +77,7 @@ class Runner:
         self._steps_done += numerics.steps
         return solution
 
-    def estimate_errors(self, coarser_runs: list, solution: Solution) -> list:
+    def estimate_errors(self, coarser_runs: ComparisonRuns, solution: Solution) -> list:
         """Estimate the errors of a run from coarse runs (`response.coarser.estimate_errors`)."""
         errors, seconds = estimate_errors(
             self._solve_coarse_run,
@@ -87,7 +88,9 @@ class Runner:
         self.error_seconds += seconds
         return errors
 
-    def list_step_runs(self, numerics: Numerics, solution: Solution, coarser_runs: list) -> list:
+    def list_step_runs(
+        self, numerics: Numerics, solution: Solution, coarser_runs: ComparisonRuns
+    ) -> list[StepRun]:
         """Return a StepRun of the run and of each run with fewer steps, from fine to coarse.
 
         If no coarse run has fewer steps, the list contains only the run itself.
@@ -97,6 +100,7 @@ class Runner:
         numerics : Numerics
             Settings of the run.
         solution : Solution
+            Solution of the run.
         coarser_runs : list of CoarserRuns
             Coarse runs, which are already solved; those with fewer steps come first.
 

@@ -4,18 +4,19 @@ In: a run of an engine. Out: `Solution`, and friction loop, load and stiffness o
 """
 
 from dataclasses import dataclass, field, replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from ...core import Measure, Outcome, Response, SineDrive
 from ...formatting import format_length
 from ...response.decay_curve import measure_last_cycle_amplitude
-from ...response.measures import compute_harmonic, measure_half_range
+from ...response.measures import Measures, Values, compute_harmonic, measure_half_range
 from ...response.reasons import MAX_OTHER_MODES_FRACTION
-from ...response.rows import AMPLITUDE
+from ...response.rows import AMPLITUDE, STEADY_AMPLITUDE
 from ...structure.drive_sizes import find_drive_omega, has_full_cycle
 
+Fields = dict[str, Any]  # fields of a record by name
 # Displacement at which a motion has left the range of a softening spring, relative to that without restoring force.
 ESCAPE_RATIO = 2.0
 NO_PEAK_REASON = "the output does not move at any of the swept frequencies, so there is no peak"
@@ -56,25 +57,25 @@ class Solution:
     - extra: further data of the result.
     """
 
-    values: dict
+    values: Values
     response: Response
     window: Response
     amplitudes: np.ndarray
     steady: tuple
     outcome: Outcome | None
     snapshots: list
-    book: dict
+    book: Values
     seconds: float
     contact: object = None
-    prepare: dict | None = None
+    prepare: Values | None = None
     message: str = ""
     levels: tuple = ()
     run_level: object = None
     log: object = None
-    notes: tuple = ()
+    notes: tuple[str, ...] = ()
     stick_tolerance: float = 0.0
-    run_errors: dict = field(default_factory=dict)
-    errors: dict | None = None
+    run_errors: Values = field(default_factory=dict)
+    errors: Values | None = None
     bond_summation: object = None
     coarser: tuple = ()
     extremes: np.ndarray | None = None
@@ -82,7 +83,7 @@ class Solution:
     drive: SineDrive | None = None
     peak_error: float = np.nan
     tail: object = None
-    extra: dict = field(default_factory=dict)
+    extra: Fields = field(default_factory=dict)
 
 
 def find_travel(rig) -> float:
@@ -125,17 +126,18 @@ def replace_output_by_gauge(model, solution: Solution) -> Solution:
     gauge = model.rig.modes.gauge
     if gauge is None:
         return solution
-    name = AMPLITUDE
     window = _compute_gauge_histories(solution.window, gauge)
     amplitude = measure_half_range(window.time, window.output, window.output_rate)
     if model.rig.drive.kind == "free":
         amplitude = find_release_amplitude(window, model.rig.drive.signal.period, amplitude)
-    ratio = max(1.0, amplitude / max(solution.values[name], 1e-300))
-    errors = solution.errors and solution.errors | {name: ratio * solution.errors.get(name, 0.0)}
-    values = {key: value for key, value in solution.values.items() if key != f"{name}_steady"}
+    ratio = max(1.0, amplitude / max(solution.values[AMPLITUDE], 1e-300))
+    errors = solution.errors and solution.errors | {
+        AMPLITUDE: ratio * solution.errors.get(AMPLITUDE, 0.0)
+    }
+    values = {key: value for key, value in solution.values.items() if key != STEADY_AMPLITUDE}
     return replace(
         solution,
-        values=values | {name: amplitude},
+        values=values | {AMPLITUDE: amplitude},
         response=_compute_gauge_histories(solution.response, gauge),
         window=window,
         steady=(None, None),
@@ -163,6 +165,7 @@ def find_release_amplitude(window, period: float, window_amplitude: float) -> fl
     Parameters
     ----------
     window : Response
+        Last cycles of the motion.
     period : float
         Period of the drive [s].
     window_amplitude : float
@@ -198,7 +201,9 @@ def compute_sampled_loop(
     Parameters
     ----------
     window : Response
+        Equally spaced samples of the last cycles.
     drive
+        Drive, whose frequency is that of the harmonics.
     work : float
         Friction work per cycle [J].
     force : complex, optional
@@ -220,7 +225,7 @@ def compute_sampled_loop(
     return CycleLoop(slide, force, work)
 
 
-def compute_peak_frequency(solution: Solution, coarser=()) -> dict:
+def compute_peak_frequency(solution: Solution, coarser=()) -> Measures:
     """Return a dict with the frequency [Hz] of the peak of a response curve and its error.
 
     The measure has no value if the amplitude is 0. The dict is empty without a curve.
@@ -228,6 +233,7 @@ def compute_peak_frequency(solution: Solution, coarser=()) -> dict:
     Parameters
     ----------
     solution : Solution
+        Solution at the peak, with its drive and the error of its frequency.
     coarser : sequence of Solution
         Coarse runs; the shift of their peaks is part of the error.
 

@@ -15,9 +15,11 @@ def solve_rig(model, numerics, patch, frames: int = 0, say=None, progress=None) 
     Parameters
     ----------
     model : Model
+        Rig, drive and friction laws.
     numerics : Numerics
         Numerical settings, including the name of the engine.
     patch : Patch or None
+        None under [normal] and between masses.
     frames : int
         Number of snapshots of the interface in the last cycle.
     say, progress : callable, optional
@@ -33,10 +35,7 @@ def solve_rig(model, numerics, patch, frames: int = 0, say=None, progress=None) 
         run = march.march_in_time
     else:
         run = steady.solve_steady_motion
-    solution = run(model, numerics, patch, frames, say, progress)
-    if model.rig.modes.gauge is None:
-        return solution
-    return replace_output_by_gauge(model, solution)
+    return replace_output_by_gauge(model, run(model, numerics, patch, frames, say, progress))
 
 
 def refuse_long_run(model, numerics) -> None:

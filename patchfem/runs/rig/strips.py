@@ -37,6 +37,7 @@ def average_histories_over_strips(response, loads, offsets):
     Parameters
     ----------
     response : Response
+        Histories in which each strip is an interface.
     loads : (s,)
         Normal loads [N].
     offsets : (s,)

@@ -24,6 +24,8 @@ from .table import Table
 from .units import HEADER_EXAMPLE, SIZE_LINES, parse_length_unit, shorten
 
 NOT_TEXT = f"export the profile as text with two columns and {HEADER_EXAMPLE}"
+# Largest relative range of the steps of coordinates; the steps of heights vary more.
+MAX_UNEVEN = 1e-6
 _QUOTED_NUMBER = re.compile(r'"\s*([+-]?[0-9]*),([0-9]+(?:[eE][+-]?[0-9]+)?)\s*"')
 _CONTROL = re.compile(r"[\x00-\x08\x0e-\x1f\x7f]")
 
@@ -114,19 +116,32 @@ def _make_matrix(path, facts: dict[str, str], z) -> Table:
     """Return the table of a matrix of heights (m, n), with the size and the units that its header states."""
     if z.shape[1] == 1 and "height" not in facts:
         z = z.T  # a trace with one height in each line
+    has_axes = min(z.shape) > 3 and _is_even(z[0, 1:]) and _is_even(z[1:, 0])
+    if has_axes and not _is_even(z[1, 1:]):
+        raise PatchfemError(
+            f"{path}: the first row and the first column of the matrix grow evenly, like coordinates and not "
+            "heights; leave out this row and this column"
+        )
+
     axes = (("x", "width", z.shape[1]), ("y", "height", z.shape[0]))
     columns = {}
     units = {"z": facts.get("value units")}
     for role, name, count in axes if z.shape[0] > 1 else axes[:1]:
         size, units[role] = parse_fact(facts.get(name, ""))
-        if size is None:
+        if size is None or not 0 < size < np.inf:
             raise PatchfemError(
                 f"{path}: the rows are a matrix of heights (a map, or more than three numbers in a "
-                f"row), but the {name} of the scan is not given; {SIZE_LINES}"
+                f"row), but the {name} of the scan is not given as a length above zero; {SIZE_LINES}"
             )
         columns[role] = np.arange(count) * size / count
     columns["z"] = z if z.shape[0] > 1 else z[0]
     return Table(path, columns, units, str(path), remedy=SIZE_LINES)
+
+
+def _is_even(values: np.ndarray) -> bool:
+    """Return whether numbers (n,) increase by equal steps, within MAX_UNEVEN of the first step."""
+    steps = np.diff(values)
+    return bool(steps[0] > 0 and np.ptp(steps) < MAX_UNEVEN * steps[0])
 
 
 def _read_rows(

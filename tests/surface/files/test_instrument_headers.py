@@ -139,14 +139,14 @@ def test_exact_given_units_override_header_with_note(tmp_path):
 REMEDIES = {  # refused text, message, text after the remedy, and given units
     "a bare matrix": (
         ROWS,
-        "the width of the scan is not given; write `# Width: 1.2 mm` and `# Height: 0.8 "
+        "the width of the scan is not given as a length above zero; write `# Width: 1.2 mm` and `# Height: 0.8 "
         "mm` and `# Value units: um` above its rows",
         "# Width: 1.2 mm\n# Height: 0.8 mm\n# Value units: um\n" + ROWS,
         None,
     ),
     "no height": (
         "# Width: 4 um\n# Value units: um\n" + ROWS,
-        "the height of the scan is not given; write",
+        "the height of the scan is not given as a length above zero; write",
         "# Width: 4 um\n# Height: 0.8 mm\n# Value units: um\n" + ROWS,
         None,
     ),
@@ -188,8 +188,16 @@ REMEDIES = {  # refused text, message, text after the remedy, and given units
     ),
     "thousands": (
         "# Width: 4,000 um\n# Height: 3,000 um\n# Value units: nm\n" + ROWS,
-        "the width of the scan is not given; write `# Width: 1.2 mm`",
+        "the width of the scan is not given as a length above zero; write `# Width: 1.2 mm`",
         "# Width: 4000 um\n# Height: 3000 um\n# Value units: nm\n" + ROWS,
+        None,
+    ),
+    "axes": (
+        "# Width: 4 um\n# Height: 4 um\n# Value units: nm\n0 0 1 2 3\n0 3 1 4 1\n1 5 9 2 6\n2 5 3 5 8\n"
+        "3 9 7 9 3\n",
+        "the first row and the first column of the matrix grow evenly, like coordinates and not "
+        "heights; leave out this row",
+        "# Width: 4 um\n# Height: 4 um\n# Value units: nm\n3 1 4 1\n5 9 2 6\n5 3 5 8\n9 7 9 3\n",
         None,
     ),
     "two scans": (

@@ -14,19 +14,19 @@ from ....core import IntegratedMeasures, NotConverged, Outcome, Response, SineDr
 from ....dynamics.harmonic import branch as branches
 from ....dynamics.harmonic.forces import LawGroup
 from ....dynamics.harmonic.laws import Interlock, Spring
-from ....dynamics.harmonic.motion import find_cycle_energies, make_cycle_response
+from ....dynamics.harmonic.motion import SteadyMotion, find_cycle_energies, make_cycle_response
 from ....dynamics.harmonic.motion import find_regime as balanced_regime
 from ....dynamics.harmonic.stability import add_stability
 from ....dynamics.harmonic.steady import find_steady_motion as periodic_point
 from ....dynamics.harmonic.steady import refine_steady_motion
 from ....formatting import format_length, format_quantity
 from ....response.errors import finer_errors
-from ....response.measures import compute_peak
+from ....response.measures import Values, compute_peak
 from ....response.rows import AMPLITUDE
 from ....response.spectrum import find_acceleration_harmonics, make_acceleration_measures
 from ..evaluation import RunEvaluator, compute_sampled_work, compute_work_check
 from ..interface import make_single_law
-from ..solution import Solution, compute_sampled_loop
+from ..solution import Fields, Solution, compute_sampled_loop
 from .curves import (
     COLUMN_MEASURES,
     HARMONIC_ROUND_OFF,
@@ -43,7 +43,7 @@ REASONS_OF_END = {
     "step": "no neighbouring motion was found there",
 }
 # Number of samples per cycle from which the measures of a steady motion are computed.
-SAMPLES_PER_CYCLE = 4096
+BALANCE_SAMPLES_PER_CYCLE = 4096
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -60,7 +60,7 @@ class CycleRun:
     window: Response
     extremes: np.ndarray
     phasors: np.ndarray
-    ledger: dict
+    ledger: Values
     outcome: Outcome | None = None
     message: str = ""
     snapshots: list = field(default_factory=list)
@@ -81,8 +81,12 @@ class BalanceEvaluator(RunEvaluator):
 
         Parameters
         ----------
-        run, drive, stuck
-            See `RunEvaluator.compute_integrated_measures`.
+        run
+            Run of the engine, or its mark at the end of a drive level.
+        drive
+            Drive of the run.
+        stuck : bool
+            Whether the interface is stuck during the last cycles.
         """
         values = {"drift_per_cycle": 0.0}
         if not self.has_friction:
@@ -98,13 +102,17 @@ class BalanceEvaluator(RunEvaluator):
         values["slip_amplitude"] = float(np.ptp(slips)) / 2
         return IntegratedMeasures(values, reversals=(tuple(turn[:2] for turn in self.turns),))
 
-    def collect_cycle_data(self, run, drive, *, stuck: bool) -> dict:
+    def collect_cycle_data(self, run, drive, *, stuck: bool) -> Fields:
         """Return the friction loop of the cycle.
 
         Parameters
         ----------
-        run, drive, stuck
-            See `RunEvaluator.collect_cycle_data`.
+        run
+            Run of the engine, or its mark at the end of a drive level.
+        drive
+            Drive of the run.
+        stuck : bool
+            Whether the interface is stuck during the last cycles.
         """
         return {"loop": compute_sampled_loop(run.window, drive, run.ledger["friction"])}
 
@@ -117,9 +125,9 @@ class CycleMeasures(NamedTuple):
     - book: energies [J] and counters by name.
     """
 
-    values: dict
-    response: object
-    book: dict
+    values: Values
+    response: Response
+    book: Values
 
 
 class StableMotion(NamedTuple):
@@ -129,9 +137,9 @@ class StableMotion(NamedTuple):
     - notes: sentences on other motions under the same drive.
     """
 
-    motion: object
-    stability: object
-    notes: tuple = ()
+    motion: SteadyMotion
+    stability: SteadyMotion
+    notes: tuple[str, ...] = ()
 
 
 class BalanceFinder:
@@ -159,7 +167,7 @@ class BalanceFinder:
         self.group = LawGroup(rig.modes, parts)
         self.tolerance = model.accuracy.tolerance
 
-    def compute_steady_motion(self, drive, guess=None) -> tuple:
+    def compute_steady_motion(self, drive, guess=None) -> tuple[Solution, SteadyMotion]:
         """Compute the steady motion under sinusoidal drive, with error estimates.
 
         The errors are estimated with twice as many harmonics and twice as many samples.
@@ -167,44 +175,48 @@ class BalanceFinder:
         Parameters
         ----------
         drive : SineDrive
+            Amplitude [m s-2] and angular frequency [rad/s].
         guess : SteadyMotion, optional
             Initial guess from the response curve, for use if several motions exist.
         """
         begin = perf_counter()
-        motion = periodic_point(
-            self.modes, drive, self.group, self.harmonics, self.tolerance, start=guess
-        )
+        motion = self._solve_balance(drive, guess)
         motion, stability, notes = self._find_stable_motion(drive, motion)
         values, response, book = self._compute_measures(motion, drive)
         errors = self._estimate_errors(
             values,
             motion,
             drive,
-            lambda motion, sine: self._compute_measures(motion, sine, 2 * SAMPLES_PER_CYCLE).values,
+            lambda motion, sine: (
+                self._compute_measures(motion, sine, 2 * BALANCE_SAMPLES_PER_CYCLE).values
+            ),
         )
+
+        # The instants of slip have at least the error of a sample, and a phase at most that of half a cycle.
         if "slip_start_phase" in errors:
             errors["slip_start_phase"] = max(
-                min(errors["slip_start_phase"], np.pi / 2), 2 * np.pi / SAMPLES_PER_CYCLE
+                min(errors["slip_start_phase"], np.pi / 2), 2 * np.pi / BALANCE_SAMPLES_PER_CYCLE
             )
-            errors["stick_fraction"] = max(errors.get("stick_fraction", 0.0), 4 / SAMPLES_PER_CYCLE)
+            errors["stick_fraction"] = max(
+                errors.get("stick_fraction", 0.0), 4 / BALANCE_SAMPLES_PER_CYCLE
+            )
         name = balanced_regime(motion)
-        is_stuck = name == "stuck"
         extra = {
             "regime": name if stability.stable else f"{name}, unstable",
             "multipliers": stability.multipliers,
             "harmonics": motion.harmonics,
         }
-        amplitude = np.array([values[AMPLITUDE]])
-        outcome = Outcome.STUCK if is_stuck else Outcome.STEADY
+        outcome = Outcome.STUCK if name == "stuck" else Outcome.STEADY
         message = ""
         if not stability.stable:
             outcome = Outcome.NOT_CONVERGED
             message = describe_instability(stability.multipliers)
+
         return Solution(
             values,
             response,
             response,
-            amplitude,
+            np.array([values[AMPLITUDE]]),
             (None, None),
             outcome,
             [],
@@ -216,7 +228,13 @@ class BalanceFinder:
             notes=notes,
         ), motion
 
-    def _estimate_errors(self, values: dict, motion, drive, compute_measures) -> dict:
+    def _solve_balance(self, drive, guess) -> SteadyMotion:
+        """Solve the harmonic balance under a drive from an initial guess; None for none."""
+        return periodic_point(
+            self.modes, drive, self.group, self.harmonics, self.tolerance, start=guess
+        )
+
+    def _estimate_errors(self, values: Values, motion, drive, compute_measures) -> Values:
         """Estimate the errors of the measures of a steady motion from a solution with more harmonics.
 
         If that solution does not converge, the error estimate of the balance itself is used.
@@ -226,7 +244,9 @@ class BalanceFinder:
         values : dict
             Measures by name.
         motion : SteadyMotion
+            Solution of the balance, with the error of its truncation.
         drive : SineDrive
+            Drive of the motion.
         compute_measures : callable
             Function (SteadyMotion, drive) that returns measures by name.
         """
@@ -245,13 +265,15 @@ class BalanceFinder:
         stability = add_stability(motion, self.modes)
         if stability.stable:
             return StableMotion(motion, stability)
+
+        # An unstable motion is not seen in a test, so that all motions under this drive are compared.
         motions = branches.find_branches(self.modes, drive, self.group, self.tolerance)
         stable_motions = [branch for branch in motions if branch.stable]
         if not stable_motions:
             return StableMotion(motion, stability)
-        motion = periodic_point(
-            self.modes, drive, self.group, self.harmonics, self.tolerance, start=stable_motions[0]
-        )
+
+        motion = self._solve_balance(drive, stable_motions[0])
+
         output = self.modes.output
         sizes = ", ".join(format_length(branch.amplitude(output), 3) for branch in motions)
         note = (
@@ -263,6 +285,7 @@ class BalanceFinder:
                 "; the stable motion of smallest amplitude is shown; accuracy.method = "
                 '"march" gives the motion that is reached from rest'
             )
+
         return StableMotion(motion, add_stability(motion, self.modes), (note,))
 
     def observe(self, drive, guess=None, *, needs_histories: bool = True) -> ObservedMotion:
@@ -271,15 +294,14 @@ class BalanceFinder:
         Parameters
         ----------
         drive : SineDrive
+            Amplitude [m s-2] and angular frequency [rad/s].
         guess : SteadyMotion, optional
             Steady motion under a similar drive.
         needs_histories : bool
             Whether histories are requested; they are always returned.
         """
-        motion = periodic_point(
-            self.modes, drive, self.group, self.harmonics, self.tolerance, start=guess
-        )
-        window = make_cycle_response(motion, self.modes, drive, SAMPLES_PER_CYCLE)
+        motion = self._solve_balance(drive, guess)
+        window = make_cycle_response(motion, self.modes, drive, BALANCE_SAMPLES_PER_CYCLE)
         peak = compute_peak(window.acceleration)
         return ObservedMotion(window, peak, motion.amplitude(self._measured_row), motion)
 
@@ -290,9 +312,7 @@ class BalanceFinder:
 
     def compute_curve_point(self, drive, guess=None) -> CurvePoint:
         """Compute one point of a response curve, without error estimates."""
-        motion = periodic_point(
-            self.modes, drive, self.group, self.harmonics, self.tolerance, start=guess
-        )
+        motion = self._solve_balance(drive, guess)
         return self._make_curve_point(add_stability(motion, self.modes))
 
     def _make_curve_point(self, motion) -> CurvePoint:
@@ -311,9 +331,9 @@ class BalanceFinder:
             motion,
         )
 
-    def _compute_curve_measures(self, motion, drive) -> dict:
+    def _compute_curve_measures(self, motion, drive) -> Values:
         """Return a dict of the measures of a point of a response curve."""
-        response = make_cycle_response(motion, self.modes, drive, SAMPLES_PER_CYCLE)
+        response = make_cycle_response(motion, self.modes, drive, BALANCE_SAMPLES_PER_CYCLE)
         values = {
             COLUMN_MEASURES["amplitude"]: motion.amplitude(self._measured_row),
             COLUMN_MEASURES["acceleration_peak"]: compute_peak(response.acceleration),
@@ -321,7 +341,9 @@ class BalanceFinder:
         }
         return {name: value for name, value in values.items() if value is not None}
 
-    def _compute_measures(self, motion, drive, samples: int = SAMPLES_PER_CYCLE) -> CycleMeasures:
+    def _compute_measures(
+        self, motion, drive, samples: int = BALANCE_SAMPLES_PER_CYCLE
+    ) -> CycleMeasures:
         """Compute the measures of a steady motion from samples of its cycle."""
         response = make_cycle_response(motion, self.modes, drive, samples)
         book = find_cycle_energies(motion, self.modes) | {
@@ -372,6 +394,7 @@ class BalanceFinder:
         Parameters
         ----------
         first, second : CurvePoint
+            Neighbouring points of a branch.
         fraction : float
             Fraction of the arc length between the points, from the first one.
         """

@@ -12,6 +12,7 @@ import numpy as np
 from ....core import NotConverged, Outcome, Response, SineDrive
 from ....dynamics.curve_points import sample_adaptively
 from ....response.levels import LEVEL_MEASURES, Level
+from ....response.measures import Values
 from ....response.rows import AMPLITUDE
 from ..solution import replace_output_by_gauge
 
@@ -44,8 +45,8 @@ class CurvePoint(NamedTuple):
     """
 
     drive: SineDrive
-    values: dict
-    errors: dict
+    values: Values
+    errors: Values
     regime: str
     multiplier: float
     stable: bool
@@ -95,12 +96,12 @@ class ResponseCurve(NamedTuple):
     - notes: sentences on a part of the sweep that the curve does not reach.
     """
 
-    points: list
-    folds: tuple = ()
-    notes: tuple = ()
+    points: list[CurvePoint]
+    folds: tuple[float, ...] = ()
+    notes: tuple[str, ...] = ()
 
 
-def estimate_exact_errors(values: dict, residual: float) -> dict:
+def estimate_exact_errors(values: Values, residual: float) -> Values:
     """Estimate the errors of an event-driven steady motion from its residual over a period."""
     errors = {}
     for name, value in values.items():
@@ -125,7 +126,9 @@ def make_curve_point(drive, solution, guess=None) -> CurvePoint:
     Parameters
     ----------
     drive : SineDrive
+        Drive of the motion.
     solution : Solution
+        Its `extra` has the regime and the Floquet multipliers.
     guess : optional
         Initial guess for the motion at a neighbouring drive.
     """
@@ -168,6 +171,7 @@ class TracedCurve:
         Parameters
         ----------
         first, second : CurvePoint
+            Neighbouring points of the curve.
         fraction : float
             Fraction of the distance between the points, from the first one.
         """
@@ -175,7 +179,7 @@ class TracedCurve:
         return self.compute_curve_point(replace(first.drive, omega=omega), first.guess)
 
 
-def compute_response_curve(modes, drive, find_point) -> list:
+def compute_response_curve(modes, drive, find_point) -> list[CurvePoint]:
     """Compute the response curve of a frequency sweep, with more points where it bends.
 
     The curve starts with N_SWEEP_POINTS frequencies and the natural frequencies. It is refined
@@ -186,6 +190,7 @@ def compute_response_curve(modes, drive, find_point) -> list:
     modes
         Modal basis.
     drive : SweepDrive
+        Range of the frequency [Hz] and acceleration [m s-2].
     find_point : callable
         Function (sine, guess) that returns a CurvePoint, where guess is the initial guess from the
         previous point or None.

@@ -16,9 +16,10 @@ import numpy as np
 
 from ....core import NotConverged
 from ....response.errors import absolute_change
+from ....response.measures import Values
 from ....response.rows import AMPLITUDE
 from ..solution import Solution, replace_output_by_gauge
-from .curves import ResponseCurve, find_largest_point, tabulate_curve
+from .curves import CurvePoint, ResponseCurve, find_largest_point, tabulate_curve
 
 MAX_ADDED_POINTS = 40  # Largest number of points that are added to refine a peak.
 # Smallest fraction of the peak at which a resonance curve is assumed concave; that of a single mode
@@ -43,12 +44,12 @@ class RefinedPeak(NamedTuple):
       bounded motion.
     """
 
-    points: list
+    points: list[CurvePoint]
     best: int
     above: float
 
 
-def refine_peak(points: list, finder, tolerance: float) -> RefinedPeak:
+def refine_peak(points: list[CurvePoint], finder, tolerance: float) -> RefinedPeak:
     """Add points to a response curve around its peak.
 
     Parameters
@@ -60,6 +61,7 @@ def refine_peak(points: list, finder, tolerance: float) -> RefinedPeak:
         `peak_tolerances`, the ratios of the remaining errors of the peak to the tolerance: that of the
         amplitude, and that of the position relative to the width.
     tolerance : float
+        Relative tolerance of the scene.
 
     Returns
     -------
@@ -71,6 +73,7 @@ def refine_peak(points: list, finder, tolerance: float) -> RefinedPeak:
         s = np.cumsum([0.0, *(finder.measure_curve_distance(a, b) for a, b in pairwise(points))])
         y = _collect_amplitudes(points)
         is_stable = np.array([point.stable for point in points])
+
         best = find_largest_point(points)
         bounds, fractions = bound_concave_curve(s, y)
         if not y[best] > 0 or not bounds.size:
@@ -82,6 +85,7 @@ def refine_peak(points: list, finder, tolerance: float) -> RefinedPeak:
             )
         if not np.isfinite(y[max(best - 1, 0) : best + 2]).all():
             return RefinedPeak(points, best, np.inf)
+
         above = max(float(bounds.max()) - y[best], 0.0)
         bounds[np.diff(s) <= IDENTICAL_POINT_TOL * s[-1]] = 0.0
         interval = int(np.argmax(bounds))
@@ -91,6 +95,7 @@ def refine_peak(points: list, finder, tolerance: float) -> RefinedPeak:
             interval = -1
             if added is not None:
                 interval, fractions[interval] = added
+
         if not remaining or interval < 0:
             return RefinedPeak(points, best, above)
         try:
@@ -200,16 +205,17 @@ def solve_peak(curve: ResponseCurve, finder) -> Solution:
     Parameters
     ----------
     curve : ResponseCurve
+        Points in order along the curve, its folds and notes.
     finder
-        See `refine_peak`.
+        Solver for steady motions that has traced the curve.
     """
     points, best, above = refine_peak(curve.points, finder, finder.model.accuracy.tolerance)
     peak_point = points[best]
     solution = finder.compute_steady_motion(peak_point.drive, peak_point.guess)[0]
-    solution = replace(solution, notes=(*solution.notes, *curve.notes))
     errors = dict(solution.errors or {})
     solution = replace(
         solution,
+        notes=(*solution.notes, *curve.notes),
         extra=solution.extra | {"curve": tabulate_curve(points, curve.folds)},
         drive=peak_point.drive,
     )
@@ -220,6 +226,8 @@ def solve_peak(curve: ResponseCurve, finder) -> Solution:
     # The curve point was computed with fewer samples, which adds this error.
     missed = abs(replace_output_by_gauge(finder.model, solution).values[AMPLITUDE] - height)
     error = min(missed + errors.get(AMPLITUDE, 0.0), height)
+
+    # The position is uncertain by the distance within which the error of the height hides the fall of the curve.
     frequencies = np.array([point.drive.omega for point in points]) / (2 * np.pi)
     max_position_error = 0.0
     position_errors = dict.fromkeys(solution.values, 0.0)
@@ -232,6 +240,7 @@ def solve_peak(curve: ResponseCurve, finder) -> Solution:
         low = ~(heights >= height - min(above, height) - 2 * error)
         number = int(np.argmax(low)) if low.any() else heights.size - 1
         far = float(distances[: number + 1].max())
+
         position_error = min(
             far,
             float(distances[1])
@@ -244,12 +253,13 @@ def solve_peak(curve: ResponseCurve, finder) -> Solution:
             position_errors[name] = max(
                 position_errors[name], difference * position_error / far if far else difference
             )
+
     position_errors[AMPLITUDE] = min(above, solution.values[AMPLITUDE]) + missed
     errors = {name: error + position_errors.get(name, 0.0) for name, error in errors.items()}
     return replace(solution, errors=errors, peak_error=float(max_position_error))
 
 
-def _compute_neighbour_differences(finder, neighbour, solution: Solution) -> dict:
+def _compute_neighbour_differences(finder, neighbour, solution: Solution) -> Values:
     """Return the differences of all measures between a curve point and a Solution."""
     try:
         other = finder.compute_steady_motion(neighbour.drive, neighbour.guess)[0]

@@ -16,6 +16,7 @@ from ....hybrid import cases, periodic
 from ....hybrid import runs as hybrid_runs
 from ....hybrid.laws import is_rigid
 from ....hybrid.records import Clock, Status, Whole, Window
+from ....response.measures import Values
 from ....response.spectrum import make_acceleration_measures
 from ....structure.response import compute_receptance
 from ..event_to_event import LumpedEvaluator
@@ -66,6 +67,7 @@ class ShootingFinder(TracedCurve):
         Parameters
         ----------
         drive : SineDrive
+            Amplitude [m s-2] and angular frequency [rad/s].
         guess : hybrid.records.State, optional
             State of a similar motion at phase 0 of the drive.
 
@@ -206,6 +208,8 @@ class ShootingFinder(TracedCurve):
         if self._leave_grooves(drive) is not None:
             regime = "leaves its grooves"
             return CurvePoint(drive, {}, {}, regime, np.nan, False, Outcome.LEAVES_GROOVES)
+
+        # A neighbour beyond a jump of the curve may be too far away as a start.
         try:
             motion = self.find_periodic_motion(drive, guess)
         except NotConverged:
@@ -233,7 +237,7 @@ class ShootingFinder(TracedCurve):
             guess=motion.batch.states,
         )
 
-    def _estimate_point_errors(self, values: dict, motion) -> dict:
+    def _estimate_point_errors(self, values: Values, motion) -> Values:
         """Return the errors of the measures of a point of a response curve."""
         relative = find_relative_error(motion)
         errors = estimate_exact_errors(values, relative)
@@ -246,6 +250,7 @@ class ShootingFinder(TracedCurve):
         Parameters
         ----------
         drive : SineDrive
+            Amplitude [m s-2] and angular frequency [rad/s].
         guess : hybrid.records.State, optional
             State of a similar motion at phase 0 of the drive.
         needs_histories : bool

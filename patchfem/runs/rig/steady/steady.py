@@ -26,8 +26,11 @@ def solve_steady_motion(
     Parameters
     ----------
     model : Model
+        Rig, drive and friction laws.
     numerics : Numerics
+        Settings of the run, from which each method makes its own.
     patch : Patch or None
+        None under [normal] and between masses.
     frames : int
         Number of snapshots of the interface in a cycle.
     say, progress : callable, optional
