@@ -222,7 +222,7 @@ EFFECTS = {
         "timeless",
     ),
     "friction.law=nonlocal": _make_law(
-        "bonds.points",
+        "bonds.parameters",
         "tau = mu_s int phi(R/eps) sigma_n u/|u| dL1/eps_0 (2.17)",
         (
             "bond_length",

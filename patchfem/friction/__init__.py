@@ -1,10 +1,10 @@
 """Friction laws: traction as a function of the relative displacement at a given pressure.
 
-In: increments of relative displacement and pressure. Out: path-mean traction, dissipated energy, and the state after
-the step (`protocol`). `laws/` has one law per file, `bonds/` the sum over bonds of eq. 2.17 and its engines. Files named
-*kernels are compiled: those of `laws/` are for the harmonic balance. `grooves` has matched grooves, whose flanks the load
-climbs. `path_work` computes the friction work of samples and the phase of slip. Read `protocol` first, then
-`laws/elastic_plastic`.
+In: keys of a table [friction] and a load. Out: the law of a contact in the form that the engines take (`protocol`).
+`laws/` has one law per file, `bonds/` the sum over bonds of eq. 2.17 and its engines. Files named *kernels are compiled:
+those of `laws/` are for the harmonic balance, those of `bonds/` for the contact points of `points`. `grooves` has matched
+grooves, whose flanks the load climbs. `path_work` computes the friction work of samples and the phase of slip. Read
+`protocol` first, then `laws/elastic_plastic`.
 """
 
 # Names that other folders use, by module
@@ -51,7 +51,6 @@ PUBLIC = {
         "short_bond_mean",
         "short_bond_step",
     ),
-    "bonds.points_kernels": ("point_list",),
     "bonds.spread": ("carried_fraction",),
     "grooves": ("Grooves",),
     "laws.bouc_wen_kernels": ("follow_path",),
@@ -72,10 +71,7 @@ PUBLIC = {
         "mean_slip_phase",
         "sampled_work",
     ),
-    "protocol": (
-        "Element",
-        "Step",
-    ),
+    "protocol": ("Element",),
     "record": (
         "make_law",
         "steady_loop",

@@ -1,16 +1,9 @@
-"""Interface of a friction law: NumPy methods for prescribed motions, `Element` for compiled solvers.
+"""Interface of a friction law: `Element`, the law of a whole contact in the form that the engines take.
 
-A law under a pressure that changes along the path or in time has these methods. None of them changes the state that it
-is given. No traction remains without pressure, and at rest no traction exceeds mu sigma.
-
-- `initial_state(sigma)`: state before any motion, under a pressure sigma (m,) [Pa]
-- `step(state, increment, s0, s1, dt)`: `Step` for an increment [m] in dt [s] under pressures from s0 to s1
-- `press(state, s0, s1)`: `Step` at rest while the pressure changes from s0 to s1
-- `traction(state)`, `stored_energy(state)`: traction [Pa] and elastic energy per area [J/m2] of a state
-- `element(load)`: `Element` of a whole contact
-
-Laws of constant load (Iwan, Bouc-Wen, LuGre) have only `element`. Its kernels are a module of compiled functions, which
-`ADDING.md` describes; `protocol_kernels` has their results, and the functions that most laws do not need.
+A law has a method `element(load)`. Its kernels for the harmonic balance are a module of compiled functions, which
+`ADDING.md` describes; `protocol_kernels` has their results. Prescribed motions and loads that change are those of the
+contact points (`points`), for the laws that have return maps there. Without pressure there is no traction, and at rest
+no traction exceeds mu sigma.
 """
 
 from typing import NamedTuple
@@ -18,67 +11,11 @@ from typing import NamedTuple
 import numpy as np
 
 
-class Step(NamedTuple):
-    """Result of a friction law for one increment of the relative displacement.
-
-    - mean: path mean (m,) [Pa] of the traction, positive against slip to +x
-    - dissipated: energy per area (m,) [J/m2], negative only if the law creates energy
-    - state: state after the increment, of the type that the `initial_state` of the law returns
-    """
-
-    mean: np.ndarray
-    dissipated: np.ndarray
-    state: object
-
-
 class SteadyLoop(NamedTuple):
     """Steady friction loop: force [N] at the reversals, and enclosed area [J]."""
 
     force: float | np.ndarray
     area: float | np.ndarray
-
-
-class LastTraction:
-    """Base class of friction laws whose state is the last traction (m,) [Pa].
-
-    A subclass has `limit(sigma, direction)`, `limit_fraction(increment, dt)` and `step`.
-    """
-
-    __slots__ = ()
-    can_change_load = True  # whether the load may change within a step
-
-    def initial_state(self, sigma):
-        """Return the traction before any motion, which is 0."""
-        return np.zeros_like(sigma)
-
-    def press(self, state, s0, s1) -> Step:
-        """Reduce the traction at rest to the friction limit that holds after a change of the pressure.
-
-        No energy is dissipated.
-
-        Parameters
-        ----------
-        state : (m,) array
-            Last traction [Pa].
-        s0, s1 : (m,) array
-            Pressures before and after [Pa].
-
-        Returns
-        -------
-        Step
-            Its mean is the traction after the change.
-        """
-        limit = self.limit(s1, 1.0)
-        traction = np.clip(state, -limit, limit)
-        return Step(traction, np.zeros_like(traction), traction)
-
-    def traction(self, state):
-        """Return the traction (m,) [Pa] at the end of the last step, positive against slip to +x."""
-        return state
-
-    def stored_energy(self, state):
-        """Return the elastic energy per area (m,) [J/m2], which is 0 because the law has no elastic stretch."""
-        return np.zeros_like(state)
 
 
 class Element(NamedTuple):

@@ -5,18 +5,24 @@ those of a point per unit of mu_s, which is numbers[1, j]. A bond keeps the load
 off loses its bonds with the energy that they store.
 """
 
-from ..compiled.flags_kernels import NJIT_CALL
+from ..compiled.flags_kernels import NJIT_CALL, NJIT_NO_REFCOUNT
 from ..compiled.jit import njit
 from ..friction.bonds.list_kernels import list_mean_and_slope
-from ..friction.bonds.list_rows_kernels import FORM_STRETCH, LAW, STATUS
+from ..friction.bonds.list_rows_kernels import FORM_STRETCH, LAW, STATUS, BondList
 from ..friction.bonds.list_step_kernels import break_bonds, list_step
-from ..friction.bonds.points_kernels import point_list
-from ..friction.bonds.points_kernels import read as read_bonds
 from .march_rows import Point
 from .return_maps_kernels import PointState
 
 # Largest energy that sums may gain in short steps and lose later, relative to the work of a bond length at the limit.
 MAX_OWED = 1e-4
+
+
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
+def _get_list(lists, j):
+    """Return the arrays of the list of point j of a `BondLists` as views."""
+    return BondList(
+        lists.bondlist, lists.nows[j], lists.statuses[j], lists.law, lists.table, lists.growth
+    )
 
 
 @njit(**NJIT_CALL)
@@ -52,7 +58,7 @@ def write_list_mean(numbers, values, lists, j, dt):
     dt : float
         Duration of the step [s].
     """
-    bonds = point_list(lists, j)
+    bonds = _get_list(lists, j)
     status = bonds.status
     dq = values[Point.SLIDE, j]
     values[Point.BY_VELOCITY, j] = 0.0
@@ -100,13 +106,13 @@ def advance_list(numbers, values, lists, j, v0, v1, dt):
     dt : float
         Duration of the step [s].
     """
-    bonds = point_list(lists, j)
+    bonds = _get_list(lists, j)
     status = bonds.status
     static = numbers[1, j]
     before = status[STATUS.energy]
     has_room = list_step(values[Point.SLIDE, j], bonds, v0, v1, dt)
     if values[Point.END_LOAD, j] <= 0.0:
-        break_bonds(0, bonds)
+        break_bonds(bonds)
     loss = values[Point.FORCE, j] * values[Point.SLIDE, j]
     loss -= static * (status[STATUS.energy] - before)
     if bonds.law[LAW.form] == FORM_STRETCH:
@@ -136,6 +142,8 @@ def read_list(numbers, lists, j, load):
     load : float
         Normal load [N].
     """
-    reading = read_bonds(lists, j, load)
     static = numbers[1, j]
-    return PointState(static * reading.force, static * reading.energy, reading.stretch)
+    force = lists.statuses[j, STATUS.force]
+    energy = lists.statuses[j, STATUS.energy] - lists.statuses[j, STATUS.owed]
+    stretch = force * lists.law[LAW.length] / load if load > 0 else 0.0
+    return PointState(static * force, static * energy, stretch)

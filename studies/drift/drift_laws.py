@@ -1,4 +1,4 @@
-"""The laws of the drift study as objects: bond laws of every order, Iwan's elements, closed forms."""
+"""The laws of the drift study as contact points: bond laws of every order, Iwan's elements, closed forms."""
 
 import sys
 from pathlib import Path
@@ -11,12 +11,14 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "friction_ladder"))
 import ladder_cycles as ladder
 import today
 
-from patchfem.friction import Step
-from patchfem.friction.bonds.points import FirstOrderBonds, ListedBonds
-from patchfem.friction.laws.elastic_plastic import ElasticPlastic
+from patchfem.friction import Bonds
+from patchfem.friction.bonds.list_numbers import cutoff_age
+from patchfem.points.contacts import BondSum, Contact, PointSet, make_pressed_contact
+from patchfem.points.laws import make_jenkins
 
 LENGTH = ladder.LENGTH  # [m] bond length
 PERIOD = 1 / ladder.HERTZ  # [s] duration of a cycle
+CUT_OFF = 1e-9  # largest part of the friction limit that the cut-off of a list leaves out
 CREEP = 1e-3  # [m/s] reference speed of the law tanh
 CASES = {
     "force .5+-.1": ((0.6, 0.4), (1.0, 1.0)),
@@ -28,28 +30,19 @@ CASES = {
 }
 
 
-class Iwan:
-    """Parallel elastic-plastic elements as one law, with the virgin curve of Dahl."""
+def make_bonds(law: Bonds):
+    """Return the function of a load that makes a point of bonds."""
+    is_first_order = law.reading == "stretch" and law.order == 1
+    bond_sum = None if is_first_order else BondSum(law, cutoff_age(law.order, CUT_OFF), 0.0)
+    return lambda load: make_pressed_contact(law, 1.0, np.zeros(0), None, bond_sum, load=load)
 
-    def __init__(self, count: int, length: float):
-        k, s = today.iwan_elements(count)
-        self.parts = [ElasticPlastic(float(a * b), float(b) * length) for a, b in zip(k, s)]
 
-    def initial_state(self, sigma):
-        return [part.initial_state(sigma) for part in self.parts]
-
-    def step(self, state, dq, s0, s1, dt) -> Step:
-        return self._sum([part.step(one, dq, s0, s1, dt) for part, one in zip(self.parts, state)])
-
-    def press(self, state, s0, s1) -> Step:
-        return self._sum([part.press(one, s0, s1) for part, one in zip(self.parts, state)])
-
-    def traction(self, state):
-        return sum(part.traction(one) for part, one in zip(self.parts, state))
-
-    def _sum(self, steps) -> Step:
-        mean, spent, state = zip(*steps)
-        return Step(sum(mean), sum(spent), list(state))
+def make_springs(stiffness, yield_slide):
+    """Return the function of a load that makes parallel elastic-plastic elements, with forces (t,) per load [1]."""
+    limits = np.multiply(stiffness, yield_slide)
+    laws = [make_jenkins(limit, length) for limit, length in zip(limits, yield_slide)]
+    points = PointSet(laws, np.zeros(0))
+    return lambda load: Contact([points], float(limits.sum()), load=load)
 
 
 class Row(NamedTuple):
@@ -62,7 +55,7 @@ class Row(NamedTuple):
 
 
 def engines(growth: bool, orders=(0.0, 0.5, 1.0, 2.0)) -> dict:
-    """Return {name: law} of the bond laws.
+    """Return {name: function of a load that makes the point} of the bond laws.
 
     Order 0 starts without bonds, because with fully grown bonds it would be a Coulomb jump.
     """
@@ -70,16 +63,18 @@ def engines(growth: bool, orders=(0.0, 0.5, 1.0, 2.0)) -> dict:
     out = {}
     for p in orders:
         law = ladder.bonds(order=p, initial=float(p > 0), **more)
-        out[f"stretch p = {p:g}{tail}"] = FirstOrderBonds(law) if p == 1 else ListedBonds(law)
+        out[f"stretch p = {p:g}{tail}"] = make_bonds(law)
     for p in (0.0, 1.0):
         law = ladder.bonds(order=p, reading="report", initial=p, **more)
-        out[f"report p = {p:g}{tail}"] = ListedBonds(law)
+        out[f"report p = {p:g}{tail}"] = make_bonds(law)
     return out
 
 
 def laws_without_bonds() -> dict:
-    """Return the laws without bonds that respond to a given force."""
-    return {"elastic-plastic": ElasticPlastic(1.0, LENGTH), "Iwan, 10 elements": Iwan(10, LENGTH)}
+    """Return the laws without bonds that respond to a given force, as `engines` does."""
+    stiffness, yield_slide = today.iwan_elements(10)
+    iwan = make_springs(stiffness / LENGTH, yield_slide * LENGTH)
+    return {"elastic-plastic": make_springs([1 / LENGTH], [LENGTH]), "Iwan, 10 elements": iwan}
 
 
 def closed_form_rows(case: str) -> list:

@@ -12,11 +12,9 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parent))
 sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
 from drawing import BLUE, GREY, drawing
-from drift_laws import LENGTH, PERIOD, ladder
+from drift_laws import LENGTH, PERIOD, ladder, make_bonds
 from force_control import OutOfReach, drift
 from friction_forms import dither_drift, stretch_loop
-
-from patchfem.friction.bonds.points import FirstOrderBonds
 
 FOLDER = Path(__file__).parent
 MARCHED_SWINGS = (0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.35, 0.4)
@@ -27,7 +25,7 @@ def growing(swing: float) -> float:
 
     NaN if the block slides away.
     """
-    engine = FirstOrderBonds(ladder.bonds(**ladder.GROWTH))
+    engine = make_bonds(ladder.bonds(**ladder.GROWTH))
     try:
         return (
             drift(engine, (0.5 + swing, 0.5 - swing), (1.0, 1.0), 4, period=PERIOD, length=LENGTH)

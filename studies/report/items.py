@@ -71,7 +71,7 @@ ITEMS = (
         "friction of constant magnitude that opposes the velocity, and static friction below a threshold of speed",
         BLOCK,
         "studies/friction_ladder/ladder.py",
-        "tests/friction/laws/test_laws.py",
+        "tests/runs/test_bench_engines.py",
         "works",
     ),
     Item(

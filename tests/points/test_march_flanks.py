@@ -1,5 +1,5 @@
-"""Friction laws with memory on the flanks of grooves: a NumPy version, limiting cases and order of
-convergence."""
+"""Friction laws with memory on the flanks of grooves: the equations of the flank in Python, limiting
+cases and order of convergence."""
 
 from itertools import pairwise
 from types import SimpleNamespace
@@ -13,14 +13,15 @@ import patchfem as pf
 from patchfem import load
 from patchfem.core import Outcome, SineDrive
 from patchfem.friction import Bonds, Grooves
-from patchfem.friction.bonds.points import FirstOrderBonds
 from patchfem.friction.laws.elastic_plastic import ElasticPlastic
+from patchfem.points import return_maps_kernels as maps
 from patchfem.points.contacts import (
     make_bond_contact,
     make_contact,
     make_flank_contact,
     make_parallel_contact,
 )
+from patchfem.points.laws import make_bonds, make_jenkins
 from patchfem.points.time_march import march
 from patchfem.response import energy_balance
 from patchfem.runs.bench import shear
@@ -34,11 +35,11 @@ DRIVE = SineDrive(49.0, 2 * np.pi * 143)
 LAWS = {
     "elastic-plastic": (
         lambda length: SimpleNamespace(law="elastic-plastic", static=MU, bond_length=length),
-        lambda length: ElasticPlastic(MU, length),
+        lambda length, load: make_jenkins(MU, length, load),
     ),
     "bonds": (
         lambda length: Bonds(MU, length),
-        lambda length: FirstOrderBonds(Bonds(MU, length)),
+        lambda length, load: make_bonds(Bonds(MU, length), load),
     ),
 }
 
@@ -53,16 +54,18 @@ def march_amplitude(law, grooves, steps, cycles=6):
     return float(result.extremes[-1, 1])
 
 
-def solve_with_numpy_law(law, grooves, slide):
-    """Return the mean force and the energy loss of the steps of a slow slide, (k - 1,) each, with
-    the NumPy law.
+def solve_flank(make_law, grooves, slide):
+    """Return the mean force and the energy loss of the steps of a slow slide, (k - 1,) each, from the
+    return maps of a point.
 
     The law acts on the path along the flank under the normal force R = N sqrt(1 + t^2) + f t. Half
     of the change of R is applied before the motion of a step.
     """
     slope = grooves.slope
-    normal = np.array([LOAD * np.hypot(1, slope(slide[0]))])
-    state = law.initial_state(normal)
+    normal = LOAD * np.hypot(1, slope(slide[0]))
+    point = make_law(normal)
+    numbers = point.numbers[:, None]
+    state = point.memory[:, None]
     force = 0.0
     forces = []
     losses = []
@@ -70,38 +73,43 @@ def solve_with_numpy_law(law, grooves, slide):
         increment = end - q
         inner = 0.5 * (q + end) + 0.5 * increment * np.array([-np.sqrt(0.6), 0, np.sqrt(0.6)])
         path = np.array([5, 8, 5]) / 18 @ np.hypot(1, slope(inner)) * increment
+        step = maps.Step(path, 1.0, path, path, 0.0)
         after = normal
         for _ in range(100):
             mean_normal = 0.5 * (normal + after)
-            pressed = law.press(state, normal, mean_normal)
-            step = law.step(pressed.state, path, mean_normal, mean_normal, 1.0)
-            mean_force = float(step.mean[0])
-            end_force = np.clip(2 * mean_force - force, -MU * after[0], MU * after[0])
+            trial = state.copy()
+            maps.press(numbers, trial, 0, normal, mean_normal)
+            maps.prepare(numbers, trial, 0, step)
+            mean_force = maps.mean_force(numbers, trial, 0, mean_normal, step).force
+            end_force = np.clip(2 * mean_force - force, -MU * after, MU * after)
             previous = after
-            after = np.array([LOAD * np.hypot(1, slope(end)) + end_force * slope(end)])
-            if abs(after - previous)[0] < 1e-13 * LOAD:
+            after = LOAD * np.hypot(1, slope(end)) + end_force * slope(end)
+            if abs(after - previous) < 1e-13 * LOAD:
                 break
-        released = law.press(step.state, mean_normal, after)
+        maps.advance(numbers, trial, 0, mean_normal, step)
+        maps.press(numbers, trial, 0, mean_normal, after)
+        gain = maps.read(numbers, trial, 0, after).energy - maps.read(numbers, state, 0, 0.0).energy
         forces.append(
             (LOAD * float(grooves.height_difference(q, end)) + mean_force * path) / increment
         )
-        losses.append(float((pressed.dissipated + step.dissipated + released.dissipated)[0]))
-        state = released.state
+        losses.append(mean_force * path - gain)
+        state = trial
         normal = after
-        force = float(law.traction(released.state)[0])
+        force = maps.read(numbers, state, 0, after).force
     return np.array(forces), np.array(losses)
 
 
 @pytest.mark.parametrize("law", LAWS)
-def test_exact_slow_slide_agrees_with_numpy_law(law):
-    """Force and loss on a slow slide over grooves agree with the NumPy version of the law within
-    1e-9 and 1e-7."""
+def test_exact_slow_slide_agrees_with_equations_of_flank(law):
+    """Force and loss on a slow slide over grooves agree with the equations of the flank within 1e-9
+    and 1e-7."""
     grooves = Grooves(80e-6, 7.5e-6, 0.4)
     slide = 30e-6 * np.sin(np.linspace(0, 7.3, 101))
-    contact = make_flank_contact(LAWS[law][0](2e-6), grooves, LOAD, BASIS.slide)
+    make_keys, make_law = LAWS[law]
+    contact = make_flank_contact(make_keys(2e-6), grooves, LOAD, BASIS.slide)
     forces, energies, n_unsolved, _ = follow_path(contact, slide, 1e-3)
     assert n_unsolved == 0
-    expected_force, expected_loss = solve_with_numpy_law(LAWS[law][1](2e-6), grooves, slide)
+    expected_force, expected_loss = solve_flank(lambda load: make_law(2e-6, load), grooves, slide)
     np.testing.assert_allclose(forces[:-1, 1], expected_force, rtol=1e-9, atol=1e-9 * LOAD)
     np.testing.assert_allclose(
         energies[:-1, 0], expected_loss, rtol=1e-7, atol=1e-12 * expected_loss.sum()

@@ -1,14 +1,15 @@
-"""Compiled engines of a bench agree with the NumPy laws, and their errors, energy balance and
-progress are right."""
+"""Engines of a bench agree with references in NumPy, and their errors, energy balance and progress
+are right."""
+
+from typing import NamedTuple
 
 import numpy as np
 import pytest
-from friction_paths import march_path
+from bond_moments import advance_bonds
+from friction_paths import reference_bond_lengths
 
 from patchfem import build
-from patchfem.friction import Coulomb, steady_loop
-from patchfem.friction.bonds.points import FirstOrderBonds
-from patchfem.friction.record import make_law
+from patchfem.friction import steady_loop
 from patchfem.points.slides import BLOCK
 from patchfem.runs.bench import bench
 from patchfem.runs.bench.slides import find_rest_ends
@@ -42,43 +43,84 @@ def build_bench(law, slide, *sets, contact=POINT):
     return build(loads(contact + FRICTION + law + "[slide]\n" + SLIDES[slide], sets=sets))
 
 
-def make_numpy_law(model):
-    """Return the friction law of a bench of one point as an object whose steps NumPy calls."""
+class ReferenceHistory(NamedTuple):
+    """Forces [N] after the steps of a slide, their path means, and dissipated and stored energies [J], (k,) each."""
+
+    force: np.ndarray
+    mean: np.ndarray
+    dissipated: np.ndarray
+    stored: np.ndarray
+
+
+def follow_sliding(fraction, slide):
+    """Return the history of a law without memory: a fraction (k,) of the limit of 30 N; NaN keeps the last force."""
+    last = np.maximum.accumulate(np.where(np.isnan(fraction), 0, np.arange(fraction.size)))
+    force = 30.0 * fraction[last]
+    return ReferenceHistory(force, force, force * np.diff(slide), np.zeros(force.size))
+
+
+def follow_springs(slide, length):
+    """Return the history of a spring of 30 N/length that slips at 30 N."""
+    rows = []
+    stretch = 0.0
+    for dq in np.diff(slide):
+        after = np.clip(stretch + dq, -length, length)
+        elastic = (after - stretch) / dq if dq else 1.0
+        mean = 30.0 / length * (elastic * (stretch + after) / 2 + (1 - elastic) * after)
+        gain = 15.0 / length * (after**2 - stretch**2)
+        rows.append((30.0 / length * after, mean, mean * dq - gain, 15.0 / length * after**2))
+        stretch = after
+    return ReferenceHistory(*np.transpose(rows))
+
+
+def follow_bonds(law, slide, times):
+    """Return the history of bonds by their moments in NumPy, with bond lengths by eq. 2.10 in closed form."""
+    rows = []
+    bonds = np.array([[100.0 * law.initial], [0.0], [0.0]])
+    middles = reference_bond_lengths(law, slide, times)[1]
+    for dq, length in zip(np.diff(slide), middles):
+        moved = advance_bonds(bonds, dq, np.array([100.0]), length)
+        bonds = moved.bonds
+        values = (bonds[1, 0], moved.mean[0], moved.damage_integral[0] / 2, bonds[2, 0] / 2)
+        rows.append(law.static / law.length * np.array(values))
+    return ReferenceHistory(*np.transpose(rows))
+
+
+def follow_reference(model, slide, times):
+    """Return the `ReferenceHistory` of the law of a bench of one point under 100 N."""
     friction = model.friction
+    steps = np.diff(slide)
     if friction.law == "nonlocal":
-        return FirstOrderBonds(model.bonds)
-    if friction.law == "convolution":
-        return Coulomb(friction.static)
-    return make_law(friction, 1.0)
+        return follow_bonds(model.bonds, slide, times)
+    if friction.law == "elastic-plastic":
+        return follow_springs(slide, friction.bond_length)
+    if friction.law == "tanh":
+        return follow_sliding(np.tanh(steps / times / friction.reference_speed), slide)
+    ratio = (getattr(friction, "kinetic", None) or friction.static) / friction.static
+    return follow_sliding(np.where(steps == 0, np.nan, ratio * np.sign(steps)), slide)
 
 
-# ---- compiled engines and their NumPy versions
+# ---- engines and references in NumPy
 
 
 @pytest.mark.share(0, 4, 8, 10, 13, 17, 19, 23)
 @pytest.mark.parametrize("slide", SLIDES)
 @pytest.mark.parametrize("law", ROUND_OFF_LAWS)
-def test_exact_compiled_bench_agrees_with_numpy_law(law, slide):
-    """The bench agrees with the law stepped in NumPy to round-off, in force and energies."""
+def test_exact_bench_agrees_with_reference(law, slide):
+    """The bench agrees with its law stepped in NumPy to round-off, in force and energies."""
     model = build_bench(ROUND_OFF_LAWS[law], slide)
     run = bench.run_bench(model, None, 80)
-    path = march_path(
-        make_numpy_law(model), run.slide, lambda slide: np.array([100.0]), np.diff(run.time)
-    )
+    path = follow_reference(model, run.slide, np.diff(run.time))
     limit = np.abs(run.force).max()
-    force = np.append(0.0, path.traction[:, 0])
+    force = np.append(0.0, path.force)
     # At the end of a rest, the bench has the static force.
     is_static = np.isin(np.arange(force.size), [*find_rest_ends(model, run.slide)])
     assert run.force[~is_static] == pytest.approx(force[~is_static], abs=1e-13 * limit)
-    work = np.append(0.0, np.cumsum(path.mean[:, 0] * np.diff(run.slide)))
-    stored = np.append(0.0, path.stored[:, 0])
+    work = np.append(0.0, np.cumsum(path.mean * np.diff(run.slide)))
     exchanged = np.abs(np.diff(work)).sum()
     assert run.ledger[0] == pytest.approx(work, abs=1e-13 * exchanged)
-    assert run.ledger[1] == pytest.approx(stored, abs=1e-13 * exchanged)
+    assert run.ledger[1] == pytest.approx(np.append(0.0, path.stored), abs=1e-13 * exchanged)
     assert run.ledger[2, -1] == pytest.approx(path.dissipated.sum(), abs=1e-13 * exchanged)
-
-
-# ---- choice of the engine and its name
 
 
 # ---- progress

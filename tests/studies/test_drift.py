@@ -18,12 +18,10 @@ def test_exact_drift_of_the_bond_law_agrees_with_closed_form(table):
         assert (result.second, result.last) == pytest.approx((expected, expected), abs=1e-9)
 
 
-def test_always_oscillating_load_causes_drift_only_at_order_zero(table):
-    """At a constant tangential force, an oscillating load causes drift only with bonds of order 0."""
-    for name, engine in table.engines(False).items():
-        drift = 0.4420 if name == "stretch p = 0" else 0.0
-        tolerance = 5e-4 if drift else 1e-12
-        assert table.row(name, engine, "load +-20 %", 3).last == pytest.approx(drift, abs=tolerance)
+def test_always_oscillating_load_causes_no_drift(table):
+    """At a constant tangential force, an oscillating load causes no drift."""
+    for name, law in table.engines(False).items():
+        assert abs(table.row(name, law, "load +-20 %", 3).last) <= 1e-12, name
 
 
 def test_exact_drift_of_the_report_law_decays_with_the_square(table):
@@ -46,10 +44,10 @@ def test_always_drift_table_has_the_stated_values(table, capsys):
     cases = tuple(table.CASES)
     expected = {
         "stretch p = 1": (0.272, 0.981, 0.446, 0, 0, 0.289),
-        "stretch p = 0.5": (0.066, 0.380, 0.103, 0, 0, 0.089),
-        "stretch p = 2": (0.782, 2.21, 1.315, 0, 0, 0.783),
+        "stretch p = 0.5": (0.066, 0.380, 0.103, 0, 0, 0.069),
+        "stretch p = 2": (0.782, 2.21, 1.315, 0, 0, 0.766),
         "report p = 0": (3e-4, 1.3e-3, 1.1e-3, 0, 0, 3e-4),
-        "stretch p = 0": (3e-4, 1.3e-3, 1.1e-3, 0.205, 0.442, 0.193),
+        "stretch p = 0": (3e-4, 1.3e-3, 1.1e-3, 0, 0, 3e-4),
         "report p = 1": (1.4e-3, 3.8e-3, 3.2e-3, 0, 0, 1.4e-3),
         "elastic-plastic": (0,) * 6,
         "Iwan, 10 elements": (0,) * 6,

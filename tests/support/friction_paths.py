@@ -3,27 +3,32 @@
 Lengths are in units of eps_0 and tractions in units of mu_s sigma, unless a law says otherwise.
 """
 
-import sys
-from pathlib import Path
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 from scipy.special import gamma
 
-sys.path.append(str(Path(__file__).parents[2] / "studies/drift"))
-from force_control import drift, slides  # noqa: F401  (force control: one door for the tests of the laws)
+from patchfem.friction import Bonds
+from patchfem.friction.bonds.list_numbers import cutoff_age
+from patchfem.points.contacts import BondSum, Contact, make_bond_contact, make_pressed_contact
+from patchfem.points.slides import follow
 
 GAUSS = np.polynomial.legendre.leggauss(12)
 
 
 class PathHistory(NamedTuple):
-    """Histories of a law along a path: step means, tractions after each step, energies per area."""
+    """Histories of contact points along a path of k steps.
 
-    mean: np.ndarray
+    - traction (k, m): tractions of the points after each step, positive against slip to +x
+    - mean, dissipated, stored (k,): sums over the points of the path-mean traction of each step, the energy per area that
+      it dissipates, and the stored energy after it
+    """
+
     traction: np.ndarray
+    mean: np.ndarray
     dissipated: np.ndarray
     stored: np.ndarray
-    state: object
 
 
 def triangle_path(amplitude, cycles, per_stroke, start=0.0):
@@ -45,21 +50,68 @@ def upper_pressure(sigma):
     return lambda q: sigma
 
 
-def lower_pressure(x, wave, floor=0.0):
-    """Return a pressure (m,) fixed to the lower body with unloaded zones: max(0, sine) pattern at x + q."""
-    return lambda q: np.maximum(np.sin(2 * np.pi * (np.asarray(x) + q) / wave) + floor, 0.0)
+class LowerPressure(NamedTuple):
+    """Pressure that is fixed to the lower body, linear between the positions of the points and 0 beyond them.
+
+    - places, sigma (m,): positions, and the pressure at them
+    """
+
+    places: np.ndarray
+    sigma: np.ndarray
+
+    def __call__(self, q):
+        """Return the pressure (m,) at the points of the upper body after a displacement q."""
+        return np.interp(self.places + q, self.places, self.sigma, left=0.0, right=0.0)
 
 
-def march_path(law, path, pressure, dt=1.0):
-    """March `law` along the knots `path`; `pressure` maps a displacement to (m,) values; dt: scalar or per step."""
-    times = np.broadcast_to(dt, len(path) - 1)
-    state = law.initial_state(pressure(path[0]))
-    rows = []
-    for k, dq in enumerate(np.diff(path)):
-        step = law.step(state, float(dq), pressure(path[k]), pressure(path[k + 1]), float(times[k]))
-        state = step.state
-        rows.append((step.mean, law.traction(state), step.dissipated, law.stored_energy(state)))
-    return PathHistory(*(np.array(part) for part in zip(*rows)), state)
+def make_bond_sum(law: Bonds, tail) -> BondSum:
+    """Return the settings of a list that loses at most a fraction `tail` of the friction limit; 0 keeps every bond."""
+    return BondSum(law, cutoff_age(law.order, tail) if tail else np.inf, 0.0)
+
+
+def make_points(law: Bonds, pressure, tail=None) -> Contact:
+    """Return contact points of unit area under a pressure.
+
+    Their bonds are known by their moments without a `tail`, else summed over lists; a tail of 0 keeps every bond.
+    """
+    bond_sum = None if tail is None else make_bond_sum(law, tail)
+    row = np.zeros(0)
+    if isinstance(pressure, LowerPressure):
+        lower = np.stack([pressure.places, pressure.sigma])
+        return make_bond_contact(law, np.ones(pressure.sigma.size), row, None, bond_sum, lower)
+    return make_bond_contact(law, pressure(0.0), row, None, bond_sum)
+
+
+def march_path(contact: Contact, path, dt=1.0) -> PathHistory:
+    """Move contact points along the knots `path`; dt: scalar or per step."""
+    times = np.concatenate([[0.0], np.cumsum(np.broadcast_to(dt, len(path) - 1))])
+    motion = follow(contact, times, path, np.arange(1, len(path)))
+    assert motion.n_unsolved == 0
+    traction = np.array([snapshot.forces for snapshot in motion.snapshots])
+    return PathHistory(traction, motion.mean, motion.losses, motion.stored[1:])
+
+
+def march_bonds(law: Bonds, path, pressure, dt=1.0, tail=None) -> PathHistory:
+    """Move `make_points` along the knots `path`; dt: scalar or per step."""
+    return march_path(make_points(law, pressure, tail), path, dt)
+
+
+def march_under_loads(law, path, loads, dt=1.0, tail=None) -> PathHistory:
+    """Move a point along the knots `path` under `loads` at them, linear between them; dt: scalar or per step.
+
+    `law` is a `Bonds`, or has the keys of a table [friction]; `tail` as in `make_points`.
+    """
+    times = np.concatenate([[0.0], np.cumsum(np.broadcast_to(dt, len(path) - 1))])
+    bond_sum = None if tail is None else make_bond_sum(law, tail)
+    contact = make_pressed_contact(
+        law,
+        float(loads[0]),
+        np.zeros(0),
+        None,
+        bond_sum,
+        load=lambda time: np.interp(time, times, loads),
+    )
+    return march_path(contact, path, dt)
 
 
 def bond_length_rates(law, speed):
@@ -152,6 +204,19 @@ def reference_traction(law, path, pressure, dt=1.0):
             * np.exp(-damage)
         )
     return total / gamma(law.order + 1)
+
+
+def reference_with_lift_off(law, path, pressure: LowerPressure, dt=1.0):
+    """Return `reference_traction` (m,) of points that lose all bonds where a step ends without pressure."""
+    is_bare = np.array([pressure(q) <= 0 for q in path])
+    tractions = np.zeros(is_bare.shape[1])
+    for point in np.flatnonzero(~is_bare[-1]):
+        bare_knots = np.flatnonzero(is_bare[:, point])
+        start = bare_knots[-1] if bare_knots.size else 0
+        kept = replace(law, initial=0.0) if bare_knots.size else law
+        at_point = lambda q: pressure(q)[point : point + 1]  # noqa: B023, E731
+        tractions[point] = reference_traction(kept, path[start:], at_point, dt)[0]
+    return tractions
 
 
 def reference_energy(law, path, dt=1.0):

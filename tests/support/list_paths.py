@@ -61,7 +61,7 @@ def march_list(law, path, times=1.0, merge=0.0, tail=0.0, capacity=60_000):
         v = dq / dt if dt > 0 else 0.0
         mean = list_kernels.list_mean(dq, bond_list, v, dt)
         list_kernels.sum_list(1.0, dq, bond_list, v, dt)
-        ahead = list_kernels.total(STRIP.force, 0, bond_list)
+        ahead = list_kernels.total(STRIP.force, bond_list)
         assert list_step_kernels.list_step(dq, bond_list, v, v, dt)
         rows.append((mean, status[STATUS.force], ahead, status[STATUS.energy]))
     return ListHistory(*np.array(rows).T, status)

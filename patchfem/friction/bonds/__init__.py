@@ -16,8 +16,8 @@ in stored energy. For "report" this may be negative: energy is created.
 Read `parameters`, then `point_kernels`: the moments of the bonds, exact for reading="stretch" with p = 1, the default.
 Every other law is a list of strips (`list_rows_kernels`), with one cut-off, one merge and one set of functions
 (`list_kernels`, `list_step_kernels`) for every form of the sum (`list_sum_kernels`). `engines` chooses cut-off and merge
-width by error and cost. `points_kernels` has the functions for many points, and `points` the laws for a prescribed motion.
-A strip is here a piece of the path along which the bonds of a point formed, not a strip of the patch.
+width by error and cost. A strip is here a piece of the path along which the bonds of a point formed, not a strip of the
+patch.
 
 Numerical errors: `EngineChoice.error` bounds what dropped and joined strips change, and every run adds this bound to
 its errors. The Gauss rules have no bound of their own. Their strips are pieces of the path in a time step, so that the

@@ -25,7 +25,6 @@ from .list_rows_kernels import (
     GAUSS_POINT_2,
     LAW,
     MAX_STRIP_LENGTH,
-    N_ROWS,
     PATH,
     STATUS,
     STRIP,
@@ -165,21 +164,18 @@ def sum_list(fraction, increment, bonds, v0, dt):
     new = _sum_new(fraction * abs(increment), after, bonds)
     strips[STRIP.force, end] = np.copysign(new.force, increment)
     strips[STRIP.energy, end] = new.energy
-    if strips.shape[0] == N_ROWS:
-        strips[STRIP.pressure, first] = status[STATUS.initial_pressure]
-        strips[STRIP.pressure, end] = status[STATUS.pressure]
+    strips[STRIP.pressure, first] = status[STATUS.initial_pressure]
+    strips[STRIP.pressure, end] = status[STATUS.pressure]
 
 
 @njit(**NJIT_KERNEL)
-def total(row, point, bonds):
-    """Return the sum of a row over all bonds, times their pressures at a point.
+def total(row, bonds):
+    """Return the sum of a row over all bonds, times their pressures.
 
     Parameters
     ----------
     row : int
         Row of `STRIP`, such as `STRIP.force`.
-    point : int
-        Number of the point, 0 for the list of a single point.
     bonds : BondList
         Strips with the values of the row for unit pressure.
 
@@ -189,11 +185,10 @@ def total(row, point, bonds):
         Force [1] or stored energy [m] per friction limit, as the row.
     """
     strips = bonds.bondlist
-    pressure = STRIP.pressure + point
     first = int(bonds.status[STATUS.first_column])
-    result = strips[pressure, first] * strips[row, first]
+    result = strips[STRIP.pressure, first] * strips[row, first]
     for k in range(int(bonds.status[STATUS.head]), int(bonds.status[STATUS.end]) + 1):
-        result += strips[pressure, k] * strips[row, k]
+        result += strips[STRIP.pressure, k] * strips[row, k]
     return result
 
 
@@ -325,11 +320,11 @@ def list_mean_and_slope(increment, bonds, v0, dt):
     # increment to either side, because the slopes of both directions differ.
     small = SLOPE_INCREMENT_RATIO * bonds.law[LAW.length]
     if abs(increment) > small:
-        return MeanForce(mean, (total(STRIP.force, 0, bonds) - mean) / increment)
+        return MeanForce(mean, (total(STRIP.force, bonds) - mean) / increment)
     sum_list(1.0, small, bonds, v0, dt)
-    forward = total(STRIP.force, 0, bonds)
+    forward = total(STRIP.force, bonds)
     sum_list(1.0, -small, bonds, v0, dt)
-    return MeanForce(mean, (forward - total(STRIP.force, 0, bonds)) / (4 * small))
+    return MeanForce(mean, (forward - total(STRIP.force, bonds)) / (4 * small))
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
@@ -393,7 +388,7 @@ def list_mean(increment, bonds, v0, dt):
     if end_weight != 0:
         _add_to_mean(end_weight, row, bonds)
     _write_exact_means(increment, after.middle_length, bonds)
-    return total(STRIP.mean, 0, bonds)
+    return total(STRIP.mean, bonds)
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)

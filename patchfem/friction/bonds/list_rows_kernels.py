@@ -9,8 +9,7 @@ Inside a strip a position is the fraction of its length from its end. Two values
   exp(growth J - reference); they say by how much the bonds are shorter than mature ones
 - `FORM_REPORT`, reading="report" with a constant bond length: no values, the sum over a strip has a closed form
 
-Force and energy of a strip hold for unit relative pressure, that is per friction limit. The points of a rigid interface
-have the same path, so that they share a list: every strip then has one pressure per point.
+Force and energy of a strip hold for unit relative pressure, that is per friction limit.
 
 Two columns are no strips: the first one of a list has the initial bonds, that after the last strip the bonds that form on
 a trial increment.
@@ -28,7 +27,7 @@ FORM_GROWING = 2.0
 # Positions of the two Gauss points of a strip, as fractions of its length from its end
 GAUSS_POINT_1 = 0.5 - sqrt(1 / 12)
 GAUSS_POINT_2 = 0.5 + sqrt(1 / 12)
-N_ROWS = 14  # number of rows of the array of strips of one point
+N_ROWS = 13  # number of rows of the array of strips
 # Largest length of a strip of age 0, as it forms, in bond lengths. Two Gauss points sum exp(-R/eps) over it to 4e-9.
 MAX_STRIP_LENGTH = 1 / 16
 N_TABLE_STEPS = 128  # number of entries of the table of P(p + 1, x) per unit of x
@@ -37,8 +36,7 @@ N_TABLE_STEPS = 128  # number of entries of the table of P(p + 1, x) per unit of
 class BondList(NamedTuple):
     """Arrays of a list. Other tuples with these fields serve as well.
 
-    - bondlist: (N_ROWS, capacity) strips, see `StripRows`; the columns may be shared with the lists of other points. With
-      further rows it is the list of several points of one path, and these rows are their pressures.
+    - bondlist: (N_ROWS, capacity) strips, see `StripRows`; the columns may be shared with the lists of other points
     - now: (6,) state of the path, see `PathRows`
     - status: (14,) see `ListStatus`
     - law: (8,) parameters, see `LawNumbers`
@@ -76,12 +74,11 @@ class StripRows(NamedTuple):
     - start, end: relative displacement [m] at the start and at the end of the strip
     - path, damage: path R [m] and damage int dR/eps [1] at its end
     - covered: path [m] along the strip
-    - density: eps^(p - 1) [m^(p - 1)], by which weights become densities of bonds, in the form FORM_STRETCH
     - value_1, value_2: values at both Gauss points
     - force, energy: force [1] and stored energy [m] in the state of the last sum
     - present_force, present_energy: the same in the present state
     - mean: contribution [1] to the path-mean force of an increment
-    - pressure: relative pressure of the first point; the following rows are those of the other points
+    - pressure: relative pressure under which its bonds formed
     """
 
     start: int = 0
@@ -89,15 +86,14 @@ class StripRows(NamedTuple):
     path: int = 2
     damage: int = 3
     covered: int = 4
-    density: int = 5
-    value_1: int = 6
-    value_2: int = 7
-    force: int = 8
-    energy: int = 9
-    present_force: int = 10
-    present_energy: int = 11
-    mean: int = 12
-    pressure: int = 13
+    value_1: int = 5
+    value_2: int = 6
+    force: int = 7
+    energy: int = 8
+    present_force: int = 9
+    present_energy: int = 10
+    mean: int = 11
+    pressure: int = 12
 
 
 class LawNumbers(NamedTuple):
@@ -151,7 +147,7 @@ class ListStatus(NamedTuple):
     - owed: energy [m] that the next dissipation repays, see `points.lists_kernels`
     - first_column, end_column: columns of the array that belong to this list; the first one has the initial bonds
     - pressure: relative pressure under which bonds form; of several points the largest
-    - initial_pressure: relative pressure under which the initial bonds of one point formed
+    - initial_pressure: relative pressure under which the initial bonds formed
     """
 
     head: int = 0

@@ -1,4 +1,4 @@
-"""Compiled list of strips of bonds (eq. 2.17): increment of a point, joined strips, and change of its load.
+"""Compiled list of strips of bonds (eq. 2.17): increment of a point, joined strips, and lift-off.
 
 `bonds` is a `list_rows_kernels.BondList`, which these functions change. `before` and `after` are `PathValues` at the ends
 of an increment, and k is the column of a strip.
@@ -17,12 +17,11 @@ from .list_rows_kernels import (
     GAUSS_POINT_1,
     GAUSS_POINT_2,
     LAW,
-    N_ROWS,
     PATH,
     STATUS,
     STRIP,
 )
-from .list_sum_kernels import PathValues, interpolate_value
+from .list_sum_kernels import MIN_POSITIVE, PathValues, interpolate_value
 
 # Largest exponent of the scaled values before they are rescaled; exp(709) is the largest
 # floating-point number
@@ -62,6 +61,9 @@ def list_step(increment, bonds, v0, v1, dt):
     bool
         False if the array of strips is full.
     """
+    # The width of a strip of a shorter path would underflow
+    if abs(increment) < MIN_POSITIVE:
+        increment = 0.0
     status = bonds.status
     now = bonds.now
     before = PathValues(
@@ -99,7 +101,7 @@ def list_step(increment, bonds, v0, v1, dt):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def update_sums(bonds):
-    """Write force and energy of the present state into the strips and, of the first point, into the status."""
+    """Write force and energy of the present state into the strips and into the status."""
     strips = bonds.bondlist
     status = bonds.status
     first = int(status[STATUS.first_column])
@@ -109,8 +111,8 @@ def update_sums(bonds):
     for k in range(int(status[STATUS.head]), int(status[STATUS.end]) + 1):
         strips[STRIP.present_force, k] = strips[STRIP.force, k]
         strips[STRIP.present_energy, k] = strips[STRIP.energy, k]
-    status[STATUS.force] = total(STRIP.force, 0, bonds)
-    status[STATUS.energy] = total(STRIP.energy, 0, bonds)
+    status[STATUS.force] = total(STRIP.force, bonds)
+    status[STATUS.energy] = total(STRIP.energy, bonds)
     n_strips = status[STATUS.end] - status[STATUS.head]
     status[STATUS.max_strips] = max(status[STATUS.max_strips], n_strips)
 
@@ -144,11 +146,6 @@ def _append_strips(increment, before, after, bonds):
     status[STATUS.n_extra] += division.count - 1
     if not _make_space(int(division.count), bonds):
         return False
-    # The pressures of the new bonds stand in the column after the last strip
-    new = int(status[STATUS.end])
-    if strips.shape[0] == N_ROWS:
-        strips[STRIP.pressure, new] = status[STATUS.pressure]
-
     # Strips follow each other from old to young, so that the head of the list is the oldest one
     for piece in range(int(division.count) - 1, -1, -1):
         column = int(status[STATUS.end])
@@ -161,8 +158,7 @@ def _append_strips(increment, before, after, bonds):
         strips[STRIP.path, column] = after.path - low * path
         strips[STRIP.damage, column] = after.damage - low * damage
         strips[STRIP.covered, column] = (high - low) * path
-        for i in range(STRIP.pressure, strips.shape[0]):
-            strips[i, column] = strips[i, new]
+        strips[STRIP.pressure, column] = status[STATUS.pressure]
 
         # The values at the Gauss points depend on the form of the sum
         if law[LAW.form] == FORM_STRETCH:
@@ -205,7 +201,6 @@ def _write_weights(width, eps, bonds, column):
     age = strips[STRIP.damage, column] - bonds.now[PATH.reference]
     strips[STRIP.value_1, column] = 0.5 * weight * exp(age - GAUSS_POINT_1 * width)
     strips[STRIP.value_2, column] = 0.5 * weight * exp(age - GAUSS_POINT_2 * width)
-    strips[STRIP.density, column] = power(eps, p) / eps
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
@@ -276,9 +271,8 @@ def _join_last_strips(bonds):
     k = int(bonds.status[STATUS.end]) - 1
     if k <= bonds.status[STATUS.head]:
         return
-    for i in range(STRIP.pressure, strips.shape[0]):
-        if strips[i, k - 1] != strips[i, k]:
-            return
+    if strips[STRIP.pressure, k - 1] != strips[STRIP.pressure, k]:
+        return
     if _join_strips(bonds, k - 1, k):
         bonds.status[STATUS.end] = k
 
@@ -316,12 +310,9 @@ def _join_strips(bonds, older, younger):
     if form == FORM_STRETCH:
         part = (younger_1 + younger_2) / weight
 
-    # The joint pressure conserves the sum of the weights of every point
-    strips[STRIP.density, older] += part * (
-        strips[STRIP.density, younger] - strips[STRIP.density, older]
-    )
-    for row in range(STRIP.pressure, strips.shape[0]):
-        strips[row, older] += part * (strips[row, younger] - strips[row, older])
+    # The joint pressure conserves the sum of the weights
+    pressure_change = strips[STRIP.pressure, younger] - strips[STRIP.pressure, older]
+    strips[STRIP.pressure, older] += part * pressure_change
     strips[STRIP.end, older] = strips[STRIP.end, younger]
     strips[STRIP.path, older] = strips[STRIP.path, younger]
     strips[STRIP.damage, older] = strips[STRIP.damage, younger]
@@ -348,135 +339,15 @@ def _have_similar_lengths(bonds, older, younger):
     )
 
 
-# ---- change of load at rest
+# ---- lift-off
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def release(before, after, point, bonds):
-    """Change the pressures of the bonds of a point as its relative pressure changes at rest.
-
-    Without pressure all bonds are lost. Else, for reading="report" a bond keeps the pressure under which it formed, and
-    none forms at rest. For reading="stretch" the bonds that formed last are lost first where the pressure falls; bonds
-    that carry more than the new limit form again without stretch. Where it rises, unstretched bonds of density m_0 form.
-
-    Parameters
-    ----------
-    before, after : float
-        Relative pressure before and after.
-    point : int
-        Number of the point in the list.
-    bonds : BondList
-        Changed in place.
-
-    Returns
-    -------
-    float
-        Density of unstretched bonds that form.
-    """
-    if after <= 0:
-        break_bonds(point, bonds)
-        return 0.0
-    if bonds.law[LAW.form] != FORM_STRETCH or after == before:
-        return 0.0
-    if after > before:
-        return bonds.law[LAW.initial] * (after - before)
-
-    # The density of the bonds falls in proportion to the pressure. Those that formed last have the least stretch, so
-    # their loss changes the force least.
-    _release_last_formed(_total_density(point, bonds) * (1 - after / before), point, bonds)
-    carried = abs(total(STRIP.present_force, point, bonds))
-    if carried <= after:
-        return 0.0
-    formed = (1 - after / carried) * _total_density(point, bonds)
-    _scale_pressure(after / carried, point, bonds)
-    return formed
-
-
-@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def break_bonds(point, bonds):
+def break_bonds(bonds):
     """Break all bonds of a point, as when it lifts off."""
-    status = bonds.status
-    _scale_pressure(0.0, point, bonds)
-    if bonds.bondlist.shape[0] == N_ROWS:
-        status[STATUS.head] = status[STATUS.end] = status[STATUS.first_column] + 1
-        status[STATUS.n_after_merge] = status[STATUS.energy] = status[STATUS.force] = 0.0
-
-
-@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def _scale_pressure(factor, point, bonds):
-    """Multiply the pressures of all bonds of a point by a factor."""
     strips = bonds.bondlist
     status = bonds.status
-    strips[STRIP.pressure + point, int(status[STATUS.first_column])] *= factor
-    for k in range(int(status[STATUS.head]), int(status[STATUS.end])):
-        strips[STRIP.pressure + point, k] *= factor
-    status[STATUS.initial_pressure] *= factor
-
-
-@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def _density(column, point, bonds):
-    """Return the density of the surviving bonds of a strip at a point, for reading="stretch"."""
-    strips = bonds.bondlist
-    pressure = strips[STRIP.pressure + point, column]
-    if column == int(bonds.status[STATUS.first_column]):
-        return pressure * bonds.law[LAW.initial] * exp(-bonds.now[PATH.damage])
-    scale = exp(bonds.now[PATH.reference] - bonds.now[PATH.damage])
-    weight = strips[STRIP.value_1, column] + strips[STRIP.value_2, column]
-    return pressure * scale * strips[STRIP.density, column] * weight
-
-
-@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def _total_density(point, bonds):
-    """Return the density of all surviving bonds of a point, for reading="stretch"."""
-    result = _density(int(bonds.status[STATUS.first_column]), point, bonds)
-    for k in range(int(bonds.status[STATUS.head]), int(bonds.status[STATUS.end])):
-        result += _density(k, point, bonds)
-    return result
-
-
-@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def _release_last_formed(excess, point, bonds):
-    """Release the bonds of a point that formed last, up to a density; the bonds of a strip in equal parts."""
-    strips = bonds.bondlist
-    status = bonds.status
-    first = int(status[STATUS.first_column])
-    head = int(status[STATUS.head])
-    for k in range(int(status[STATUS.end]) - 1, head - 2, -1):
-        column = first if k < head else k
-        density = _density(column, point, bonds)
-        released = min(excess, density)
-        if released > 0:
-            strips[STRIP.pressure + point, column] *= 1 - released / density
-        excess -= released
-    if strips.shape[0] == N_ROWS:
-        status[STATUS.initial_pressure] = strips[STRIP.pressure, first]
-
-
-@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def append_unstretched(bonds):
-    """Append a strip of length 0 without pressure: fully grown bonds at the present displacement, of unit density.
-
-    Returns
-    -------
-    bool
-        False if the array of strips is full.
-    """
-    if not _make_space(1, bonds):
-        return False
-    strips = bonds.bondlist
-    now = bonds.now
-    column = int(bonds.status[STATUS.end])
-    for i in range(strips.shape[0]):
-        strips[i, column] = 0.0
-    strips[STRIP.start, column] = strips[STRIP.end, column] = now[PATH.displacement]
-    strips[STRIP.path, column] = now[PATH.path]
-    strips[STRIP.damage, column] = now[PATH.damage]
-    # Their length is eps_0
-    eps0 = bonds.law[LAW.length]
-    strips[STRIP.density, column] = power(eps0, bonds.law[LAW.order]) / eps0
-    scale = exp(now[PATH.damage] - now[PATH.reference])
-    strips[STRIP.value_1, column] = strips[STRIP.value_2, column] = (
-        0.5 * scale / strips[STRIP.density, column]
-    )
-    bonds.status[STATUS.end] = column + 1
-    return True
+    strips[STRIP.pressure, int(status[STATUS.first_column])] = 0.0
+    status[STATUS.initial_pressure] = 0.0
+    status[STATUS.head] = status[STATUS.end] = status[STATUS.first_column] + 1
+    status[STATUS.n_after_merge] = status[STATUS.energy] = status[STATUS.force] = 0.0

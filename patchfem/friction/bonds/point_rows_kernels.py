@@ -1,4 +1,4 @@
-"""Named indices of the arrays of bonds of a point: the parameters of their growth (eq. 2.10), and their moments."""
+"""Named indices of the array of the parameters of bond growth (eq. 2.10)."""
 
 from typing import NamedTuple
 
@@ -19,14 +19,4 @@ class GrowthNumbers(NamedTuple):
     slip_length: int = 4
 
 
-class MomentRows(NamedTuple):
-    """Rows of the moments of the bonds of points (`point_kernels`): m [Pa], z [Pa m], s2 [Pa m2], bond length [m]."""
-
-    m: int = 0
-    z: int = 1
-    s2: int = 2
-    length: int = 3
-
-
 GROWTH = GrowthNumbers()
-MOMENT = MomentRows()

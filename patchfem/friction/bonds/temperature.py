@@ -6,7 +6,7 @@ which a_s and l_k are known, so that a surface at this temperature changes nothi
     a_s = a_ref exp(T_a (1/T_ref - 1/T_s)),   l_k = l_ref exp(T_l (1/T_s - 1/T_ref)).
 
 Eq. 2.13 is the limit of an infinite T_ref. Temperatures are absolute, in kelvin. Points of different temperature are a
-law whose two rates are arrays (m,): `points.FirstOrderBonds` then has a bond length per point.
+law whose two rates are arrays (m,).
 """
 
 from typing import NamedTuple

@@ -13,32 +13,16 @@ where the pressure vanishes: such a point carries nothing, and the average ends 
 which the pressure is 0.
 """
 
-from dataclasses import dataclass, field
-from typing import ClassVar, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from scipy.special import gammainc, gammainccinv
-
-from ..protocol import Step
 
 # Number of positions that are averaged at a time; nodes beyond the cut-off of the whole block are
 # left out
 N_POSITIONS_PER_BLOCK = 64
 # Largest weight of a node beyond the cut-off in an average; it is below round-off
 CUTOFF_WEIGHT = 1e-20
-
-
-class ConvolutionState(NamedTuple):
-    """State of the friction law that averages the pressure.
-
-    - traction (m,): traction [Pa] of the last motion
-    - displacement: relative displacement [m] since the start
-    - direction: sign of the last motion; 0 if the traction is no longer at the limit of this motion
-    """
-
-    traction: np.ndarray
-    displacement: float
-    direction: float
 
 
 class SlidingLimits(NamedTuple):
@@ -156,120 +140,3 @@ def sliding_limits(nodes, sigma, weight, length: float, order: float) -> Sliding
     forward = weight @ average_pressure(nodes, nodes, sigma, 1.0, length, order)
     backward = weight @ average_pressure(nodes, nodes, sigma, -1.0, length, order)
     return SlidingLimits(float(forward), float(backward))
-
-
-@dataclass(frozen=True, eq=False, slots=True)
-class Convolution:
-    """Friction law whose traction is proportional to a weighted average of the pressure.
-
-    - static, length, order: mu_s [1], eps [m] and p
-    - nodes (m,): positions [m] of the points of the upper piece; None for a uniform pressure, whose average is the
-      pressure itself (Coulomb's law)
-    - lower_pressure (m,): pressure [Pa] at these positions of the lower piece if it stays there; None if it moves with
-      the upper piece
-    - cache: last pressure and its average, per direction
-    """
-
-    static: float
-    length: float
-    order: float = 1.0
-    nodes: np.ndarray | None = None
-    lower_pressure: np.ndarray | None = None
-    cache: dict[float, tuple[np.ndarray, np.ndarray]] = field(default_factory=dict)
-    can_change_load: ClassVar[bool] = True  # the law has no stretch
-    has_force_at_rest: ClassVar[bool] = True  # the traction persists while the interface rests
-
-    def initial_state(self, sigma) -> ConvolutionState:
-        """Return the state before any motion: zero traction, under a pressure sigma (m,) [Pa]."""
-        return ConvolutionState(np.zeros_like(sigma), 0.0, 0.0)
-
-    def limit_fraction(self, dq, dt):
-        """Return the ratio of the friction force to its limit for increments dq [m]; 0 at rest."""
-        return np.sign(dq)
-
-    def limit(self, sigma, direction: float):
-        """Return the traction (m,) [Pa], >= 0, that resists sliding in a given direction.
-
-        The pressure sigma (m,) [Pa] moves with the upper piece.
-        """
-        return self.static * self._average(0.0, sigma, direction)
-
-    def step(self, state: ConvolutionState, dq: float, s0, s1, dt: float) -> Step:
-        """Advance the law by an increment; all friction work is dissipated.
-
-        The mean traction is that of the two ends of the increment. Without motion the traction stays.
-
-        Parameters
-        ----------
-        state : ConvolutionState
-            Last traction, displacement and direction.
-        dq : float
-            Increment [m].
-        s0, s1 : (m,) array
-            Pressures [Pa] at the ends.
-        dt : float
-            Not used.
-
-        Returns
-        -------
-        Step
-        """
-        if dq == 0:
-            return Step(state.traction, np.zeros_like(s0), state)
-        direction = float(np.sign(dq))
-        displacement = state.displacement + dq
-        start = state.traction
-        if direction != state.direction:
-            start = self.static * direction * self._average(state.displacement, s0, direction)
-        end = self.static * direction * self._average(displacement, s1, direction)
-        mean = (start + end) / 2
-        return Step(mean, mean * dq, ConvolutionState(end, displacement, direction))
-
-    def press(self, state: ConvolutionState, s0, s1) -> Step:
-        """Change the pressure at rest; a traction above the new friction limit is reduced to this limit.
-
-        Parameters
-        ----------
-        state : ConvolutionState
-            Last traction, displacement and direction.
-        s0, s1 : (m,) array
-            Pressures [Pa] before and after.
-
-        Returns
-        -------
-        Step
-            Its mean is the traction after the change; nothing is dissipated.
-        """
-        direction = float(np.sign(state.traction.sum()))
-        traction = state.traction
-        if direction != 0:
-            limit = self.static * self._average(state.displacement, s1, direction)
-            traction = direction * np.minimum(direction * traction, limit)
-        after = ConvolutionState(traction, state.displacement, 0.0)
-        return Step(traction, np.zeros_like(traction), after)
-
-    def _average(self, displacement: float, sigma, direction: float):
-        """Return the average (m,) [Pa] of the pressure behind the points, or 0 where sigma is 0."""
-        if self.nodes is None:
-            return sigma
-        if self.lower_pressure is not None:
-            positions = self.nodes + displacement
-            average = self._average_at(positions, self.lower_pressure, direction)
-            return np.where(sigma > 0, average, 0.0)
-        pressure, average = self.cache.get(direction, (None, None))
-        if pressure is None or not np.array_equal(pressure, sigma):
-            average = self._average_at(self.nodes, sigma, direction)
-            self.cache[direction] = np.array(sigma), average
-        return np.where(sigma > 0, average, 0.0)
-
-    def _average_at(self, positions, sigma, direction: float) -> np.ndarray:
-        """Return the average (n,) [Pa] at positions (n,) [m] of a pressure (m,) [Pa] at the nodes."""
-        return average_pressure(positions, self.nodes, sigma, direction, self.length, self.order)
-
-    def traction(self, state: ConvolutionState):
-        """Return the traction (m,) [Pa] at the end of the last step, positive against slip to +x."""
-        return state.traction
-
-    def stored_energy(self, state: ConvolutionState):
-        """Return the elastic energy per area (m,) [J/m2], which is 0."""
-        return np.zeros_like(state.traction)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..protocol import Element, SteadyLoop, Step
+from ..protocol import Element, SteadyLoop
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,85 +28,6 @@ class ElasticPlastic:
         """Return the Element under a constant load N [N]: a spring mu N/eps that slips at the force mu N."""
         stiffness = self.static * load / self.length
         return parallel_element([stiffness], [self.length])._replace(length=self.length)
-
-    def initial_state(self, sigma):
-        """Return the initial state (2, m) [Pa]: traction/mu, and density of the springs.
-
-        The springs are unstretched, of the density of the pressure sigma (m,) [Pa].
-        """
-        return np.stack([np.zeros_like(sigma), sigma])
-
-    def step(self, state, dq: float, s0, s1, dt: float) -> Step:
-        """Advance the law by an increment at the mean pressure of the step.
-
-        The traction is a ramp that is cut at mu sigma, whose path mean is exact.
-
-        Parameters
-        ----------
-        state : (2, m) array
-            Traction/mu [Pa] and density of the springs [Pa].
-        dq : float
-            Increment [m].
-        s0, s1 : (m,) array
-            Pressures [Pa] at the ends.
-        dt : float
-            Not used.
-
-        Returns
-        -------
-        Step
-        """
-        # Springs stretch until y = traction/mu reaches sigma; `elastic` is that fraction of the increment
-        sigma = (s0 + s1) / 2
-        y0, springs = self._limit_traction(state, sigma)
-        change = springs * dq / self.length
-        y1 = np.clip(y0 + change, -sigma, sigma)
-        elastic = np.divide(y1 - y0, change, out=np.zeros_like(y0), where=change != 0)
-        mean = np.where(change != 0, elastic * (y0 + y1) / 2 + (1 - elastic) * y1, y0)
-
-        # Springs beyond the limit break within one length of slip (class docstring)
-        remaining = np.minimum(sigma, springs)
-        decay = np.exp(-(1 - elastic) * abs(dq) / self.length)
-        springs = remaining + (springs - remaining) * decay
-        after = np.where(s1 > 0, np.stack([y1, springs]), 0.0)
-
-        energy_gain = self.stored_energy(after) - self.stored_energy(state)
-        return Step(self.static * mean, self.static * mean * dq - energy_gain, after)
-
-    def press(self, state, s0, s1) -> Step:
-        """Change the pressure at rest; energy of spring stretch beyond the new friction limit is lost.
-
-        Parameters
-        ----------
-        state : (2, m) array
-            Traction/mu [Pa] and density of the springs [Pa].
-        s0, s1 : (m,) array
-            Pressures [Pa] before and after.
-
-        Returns
-        -------
-        Step
-            Its mean is the traction after the change.
-        """
-        after = np.stack(self._limit_traction(state, s1))
-        return Step(
-            self.traction(after), self.stored_energy(state) - self.stored_energy(after), after
-        )
-
-    def _limit_traction(self, state, sigma):
-        """Return traction/mu and spring density after a pressure change, or 0 where the pressure is zero."""
-        y, springs = state
-        return np.clip(y, -sigma, sigma), np.where(sigma > 0, np.maximum(springs, sigma), 0.0)
-
-    def traction(self, state):
-        """Return the traction (m,) [Pa] in a state, positive against slip to +x."""
-        return self.static * state[0]
-
-    def stored_energy(self, state):
-        """Return the elastic energy per area (m,) [J/m2], mu eps y^2/(2 density) with y = traction/mu."""
-        y, springs = state
-        energy = np.divide(y**2, 2 * springs, out=np.zeros_like(y), where=springs > 0)
-        return self.static * self.length * energy
 
 
 def parallel_element(stiffness, yield_displacement) -> Element:

@@ -3,17 +3,17 @@
 import numpy as np
 import pytest
 from friction_paths import (
-    lower_pressure,
-    march_path,
+    LowerPressure,
+    march_bonds,
     reference_traction,
     triangle_path,
     upper_pressure,
 )
 
-from patchfem.friction import STATUS, Bonds
-from patchfem.friction.bonds.points import ListedBonds
+from patchfem.friction import Bonds
 
 TWO_PRESSURES = upper_pressure([1.0, 0.25])
+PLACES = np.linspace(-40.0, 40.0, 9)
 GROWTH = {"ratio": 0.6, "rest_growth": 0.3, "slip_growth": 0.4, "rest_speed": 1e-2}
 
 
@@ -36,7 +36,7 @@ def test_exact_printed_law_agrees_with_hand_sum(order, initial):
     """
     law = Bonds(1.0, 1.0, order, "report", initial=initial)
     path = random_displacements(4, 40)
-    run = march_path(ListedBonds(law, tail=0.0), path, TWO_PRESSURES)
+    run = march_bonds(law, path, TWO_PRESSURES, tail=0.0)
     tolerance = {-0.5: 0.05, 0.5: 1e-4}.get(order, 1e-8 if order == 3.7 else 1e-12)
     assert run.traction[-1] == pytest.approx(
         reference_traction(law, path, TWO_PRESSURES), abs=tolerance
@@ -44,7 +44,7 @@ def test_exact_printed_law_agrees_with_hand_sum(order, initial):
 
 
 @pytest.mark.parametrize(
-    "pressure", [TWO_PRESSURES, lower_pressure(np.linspace(-2, 2, 5), 5.0, 1.5)]
+    "pressure", [TWO_PRESSURES, LowerPressure(PLACES, 1.5 + np.sin(0.4 * PLACES))]
 )
 @pytest.mark.parametrize("reading, order", [("report", 0.0), ("report", 2.0), ("stretch", 1.0)])
 def test_exact_pressure_on_upper_or_lower_piece(reading, order, pressure):
@@ -54,9 +54,12 @@ def test_exact_pressure_on_upper_or_lower_piece(reading, order, pressure):
     """
     law = Bonds(1.0, 1.0, order, reading, initial=0.5)
     path = random_displacements(5, 40)
-    run = march_path(ListedBonds(law, tail=0.0), path, pressure)
+    run = march_bonds(law, path, pressure, tail=0.0)
     tolerance = 3e-8 if reading == "stretch" else 1e-12
-    assert run.traction[-1] == pytest.approx(reference_traction(law, path, pressure), abs=tolerance)
+    # The outermost points of a pressure on the lower piece leave it on the way.
+    inner = slice(1, -1) if isinstance(pressure, LowerPressure) else slice(None)
+    expected = reference_traction(law, path, pressure)[inner]
+    assert run.traction[-1, inner] == pytest.approx(expected, abs=tolerance)
 
 
 # ---- Gauss strips
@@ -67,7 +70,7 @@ def test_exact_gauss_strips_with_smooth_orders(order):
     """The traction of the stretch law of order 2 and 3 agrees with a sum by hand within 2e-8."""
     path = np.concatenate([np.linspace(0, 3, 13), np.linspace(3, 1, 9)[1:]])
     law = Bonds(1.0, 1.0, order, "stretch", initial=0.3)
-    run = march_path(ListedBonds(law, tail=0.0), path, TWO_PRESSURES)
+    run = march_bonds(law, path, TWO_PRESSURES, tail=0.0)
     assert run.traction[-1] == pytest.approx(reference_traction(law, path, TWO_PRESSURES), abs=2e-8)
 
 
@@ -77,48 +80,10 @@ def test_exact_growing_printed_law_is_independent_of_step(order):
     law = Bonds(1.0, 1.0, order, "report", initial=0.0, **GROWTH)
     for n_parts in (1, 2, 4):
         path = triangle_path(1.0, 1, 8 * n_parts)[: 20 * n_parts + 1]
-        run = march_path(ListedBonds(law, tail=0.0), path, TWO_PRESSURES, dt=0.4 / n_parts)
+        run = march_bonds(law, path, TWO_PRESSURES, 0.4 / n_parts, 0.0)
         force = run.traction[-1, 0]
         expected = reference_traction(law, path, TWO_PRESSURES, 0.4 / n_parts)[0]
         assert force == pytest.approx(expected, abs=2e-6 if order > -0.5 else 1e-4)
-
-
-# ---- cut-off
-
-
-@pytest.mark.share(0, 3)
-@pytest.mark.parametrize(
-    "reading, order, growth",
-    [
-        ("report", 0.0, {}),
-        ("report", 2.0, {}),
-        ("stretch", 1.0, {}),
-        ("stretch", 1.0, GROWTH),
-        ("stretch", 2.0, {}),
-        ("report", 1.0, GROWTH),
-    ],
-)
-def test_always_cut_off_error_is_below_bound(reading, order, growth):
-    """The cut-off drops bonds and changes the traction by at most its tail times the friction limit."""
-    law = Bonds(0.4, 1.0, order, reading, **growth)
-    path = np.concatenate(
-        [
-            random_displacements(6, 150, 0.4),
-            random_displacements(6, 151, 0.4)[-1] + np.linspace(0.2, 20, 100),
-        ]
-    )
-    full = march_path(ListedBonds(law, 0.0), path, TWO_PRESSURES, 0.3)
-    for tail in (1e-2, 1e-5):
-        truncated = march_path(ListedBonds(law, tail), path, TWO_PRESSURES, 0.3)
-        lengths = [
-            run.state.status[STATUS.end] - run.state.status[STATUS.head]
-            for run in (truncated, full)
-        ]
-        assert lengths[0] < lengths[1]
-        error = np.abs(truncated.traction - full.traction).max()
-        assert error <= tail * 0.4 * 1.0
-        if reading == "report" and not growth:
-            assert error > 0
 
 
 # ---- extreme values
@@ -134,13 +99,13 @@ def test_exact_rests_and_long_steps_are_handled(reading, order, growth):
     """Rests and a step of a thousand bond lengths give finite tractions, and without growth the friction limit."""
     law = Bonds(1.0, 1.0, order, reading, **growth)
     path = np.array([0.0, 0.0, 0.3, 0.3, 1e3, 1e3])
-    run = march_path(ListedBonds(law), path, TWO_PRESSURES, 1.0)
-    assert np.isfinite(np.concatenate([run.mean, run.traction])).all()
+    run = march_bonds(law, path, TWO_PRESSURES, 1.0, 1e-9)
+    assert np.isfinite(run.mean).all() and np.isfinite(run.traction).all()
     assert not run.traction[0].any()
     # in the printed law, loaded bonds heal at rest and the force changes without motion
     if reading == "stretch" or not growth:
         assert run.traction[3] == pytest.approx(run.traction[4], rel=1e-12)
-        assert run.mean[4] == pytest.approx(run.traction[4], rel=1e-12)
+        assert run.mean[4] == pytest.approx(run.traction[4].sum(), rel=1e-12)
     if not growth:
         assert run.traction[4] == pytest.approx([1.0, 0.25], rel=1e-3)
         assert run.traction[2] == pytest.approx(run.traction[1], rel=1e-14)
@@ -161,9 +126,7 @@ def test_exact_dwell_does_not_grow_next_strip():
     )
     path = np.concatenate([np.linspace(0, 2, 41), [2.0, 2.05]])
     times = np.append(np.full(40, 0.5), [1.0, 0.5])
-    force = march_path(ListedBonds(law, tail=0.0), path, upper_pressure([1.0]), times).traction[
-        -1, 0
-    ]
+    force = march_bonds(law, path, upper_pressure([1.0]), times, 0.0).traction[-1, 0]
     assert force == pytest.approx(
         reference_traction(law, path, upper_pressure([1.0]), times)[0], abs=2e-4
     )

@@ -5,12 +5,10 @@ integrals by mpmath or scipy of the printed law, closed forms, or an integrated 
 the code under test.
 """
 
-from itertools import pairwise
-
 import mpmath
 import numpy as np
 import pytest
-from friction_paths import march_path, upper_pressure
+from friction_paths import LowerPressure, march_bonds, upper_pressure
 from modal_bases import make_modal_basis
 from scipy.special import gammainc
 from vibration_forms import sliding_amplitude
@@ -19,7 +17,6 @@ from patchfem import build
 from patchfem.core import SineDrive
 from patchfem.friction import Bonds
 from patchfem.friction.bonds.list_numbers import cutoff_age
-from patchfem.friction.bonds.points import FirstOrderBonds, ListedBonds
 from patchfem.points.contacts import make_bond_contact
 from patchfem.points.time_march import march
 from patchfem.response import energy_balance
@@ -35,61 +32,54 @@ OMEGA = 2 * np.pi * 143
 
 @pytest.mark.parametrize("dwell_time", [0.05, 0.2, 1.0])
 def test_exact_dwell_of_stretch_law_agrees_with_closed_form(dwell_time):
-    """Bond length during a dwell and force after the dwell agree with the closed form; the dwell keeps the force (C8)."""
-    law = FirstOrderBonds(
-        Bonds(1.0, 1.0, ratio=0.5, rest_growth=10.0, slip_growth=1e30, rest_speed=1.0)
-    )
-    state = np.array([[1.0], [0.5], [0.5], [0.5]])
-    unit = np.ones(1)
-    dwell = law.step(state, 0.0, unit, unit, dwell_time)
-    eps = 1 - 0.5 * np.exp(-10 * dwell_time)
-    assert (
-        dwell.state[3, 0] == pytest.approx(eps, rel=1e-14) and law.traction(dwell.state)[0] == 0.5
-    )
+    """A dwell keeps the force of steady sliding, and the force after it is that of the longer new bonds (C8).
+
+    Sliding at a high speed leaves bonds of half the length, which grow by 10 exp(-10 t) at rest. The step after the dwell
+    is as fast, so that the length decreases over one bond length of slip.
+    """
+    law = Bonds(1.0, 1.0, ratio=0.5, rest_growth=10.0, slip_growth=1.0, rest_speed=1.0)
     for x in (0.25, 0.5, 1.0, 2.0):
-        force = law.traction(law.step(dwell.state, x, unit, unit, 0.0).state)[0]
-        assert force == pytest.approx(eps + (0.5 - eps) * np.exp(-x / eps), abs=1e-12)
+        path = np.append(np.linspace(0.0, 60.0, 121), [60.0, 60.0 + x])
+        times = np.concatenate([np.full(120, 1e-12), [dwell_time, 1e-12]])
+        force = march_bonds(law, path, UNIT_PRESSURE, times).traction[:, 0]
+        assert force[119:121] == pytest.approx(0.5, abs=1e-9)
+        eps = 0.5 + 0.5 * (1 - np.exp(-10 * dwell_time)) * np.exp(-x / 2)
+        assert force[-1] == pytest.approx(eps + (0.5 - eps) * np.exp(-x / eps), abs=1e-9)
 
 
 # ---- C9: pressure on the lower piece
 
 
-def pad_traction(engine, depth, width, pressure_beyond=0.0, distance_beyond=0.0):
-    """Return the traction (m,) at points that slide over a pad of uniform unit pressure.
+def pad_traction(law, depth, tail):
+    """Return the traction (m,) at points that slid `depth` (m,) into a pad of uniform unit pressure."""
+    edge = 1e-12
+    end = depth.max() + 1.0
+    places = np.concatenate([depth - end, [-edge, 0.0, end]])
+    order = np.argsort(places)
+    sigma = (places >= 0.0).astype(float)
 
-    The points slid `depth` (m,) into the pad, or `width` and then a distance beyond its trailing
-    edge.
-    """
-    entries = np.unique(np.concatenate([[0.0], depth.max() - depth, [depth.max()]]))
-    pressure = np.zeros_like(depth)
-    state = engine.initial_state(pressure)
-    for a, b in pairwise(entries):
-        pressure = (depth.max() - depth <= a + 1e-14).astype(float)
-        for step in np.diff(np.linspace(a, b, max(2, int(np.ceil((b - a) / 0.5)) + 1))):
-            state = engine.step(state, step, pressure, pressure, 1.0).state
-    if distance_beyond:
-        state = engine.step(
-            state, distance_beyond, pressure_beyond * pressure, pressure_beyond * pressure, 1.0
-        ).state
-    return engine.traction(state)
+    # A point passes the edge of the pad within one step; further steps are at most half a bond length.
+    entries = end - depth
+    marks = [entries - 2 * edge, entries + edge, np.arange(0.25, end, 0.5), [0.0, end]]
+    pressure = LowerPressure(places[order], sigma[order])
+    traction = march_bonds(law, np.unique(np.concatenate(marks)), pressure, tail=tail).traction[-1]
+    return traction[np.argsort(order)[: depth.size]]
 
 
 @pytest.mark.share(0, 5, 7)
 @pytest.mark.parametrize(
-    "order, engine", [(0.0, "printed"), (1.0, "printed"), (1.0, "sum"), (1.0, "state")]
+    "order, reading, tail",
+    [(0.0, "report", 0.0), (1.0, "report", 0.0), (1.0, "stretch", 0.0), (1.0, "stretch", None)],
 )
 @pytest.mark.parametrize(
     "width, expected",
     [(5, (0.80134759, 0.60943313)), (10, (0.90000454, 0.80005448)), (100, (0.99, 0.98))],
 )
-def test_exact_resultant_of_pad_on_lower_piece(order, engine, width, expected):
+def test_exact_resultant_of_pad_on_lower_piece(order, reading, tail, width, expected):
     """The traction behind the leading edge of a pad on the lower piece and its resultant agree with closed forms (C9)."""
-    reading = "report" if engine == "printed" else "stretch"
-    law = Bonds(1.0, 1.0, order, reading)
-    law = FirstOrderBonds(law) if engine == "state" else ListedBonds(law, tail=0.0)
     y, w = np.polynomial.legendre.leggauss(24 if width < 50 else 70)
     depth = width * (1 + y) / 2
-    tau = pad_traction(law, depth, width)
+    tau = pad_traction(Bonds(1.0, 1.0, order, reading), depth, tail)
     s = order + 1
     assert tau == pytest.approx(gammainc(s, depth), abs=1e-11)
     assert w / 2 @ tau == pytest.approx(
@@ -184,7 +174,7 @@ def test_exact_printed_law_with_extreme_orders(order):
     """For orders -0.9 and 20 the first loading, the reversal and the cut-off age agree with incomplete gamma functions."""
     law = Bonds(1.0, 1.0, order, "report", initial=0.0)
     path = np.concatenate([np.linspace(0, 60, 121), 60 - np.array([0.01, 0.5, 4.0, 12.0, 30.0])])
-    force = march_path(ListedBonds(law, tail=0.0), path, UNIT_PRESSURE).traction[:, 0]
+    force = march_bonds(law, path, UNIT_PRESSURE, tail=0.0).traction[:, 0]
 
     def below(x):
         return float(mpmath.gammainc(mpmath.mpf(order) + 1, 0, x, regularized=True))

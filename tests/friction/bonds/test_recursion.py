@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 from friction_paths import (
+    LowerPressure,
     PathHistory,
-    lower_pressure,
-    march_path,
+    march_bonds,
     reference_traction,
     upper_pressure,
 )
@@ -14,17 +14,17 @@ from hypothesis import strategies as st
 
 from patchfem.friction import Bonds
 from patchfem.friction.bonds.point_kernels import bond_mean
-from patchfem.friction.bonds.points import FirstOrderBonds, ListedBonds
 
 GROWTH = [{}, {"ratio": 0.5, "rest_growth": 0.4, "slip_growth": 0.3, "rest_speed": 1e-2}]
-X = np.linspace(-3, 3, 7)
+X = np.linspace(-30, 30, 31)
 
 
 def make_pressure(name):
     """Return the pressure as a function of the displacement, on the upper or the lower piece."""
     if name == "upper":
         return upper_pressure(1 + 0.5 * np.cos(X))
-    return lower_pressure(X, 7.0, 1.5 if name == "lower" else 0.2)
+    floor = 1.5 if name == "lower" else 0.2
+    return LowerPressure(X, np.maximum(np.sin(2 * np.pi * X / 7) + floor, 0.0))
 
 
 @st.composite
@@ -58,8 +58,8 @@ def test_exact_recursion_equals_sum_over_bonds(piece, growth, seed):
     path = np.concatenate([[0], np.cumsum(steps)])
     times = rng.uniform(0.01, 1, 120)
     law = Bonds(0.4, 1.0, initial=0.8, **growth)
-    recursion = march_path(FirstOrderBonds(law), path, make_pressure(piece), times)
-    summed = march_path(ListedBonds(law, tail=0.0), path, make_pressure(piece), times)
+    recursion = march_bonds(law, path, make_pressure(piece), times)
+    summed = march_bonds(law, path, make_pressure(piece), times, 0.0)
     if piece == "lower with bare places":
         contact_changes = np.diff(
             (np.array([make_pressure(piece)(q) for q in path]) <= 0).astype(int), axis=0
@@ -67,15 +67,18 @@ def test_exact_recursion_equals_sum_over_bonds(piece, growth, seed):
         assert (
             contact_changes > 0
         ).sum() > 20  # the test is only meaningful if contact is lost often
-    for name in PathHistory._fields[:-1]:
-        assert getattr(recursion, name) == pytest.approx(getattr(summed, name), abs=2e-7), name
+    assert recursion.traction == pytest.approx(summed.traction, abs=2e-7)
+    # These are sums over the points.
+    for name in PathHistory._fields[1:]:
+        tolerance = 2e-7 * np.sqrt(X.size)
+        assert getattr(recursion, name) == pytest.approx(getattr(summed, name), abs=tolerance), name
 
 
 def test_exact_step_mean_equals_average_along_step():
     """The mean traction of a step agrees with Gauss quadrature over partial steps whose bonds are summed by hand."""
     law = Bonds(1.0, 1.0)
     path = np.array([0.0, 0.8, -0.5, 0.1, 2.0])
-    run = march_path(FirstOrderBonds(law), path, make_pressure("upper"), 0.5)
+    run = march_bonds(law, path, make_pressure("upper"), 0.5)
     y, w = np.polynomial.legendre.leggauss(10)
     for k in range(1, 5):
         dq = path[k] - path[k - 1]
@@ -88,7 +91,7 @@ def test_exact_step_mean_equals_average_along_step():
             )
             for a in y
         ]
-        assert run.mean[k - 1] == pytest.approx(w / 2 @ np.array(parts), abs=1e-10)
+        assert run.mean[k - 1] == pytest.approx((w / 2 @ np.array(parts)).sum(), abs=1e-9)
 
 
 def test_exact_slope_equals_derivative_of_mean():
@@ -107,12 +110,17 @@ def test_exact_slope_equals_derivative_of_mean():
 @given(st.lists(st.floats(-3, 3), min_size=1, max_size=15), growth_parameters())
 @example([2e-309], {})
 def test_always_sum_over_bonds_is_passive(steps, growth):
-    """Dissipated and stored energy of the sum over bonds are never negative."""
-    law = ListedBonds(Bonds(1.0, 1.0, **growth), tail=0.0)
+    """No step creates energy, and the stored energy of the recursion is never negative.
+
+    That of a list, whose sums have quadrature errors, is above -1e-4 of the work of a bond length at the limit.
+    """
+    law = Bonds(1.0, 1.0, **growth)
     path = np.concatenate([[0], np.cumsum(steps)])
-    run = march_path(law, path, make_pressure("lower with bare places"), 0.3)
-    total = max(np.abs(run.mean * np.diff(path)[:, None]).sum(), 1e-3)
-    assert run.dissipated.min() >= -1e-12 * total and run.stored.min() >= 0
+    for tail, least in ((None, 0.0), (0.0, -1e-4 * X.size)):
+        run = march_bonds(law, path, make_pressure("lower with bare places"), 0.3, tail)
+        total = max(np.abs(run.mean * np.diff(path)).sum(), 1e-3)
+        assert run.dissipated.min() >= -1e-12 * total
+        assert run.stored.min() >= least
 
 
 # ---- extreme values
@@ -122,30 +130,25 @@ def test_always_sum_over_bonds_is_passive(steps, growth):
 def test_exact_huge_steps_reach_steady_sliding(growth):
     """A step of a million bond lengths reaches the friction limit of steady sliding without overflow."""
     law = Bonds(0.3, 1.0, **growth)
-    for engine in (FirstOrderBonds, ListedBonds):
-        run = march_path(
-            engine(law), np.array([0.0, 1e6, -1e6, -1e6, -1e6 + 1e-9]), make_pressure("upper"), 1.0
-        )
-        assert np.isfinite(
-            np.concatenate([run.mean, run.traction, run.dissipated, run.stored])
-        ).all()
+    path = np.array([0.0, 1e6, -1e6, -1e6, -1e6 + 1e-9])
+    for tail in (None, 1e-9):
+        run = march_bonds(law, path, make_pressure("upper"), 1.0, tail)
+        assert all(np.isfinite(values).all() for values in run)
         sigma = make_pressure("upper")(0)
         length_ratio = 0.5 if growth else 1.0
         assert run.traction[0] == pytest.approx(0.3 * length_ratio * sigma, rel=1e-4)
         assert run.traction[1] == pytest.approx(-0.3 * length_ratio * sigma, rel=1e-4)
-        assert run.mean[1] == pytest.approx(-0.3 * length_ratio * sigma, rel=1e-4)
+        assert run.mean[1] == pytest.approx(-0.3 * length_ratio * sigma.sum(), rel=1e-4)
         assert run.traction[2] == pytest.approx(run.traction[1], rel=1e-12)  # step of zero length
 
 
 def test_exact_zero_steps_do_not_change_state():
-    """A step of zero length and zero duration changes neither traction nor energy."""
-    law = Bonds(0.3, 1.0, **GROWTH[1])
-    for engine in (FirstOrderBonds, ListedBonds):
-        path = np.array([0, 0.4, 0.4, 0.4, 0.9])
-        times = np.array([0.5, 0.0, 0.0, 0.5])
-        run = march_path(engine(law), path, make_pressure("upper"), times)
-        shortened = march_path(engine(law), path[[0, 1, 4]], make_pressure("upper"), times[[0, 3]])
+    """A step of zero length changes neither traction nor energy."""
+    law = Bonds(0.3, 1.0)
+    path = np.array([0, 0.4, 0.4, 0.4, 0.9])
+    for tail in (None, 0.0):
+        run = march_bonds(law, path, make_pressure("upper"), 0.5, tail)
+        shortened = march_bonds(law, path[[0, 1, 4]], make_pressure("upper"), 0.5, tail)
         assert run.traction[-1] == pytest.approx(shortened.traction[-1], abs=1e-14)
-        assert (
-            run.mean[1] == pytest.approx(run.traction[0], abs=1e-14) and not run.dissipated[1].any()
-        )
+        assert run.mean[1] == pytest.approx(run.traction[0].sum(), abs=1e-13)
+        assert abs(run.dissipated[1]) <= 1e-15

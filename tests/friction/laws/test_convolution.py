@@ -4,7 +4,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from friction_paths import march_path, triangle_path, upper_pressure
+from friction_paths import LowerPressure, march_bonds
 from hypothesis import given
 from hypothesis import strategies as st
 from scene_texts import COULOMB, POINT, SHEAR, SHORT, SLIDE, SMALL_PATCH
@@ -13,9 +13,8 @@ from scipy.special import gamma
 
 from patchfem import SceneError, build, plan
 from patchfem.core import PatchfemError
-from patchfem.friction import Bonds, Coulomb
-from patchfem.friction.bonds.points import FirstOrderBonds, ListedBonds
-from patchfem.friction.laws.convolution import Convolution, average_pressure, sliding_limits
+from patchfem.friction import Bonds
+from patchfem.friction.laws.convolution import average_pressure, sliding_limits
 from patchfem.runs import solve_with_coarser
 from patchfem.runs.bench import bench
 from patchfem.runs.run import run
@@ -85,18 +84,11 @@ def test_exact_average_pressure_equals_integral(order, direction, length):
 # ---- the steady limit of 2.17
 
 
-def lower_piece_pressure(nodes, sigma):
-    """Return a pressure that moves with the lower piece, as a function of the displacement."""
-    return lambda q: np.interp(nodes + q, nodes, sigma, left=0.0, right=0.0)
-
-
 @pytest.mark.share(0, 5)
-@pytest.mark.parametrize(
-    "law, order", [(FirstOrderBonds, 1), (ListedBonds, 1), (ListedBonds, 0), (ListedBonds, 2)]
-)
+@pytest.mark.parametrize("tail, order", [(None, 1), (0.0, 1), (0.0, 0), (0.0, 2)])
 @pytest.mark.parametrize("direction", [1.0, -1.0])
-def test_exact_long_sliding_reaches_averaged_law(law, order, direction):
-    """The traction of the bond engines after 20 bond lengths, extrapolated to zero step, agrees with the averaged law.
+def test_exact_long_sliding_reaches_averaged_law(tail, order, direction):
+    """The traction of bonds after 20 bond lengths, extrapolated to zero step, agrees with the averaged law.
 
     The pressure on the lower piece has two contact zones with a gap of several nodes, over which no
     bond survives.
@@ -104,78 +96,36 @@ def test_exact_long_sliding_reaches_averaged_law(law, order, direction):
     nodes = np.linspace(0, 60, 241)
     sigma = np.maximum(np.sin(nodes / 2) + 0.8, 0.0)
     bonds = Bonds(0.4, 1.0, float(order), "report" if order != 1 else "stretch", initial=0.0)
-    engine = law(bonds, 0.0) if law is ListedBonds else law(bonds)
-    pressure = lower_piece_pressure(nodes, sigma)
+    pressure = LowerPressure(nodes, sigma)
     coarse, fine = (
-        march_path(engine, direction * np.linspace(0, 20, steps + 1), pressure).traction[-1]
+        march_bonds(bonds, direction * np.linspace(0, 20, steps + 1), pressure, tail=tail).traction[
+            -1
+        ]
         for steps in (160, 320)
     )
-    averaged = Convolution(0.4, 1.0, order, nodes, sigma)
-    end_state = averaged.step(
-        averaged.initial_state(sigma), direction * 20.0, sigma, pressure(direction * 20.0), 1.0
-    ).state
+    average = average_pressure(nodes + direction * 20.0, nodes, sigma, direction, 1.0, order)
+    expected = 0.4 * direction * np.where(pressure(direction * 20.0) > 0, average, 0.0)
     assert (np.diff((sigma > 0).astype(int)) != 0).sum() >= 2
-    assert (4 * fine - coarse) / 3 == pytest.approx(averaged.traction(end_state), abs=2e-6)
-    assert np.abs(averaged.traction(end_state)).max() > 0.4
+    assert (4 * fine - coarse) / 3 == pytest.approx(expected, abs=2e-6)
+    assert np.abs(expected).max() > 0.4
 
 
-def test_exact_uniform_pressure_reduces_to_coulomb():
-    """The averaged law equals Coulomb's law under uniform pressure."""
-    path = triangle_path(2.0, 2, 8)
+def test_exact_uniform_pressure_is_its_average():
+    """Far from the ends a uniform pressure is its own average, so that the averaged law is Coulomb's law."""
     nodes = np.linspace(0, 100, 41)
-    sigma = np.full(41, 2.0)
-    is_inner = (nodes > 45) & (nodes < 55)
-    coulomb_run = march_path(Coulomb(0.3), path, upper_pressure(sigma))
-    for law in (Convolution(0.3, 0.5, 1.0, nodes), Convolution(0.3, 0.5, 1.0)):
-        averaged_run = march_path(law, path, upper_pressure(sigma))
-        assert averaged_run.mean[:, is_inner] == pytest.approx(
-            coulomb_run.mean[:, is_inner], rel=1e-13
-        )
-        assert averaged_run.traction[:, is_inner] == pytest.approx(
-            coulomb_run.traction[:, is_inner], rel=1e-13
-        )
+    for direction in (1.0, -1.0):
+        average = average_pressure(nodes[18:23], nodes, np.full(41, 2.0), direction, 0.5, 1.0)
+        assert average == pytest.approx(2.0, rel=1e-13)
 
 
-def test_exact_average_follows_changed_pressure():
-    """Under a second pressure a law has the traction of one that has never seen the first; the averages are kept."""
-    nodes = np.linspace(0, 10, 11)
-    even = np.ones(11)
-    rising = np.linspace(1, 2, 11)
-    used, fresh = Convolution(0.3, 0.5, 1.0, nodes), Convolution(0.3, 0.5, 1.0, nodes)
-    before = used.step(used.initial_state(even), 1.0, even, even, 1.0).mean
-    one, other = (
-        law.step(law.initial_state(rising), 1.0, rising, rising, 1.0).mean for law in (used, fresh)
-    )
-    assert np.array_equal(one, other) and one[-1] > 1.5 * before[-1]
-
-
-def test_exact_traction_persists_at_rest():
-    """The traction persists at rest, and a falling pressure reduces it to the friction limit without dissipation."""
-    law = Convolution(0.3, 1.0)
-    unit = np.ones(1)
-    state = law.step(law.initial_state(unit), -0.1, unit, unit, 1.0).state
-    rest = law.step(state, 0.0, unit, unit, 5.0)
-    assert rest.mean[0] == -0.3 and law.traction(rest.state)[0] == -0.3 and rest.dissipated[0] == 0
-    for pressure, expected in ((2.0, -0.3), (0.5, -0.15), (0.0, 0.0)):
-        rested = law.press(state, unit, pressure * unit)
-        assert rested.state.traction[0] == expected and rested.dissipated[0] == 0
-        sliding = law.step(rested.state, -0.1, pressure * unit, 1.0 * unit, 1.0)
-        assert (
-            sliding.mean[0] == pytest.approx(-0.3 * (pressure + 1) / 2)
-            and sliding.state.traction[0] == -0.3
-        )
-
-
-@given(st.lists(st.floats(-3, 3), min_size=1, max_size=12), st.booleans())
-def test_always_averaged_law_is_passive(steps, on_lower_piece):
-    """The averaged law never creates energy, and its traction stays within the largest friction limit."""
+@given(st.floats(-30, 30), st.sampled_from([1.0, -1.0]))
+def test_always_average_is_within_pressures(offset, direction):
+    """An average is never negative and never above the largest pressure, so that the averaged law creates no energy."""
     nodes = np.linspace(0, 9, 13)
     sigma = np.maximum(np.sin(nodes), 0.0)
-    law = Convolution(0.5, 0.8, 1.0, nodes, sigma if on_lower_piece else None)
-    pressure = lower_piece_pressure(nodes, sigma) if on_lower_piece else upper_pressure(sigma)
-    result = march_path(law, np.cumsum([0.0, *steps]), pressure)
-    assert (result.dissipated >= -1e-14).all()
-    assert (np.abs(result.traction) <= 0.5 * sigma.max() + 1e-12).all()
+    average = average_pressure(nodes + offset, nodes, sigma, direction, 0.8, 1.0)
+    assert (average >= -1e-14).all()
+    assert (average <= sigma.max() + 1e-12).all()
 
 
 def test_exact_sliding_limits_differ_by_edge_pressure():
