@@ -38,6 +38,12 @@ def row(name: str, engine, case: str, cycles: int = CYCLES) -> Row:
     return Row(name, case, float(ends[1] - ends[0]), float(ends[-1] - ends[-2]))
 
 
+def is_supported(name: str, case: str) -> bool:
+    """Return whether runs support a law in a case: stretch laws of another order than 1 have a constant load."""
+    is_constant = len(set(CASES[case][1])) == 1
+    return is_constant or not name.startswith("stretch") or "p = 1" in name
+
+
 def main(laws=None, cases=tuple(CASES), growing: bool = True) -> dict:
     """Print a Markdown table of all laws and cases, and return {(law, case): Row}.
 
@@ -47,7 +53,7 @@ def main(laws=None, cases=tuple(CASES), growing: bool = True) -> dict:
         laws = laws_without_bonds() | engines(False) | (engines(True) if growing else {})
     out = {(found.law, case): found for case in cases for found in closed_form_rows(case)}
     for name, engine in laws.items():
-        out |= {(name, case): row(name, engine, case) for case in cases}
+        out |= {(name, case): row(name, engine, case) for case in cases if is_supported(name, case)}
     print(
         "| drift per cycle [bond lengths]: last (second) | "
         + " | ".join(cases)

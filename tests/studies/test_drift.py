@@ -20,7 +20,11 @@ def test_exact_drift_of_the_bond_law_agrees_with_closed_form(table):
 
 def test_always_oscillating_load_causes_no_drift(table):
     """At a constant tangential force, an oscillating load causes no drift."""
-    for name, law in table.engines(False).items():
+    laws = table.engines(False)
+    supported = [name for name in laws if table.is_supported(name, "load +-20 %")]
+    assert supported == ["stretch p = 1", "report p = 0", "report p = 1"]
+    for name in supported:
+        law = laws[name]
         assert abs(table.row(name, law, "load +-20 %", 3).last) <= 1e-12, name
 
 
@@ -44,16 +48,17 @@ def test_always_drift_table_has_the_stated_values(table, capsys):
     cases = tuple(table.CASES)
     expected = {
         "stretch p = 1": (0.272, 0.981, 0.446, 0, 0, 0.289),
-        "stretch p = 0.5": (0.066, 0.380, 0.103, 0, 0, 0.069),
-        "stretch p = 2": (0.782, 2.21, 1.315, 0, 0, 0.766),
+        "stretch p = 0.5": (0.066, 0.380, 0.103),
+        "stretch p = 2": (0.782, 2.21, 1.315),
         "report p = 0": (3e-4, 1.3e-3, 1.1e-3, 0, 0, 3e-4),
-        "stretch p = 0": (3e-4, 1.3e-3, 1.1e-3, 0, 0, 3e-4),
+        "stretch p = 0": (3e-4, 1.3e-3, 1.1e-3),
         "report p = 1": (1.4e-3, 3.8e-3, 3.2e-3, 0, 0, 1.4e-3),
         "elastic-plastic": (0,) * 6,
         "Iwan, 10 elements": (0,) * 6,
         "Coulomb": (0,) * 6,
     }
     for law, values in expected.items():
-        assert [rows[law, case].last for case in cases] == pytest.approx(values, abs=6e-4), law
+        found = [rows[law, case].last for case in cases if (law, case) in rows]
+        assert found == pytest.approx(values, abs=6e-4), law
     assert rows["stretch p = 1, growing", "force .5+-.3"].last is None
     assert "| away |" in capsys.readouterr().out
