@@ -1,5 +1,7 @@
 """Depths of aligned surfaces, their errors from the means of unworn tiles, and the largest depth."""
 
+from itertools import product
+
 import numpy as np
 from scipy import ndimage, special
 
@@ -203,9 +205,12 @@ def measure_largest(depths: DepthMap) -> tuple[Quantity, np.ndarray]:
     value = float(smooth[top]) - bias
 
     crest = float(depth.max())
+    halves = product((slice(0, None, 2), slice(1, None, 2)), repeat=n_axes)
+    coarser = float(np.mean([depth[half].max() for half in halves]))
+    unresolved = crest - coarser if np.isfinite(coarser) else 0.0
     sigma = float(np.hypot(sigma, depths.level_error))
     scatter = np.hypot(SCATTER_FACTOR * sigma, depths.errors.model * value)
-    error = SIDE * float(scatter)
+    error = SIDE * float(scatter) + unresolved
     # A missing height may be as much deeper as worn depths scatter about those beside them.
     if (depths.missing & ndimage.binary_dilation(depths.worn)).any():
         crest += SIDE * depths.scatter

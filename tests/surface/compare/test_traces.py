@@ -217,6 +217,20 @@ def test_exact_deep_narrow_groove_in_a_smooth_surface():
     assert area.low <= worn.sum() * UM <= area.high
 
 
+@pytest.mark.parametrize("seed", range(4))
+def test_always_largest_depth_contains_a_crest_between_samples(seed):
+    """The deepest point of a V, a quarter step from a sample, is deeper than all samples, but in the interval."""
+    places = np.arange(1500)
+    bottom = 700.25
+    worn = UM * np.sqrt(np.clip(1 - np.abs(places - bottom) / 200, 0, None))
+    worn += 2 * UM * np.clip(1 - np.abs(places - bottom) / 5, 0, None)
+    found = compare_surfaces(*make_pair(worn, seed))
+    largest = found.values["worn_depth_max"]
+    assert worn.max() < 3 * UM - 90 * NM
+    assert largest.low <= 3 * UM <= largest.high
+    assert largest.high < 3.6 * UM
+
+
 def test_always_scar_like_a_parabola_may_be_a_bow():
     """A parabola of 2 um over 90 % of the trace is no wear of nanometres; a straight datum is no bow.
 
