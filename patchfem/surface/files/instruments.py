@@ -22,14 +22,19 @@ def read_instrument(content: Content) -> Table:
     Raises Missing without the package, and PatchfemError if it cannot read the file.
     """
     path = content.path
+    kind = "a file in an instrument's own format"
+    remedy = "export the surface as text"
+    if content.data.startswith(b"PK"):
+        kind = "a zip file; unpack it if it contains a text; X3P is such a format"
+        remedy = f"unpack a text that it contains, or {remedy}"
     try:
         # The import takes two seconds.
         import SurfaceTopography
         from SurfaceTopography.IO import open_topography
     except ImportError:
         raise Missing(
-            f"{path}: an X3P file or one in an instrument's own format; the package SurfaceTopography can read many such "
-            f"formats: pip install 'patchfem[profiles]', or export the surface as text and {HEADER_EXAMPLE}"
+            f"{path}: {kind}; the package SurfaceTopography can read many such formats: pip install "
+            f"'patchfem[profiles]', or export the surface as text and {HEADER_EXAMPLE}"
         ) from None
 
     # x runs along the first axis of SurfaceTopography, and a missing height is masked.
@@ -55,7 +60,7 @@ def read_instrument(content: Content) -> Table:
     except Exception as error:  # a damaged file leads to any kind of exception in a library
         reason = shorten(f"{type(error).__name__}: {error}", 120)
         raise PatchfemError(
-            f"{path}: SurfaceTopography cannot read this file ({reason}); export the surface as text"
+            f"{path}: SurfaceTopography cannot read this file ({reason}); {remedy}"
         ) from None
 
     name = type(reader).__name__.removesuffix("Reader")

@@ -10,6 +10,7 @@ from .content import TEXT_SUFFIXES, fetch
 from .instruments import read_instrument
 from .table import make_surface
 from .text import read_text
+from .units import SIZE_LINES, UNIT_LIST, parse_length_unit
 
 READERS = {"npy": read_npy, "mat": read_mat, "instrument": read_instrument}
 
@@ -34,8 +35,10 @@ def read_surface(path, units: tuple[str, str] | None = None) -> Profile | Areal:
     Missing
         If there is no file, or a package that can read it is not installed.
     PatchfemError
-        If the file cannot be read, with file and line.
+        If the file cannot be read, with file and line, or if the units are not two units of length.
     """
+    if units is not None:
+        _require_units(path, units)
     content = fetch(path)
     if content.kind != "text":
         return make_surface(READERS[content.kind](content), units)
@@ -45,6 +48,17 @@ def read_surface(path, units: tuple[str, str] | None = None) -> Profile | Areal:
         if content.suffix in ("", *TEXT_SUFFIXES) or find_spec("SurfaceTopography") is None:
             raise
     return make_surface(read_instrument(content), units)
+
+
+def _require_units(path, units) -> None:
+    """Raise PatchfemError unless the units are a pair of units of length; the text "mm" is not the pair m and m."""
+    is_pair = isinstance(units, tuple | list) and len(units) == 2
+    if is_pair and all(isinstance(unit, str) and parse_length_unit(unit) for unit in units):
+        return
+    raise PatchfemError(
+        f'{path}: the units {units!r} are not those of x and of z, such as ("mm", "um"): use two of {UNIT_LIST}; for the '
+        f"size of a matrix of heights, which is no unit, {SIZE_LINES} in a text"
+    )
 
 
 def read_profile(path, units: tuple[str, str] | None = None) -> Profile:

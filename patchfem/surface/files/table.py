@@ -75,11 +75,6 @@ def make_surface(table: Table, units: tuple[str, str] | None = None) -> Profile 
         Units of x (and y) and of z. They complete and overrule those of the file, with a note, except in formats that
         always state their units.
     """
-    if units is not None and (len(units) != 2 or None in map(parse_length_unit, units)):
-        raise PatchfemError(
-            f'{table.path}: the units {units!r} are not those of x and of z, such as ("mm", "um"); use two of {UNIT_LIST}'
-        )
-
     size = table.columns["z"].size
     if size > MAX_POINTS:
         raise PatchfemError(

@@ -1,8 +1,11 @@
 """Files of instruments: all variants of a format give the written heights, to the last bit if stored exactly."""
 
 import gzip
+import re
 import sys
 import types
+import zipfile
+from importlib.util import find_spec
 
 import numpy as np
 import pytest
@@ -105,8 +108,14 @@ REFUSED = {  # bytes, file name, given units, and the expected message
     },
     "an unknown unit of a text": (b"x,z\n0,1\n5,2\n", "a.csv", ("um", "furlong"),
                                   "the units .'um', 'furlong'. are not those of x and of z.*m, km"),
-    "one unit": (b"x [um],z [um]\n0,1\n5,2\n", "a.csv", "um",
-                 "the units 'um' are not those of x and of z"),
+    **{
+        f"units {units!r}": (b"x [um],z [um]\n0,1\n5,2\n", "a.csv", units,
+                           f"the units {re.escape(repr(units))} are not those of x and of z.*# Width: 1.2 mm")
+        # Each letter of "mm" is a unit.
+        for units in ("um", "mm", 5, ("mm",), ("mm", 1.0), ("0.8 um", "um"))
+    },
+    "npy with a pixel size": (write.make_npy(np.zeros((4, 6))), "a.npy", ("0.8 um", "um"),
+                              "size of a matrix of heights, which is no unit, write `# Width: 1.2 mm`"),
     "npy of no columns": (write.make_npy(np.zeros((4, 6))), "a.npy", UM,
                           r"holds float64 \(4, 6\); one matrix of the columns x, z or x, y, z is needed"),
     "npy of complex numbers": (write.make_npy(TRACE.astype(complex)), "a.npy", UM,
@@ -136,6 +145,17 @@ def test_refuses_faulty_file(tmp_path, data, name, units, message):
     """A faulty file is refused with a message that states the fault."""
     with pytest.raises(PatchfemError, match=message):
         read_bytes(tmp_path, data, name, units)
+
+
+@pytest.mark.skipif(
+    find_spec("SurfaceTopography") is not None, reason="the extra `profiles` is installed"
+)
+def test_refuses_zip_file_without_extra(tmp_path):
+    """A text in a zip file is refused with the advice to unpack it, and an X3P file with the extra to install."""
+    with zipfile.ZipFile(tmp_path / "a.zip", "w") as archive:
+        archive.writestr("a.csv", "x [um],z [um]\n0,1\n5,2\n")
+    with pytest.raises(PatchfemError, match=r"unpack it if it contains a text; X3P .*\[profiles\]"):
+        read_surface(tmp_path / "a.zip")
 
 
 @pytest.mark.parametrize(
