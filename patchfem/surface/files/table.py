@@ -25,6 +25,9 @@ MIN_ROUNDED = 10  # smallest number of positions that show whether they are even
 # Largest distance from even positions in printed digits, half of which is rounding.
 MAX_ROUNDING = 0.75
 MIN_PRINTED_DIGIT = 1e-11  # smallest printed digit of a position [m]
+DIGIT_TOL = (
+    1e-4  # largest distance of a step from a multiple of the printed digit, relative to the digit
+)
 # Largest distance of positions that count as even, and smallest difference of two steps, relative to a step.
 EVEN_TOL = 1e-6
 # Largest distance of positions that count as equal, relative to the length of the axis.
@@ -214,7 +217,7 @@ def _undo_rounding(table: Table, role: str, x) -> tuple[Table, np.ndarray]:
 
     A step of 0.15625 um printed to 0.1 um makes the slopes 14 % too large. If the header gives a length that fits, it
     gives the step, else the regression on the positions. Rounded even steps are two multiples of the printed digit, and
-    differ by it.
+    differ by it; uneven steps, such as 1.0 and 1.4 um in turn, are no multiples of their difference.
     """
     if x.size < MIN_ROUNDED or not x[-1] > x[0]:
         return table, x
@@ -223,8 +226,11 @@ def _undo_rounding(table: Table, role: str, x) -> tuple[Table, np.ndarray]:
     gaps = np.diff(np.sort(np.diff(x)))
     gaps = gaps[gaps > EVEN_TOL * np.ptp(x) / x.size]
     digit = MIN_PRINTED_DIGIT
-    if gaps.size:
-        digit = max(digit, float(gaps.min()))
+    if gaps.size and gaps[0] > digit:
+        digit = float(gaps[0])
+        n_digits = np.diff(x) / digit
+        if np.abs(n_digits - np.rint(n_digits)).max() > DIGIT_TOL:
+            return table, x
 
     count = np.arange(x.size) - (x.size - 1) / 2
     evens = [x.mean() + float(count @ x / (count @ count)) * count]

@@ -104,6 +104,14 @@ def test_exact_rounded_x_in_every_unit(tmp_path, unit, metres):
     assert f"x is rounded to {format_length(0.1 * metres)} in the file" in profile.notes[0]
 
 
+@pytest.mark.parametrize("steps", [(1.0, 1.4), (1.37, 0.63, 1.0)])
+def test_exact_uneven_x_is_kept(tmp_path, steps):
+    """Steps that are no multiples of their difference are uneven, and not even steps that a file has rounded."""
+    x = np.cumsum(np.tile(steps, 30))
+    profile = read_content(tmp_path, format_trace(x, np.sin(x)).encode())
+    assert profile.x == pytest.approx(x * 1e-6, rel=1e-12) and not profile.notes
+
+
 @pytest.mark.parametrize("setting", ["Length,10.0 um", "Length, 46.875 um", "Length,46.71875 um"])
 def test_exact_rounded_x_below_any_length(tmp_path, setting):
     """A length in the header gives the step if it fits, with a blank behind the comma too, else the positions do."""
