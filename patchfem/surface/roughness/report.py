@@ -117,11 +117,13 @@ def make_report(
     """
     part = surface if window is None else crop(surface, *window)
     is_scan = isinstance(part, Areal)
-    if part.x.size < MIN_SAMPLES and not is_scan:
-        raise PatchfemError(
-            f"{part.source}: {part.x.size} samples; the parameters need at least {MIN_SAMPLES}"
-        )
     whole = part if is_scan else resample_evenly(part)
+    # An uneven trace has more samples afterwards, and one without heights at its ends fewer.
+    count = min(part.x.size, whole.x.size)
+    if count < MIN_SAMPLES and not is_scan:
+        raise PatchfemError(
+            f"{part.source}: {count} samples; the parameters need at least {MIN_SAMPLES}"
+        )
     primary, form_name = subtract_form(whole, form)
     if short is not None:
         # The filter changes the plane or line, so the form is subtracted again after it.

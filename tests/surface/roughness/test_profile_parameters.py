@@ -137,6 +137,10 @@ def test_exact_fitting_cutoff_is_longest_standard_one(length, expected):
             "10 samples; the parameters need at least 16",
         ),
         (
+            lambda: make_report(make_trace(np.append(np.arange(10.0) ** 2, np.full(10, np.nan)))),
+            "10 samples; the parameters need at least 16",
+        ),
+        (
             lambda: make_report(make_trace(np.zeros(99)), window=(50 * UM, 20 * UM)),
             "the window runs",
         ),
