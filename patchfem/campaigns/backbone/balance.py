@@ -19,8 +19,13 @@ from .records import ROUND_OFF_ERROR, Curve, make_curve
 # Numbers of harmonics that are tried in turn, each with four times the samples of the previous one.
 HARMONIC_COUNTS = (9, 19, 39)
 # Number of fixed-point steps to the damping that sustains the motion of a linear rig. They converge slowly where a force at
-# the output moves other modes; where no force holds the phase resonance, the damping grows beyond 1.
+# the output moves other modes; where no force holds the phase resonance, the damping grows beyond 1 or changes without end.
 N_LINEAR_STEPS = 200
+# A force holds the mode if the shape of the free motion has at least MIN_ENERGY of the kinetic energy of the motion under
+# the force, else it holds another mode; and if this shape moves the output by what it moves in all, within MAX_DEVIATION
+# of it. At an antiresonance other modes cancel most of the motion of the mode at the output.
+MIN_ENERGY = 0.5
+MAX_DEVIATION = 0.6
 NO_MOTION = "no free motion of these amplitudes was found"
 NO_OSCILLATION = "the mode does not oscillate at these amplitudes: its damping ratio is above 1"
 
@@ -149,22 +154,40 @@ def find_forces(
     Returns
     -------
     (2, k) array
-        Force [N] and its frequency [Hz]; NaN if no force holds the motion.
+        Force [N] and its frequency [Hz]; NaN if no force holds the motion in the shape of the mode.
     """
     modes = joint.modes
     reach = abs(float(modes.output @ joint.shape))
     excitation = np.outer(modes.output, modes.output) / reach**2
+    forced_motions = _find_motions(group, joint, amplitudes, harmonics, excitation, motions)
     out = np.full((2, len(amplitudes)), np.nan)
-    for column, found in enumerate(
-        _find_motions(group, joint, amplitudes, harmonics, excitation, motions)
-    ):
-        if found is not None:
-            # the excitation 2 zeta omega m E z' with E = output output^T/reach^2, as a force at the output
-            free = found.motion
-            output = abs(free.modal[1] @ modes.output)
-            force = 2 * free.zeta * free.omega**2 * modes.mass * output / reach**2
-            out[:, column] = force, free.omega / (2 * np.pi)
+    for column, (free, forced) in enumerate(zip(motions, forced_motions)):
+        if free is None or forced is None:
+            continue
+        motion = forced.motion
+        if not _holds_mode(free.motion.modal[1], motion.modal[1], modes.output):
+            continue
+        # the excitation 2 zeta omega m E z' with E = output output^T/reach^2, as a force at the output
+        output = abs(motion.modal[1] @ modes.output)
+        force = 2 * motion.zeta * motion.omega**2 * modes.mass * output / reach**2
+        out[:, column] = force, motion.omega / (2 * np.pi)
     return out
+
+
+def _holds_mode(free: np.ndarray, forced: np.ndarray, output: np.ndarray) -> bool:
+    """Return whether a motion under a force at the output is that of the mode, from its first harmonic.
+
+    Parameters
+    ----------
+    free, forced : (n,) complex array
+        Modal coordinates of the free motion and of the motion under the force, of equal modal mass.
+    output : (n,) array
+        Displacement of the output per modal coordinate.
+    """
+    part = free * np.vdot(free, forced) / np.vdot(free, free)
+    energy = np.vdot(part, part).real / np.vdot(forced, forced).real
+    whole = output @ forced
+    return energy >= MIN_ENERGY and abs(output @ part - whole) <= MAX_DEVIATION * abs(whole)
 
 
 def _compute_rigid_curve(joint: JointMode, amplitudes) -> Curve:
@@ -250,14 +273,17 @@ def _sustain_linear_motion(
 ) -> tuple[float, float] | tuple[None, None]:
     """Return the frequency omega [rad/s] and zeta of a linear motion z'' + (D - 2 zeta omega E) z' + Omega^2 z = 0.
 
-    Both are None if the mode does not oscillate. excitation: E (n, n).
+    Both are None if the mode does not oscillate, or if no such motion of the mode is found. excitation: E (n, n).
     """
     rate = 0.0
     for _ in range(N_LINEAR_STEPS):
         rate -= 2 * _find_mode_eigenvalue(joint, rate * excitation).real
-    omega = abs(_find_mode_eigenvalue(joint, rate * excitation))
+    sustained = _find_mode_eigenvalue(joint, rate * excitation)
+    omega = abs(sustained)
     damped = _find_mode_eigenvalue(joint, 0.0 * excitation)
-    if not (damped.imag and rate < 2 * omega):
+    # Where the eigenvector of the mode changes with the damping, the steps may not converge.
+    is_found = abs(sustained.real) <= ROUND_OFF_ERROR * omega
+    if not (damped.imag and rate < 2 * omega and is_found):
         return None, None
     return omega, rate / (2 * omega)
 
