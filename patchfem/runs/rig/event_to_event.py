@@ -172,6 +172,8 @@ def run_from_event_to_event(
         for name in select_names("run"):
             if before is not None and name in before.values:
                 run.values[name] += before.values[name]
+        if watch is not None:
+            watch(1.0)
         return run
 
     fields = {}
@@ -183,8 +185,6 @@ def run_from_event_to_event(
         steady = evaluator.find_steady_amplitude(run)
         fields |= {} if steady is None else {"steady": steady}
         run = remove_incomplete_cycle(run)
-    if progress is not None:
-        progress(1.0)
     fields["prepare"] = {"reduce": reduced}
     return evaluator.make_solution(run, perf_counter() - begin, **fields)
 
