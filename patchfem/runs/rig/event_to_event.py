@@ -431,10 +431,10 @@ class LumpedEvaluator(RunEvaluator):
 
         Parameters
         ----------
-        run
-            Run of the engine, or its mark at the end of a drive level.
+        run : LumpedRun
+            Run of the engine `hybrid`.
         drive
-            Drive of the run.
+            Drive of this run, which may be a single level.
         stuck : bool
             Whether the interface is stuck during the last cycles.
         """
@@ -472,10 +472,10 @@ class LumpedEvaluator(RunEvaluator):
 
         Parameters
         ----------
-        run
-            Run of the engine, or its mark at the end of a drive level.
+        run : LumpedRun
+            Run of the engine `hybrid`.
         drive
-            Drive of the run.
+            Drive of this run, which may be a single level.
         stuck : bool
             Whether the interface is stuck during the last cycles.
         """
@@ -509,8 +509,8 @@ class LumpedEvaluator(RunEvaluator):
 
         Parameters
         ----------
-        run
-            Run of the engine.
+        run : LumpedRun
+            Run of the engine `hybrid`.
         drive
             Drive of the run.
         values : dict of float
