@@ -24,7 +24,6 @@ from .formatting import format_value
 
 __all__ = [
     "G_N",
-    "STICK_SPEED_RATIO",
     "Compliance",
     "ContactState",
     "DriveSegment",
@@ -45,8 +44,6 @@ __all__ = [
     "frozen_array",
 ]
 
-# largest slip speed, relative to its peak in the cycle, at which a law with memory counts as sticking
-STICK_SPEED_RATIO = 1e-2
 G_N = 9.80665  # standard gravity [m s-2]
 # relative round-off of squared frequencies, allowed for in the rule that a spring lowers no frequency
 _STIFFENING_ROUND_OFF = 1e-9

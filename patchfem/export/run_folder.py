@@ -176,8 +176,13 @@ def _write_face(result: Result, face: Face, folder: Path) -> list[str]:
 
 
 def save_run(result: Result, folder: Path) -> Answer:
-    """Write the results folder of a finished run with its page; an older results folder is replaced."""
+    """Write the results folder of a finished run with its page; an older results folder is replaced.
+
+    What prevents the page is raised once the other results are in place.
+    """
     with Folder(folder) as claimed:
         answer = write_results(result, claimed.path)
-        page.write_page(claimed.path)
+        fault = _draw_page(claimed.path)
+    if fault is not None:
+        raise fault
     return answer

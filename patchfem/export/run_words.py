@@ -175,7 +175,7 @@ def describe_outcome(result: Result, measures: Quantities, details: JsonObject) 
     if outcome is Outcome.TRANSIENT and _is_release(result):
         return "The run ended before the motion came to rest; raise drive.cycles to see more of it."
     if outcome is Outcome.STUCK and {"loop_area", "slip_amplitude"} & measures.keys():
-        return _describe_stuck_outcome(result, measures)
+        return _describe_stuck_outcome(measures)
     return _describe_stability(result)
 
 
@@ -236,7 +236,7 @@ def _describe_no_slip(has_patch: bool, cycles: str) -> str:
     return f"The interface sticks: no slip in the last {cycles}{limit * has_patch}."
 
 
-def _describe_stuck_outcome(result: Result, measures: Quantities) -> str:
+def _describe_stuck_outcome(measures: Quantities) -> str:
     """Return the sentence for an interface that sticks as a whole."""
     has_patch = "contact_fraction" in measures
     part = "part of the patch slips" if has_patch else "part of it slips"

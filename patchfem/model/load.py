@@ -78,11 +78,14 @@ class PointLoad:
                 "slide.hold",
                 "",
             )
-        load_times = self._times_in_periods(time, steps)
-        inner = load_times[(load_times > time[0]) & (load_times < time[-1])]
-        grid = np.union1d(time, inner)
-        is_new_instant = np.append(True, np.diff(grid) > MIN_SAMPLE_SPACING * period)
-        grid = grid[is_new_instant | np.isin(grid, time)]
+        inner = np.unique(self._times_in_periods(time, steps))
+        inner = inner[(inner > time[0]) & (inner < time[-1])]
+
+        # An added sample is no sample of the slide and no other added sample apart from round-off.
+        after = np.searchsorted(time, inner)
+        distance = np.minimum(inner - time[after - 1], time[after] - inner)
+        distance = np.minimum(distance, np.diff(inner, prepend=-np.inf))
+        grid = np.union1d(time, inner[distance > MIN_SAMPLE_SPACING * period])
         if slide.kind == "sine":
             return grid, slide.amplitude * np.sin(2 * np.pi * slide.frequency * grid)
         return grid, np.interp(grid, time, rel_disp)

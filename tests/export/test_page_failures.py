@@ -7,6 +7,7 @@ import xarray as xr
 from command_line import run_cli
 from scene_texts import BENCH
 
+from patchfem import run
 from patchfem.core import Missing
 from patchfem.export import page
 
@@ -60,3 +61,16 @@ def test_always_failing_page_leaves_results(scene_file, tmp_path, monkeypatch, f
     assert json.loads((out / "summary.json").read_text("utf-8"))["outcome"] == "done"
     with xr.open_dataset(out / "result.nc", engine="h5netcdf") as data:
         assert data.friction_force.size == data.time.size > 0
+
+
+def test_always_failing_page_leaves_saved_results(scene_file, tmp_path, monkeypatch):
+    """A finished run that is saved from Python keeps its results if the page cannot be drawn."""
+
+    def fail(folder):
+        """Fail in place of writing a page."""
+        raise Missing("report.html: no space")
+
+    monkeypatch.setattr(page, "write_page", fail)
+    with pytest.raises(Missing, match="no space"):
+        run(scene_file).save(tmp_path / "out")
+    assert {path.name for path in (tmp_path / "out").iterdir()} == RESULT_FILES

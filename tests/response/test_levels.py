@@ -92,6 +92,15 @@ def test_exact_no_onset_below_friction_limit():
     assert found["onset_level"].reason == "no level of the increasing sequence slips"
 
 
+def test_always_run_from_event_to_event_reports_each_level():
+    """A run from event to event reports its progress after each level of the drive."""
+    fractions = []
+    text = RIG.format(law='law = "coulomb"', levels='["1 g", "2 g", "4 g", "5 g"]', method="")
+    result = run(loads(text), progress=fractions.append, estimate=False)
+    assert result.extra["engine"] == "hybrid"
+    assert fractions == pytest.approx([0.25, 0.5, 0.75, 1.0])
+
+
 def run_single_level(level: str, cycles: int = 30):
     """Return a run at one drive level [g] from rest."""
     text = (

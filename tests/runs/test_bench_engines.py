@@ -107,20 +107,36 @@ def follow_reference(model, slide, times):
 @pytest.mark.parametrize("slide", SLIDES)
 @pytest.mark.parametrize("law", ROUND_OFF_LAWS)
 def test_exact_bench_agrees_with_reference(law, slide):
-    """The bench agrees with its law stepped in NumPy to round-off, in force and energies."""
+    """The bench agrees with its law stepped in NumPy to round-off, in force, slip and energies."""
     model = build_bench(ROUND_OFF_LAWS[law], slide)
     run = bench.run_bench(model, None, 80)
     path = follow_reference(model, run.slide, np.diff(run.time))
     limit = np.abs(run.force).max()
     force = np.append(0.0, path.force)
-    # At the end of a rest, the bench has the static force.
-    is_static = np.isin(np.arange(force.size), [*find_rest_ends(model, run.slide)])
+    # At the end of a rest, the bench has the static force of the motion that follows.
+    ends = find_rest_ends(model, run.slide)
+    is_static = np.isin(np.arange(force.size), [*ends])
+    assert run.force[is_static] == pytest.approx(30.0 * np.array([*ends.values()]), rel=1e-13)
     assert run.force[~is_static] == pytest.approx(force[~is_static], abs=1e-13 * limit)
+    is_elastic = law in ("elastic-plastic", "bonds", "growing")
+    stretch = np.clip(force / 30.0, -1, 1) * (2e-6 if is_elastic else 0.0)
+    assert run.slip == pytest.approx(run.slide - stretch, abs=1e-18)
     work = np.append(0.0, np.cumsum(path.mean * np.diff(run.slide)))
     exchanged = np.abs(np.diff(work)).sum()
     assert run.ledger[0] == pytest.approx(work, abs=1e-13 * exchanged)
     assert run.ledger[1] == pytest.approx(np.append(0.0, path.stored), abs=1e-13 * exchanged)
     assert run.ledger[2, -1] == pytest.approx(path.dissipated.sum(), abs=1e-13 * exchanged)
+
+
+def test_exact_velocity_under_changing_load_is_that_of_the_slide():
+    """Samples that a changing load adds near those of the slide do not disturb its velocity."""
+    changing = POINT + 'amplitude = "30 N"\nfrequency = "55 Hz"\n'
+    run = bench.run_bench(
+        build_bench(ROUND_OFF_LAWS["coulomb"], "sine", contact=changing), None, 400
+    )
+    omega = 2 * np.pi * 50
+    exact = 4e-6 * omega * np.cos(omega * run.time)
+    assert run.rate[1:-1] == pytest.approx(exact[1:-1], abs=1e-4 * np.abs(exact).max())
 
 
 # ---- progress

@@ -132,7 +132,8 @@ def refusal_reason(model: Model) -> str:
         return "the contact of the case is not a single point, or its table of measured responses cannot be read"
 
     # The kernel has one slip variable per case, one normal force and a linear flexure.
-    friction, modes = model.friction, rig.modes
+    friction = model.friction
+    modes = rig.modes
     if (
         len(rig.friction.interfaces) != 1
         or rig.friction.load_varies
@@ -192,7 +193,7 @@ def _solve_cases(models: Sequence[Model], report: Callable | None) -> CaseResult
     refined = refine(cases, scales)
     results = make_results(models, cases, scales, refined)
     _insert_texts(models, results)
-    is_alone = needs_single_run(cases, scales, refined, results)
+    is_alone = needs_single_run(scales, refined, results)
     mark_loading_cases(models, cases, scales, refined, results, is_alone)
     results.seconds[:] = (perf_counter() - begin) / len(models)
     one_by_one.replace_by_single_runs(results, models, is_alone, report)
@@ -459,9 +460,7 @@ def _judge_motions(cases: Cases, scales: Scales, refined: Refined) -> tuple:
     return np.where(is_steady & drifts, 0, classes), *steady
 
 
-def needs_single_run(
-    cases: Cases, scales: Scales, refined: Refined, results: CaseResults
-) -> np.ndarray:
+def needs_single_run(scales: Scales, refined: Refined, results: CaseResults) -> np.ndarray:
     """Return a mask (n,) of the cases that only a single run can compute."""
     values = refined.march.values
     is_alone = ~refined.is_met | (results.outcome == str(Outcome.GROWS))
@@ -480,14 +479,18 @@ def mark_loading_cases(
     results: CaseResults,
     is_done: np.ndarray,
 ) -> None:
-    """Call the sticking cases whose friction force still increases transient.
+    """Set the outcome of sticking cases whose friction force still increases to transient.
 
     Their forces are those of another march, which keeps its samples.
 
     Parameters
     ----------
-    models, cases, scales, refined, results
-        As before.
+    models : sequence of Model
+        Models of one group.
+    cases, scales, refined
+        Numbers of their motions, their scales, and their marches.
+    results : CaseResults
+        Outcomes and reasons are changed in place.
     is_done : (n,) of bool
         Cases that are left out.
     """
@@ -499,8 +502,9 @@ def mark_loading_cases(
         part = np.flatnonzero(may_load & (refined.steps == count))
         samples = march_cases(cases.select(part), count, has_samples=True).samples
         for row, case in enumerate(part.tolist()):
-            drive, modes = models[case].rig.drive.signal, models[case].rig.modes
-            window = _make_window(modes, drive, samples[row], count)
+            rig = models[case].rig
+            drive = rig.drive.signal
+            window = _make_window(rig.modes, drive, samples[row], count)
             is_loading[case] = is_still_loading(window, drive.period, scales.tolerance[case])
 
     results.outcome[is_loading] = str(Outcome.TRANSIENT)

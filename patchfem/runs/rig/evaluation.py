@@ -74,7 +74,7 @@ class RunEvaluator:
         Parameters
         ----------
         run
-            Run of the engine, or its mark at the end of a drive level.
+            Run of the engine, with all cycles or with those of a drive level.
         drive
             Drive of the run.
         stuck : bool
@@ -88,7 +88,7 @@ class RunEvaluator:
         Parameters
         ----------
         run
-            Run of the engine, or its mark at the end of a drive level.
+            Run of the engine, with all cycles or with those of a drive level.
         drive
             Drive of the run.
         stuck : bool
@@ -102,7 +102,7 @@ class RunEvaluator:
         Parameters
         ----------
         run
-            Run of the engine, or its mark at the end of a drive level.
+            Run of the engine, with all cycles or with those of a drive level.
         drive : optional
             Drive of the run; default: that of the model.
         ledger : (4, k), optional
@@ -190,9 +190,9 @@ class RunEvaluator:
 
         ends = window_end_values(run.extremes, run.phasors, n_cycles)
         fields = {
-            "message": getattr(run, "message", ""),
-            "log": getattr(run, "log", None),
-            "snapshots": getattr(run, "snapshots", []),
+            "message": run.message,
+            "log": run.log,
+            "snapshots": run.snapshots,
             "steady": estimate_steady(drive, *ends),
         }
         fields |= self.collect_solution_fields(run, drive)
@@ -221,7 +221,7 @@ class RunEvaluator:
         level : float
             Drive level [m s-2].
         run
-            Run of the engine, or its mark at the end of a drive level.
+            Run of the engine, with all cycles or with those of a drive level.
         drive : optional
             Drive of the run; default: that of the model.
         relative_error : float

@@ -172,6 +172,8 @@ def run_from_event_to_event(
         for name in select_names("run"):
             if before is not None and name in before.values:
                 run.values[name] += before.values[name]
+        if watch is not None:
+            watch(1.0)
         return run
 
     fields = {}
@@ -183,8 +185,6 @@ def run_from_event_to_event(
         steady = evaluator.find_steady_amplitude(run)
         fields |= {} if steady is None else {"steady": steady}
         run = remove_incomplete_cycle(run)
-    if progress is not None:
-        progress(1.0)
     fields["prepare"] = {"reduce": reduced}
     return evaluator.make_solution(run, perf_counter() - begin, **fields)
 
@@ -431,10 +431,10 @@ class LumpedEvaluator(RunEvaluator):
 
         Parameters
         ----------
-        run
-            Run of the engine, or its mark at the end of a drive level.
+        run : LumpedRun
+            Run of the engine `hybrid`.
         drive
-            Drive of the run.
+            Drive of this run, which may be a single level.
         stuck : bool
             Whether the interface is stuck during the last cycles.
         """
@@ -472,10 +472,10 @@ class LumpedEvaluator(RunEvaluator):
 
         Parameters
         ----------
-        run
-            Run of the engine, or its mark at the end of a drive level.
+        run : LumpedRun
+            Run of the engine `hybrid`.
         drive
-            Drive of the run.
+            Drive of this run, which may be a single level.
         stuck : bool
             Whether the interface is stuck during the last cycles.
         """
@@ -509,8 +509,8 @@ class LumpedEvaluator(RunEvaluator):
 
         Parameters
         ----------
-        run
-            Run of the engine.
+        run : LumpedRun
+            Run of the engine `hybrid`.
         drive
             Drive of the run.
         values : dict of float

@@ -128,8 +128,8 @@ class MarchEvaluator(RunEvaluator):
 
         Parameters
         ----------
-        run
-            Run of the engine.
+        run : points.time_march.Motion
+            Motion in time steps.
         drive
             Drive of the run.
         values : dict of float
@@ -149,10 +149,10 @@ class MarchEvaluator(RunEvaluator):
 
         Parameters
         ----------
-        run
-            Run of the engine, or its mark at the end of a drive level.
+        run : points.time_march.Motion
+            Motion in time steps.
         drive
-            Drive of the run.
+            Drive of this motion, which may be a single level.
         stuck : bool
             Whether the interface is stuck during the last cycles.
         """
@@ -181,10 +181,10 @@ class MarchEvaluator(RunEvaluator):
 
         Parameters
         ----------
-        run
-            Run of the engine, or its mark at the end of a drive level.
+        run : points.time_march.Motion
+            Motion in time steps.
         drive
-            Drive of the run.
+            Drive of this motion, which may be a single level.
         stuck : bool
             Whether the interface is stuck during the last cycles.
         """
@@ -207,8 +207,7 @@ class MarchEvaluator(RunEvaluator):
         omega = find_drive_omega(drive)
         rig = self.model.rig
 
-        work = getattr(run, "window_work", None)
-        work = run.work if work is None else work
+        work = run.window_work
         # The friction of strips that yaw does more work than follows from the mean displacement.
         together = self.contact.set_valued and not rig.friction.strips_slide_apart
         # The friction work of this interface excludes other interfaces and impacts at stops.

@@ -4,7 +4,7 @@ In: a Model, its Numerics and its Patch. Out: the Solution under a sine, and the
 frequency with its folds (`dynamics.harmonic`).
 """
 
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from time import perf_counter
 from typing import NamedTuple
 
@@ -46,24 +46,17 @@ REASONS_OF_END = {
 BALANCE_SAMPLES_PER_CYCLE = 4096
 
 
-@dataclass(frozen=True, eq=False, slots=True)
-class CycleRun:
+class CycleRun(NamedTuple):
     """One cycle of a motion from harmonic balance as a run that is evaluated.
 
-    - response, window: histories of the cycle
-    - extremes: (1, 2) smallest and largest output [m]
-    - phasors: (1,) phasor of the output at the drive frequency [m]
+    - window: histories of the cycle
+    - extremes (1, 2): smallest and largest output [m]
     - ledger: energies [J] by name
     """
 
-    response: Response
     window: Response
     extremes: np.ndarray
-    phasors: np.ndarray
     ledger: Values
-    outcome: Outcome | None = None
-    message: str = ""
-    snapshots: list = field(default_factory=list)
 
 
 class BalanceEvaluator(RunEvaluator):
@@ -81,10 +74,10 @@ class BalanceEvaluator(RunEvaluator):
 
         Parameters
         ----------
-        run
-            Run of the engine, or its mark at the end of a drive level.
+        run : CycleRun
+            One cycle of the steady motion.
         drive
-            Drive of the run.
+            Sine that drives the cycle.
         stuck : bool
             Whether the interface is stuck during the last cycles.
         """
@@ -92,7 +85,7 @@ class BalanceEvaluator(RunEvaluator):
         if not self.has_friction:
             return IntegratedMeasures(values)
         book = run.ledger | {"booked": run.ledger["friction"]}
-        values["work_check"] = compute_work_check(book | compute_sampled_work(run.response))
+        values["work_check"] = compute_work_check(book | compute_sampled_work(run.window))
         if not self.turns:
             return IntegratedMeasures(values)
         _, turn_forces, turn_slips = zip(*self.turns)
@@ -107,10 +100,10 @@ class BalanceEvaluator(RunEvaluator):
 
         Parameters
         ----------
-        run
-            Run of the engine, or its mark at the end of a drive level.
+        run : CycleRun
+            One cycle of the steady motion.
         drive
-            Drive of the run.
+            Sine that drives the cycle.
         stuck : bool
             Whether the interface is stuck during the last cycles.
         """
@@ -358,7 +351,7 @@ class BalanceFinder:
         top = motion.amplitude(self.modes.output)
         middle = (response.output.max() + response.output.min()) / 2
         extremes = np.array([[middle - top, middle + top]])
-        run = CycleRun(response, response, extremes, np.zeros(1), book)
+        run = CycleRun(response, extremes, book)
         evaluator = BalanceEvaluator(self.model, self.numerics, self.patch, steps=samples)
         evaluator.turns = motion.find_reversals()
         return CycleMeasures(evaluator.evaluate_measures(run, drive), response, book)
