@@ -324,16 +324,18 @@ def count_cache_misses(found) -> tuple:
     return sum(found.stats.cache_misses.values()), sum(found.stats.cache_hits.values())
 
 
-@pytest.mark.share(0, 3, 5, 7)
+@pytest.mark.share(0, 3, 5, 9)
 @pytest.mark.parametrize("ending", ["nbi", "nbc"])
-@pytest.mark.parametrize("harm", ["cut", "emptied", "gone", "a folder"])
+@pytest.mark.parametrize("harm", ["cut", "emptied", "a bit", "gone", "a folder"])
 def test_always_damaged_cache_is_rebuilt(code_folder, ending, harm):
-    """A truncated, emptied, deleted or replaced cache file of numba is compiled again."""
+    """A truncated, emptied, changed, deleted or replaced cache file of numba is compiled again."""
     assert count_cache_misses(make_dispatcher(code_folder)) == (1, 0) and count_cache_misses(
         make_dispatcher(code_folder)
     ) == (0, 1)
     [path] = code_folder.rglob(f"*.{ending}")
-    path.write_bytes(path.read_bytes()[:-5] if harm == "cut" else b"")
+    data = bytearray(path.read_bytes())
+    data[len(data) // 2] ^= 1
+    path.write_bytes({"cut": data[:-5], "a bit": data}.get(harm, b""))
     if harm in ("gone", "a folder"):
         path.unlink()
     if harm == "a folder":

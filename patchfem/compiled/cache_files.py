@@ -1,13 +1,40 @@
 """Numba's cache of machine code, for functions whose code `machine` does not store; its errors never stop a run."""
 
 import os
+import pickle
 from contextlib import suppress
+from hashlib import sha256
 
-from numba.core.caching import FunctionCache
+from numba.core.caching import FunctionCache, IndexDataCacheFile
+
+
+class CheckedContent(bytes):
+    """Pickled object that is unpickled only if its SHA-256 hash, which is stored with it, still matches."""
+
+    def __reduce__(self):
+        return load_checked, (sha256(self).digest(), bytes(self))
+
+
+def load_checked(checksum: bytes, content: bytes):
+    """Return the object that `content` contains; raise UnpicklingError if its hash is not `checksum`."""
+    if checksum != sha256(content).digest():
+        raise pickle.UnpicklingError("the checksum does not match")
+    return pickle.loads(content)
+
+
+class ChecksummedFiles(IndexDataCacheFile):
+    """Index and data files of numba with a checksum; code with a changed bit may run and give wrong numbers."""
+
+    def _dump(self, obj) -> bytes:
+        return pickle.dumps(CheckedContent(super()._dump(obj)))
 
 
 class FaultTolerantCache(FunctionCache):
     """Numba's cache of a function, in which a file that cannot be read or written is no error."""
+
+    def __init__(self, py_func):
+        super().__init__(py_func)
+        self._cache_file.__class__ = ChecksummedFiles
 
     def load_overload(self, sig, target_context):
         """Load the code for these types; return None if there is none or its file is damaged.

@@ -49,6 +49,9 @@ AMPLITUDE_TOL = 1e-9
 # Largest velocity at a reversal that counts as zero, times the half
 # period and relative to the slide.
 REST_TOL = 1e-8
+# Largest condition number of the eigenvectors of modes; round-off of a motion is then below AMPLITUDE_TOL.
+MAX_CONDITION = 1e6
+CRITICAL_CHANGE = 1e-10  # relative change of the damping that separates the eigenvectors
 MAX_SECANT_STEPS = 12  # largest number of secant steps for the damping that balances an amplitude
 # Largest damping ratio of friction by den Hartog's balance; above it friction is at least 3 times
 # the elastic force at the reversal, so the interface sticks there.
@@ -178,11 +181,17 @@ class _ForcedFlow(NamedTuple):
 def _make_flow(modes: ModalBasis, row, force: float) -> _ForcedFlow:
     """Return the motion of modes under a force [N] on a row (n,)."""
     n = modes.omega.size
-    matrix = np.block(
-        [[np.zeros((n, n)), np.eye(n)], [-np.diag(modes.omega**2), -modes.damping_matrix]]
-    )
     rest = np.concatenate([row * force / (modes.mass * modes.omega**2), np.zeros(n)])
-    return _ForcedFlow(modes, np.asarray(row, float), *np.linalg.eig(matrix), rest)
+
+    # Both eigenvectors of a critically damped mode are equal; with a little more damping they differ.
+    for change in (0.0, CRITICAL_CHANGE):
+        damping = (1 + change) * modes.damping_matrix
+        matrix = np.block([[np.zeros((n, n)), np.eye(n)], [-np.diag(modes.omega**2), -damping]])
+        rates, vectors = np.linalg.eig(matrix)
+        scaled = vectors * np.concatenate([modes.omega, np.ones(n)])[:, None]
+        if np.linalg.cond(scaled) <= MAX_CONDITION:
+            break
+    return _ForcedFlow(modes, np.asarray(row, float), rates, vectors, rest)
 
 
 def _find_mode_relay_cycles(
