@@ -231,6 +231,20 @@ def test_refuses_removed_feature(tmp_path, name):
     assert len(sentence.strip().splitlines()) == 1
 
 
+@pytest.mark.parametrize("name", ["offset", "warm_up", "resume", "seed", "unstable"])
+def test_refuses_removed_option_of_fit_in_python(name):
+    """A removed option of a fit is no unknown key in Python: the message says what to use instead."""
+    with pytest.raises(pf.PatchfemError, match=f"^fit: {name} was removed in patchfem 1.10; "):
+        pf.fit(RIG, "loop.csv", free={"friction.static": (0.1, 0.6)}, **{name: 1})
+
+
+@pytest.mark.parametrize("name", ["segment", "window"])
+def test_refuses_removed_option_of_import_in_python(name):
+    """A removed option of an import is refused in Python with what to use instead."""
+    with pytest.raises(pf.PatchfemError, match=f"^import: {name} was removed in patchfem 1.10; "):
+        pf.import_("a.csv", "b.toml", **{name: "2 s"})
+
+
 def test_always_all_removed_features_are_tested():
     """Every removed option and key is among the tested features."""
     assert set(removed.REMOVED_NAMES) - {"files of Nastran"} <= set(TRIED)
