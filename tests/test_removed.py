@@ -69,10 +69,10 @@ def export_script(folder) -> None:
     pf.export(results, folder / "play.py")
 
 
-def read_responses(folder) -> None:
-    """Read the modes of a rig from a universal file of frequency responses."""
+def write_responses(folder) -> Path:
+    """Write a universal file with a frequency response, and return its path."""
     response = make_record([1.0, 2.0], [1j, 2j], 12, func_type=4, abscissa_spec_data_type=18)
-    universal.read_universal(write_universal(folder / "a.uff", [response]))
+    return write_universal(folder / "a.uff", [response])
 
 
 def read_modes_as_arrays(folder) -> None:
@@ -189,7 +189,14 @@ TRIED = {  # removed feature -> (function that uses it, replacement that the mes
         lambda folder: pf.backbone(write_rig(folder), method="decay"),
         'drive.kind = "free"',
     ),
-    "fit of responses": (read_responses, "write the modes of your modal analysis as dataset 55"),
+    "fit of responses": (
+        lambda folder: universal.read_universal(write_responses(folder)),
+        "write the modes of your modal analysis as dataset 55",
+    ),
+    "import of responses": (
+        lambda folder: pf.import_(write_responses(folder), folder / "modes.toml"),
+        "write the modes of your modal analysis as dataset 55",
+    ),
     "modes as arrays": (read_modes_as_arrays, "write M = m I, K = m diag(omega^2)"),
     "backbone --method all": (
         lambda folder: pf.backbone(write_rig(folder), method="all"),
