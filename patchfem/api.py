@@ -64,6 +64,7 @@ from .scene import assignments, starting
 from .scene.backbone_scene import BackboneTables
 from .scene.files import require_files
 from .scene.keys.quantities import parse_quantity
+from .scene.keys.removed import describe_removed
 from .scene.overrides import BaseScene
 from .scene.scene import Scene, SceneError, loads, remember_written
 from .scene.scene import load as load_file
@@ -820,6 +821,7 @@ def fit(
     names = {field.name for field in fields(FitOptions)}
     changes = {name: value for name, value in keywords.items() if name in names}
     sets = {key: value for key, value in keywords.items() if key not in names | {"to"}}
+    _refuse_removed("fit", sets)
     loaded = remember_written(load(scene, **sets), _count_written(scene))
     if not isinstance(free, Mapping | None):
         raise PatchfemError(
@@ -1094,6 +1096,7 @@ def import_(
     out = _require_path(out, "import_: out")
     names = imported.EstimateOptions._fields
     if unknown := set(how) - set(names):
+        _refuse_removed("import", unknown)
         raise PatchfemError(
             f"import_: {unknown.pop()}: unknown setting; use map, zero, {', '.join(sorted(names))}"
         )
@@ -1311,6 +1314,13 @@ def _require_strings(value: str | Iterable[str], name: str) -> tuple:
 def _print_to_stderr(line: str) -> None:
     """Print a line of text to the standard error stream."""
     print(line, file=sys.stderr, flush=True)
+
+
+def _refuse_removed(verb: str, names: Iterable[str]) -> None:
+    """Raise PatchfemError for the first name that was an option of a verb, with what to use instead."""
+    for name in names:
+        if removed := describe_removed(f"{verb} --{name.replace('_', '-')}", f"{verb}: {name}"):
+            raise PatchfemError(removed)
 
 
 def _reject_keys(sets: dict, kind: str) -> None:

@@ -69,10 +69,10 @@ def export_script(folder) -> None:
     pf.export(results, folder / "play.py")
 
 
-def read_responses(folder) -> None:
-    """Read the modes of a rig from a universal file of frequency responses."""
+def write_responses(folder) -> Path:
+    """Write a universal file with a frequency response, and return its path."""
     response = make_record([1.0, 2.0], [1j, 2j], 12, func_type=4, abscissa_spec_data_type=18)
-    universal.read_universal(write_universal(folder / "a.uff", [response]))
+    return write_universal(folder / "a.uff", [response])
 
 
 def read_modes_as_arrays(folder) -> None:
@@ -189,7 +189,14 @@ TRIED = {  # removed feature -> (function that uses it, replacement that the mes
         lambda folder: pf.backbone(write_rig(folder), method="decay"),
         'drive.kind = "free"',
     ),
-    "fit of responses": (read_responses, "write the modes of your modal analysis as dataset 55"),
+    "fit of responses": (
+        lambda folder: universal.read_universal(write_responses(folder)),
+        "write the modes of your modal analysis as dataset 55",
+    ),
+    "import of responses": (
+        lambda folder: pf.import_(write_responses(folder), folder / "modes.toml"),
+        "write the modes of your modal analysis as dataset 55",
+    ),
     "modes as arrays": (read_modes_as_arrays, "write M = m I, K = m diag(omega^2)"),
     "backbone --method all": (
         lambda folder: pf.backbone(write_rig(folder), method="all"),
@@ -229,6 +236,20 @@ def test_refuses_removed_feature(tmp_path, name):
     sentence = str(refused.value)
     assert re.search(r"removed in patchfem \d\.\d+\b", sentence) and instead in sentence
     assert len(sentence.strip().splitlines()) == 1
+
+
+@pytest.mark.parametrize("name", ["offset", "warm_up", "resume", "seed", "unstable"])
+def test_refuses_removed_option_of_fit_in_python(name):
+    """A removed option of a fit is no unknown key in Python: the message says what to use instead."""
+    with pytest.raises(pf.PatchfemError, match=f"^fit: {name} was removed in patchfem 1.10; "):
+        pf.fit(RIG, "loop.csv", free={"friction.static": (0.1, 0.6)}, **{name: 1})
+
+
+@pytest.mark.parametrize("name", ["segment", "window"])
+def test_refuses_removed_option_of_import_in_python(name):
+    """A removed option of an import is refused in Python with what to use instead."""
+    with pytest.raises(pf.PatchfemError, match=f"^import: {name} was removed in patchfem 1.10; "):
+        pf.import_("a.csv", "b.toml", **{name: "2 s"})
 
 
 def test_always_all_removed_features_are_tested():

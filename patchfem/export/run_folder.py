@@ -82,11 +82,11 @@ def run_into(
         except NotConverged as error:
             result = _partial_result(error)
         answer = write_results(result, folder.path)
-        fault = _draw_page(folder.path) if has_page else None
+        fault = draw_page(folder.path) if has_page else None
     return WrittenRun(answer, result, fault)
 
 
-def _draw_page(folder: Path) -> BaseException | None:
+def draw_page(folder: Path) -> BaseException | None:
     """Write the page of a run, and return what prevents it: the results of a long run are kept without their page."""
     try:
         page.write_page(folder)
@@ -178,11 +178,11 @@ def _write_face(result: Result, face: Face, folder: Path) -> list[str]:
 def save_run(result: Result, folder: Path) -> Answer:
     """Write the results folder of a finished run with its page; an older results folder is replaced.
 
-    What prevents the page is raised once the other results are in place.
+    What prevents the page is raised when the results are in place.
     """
     with Folder(folder) as claimed:
         answer = write_results(result, claimed.path)
-        fault = _draw_page(claimed.path)
+        fault = draw_page(claimed.path)
     if fault is not None:
         raise fault
     return answer

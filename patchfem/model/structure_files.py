@@ -3,6 +3,8 @@
 from pathlib import Path
 from typing import NamedTuple
 
+import numpy as np
+
 from ..core import ModalBasis, PatchfemError
 from ..scene.rules.structure import LOCATION_KEYS, UNIVERSAL_EXTENSIONS
 from ..structure import arrays, places, universal
@@ -86,14 +88,14 @@ def _build_modes(
     try:
         modes = arrays.build_basis(content, pairs, mass if is_forced else None, is_forced=is_forced)
         if needs_interface:
-            _require_slides(modes)
+            _require_slides(modes, content)
     except PatchfemError as error:
         raise PatchfemError(f"{path}: {error}", error.key) from None
     return FileModes(modes, [])
 
 
-def _require_slides(modes: ModalBasis) -> None:
-    """Raise PatchfemError unless every interface slides, and the patch moves along x alone."""
+def _require_slides(modes: ModalBasis, content: dict[str, np.ndarray]) -> None:
+    """Raise PatchfemError unless every interface slides, and the arrays of the file move the patch along x alone."""
     if not len(modes.interfaces):
         raise PatchfemError(
             "lacks `slide`, the motion at the patch; add `slide` to the file, or write "
@@ -104,7 +106,7 @@ def _require_slides(modes: ModalBasis) -> None:
             "`slide` of an interface is 0 in every mode, so nothing slides there; give the motion at the patch"
         )
     for key in PATCH_MOTIONS:
-        if getattr(modes, key) is not None:
+        if np.any(content.get(key, 0)):
             raise PatchfemError(
                 f"contains `{key}`, but the modes of such a file move the patch along x alone; list the modes in "
                 f"[[structure.mode]], which has the key {key}, or leave this array out"

@@ -68,7 +68,7 @@ def build_reduced_modes(scene) -> ReducedModes:
         modes, *other_modes = [reduced.build_basis(reduction, n, *arguments) for n in counts]
     max_modes = n_computed
     if not reduction.modes.is_complete:
-        max_modes = reduction.lowest.size - len(reduction.boundary)
+        max_modes = reduction.n_coordinates - len(reduction.boundary)
     notes = [*notes, _describe_reduction(reduction, modes, table)]
     return ReducedModes(modes, tuple(other_modes), notes, max_modes)
 

@@ -85,7 +85,7 @@ def describe_unknown_key(
         return UnknownKey(f"unknown key; leave out its quotes: {key}", "")
     is_table = _is_table(raw[key])
     subject = "unknown table" if is_table else "unknown key"
-    names = _list_tables_with_key(key) if table_key else []
+    names = _list_tables_with_key(key, table_key) if table_key else []
     owners = [_write_header(name) for name in names if name]
     wrong_table = ""
     if owners:
@@ -117,12 +117,23 @@ def _is_table(value: Any) -> bool:
     return isinstance(value, dict)
 
 
-def _list_tables_with_key(key: str) -> list[str]:
-    """Return the dotted names of the tables that have a key of this name, of the least depth at which one has it."""
+def _list_tables_with_key(key: str, table_key: str = "") -> list[str]:
+    """Return the dotted names of the tables that have a key of this name.
+
+    They are those of the least depth at which one has it, and those right inside the table `table_key`.
+    """
     tables = {"": Tables, **list_inner_tables(Tables)}
-    owners = [name for name, model in tables.items() if key in list_keys(model)]
-    least = min((bool(name) + name.count(".") for name in owners), default=0)
-    return [name for name in owners if bool(name) + name.count(".") == least]
+    depths = {
+        name: bool(name) + name.count(".")
+        for name, model in tables.items()
+        if key in list_keys(model)
+    }
+    least = min(depths.values(), default=0)
+    return [
+        name
+        for name, depth in depths.items()
+        if depth == least or (table_key and name.rpartition(".")[0] == table_key)
+    ]
 
 
 def _suggest_name(
@@ -143,7 +154,8 @@ def _suggest_name(
     path = f"{table_key}.".lstrip(".")
     is_set = f"{path}{key}" in sets
     written = {name for name in raw if not is_set or f"{path}{name}" in sets}
-    free = [name for name in list_keys(model) if name not in written]
+    keys = list_keys(model)
+    free = [name for name in keys if name not in written and keys[name].accepts_value]
     fitting = [name for name in free if _accepts_value(model, name, raw[key])]
     lacking = [name for name in _list_needed_keys(model, raw) if name in fitting]
     word = key.lower()
@@ -154,7 +166,7 @@ def _suggest_name(
             (name for name in fitting if words & set(name.split("_")) or name.startswith(word)),
             lacking if len(lacking) == 1 or not is_set else (),
             _list_similar(key, free),
-            _list_similar(key, written & list_keys(model).keys()),
+            _list_similar(key, written & keys.keys()),
         ),
         "",
     )

@@ -21,8 +21,8 @@ from ..scene.keys.removed import describe_removed
 from . import masses, matrices
 from .modes import PATCH_MOTIONS
 
-REMOVED_NAMES = ("omega", "frequency")  # arrays of a file of modes, which is no longer read
-ARRAY_NAMES = ("M", "K", "C", "slide", "base", "output", "force", *PATCH_MOTIONS, *REMOVED_NAMES)
+REMOVED_ARRAYS = ("omega", "frequency")  # arrays of a file of modes, which is no longer read
+ARRAY_NAMES = ("M", "K", "C", "slide", "base", "output", "force", *PATCH_MOTIONS, *REMOVED_ARRAYS)
 # Largest size of a number [bytes], that of a complex number of double precision
 MAX_NUMBER_BYTES = 16
 
@@ -151,7 +151,6 @@ def build_basis(
         output=output,
         base=data.get("base"),
         force=force,
-        **{name: data.get(name) for name in PATCH_MOTIONS},
     )
 
 
@@ -159,7 +158,7 @@ def _refuse_missing(data: dict[str, np.ndarray], missing_name: str) -> None:
     """Raise PatchfemError for an array that the file does not contain."""
     names = ", ".join(data) or "none that patchfem knows"
     removed = ""
-    if not data.keys().isdisjoint(REMOVED_NAMES):
+    if not data.keys().isdisjoint(REMOVED_ARRAYS):
         removed = f"; {describe_removed('modes as arrays', 'a file of modes as arrays')}"
     raise PatchfemError(f"lacks {missing_name}; the file contains {names}{removed}")
 

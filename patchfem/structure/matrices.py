@@ -43,7 +43,6 @@ def build_basis(
     names=None,
     spring_rows=None,
     damper_rows=None,
-    **rows,
 ) -> ModalBasis:
     """Compute the modal basis (modal mass 1 kg) of a rig from its matrices.
 
@@ -68,8 +67,6 @@ def build_basis(
         in the presence of stiff springs then keep all their digits.
     damper_rows : (d, n) array_like, optional
         The same for C.
-    **rows : (n,) array_like, optional
-        Rows that give the motions normal, pitch and yaw of the patch.
 
     Returns
     -------
@@ -114,9 +111,6 @@ def build_basis(
     else:
         base = np.ones(n) if base is None else _check_row(base, n, "base")
         participation = phi.T @ (M @ base)
-    patch_motions = {
-        key: _check_row(row, n, key) @ phi for key, row in rows.items() if row is not None
-    }
 
     slides = faces @ phi
     return make_basis(
@@ -130,7 +124,6 @@ def build_basis(
         damping=damping,
         faces=None if len(slides) == 1 else slides,
         shapes=phi,
-        **patch_motions,
     )
 
 

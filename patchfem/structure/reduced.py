@@ -72,7 +72,7 @@ class Reduction(NamedTuple):
     - boundary: motion (b, p) of the boundary coordinates in each shape.
     - base_load: V^T M r (p,) for a unit motion r of the base, None if the base stands still.
     - modes: frequencies of the modes, and their participation in the static shapes.
-    - lowest: lowest elastic mode (n,) of the structure, of unit modal mass.
+    - n_coordinates: number of coordinates of the structure.
     """
 
     stiffness: np.ndarray
@@ -81,7 +81,7 @@ class Reduction(NamedTuple):
     boundary: np.ndarray
     base_load: np.ndarray | None
     modes: ComputedModes
-    lowest: np.ndarray
+    n_coordinates: int
 
     def select_modes(self, n_modes: int) -> np.ndarray:
         """Return the linear combinations of the shapes that retain only the first modes.
@@ -163,7 +163,6 @@ def reduce_matrices(K, M, C, boundary, modes: int, method: str, moved=None) -> R
         stiffness[:n_modes] = 0.0
         stiffness[:, :n_modes] = 0.0
         np.fill_diagonal(stiffness[:n_modes, :n_modes], computed.omega**2)
-        squares, combinations = _compute_elastic_modes(stiffness, mass)
     return Reduction(
         stiffness=stiffness,
         mass=mass,
@@ -171,7 +170,7 @@ def reduce_matrices(K, M, C, boundary, modes: int, method: str, moved=None) -> R
         boundary=shapes[boundary],
         base_load=None if load is None else shapes.T @ load,
         modes=computed,
-        lowest=shapes @ combinations[:, 0] if squares.size else np.zeros(len(shapes)),
+        n_coordinates=len(shapes),
     )
 
 

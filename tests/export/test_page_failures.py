@@ -7,7 +7,7 @@ import xarray as xr
 from command_line import run_cli
 from scene_texts import BENCH
 
-from patchfem import run
+import patchfem as pf
 from patchfem.core import Missing
 from patchfem.export import page
 
@@ -63,14 +63,22 @@ def test_always_failing_page_leaves_results(scene_file, tmp_path, monkeypatch, f
         assert data.friction_force.size == data.time.size > 0
 
 
-def test_always_failing_page_leaves_saved_results(scene_file, tmp_path, monkeypatch):
-    """A finished run that is saved from Python keeps its results if the page cannot be drawn."""
+def test_always_failing_page_leaves_results_in_python(scene_file, tmp_path, monkeypatch):
+    """Results that Python saves, and those of the cases of a sweep, are complete if their pages cannot be written."""
 
     def fail(folder):
         """Fail in place of writing a page."""
         raise Missing("report.html: no space")
 
+    result = pf.run(scene_file)
     monkeypatch.setattr(page, "write_page", fail)
     with pytest.raises(Missing, match="no space"):
-        run(scene_file).save(tmp_path / "out")
-    assert {path.name for path in (tmp_path / "out").iterdir()} == RESULT_FILES
+        result.save(tmp_path / "out")
+    over = ("--over", "friction.static=0.2", "--keep", "pages")
+    assert run_cli("sweep", scene_file, *over, "-o", tmp_path / "sweep").code == 4
+    for summary in (
+        tmp_path / "out" / "summary.json",
+        *tmp_path.glob("sweep/cases/*/summary.json"),
+    ):
+        assert {path.name for path in summary.parent.iterdir()} == RESULT_FILES
+    assert len(list(tmp_path.glob("sweep/cases/*"))) == 1

@@ -59,7 +59,12 @@ def test_exact_setting_suggests_key_of_file(wrong, meant):
             "[[structure.spring]], [[structure.damper]] and [[structure.interface]] have a key of",
         ),
         ("drive.yaw=1 rad/m", "[[structure.mode]] has a key of this name"),
-        ("structure.law=coulomb", "[friction] has a key of this name"),
+        ("structure.damping=0.01", "unknown key; [[structure.mode]], "),
+        (
+            "structure.frequency=9 Hz",
+            "[normal], [slide], [[structure.mode]] and [drive] have a key of",
+        ),
+        ("structure.law=coulomb", "[friction] and [[structure.interface]] have a key of this name"),
         (
             "friction.tolerance=1e-3",
             "unknown key; [accuracy] has a key of this name; known here: law, static",

@@ -24,6 +24,7 @@ from .write import format_columns
 EXPORTED_NAMES = {"displacement": ("output_displacement", "relative_displacement", "slide")}
 # options that each form of a file uses
 USED = {"table": (), "decay": ("decay", "begin"), "modes": ("band", "decay", "begin")}
+FREQUENCY_RESPONSE_TYPE = 4  # function type of a frequency response in dataset 58
 # records [SI] by quantity
 Records = dict[str, np.ndarray]
 DECAY_UNITS = {"time": "s", "amplitude": "m", "frequency": "Hz", "damping": "1"}
@@ -78,10 +79,8 @@ def convert_file(
     form = _choose_form(out, settings, zero=zero)
     if form == "table":
         return _write_table(file, out, requests, zero)
-    if form == "modes" and _has_mode_shapes(file):
-        raise PatchfemError(
-            describe_removed("import of mode shapes", f"{file}: the import of mode shapes")
-        )
+    if form == "modes":
+        _refuse_modal_data(file)
 
     # decays and modes are estimated from records of known quantities
     values, notes = _read_records(file, requests)
@@ -213,12 +212,20 @@ def _read_records(file: Path, requests: Iterable[str]) -> tuple[Records, list[st
     return found.values, found.notes
 
 
-def _has_mode_shapes(file: Path) -> bool:
-    """Return whether a file is a universal file with mode shapes (dataset 55)."""
+def _refuse_modal_data(file: Path) -> None:
+    """Raise PatchfemError for a universal file of mode shapes (dataset 55), or of frequency responses alone."""
     if file.suffix.lower() not in laboratory.UNIVERSAL_EXTENSIONS:
-        return False
+        return
     datasets = universal_files.read_datasets(file)
-    return any(dataset["type"] == 55 for dataset in datasets)
+    if any(dataset["type"] == 55 for dataset in datasets):
+        raise PatchfemError(
+            describe_removed("import of mode shapes", f"{file}: the import of mode shapes")
+        )
+    functions = {int(dataset["func_type"]) for dataset in datasets if dataset["type"] == 58}
+    if functions == {FREQUENCY_RESPONSE_TYPE}:
+        raise PatchfemError(
+            describe_removed("fit of responses", f"{file}: the fit of modes to frequency responses")
+        )
 
 
 def _parse_quantity(text: str, kind: str, option: str) -> float | None:

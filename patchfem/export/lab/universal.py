@@ -1,4 +1,4 @@
-"""Histories, friction loops and frequency responses as a universal file: datasets 164 (SI) and binary datasets 58.
+"""Histories and friction loops as a universal file: datasets 164 (SI) and binary datasets 58.
 
 The datasets are binary and unevenly spaced, because only then are abscissa and value exact to the last bit. pyuff writes the
 file; it counts the bytes of a dataset without the abscissa, and this number is corrected.
@@ -16,13 +16,11 @@ from ...disk.atomic_write import write_atomically
 
 PROGRAM = f"patchfem {__version__}"
 # type codes of dataset 58 by the unit of a quantity; 1 (general) for other units
-TYPES = {"m": 8, "m s-1": 11, "m s-2": 12, "N": 13, "s": 17, "Hz": 18}
+TYPES = {"m": 8, "m s-1": 11, "m s-2": 12, "N": 13, "s": 17}
 LABELS = {"m s-1": "m/s", "m s-2": "m/s^2"}
 # function types of dataset 58
 LOOP = 0
 HISTORY = 1
-RESPONSE = 4
-COHERENCE = 6
 SI_UNITS = {
     "type": 164,
     "units_code": 1,
@@ -53,7 +51,7 @@ class Column(NamedTuple):
 
 
 def make_dataset(
-    name: str, function: int, x: Column, y: Column, **entries: str | int
+    name: str, function: int, x: Column, y: Column, title: str
 ) -> dict[str, str | int | np.ndarray]:
     """Return a dataset 58 of one column against another.
 
@@ -62,11 +60,11 @@ def make_dataset(
     name : str
         First line of identification.
     function : int
-        LOOP, HISTORY, RESPONSE or COHERENCE.
+        LOOP or HISTORY.
     x, y : Column
         Abscissa and ordinate.
-    **entries
-        Further entries of the dataset; pyuff has default values.
+    title : str
+        Fourth line of identification.
     """
     return {
         "type": 58,
@@ -74,6 +72,7 @@ def make_dataset(
         "func_type": function,
         "id1": name[:80],
         "id2": PROGRAM,
+        "id4": title,
         "rsp_node": y.number or 1,
         "rsp_dir": 1,
         "ref_node": 0,
@@ -85,7 +84,7 @@ def make_dataset(
         "ordinate_axis_units_lab": LABELS.get(y.unit, y.unit),
         "data": np.array(y.values),
         "x": np.array(x.values, float),
-    } | entries
+    }
 
 
 def write_histories(
@@ -126,7 +125,7 @@ def write_histories(
     if not curves:
         raise PatchfemError("there is neither time nor loop to write")
     line = "".join(letter if " " <= letter <= "~" else "?" for letter in title)[:80].strip()
-    write_datasets(path, [make_dataset(*curve, id4=line or "NONE") for curve in curves])
+    write_datasets(path, [make_dataset(*curve, line or "NONE") for curve in curves])
 
 
 def write_datasets(path: Path, datasets: list[dict]) -> None:

@@ -108,14 +108,14 @@ class Writer:
     def write_results(self, number: int, result) -> None:
         """Write the results folder of a case after its run."""
         # Only these sweeps need the modules that write the fields of a run.
-        from .. import page
         from ..folder import Folder as ResultsFolder
-        from ..run_folder import write_results
+        from ..run_folder import draw_page, write_results
 
         with ResultsFolder(self.target / CASES / case_folder_name(self.names[number])) as folder:
             write_results(result, folder.path, self._name_case(number))
-            if self.keep == "pages":
-                page.write_page(folder.path)
+            fault = draw_page(folder.path) if self.keep == "pages" else None
+        if fault is not None:
+            raise fault
 
     def put(self, numbers: Sequence[int], results: CaseResults, texts: Sequence[str]) -> None:
         """Write the summaries of cases, then their chunk.
