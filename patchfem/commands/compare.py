@@ -73,8 +73,8 @@ def compare(
 ):
     """Compare the surfaces measured in the files BEFORE and AFTER: worn depth, volume or area with intervals, a verdict
     and a page. With --pairs, each pair of a table is compared; pairs.csv and a page then have its depths and ratios with
-    their intervals. BEFORE and AFTER may also be results folders of two runs, the second one with [wear]. With --predicted, the worn
-    depth of a run is drawn over that of the traces, and the wear coefficient is fitted with its interval.
+    their intervals. BEFORE and AFTER may also be results folders of two runs, the second one with [wear]. With --predicted,
+    the worn depth of a run is drawn over that of the traces, and the wear coefficient is fitted with its interval.
 
     Example: patchfem compare before.csv after.csv --direction x -o out/worn
     """
