@@ -454,6 +454,9 @@ def _find_source(module: str) -> Path:
     return PACKAGE_FOLDER.joinpath(*module.split(".")).with_suffix(".py")
 
 
+_INSTANCES = {}  # `KernelModule` for each name that `instantiate` has made
+
+
 def instantiate(module: str, replacements: dict, report=None) -> KernelModule:
     """Write a kernel module in which other modules replace some of its imports.
 
@@ -490,7 +493,12 @@ def instantiate(module: str, replacements: dict, report=None) -> KernelModule:
         if count != 1:
             raise ValueError(f"patchfem.{module} imports its part {alias} {count} times, not once")
     imported = [other for other in replacements.values() if isinstance(other, KernelModule)]
-    return write_kernel_module(f"{module}_{hash_text(text)}", text, report, imported)
+
+    # Each new module would load its machine code (about 1 MB) again, in every run of a long sweep.
+    name = f"{module}_{hash_text(text)}"
+    if name not in _INSTANCES:
+        _INSTANCES[name] = write_kernel_module(name, text, report, imported)
+    return _INSTANCES[name]
 
 
 def hash_text(text: str) -> str:
