@@ -10,10 +10,11 @@ from ... import __version__
 from ...campaigns import compare as pressing
 from ...campaigns.compare import SurfaceRuns
 from ...core import PatchfemError
+from ...surface.areal import level
 from ...surface.compare import compare
 from ...surface.compare.compare import DEFAULTS, Options
 from ...surface.compare.records import Comparison, Track
-from ...surface.profile import level, resample_evenly
+from ...surface.profile import resample_evenly
 from ...surface.quantity import LEVEL, SIDE, Quantity
 from ...surface.spectrum import BAND
 from ..answer import Answer, Remarks, Variable

@@ -93,7 +93,6 @@ REASONS = {
     "noise": "the noise is as large as the roughness",
     "short_track": "the track, or the surface beside it, is too short for a standard cut-off",
     "scans": "only that of traces is compared",
-    "other_step": "the steps differ",
     "unresolved": "it is shorter than two steps, which do not resolve it",
     "not_falling": "the autocorrelation does not fall to 0.2 within half of each side",
     "no_limit": "even or wedge-shaped wear of any size looks like an offset or tilt of the datum",
