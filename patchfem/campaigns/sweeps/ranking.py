@@ -189,8 +189,8 @@ def _compute_surface_indices(surface) -> tuple[np.ndarray, np.ndarray]:
 def compute_quantiles(table: SweepTable) -> dict[str, np.ndarray]:
     """Return the quantiles of QUANTILE_LEVELS [SI] of each ranked measure over the random cases.
 
-    Measures of which fewer than 90 % of the cases have a
-    settled value have none, because the others may be the extreme ones.
+    Measures of which fewer than 90 % of the cases have a settled value have none, because the others may be the extreme
+    ones.
     """
     quantiles = {}
     settled = table.has_settled
