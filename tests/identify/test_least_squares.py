@@ -51,9 +51,7 @@ def test_exact_linear_fit_has_closed_form_intervals():
     assert fit.intervals.methods == ("linear",) * 3
     assert fit.at_bound == ("",) * 3
     assert fit.intervals.unknown.shape == (0, 3)
-    assert (
-        fit.outcome is Outcome.DONE and fit.descents.n_best == 3 and describe_fit(fit, "abc") == []
-    )
+    assert fit.outcome is Outcome.DONE and fit.n_best == 3 and describe_fit(fit, "abc") == []
 
 
 @given(st.integers(0, 10_000), st.floats(-3, 3), st.integers(-8, 8))
@@ -283,7 +281,7 @@ def test_exact_counts_contain_every_evaluation():
     first = problem.solve(4, "")
     second = replace(problem, start=first.values).solve(1).count_earlier_search(first)
     assert fit.counts.evaluations + second.counts.evaluations == len(calls)
-    assert second.descents.n_best == first.descents.n_best == 4
+    assert second.n_best == first.n_best == 4
     failures = fit.counts.failures + second.counts.failures
     assert failures == sum(values[0] > 4 for values in calls) > 0
     assert second.counts.reason == "too large"

@@ -104,17 +104,6 @@ def _choose_axis(table: SweepTable) -> int | None:
     return max(axes, key=lambda axis: table.shape[axis], default=None)
 
 
-def explain_missing_limits(table: SweepTable) -> str:
-    """Return why no limit is known of a key that can have one; "" without such a key, or without two settled cases."""
-    axis = _choose_axis(table)
-    if axis is None or np.count_nonzero(table.has_settled) < 2:
-        return ""
-    return (
-        f"No limit of {table.keys[axis].key} is known: no measure has a value that counts at the smallest value of this key "
-        "and at another one."
-    )
-
-
 def _find_limit_on_line(
     name: str,
     key: SweptKey,
