@@ -43,8 +43,6 @@ class KeyLimit(NamedTuple):
         Names of measure and key, and unit of the key.
     change : float
         Relative change at the limit; negative if the measure decreases.
-    total_change : float
-        Relative change up to the last case that counts.
     value : float
         The limit; NaN if no case is surely beyond it.
     low : float
@@ -59,7 +57,6 @@ class KeyLimit(NamedTuple):
     key: str
     unit: str
     change: float
-    total_change: float
     value: float
     low: float
     high: float
@@ -146,7 +143,6 @@ def _find_limit_on_line(
         key=key.key,
         unit=key.unit,
         change=largest,
-        total_change=float(change[-1]),
         value=np.nan,
         low=low,
         high=np.nan,
@@ -161,14 +157,13 @@ def _find_limit_on_line(
     change_at_limit = float(np.copysign(largest, change[beyond]))
     ends = np.array([change[inside], change[beyond], change_at_limit])
     positions = np.array([low, high])
-    is_logarithmic = key.is_logarithmic
-    if is_logarithmic:
+    if key.is_logarithmic:
         positions = np.log(positions)
         # A power law of the key is a straight line in logarithmic coordinates.
         ends = np.log1p(ends) if largest >= DOUBLING else ends
     fraction = (ends[2] - ends[0]) / (ends[1] - ends[0])
     value = positions[0] + fraction * (positions[1] - positions[0])
-    value = float(np.exp(value) if is_logarithmic else value)
+    value = float(np.exp(value) if key.is_logarithmic else value)
     return limit._replace(change=change_at_limit, value=value, high=high)
 
 
