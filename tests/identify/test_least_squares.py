@@ -246,22 +246,6 @@ def make_failing_residual(error):
     return residual
 
 
-@pytest.mark.slow
-def test_exact_decay_intervals_cover_values_in_95_percent():
-    """Of 2000 intervals of amplitude and rate of a decay, 95 % cover the true values.
-
-    The binomial fraction has a standard deviation of 0.005.
-    """
-    inside = 0
-    for seed in range(1000):
-        data = np.exp(-3 * LINE) + 0.15 * np.random.default_rng(seed).normal(size=40)
-        fit = Problem(
-            lambda v, data=data: v[0] * np.exp(-v[1] * LINE) - data, [0.01, 0.01], [30, 50]
-        ).solve()
-        inside += sum(a <= x <= b for (a, b), x in zip(fit.intervals.ends, (1.0, 3.0)))
-    assert 0.935 < inside / 2000 < 0.965
-
-
 def test_exact_counts_contain_every_evaluation():
     """The counts of a search contain its last descent and its failures, and those of an earlier search if asked.
 

@@ -148,6 +148,13 @@ def _format_cell(name: str, value) -> str:
     return f"{value:.6g}{unit}" if unit else str(value) or "(none)"
 
 
+def _number_values(values) -> np.ndarray:
+    """Return the number (n,) of each value in rising order; values within EQUAL_TOL have the same number."""
+    distinct, place = np.unique(values, return_inverse=True)
+    is_new = np.diff(distinct, prepend=-np.inf) > EQUAL_TOL * distinct
+    return np.cumsum(is_new)[place]
+
+
 def read_response_table(path: Path) -> Readings:
     """Read the readings from a CSV table of measured responses (`inputs.measured.read_table`).
 
@@ -180,8 +187,8 @@ def read_response_table(path: Path) -> Readings:
 
     # inputs that differ only by the round-off of a unit conversion are one condition
     inputs = np.array([(rows[k].frequency, rows[k].input) for k in row_numbers])
-    rounded = [[float(f"{number:.9g}") for number in row] for row in inputs]
-    _, first, condition = np.unique(rounded, axis=0, return_index=True, return_inverse=True)
+    numbers = np.transpose([_number_values(column) for column in inputs.T])
+    _, first, condition = np.unique(numbers, axis=0, return_index=True, return_inverse=True)
     return Readings(
         path=Path(path),
         rows=rows,
