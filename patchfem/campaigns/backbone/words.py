@@ -151,7 +151,7 @@ def describe_band_width(backbone: Backbone) -> str:
     for name in ("frequency", "damping"):
         value = getattr(curve, name)
         ends = np.array([getattr(band, f"{name}_low"), getattr(band, f"{name}_high")])
-        deviations[name] = np.abs(ends / value - 1).max(axis=0)
+        deviations[name] = np.abs(ends - value).max(axis=0) / np.maximum(np.abs(value), 1e-300)
     k = int(np.argmax(deviations["damping"]))
     low, high, best = (
         format_number(float(values[k]), 4)
