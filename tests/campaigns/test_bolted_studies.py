@@ -133,13 +133,6 @@ def test_exact_modes_given_beside_the_scene_keep_their_slide():
     assert free[1] == pytest.approx(free[0], rel=1e-12)
 
 
-def test_exact_joint_of_each_case_is_subtracted_if_asked():
-    """With measured_joint = "case" every load has the measured frequency while it sticks."""
-    text = (POINT + MODE + DRIVE).replace('"stuck"', '"stuck"\nmeasured_joint = "case"')
-    curves = pf.backbone(text, amplitudes="0.1 um", method="balance", **{"normal.load": "3.2 kN"})
-    assert curves.attrs["stuck_frequency"] == pytest.approx(212.0, rel=1e-9)
-
-
 def test_exact_fit_of_the_bolted_joint_finds_its_stiffness(tmp_path: Path):
     """A fit of a joint that was bolted in the modal test finds the bond length of synthetic data with
     measured_joint = "case"; with the joint of the scene as written it warns."""

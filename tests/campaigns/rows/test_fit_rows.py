@@ -167,18 +167,6 @@ def friction_rows(tmp_path_factory):
     return out
 
 
-def test_exact_friction_rig_is_recovered_from_its_rows(tmp_path, friction_rows):
-    """A fit recovers friction coefficient and stiffness of a rig from computed rows at three frequencies within 1e-5."""
-    found = fit_to_rows(
-        write_and_load(tmp_path, RUBS),
-        write_rows(tmp_path, friction_rows[1::2]),
-        read_free_keys(*RUBS_FREE),
-        starts=1,
-    )
-    assert found.keys.fit.values == pytest.approx([0.45, 2.4e6], rel=1e-5)
-    assert any("steady motions are computed" in text for text in found.keys.warnings)
-
-
 def test_always_held_out_rows_do_not_affect_fit(tmp_path):
     """Other values in rows held out or left out change neither the fit nor any of its starts."""
     scene = write_and_load(tmp_path, LINEAR)
@@ -215,6 +203,7 @@ def test_exact_fit_readings_equal_marched_rows(tmp_path, friction_rows):
     asked = ConditionModels(
         write_and_load(tmp_path, RUBS), cells.conditions, read_free_keys(*RUBS_FREE), path
     )
+    assert any("steady motions are computed" in text for text in asked.notes)
     computed = ModelReadings(asked)
     cold = np.array(computed([0.45, 2.4e6], range(6)))
     assert (

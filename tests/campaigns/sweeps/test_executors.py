@@ -118,16 +118,6 @@ def assert_only_killing_case_fails(tmp_path: Path, once: bool, executor) -> None
         assert results.outcome[number] == FAILED_OUTCOME and "died" in results.messages[number]
 
 
-def test_exact_chunk_size_follows_time_per_case():
-    """The size of a chunk follows the measured time per case."""
-    chunks = ChunkQueue(range(1000), 2)
-    assert len(chunks.take_chunk()) == 1
-    chunks.record_time([0], 0.02)
-    assert len(chunks.take_chunk()) == 50  # chunks of one second
-    chunks.record_time([0], 1e-6)
-    assert len(chunks.take_chunk()) == 238  # a quarter of the remaining cases for two workers
-
-
 def test_exact_cases_of_failed_chunk_are_repeated_alone():
     """The cases of a chunk with a failing case are repeated alone, and only the failing one is lost."""
     chunks = ChunkQueue(range(100), 1, 100)
