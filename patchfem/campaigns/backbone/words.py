@@ -158,8 +158,8 @@ def describe_band_width(backbone: Backbone) -> str:
         for values in (band.damping_low, band.damping_high, curve.damping)
     )
     return (
-        "Its band holds the numerical error and, where both methods have a value, their difference; it is widest at "
-        f"{format_length(curve.amplitude[k], 3)}, where the damping ratio is {low} to {high} beside {best}, and the "
+        "The band of this curve holds the numerical error and, where both methods have a value, their difference; it is "
+        f"widest at {format_length(curve.amplitude[k], 3)}, where the damping ratio is {low} to {high} beside {best}, and the "
         f"frequency is within {100 * deviations['frequency'].max():.2g} % everywhere."
     )
 
