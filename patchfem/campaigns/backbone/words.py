@@ -159,8 +159,8 @@ def describe_band_width(backbone: Backbone) -> str:
     )
     return (
         "The band of this curve holds the numerical error and, where both methods have a value, their difference; it is "
-        f"widest at {format_length(curve.amplitude[k], 3)}, where the damping ratio is {low} to {high} beside {best}, and the "
-        f"frequency is within {100 * deviations['frequency'].max():.2g} % everywhere."
+        f"widest at {format_length(curve.amplitude[k], 3)}, where the damping ratio is {low} to {high} beside {best}, and "
+        f"the frequency is within {100 * deviations['frequency'].max():.2g} % everywhere."
     )
 
 
