@@ -33,7 +33,6 @@ SHOWN_ELSEWHERE = (
     "worn_from_after",
     "worn_to_before",
     "worn_to_after",
-    "track_pile_up",
 )
 MIN_BAND_FRACTION = 0.01  # width of a band relative to the axis, below which the line hides it
 MATERIAL_RATIOS = np.linspace(0.0, 1.0, 201)
