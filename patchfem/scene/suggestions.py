@@ -141,7 +141,9 @@ def _suggest_name(
 ) -> str:
     """Return the key or table that was probably meant by an unknown one, or "" if none is similar."""
     if _is_table(raw[key]):
-        return _suggest_table(model, key, raw[key])
+        table = _suggest_table(model, key, raw[key])
+        # A second table of this name would be refused, unless both are items of an array.
+        return table if table not in raw or isinstance(raw[key], list) else ""
     if not table_key:
         # --set may name a key without its table; the key then belongs to a table that has a key of this name.
         owners = _list_tables_with_key(key)

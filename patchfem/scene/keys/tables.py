@@ -291,7 +291,7 @@ class Interface(Friction):
 
     between: key(
         MassPair,
-        "numbers of the two masses that rub, counted from 1; 0 is the base; the slide is the motion "
+        "numbers of the two masses that rub, counted from 1, and 0 for the base; the slide is the motion "
         "of the first mass minus the motion of the second",
     )
     load: optional(
