@@ -362,18 +362,3 @@ def test_always_generated_module_needs_no_file(code_folder):
         assert source.read_text() == text
     for name in ("with", "without"):
         sys.modules.pop(f"patchfem.compiled.{name}_file")
-
-
-@pytest.mark.usefixtures("code_folder")
-def test_exact_message_on_full_cache():
-    """The message on compilation says that code is compiled at every command if the cache has no room, else once."""
-    messages = []
-    with limit_file_size(1000):
-        compiled._report_once.__wrapped__(messages.append)
-    compiled._report_once.__wrapped__(messages.append)
-    if compiled.IS_JIT_DISABLED:
-        assert not messages
-    else:
-        assert "at every command" in messages[0]
-        assert "is the limit on the size" in messages[0]
-        assert "once" in messages[1]

@@ -73,7 +73,7 @@ def write_report(folders: list[Path], out: Path | None = None) -> Path:
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise explain_write_error(error, path, path) from None
+        raise explain_write_error(error, path) from None
     write_text(path, text)
     return path
 
