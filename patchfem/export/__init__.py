@@ -15,19 +15,18 @@ list that come before it:
 10. `page`: report.html, made from the other files
 11. `folder`: the results folder, complete at every moment
 12. `show`: an answer as lines on the screen
-13. `driven`: the drive of a run in words
-14. `run_data`: arrays of a run
-15. `run_words`: verdict of a run
-16. `runs`: answer of a run
-17. `run_folder`: a run that writes its folder
-18. `sweeps`: answer of a sweep, and its folder
-19. `surfaces`: answers on measured surfaces
-20. `costs`: answer on error against time
-21. `backbones`: answer on frequency and damping over the amplitude
-22. `fits`: answer of a fit
-23. `lab`: histories and loops in the formats of laboratories
-24. `pieces`: pictures and films of the pieces
-25. `convert`: a results folder in another format, chosen by the suffix of a file
+13. `run_data`: arrays of a run
+14. `run_words`: verdict of a run
+15. `runs`: answer of a run
+16. `run_folder`: a run that writes its folder
+17. `sweeps`: answer of a sweep, and its folder
+18. `surfaces`: answers on measured surfaces
+19. `costs`: answer on error against time
+20. `backbones`: answer on frequency and damping over the amplitude
+21. `fits`: answer of a fit
+22. `lab`: histories and loops in the formats of laboratories
+23. `pieces`: pictures and films of the pieces
+24. `convert`: a results folder in another format, chosen by the suffix of a file
 
 Read `answer` first.
 """

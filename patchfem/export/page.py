@@ -219,14 +219,13 @@ def _label_all(answers: Answers, get_sentences) -> list[str]:
 
 
 def _subtitle(answer: Answer) -> str:
-    """Return the line below the title: version, kind, drive, engine and time."""
+    """Return the line below the title: version, kind, outcome, engine and time."""
     details = answer.details
     engine = (details.get("numerics") or {}).get("engine", "") if answer.is_run else ""
     seconds = (details.get("seconds") or {}).get("total") if answer.is_run else None
     parts = (
         f"patchfem {answer.origin.get('patchfem', '')}".strip(),
         answer.kind,
-        answer.origin.get("driven", ""),
         answer.details.get("outcome", "") if answer.is_run else "",
         f"engine {engine}" if engine else "",
         f"computed in {seconds:.2f} s" if seconds is not None else "",

@@ -236,7 +236,8 @@ RUN = (
         "normal_stress",
         "area",
         span="contact",
-        caption="Normal stress at the end of the run, compression positive; only the part in contact.",
+        caption="Normal stress at the end of the run, compression positive; only the part in contact. The drawn values are "
+        "means over the elements beside a node; the measure pressure_peak is the maximum of the continuous pressure.",
     ),
     Chart(
         "Shear stress on the interface",
