@@ -1539,8 +1539,7 @@ class Result(run_result.Result):
         The blocks are `lower`, `upper` and `interface`; over strips a field has its mean there. The pieces
         have the arrays `displacement`, `stress` (xx, yy, zz, xy, 0, 0; tension positive), `von_mises` and `material`. The
         interface has `normal_stress` (compression positive), `gap` and, after a motion, `shear_stress`, `slip` and
-        `status`. Stresses are in MPa and lengths in m. The field array `units` of each grid lists the unit of each array,
-        and `TimeValue` is the time [s].
+        `status`, all in SI units. The field array `TimeValue` of each grid is the time [s].
 
         Parameters
         ----------
