@@ -71,7 +71,6 @@ class Folder:
         self.shown = target
         self.resume = resume
         self.dropped = ""
-        self.new_parents = [path for path in self.target.parents if not path.exists()]
         self.claim = FolderLock(self.target.parent / f".{self.target.name}{LOCK}", target, "run")
 
     def __enter__(self) -> "Folder":
@@ -125,16 +124,6 @@ class Folder:
                 ) from None
             finally:
                 self.claim.release()
-                if kind is not None:
-                    self._remove_new_parents()
-
-    def _remove_new_parents(self) -> None:
-        """Remove the parents that were made for the folder, unless they contain other files."""
-        for path in self.new_parents:
-            try:
-                path.rmdir()
-            except OSError:
-                return
 
     def _refuse_others(self) -> None:
         """Raise PatchfemError if the target, or its partial or old folder, contains other files."""

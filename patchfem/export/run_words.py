@@ -139,7 +139,7 @@ def _is_shown(measures: Quantities, name: str) -> bool:
 
 
 def _describe_interfaces(result: Result, measures: Quantities, text: str) -> list[str]:
-    """Return the dissipated energy of the interface, or of each of a few interfaces."""
+    """Return the dissipated energy of the interface, or of the first of several interfaces."""
     names = [
         name
         for name in measures
@@ -152,11 +152,8 @@ def _describe_interfaces(result: Result, measures: Quantities, text: str) -> lis
     if any(warning.startswith(OPEN_LOOP) for warning in result.warnings):
         text = "friction work of the last cycle {}"
     has_strips = any(name == "contact.strips" for name in result.plan.effects)
-    if len(names) == 1 or has_strips or len(names) > MAX_LISTED:
-        where = "" if len(names) == 1 or has_strips else f" at interface 1 of {len(names)}"
-        return [text.format(_format(names[0], measures)) + where]
-    values = [_format(name, measures) for name in names]
-    return [text.format(f"{', '.join(values[:-1])} and {values[-1]}") + " at the interfaces"]
+    where = "" if len(names) == 1 or has_strips else f" at interface 1 of {len(names)}"
+    return [text.format(_format(names[0], measures)) + where]
 
 
 def describe_outcome(result: Result, measures: Quantities, details: JsonObject) -> str:

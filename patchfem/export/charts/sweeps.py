@@ -1,4 +1,4 @@
-"""Charts of a sweep: panels of the styles `relative`, `menu`, `maps` and `shares`.
+"""Charts of a sweep: panels of the styles `relative`, `menu` and `maps`.
 
 They take answers of kind "sweep", from memory or from their folders.
 """
@@ -233,25 +233,8 @@ def make_map_menu(answers: Answers, chart: Chart) -> Panel | None:
     return _add_choices(chart, panels)
 
 
-def make_shares(answers: Answers, chart: Chart) -> Panel | None:
-    """Return bars of the shares of the variance with their intervals, with a menu of the measures."""
-    panels = []
-    ranking = next(iter(answers.values())).details.get("ranking", {})
-    for name, indices in ranking.items() if len(answers) == 1 else ():
-        # The first bar is at the bottom.
-        columns = {part: np.array([index[part] for index in indices[::-1]]) for part in indices[0]}
-        keys = columns.pop("key")
-        first, total, low, high = (100 * column for column in columns.values())
-        ends = (None, None) if (low == high).all() else (low, high)
-        curves = [Curve("with interactions", keys, total, *ends), Curve("alone", keys, first)]
-        axes = (Axis("share of the variance [%]"), Axis(""))
-        panels.append(Panel(name.replace("_", " "), "bars", *axes, curves))
-    return _add_choices(chart, panels)
-
-
 STYLES = {
     "relative": make_relative,
     "menu": make_menu,
     "maps": make_map_menu,
-    "shares": make_shares,
 }
