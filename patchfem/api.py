@@ -658,7 +658,7 @@ class SweepPlots:
     def sweep(dataset: Dataset, measure: str, ax: Axes | None = None) -> Axes:
         """Plot a measure of a sweep against the key with the most values, with error bars.
 
-        Hollow markers denote errors above the tolerance. An axis whose values span more than two decades is logarithmic.
+        Crosses mark cases that did not settle. An axis whose values span more than two decades is logarithmic.
 
         Parameters
         ----------

@@ -7,6 +7,7 @@ refused before a run starts.
 import os
 import re
 import shutil
+from contextlib import suppress
 from pathlib import Path
 
 from ..core import Missing, PatchfemError
@@ -71,6 +72,7 @@ class Folder:
         self.shown = target
         self.resume = resume
         self.dropped = ""
+        self.new_parents = [path for path in self.target.parents if not path.exists()]
         self.claim = FolderLock(self.target.parent / f".{self.target.name}{LOCK}", target, "run")
 
     def __enter__(self) -> "Folder":
@@ -124,6 +126,14 @@ class Folder:
                 ) from None
             finally:
                 self.claim.release()
+                if kind is not None:
+                    self._remove_new_parents()
+
+    def _remove_new_parents(self) -> None:
+        """Remove the parents that were made for the folder, unless they contain other files."""
+        with suppress(OSError):
+            for path in self.new_parents:
+                path.rmdir()
 
     def _refuse_others(self) -> None:
         """Raise PatchfemError if the target, or its partial or old folder, contains other files."""

@@ -17,8 +17,7 @@ PICTURE_ENDINGS = (".png", ".svg", ".pdf")
 # Number of charts of a picture, 1 for all other kinds of answers. A backbone needs frequency, damping and force.
 PICTURE_CHARTS = {"backbone": 3}
 
-# Marker and face of each symbol of a point; "" is the colour of the curve.
-MARKERS = {"circle": ("o", ""), "circle-open": ("o", "none"), "x": ("x", "")}
+MARKERS = {"circle": "o", "x": "x"}  # of the symbols of points
 # style of the pictures; two drawings of the same answer are equal files
 STYLE = {
     "svg.hashsalt": "patchfem",
@@ -79,12 +78,10 @@ def _draw_curve(curve: Curve, style: str, colour: str, axes) -> None:
 def _draw_points(curve: Curve, colour: str, axes) -> None:
     """Draw the points of a curve with their symbols."""
     symbols = np.full(curve.x.size, "circle") if curve.symbols is None else curve.symbols
-    # the first symbol has the entry of the legend, and is drawn above the others
-    for zorder, (symbol, (marker, face)) in zip((4, 3, 3), MARKERS.items()):
+    for symbol, marker in MARKERS.items():
         is_drawn = symbols == symbol
-        label = curve.name if symbol == "circle" else None
-        options = {"color": colour, "mfc": face or colour, "label": label, "zorder": zorder}
-        axes.plot(curve.x[is_drawn], curve.y[is_drawn], marker, **options)
+        label = curve.name if symbol == "circle" else None  # the entry of the legend
+        axes.plot(curve.x[is_drawn], curve.y[is_drawn], marker, color=colour, label=label, zorder=3)
 
 
 def _draw_map(panel: Panel, axes) -> None:

@@ -43,7 +43,7 @@ class Curve:
     is_line : bool
         Whether the curve is a line in a chart of points.
     symbols : (k,) ndarray of str or None
-        Symbols of the points: "circle", "circle-open" or "x".
+        Symbols of the points: "circle" or "x".
     """
 
     name: str

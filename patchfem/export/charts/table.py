@@ -297,7 +297,7 @@ SWEEP = (
         "",
         "",
         "menu",
-        caption="Bars show the numerical error. Hollow points miss the tolerance, crosses mark cases that did not settle.",
+        caption="Bars show the numerical error. Crosses mark cases that did not settle.",
     ),
     Chart("One measure over two keys", "", "", "maps", caption="White cells have no value."),
 )
