@@ -17,7 +17,7 @@ PICTURE_ENDINGS = (".png", ".svg", ".pdf")
 # Number of charts of a picture, 1 for all other kinds of answers. A backbone needs frequency, damping and force.
 PICTURE_CHARTS = {"backbone": 3}
 
-MARKERS = {"circle": "o", "x": "x"}  # of the symbols of points
+MARKERS = {"circle": "o", "x": "x"}  # markers of matplotlib for the symbols of points
 # style of the pictures; two drawings of the same answer are equal files
 STYLE = {
     "svg.hashsalt": "patchfem",

@@ -157,8 +157,8 @@ def _find_span(data: Variables, span: str, x_name: str) -> np.ndarray | None:
         size = pressure.values.shape[-1]
         loaded = np.flatnonzero((pressure.values.reshape(-1, size) > 0).any(axis=0))
         if loaded.size:
-            start, stop = loaded[0] - MARGIN_NODES, loaded[-1] + MARGIN_NODES + 1
-            return np.arange(max(start, 0), min(stop, size))
+            first = max(loaded[0] - MARGIN_NODES, 0)
+            return np.arange(first, min(loaded[-1] + MARGIN_NODES + 1, size))
     return None
 
 

@@ -3,7 +3,6 @@
 from pathlib import Path
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from .vtkhdf import Frames, read_frames
 
@@ -63,7 +62,7 @@ def stress_frames(path: Path) -> dict[str, np.ndarray]:
     -------
     dict
         `x` (61,) and `y` (60,) [m], y > 0 in the upper piece; `times` (f,) [s] of at most 30 frames;
-        `values` (f, 60, 61) [Pa] of the nearest cell, NaN outside the pieces.
+        `values` (f, 60, 61) [Pa] of the cell at each point, NaN outside the pieces.
 
     Raises
     ------
@@ -78,14 +77,17 @@ def stress_frames(path: Path) -> dict[str, np.ndarray]:
     x = np.linspace(left, right, columns)
     y = bottom + (top - bottom) * (np.arange(rows) + 0.5) / rows  # no row is on the interface
 
-    # a point has the stress of the cell with the nearest centre
-    grid = np.stack(np.meshgrid(x, y), axis=-1)
     values = np.full((numbers.size, rows, columns), np.nan)
     for side in ("lower", "upper"):
         block = frames.blocks[side]
-        low, high = block.points[:, :2].min(axis=0), block.points[:, :2].max(axis=0)
-        is_inside = ((grid >= low) & (grid <= high)).all(axis=-1)
-        centres = block.points[block.cells, :2].mean(axis=1)
-        nearest = cKDTree(centres).query(grid[is_inside])[1]
-        values[:, is_inside] = block.cell_data["von_mises"][numbers][:, nearest]
+        stress = block.cell_data["von_mises"][numbers]
+        corners = block.points[block.cells, :2]
+        # A cell gives its stress to the points of the grid in the rectangle around it.
+        first, last = (
+            np.stack([np.searchsorted(x, ends[:, 0], how), np.searchsorted(y, ends[:, 1], how)], 1)
+            for ends, how in ((corners.min(axis=1), "left"), (corners.max(axis=1), "right"))
+        )
+        for cell in np.flatnonzero((last > first).all(axis=1)):
+            across, down = map(slice, first[cell], last[cell])
+            values[:, down, across] = stress[:, cell, None, None]
     return {"x": x, "y": y, "times": frames.times[numbers], "values": values}
