@@ -38,7 +38,8 @@ class FolderLock:
         """Acquire the lock; raise Missing if another writer holds it, or if the file cannot be written."""
         try:
             while self.file < 0:
-                file = os.open(self.path, os.O_RDWR | os.O_CREAT | getattr(os, "O_NOFOLLOW", 0))
+                flags = os.O_RDWR | os.O_CREAT | getattr(os, "O_NOFOLLOW", 0)
+                file = os.open(self.path, flags, 0o644)
                 self._lock(file)
                 # the previous owner may have removed this file after it was opened
                 if _is_same_file(file, self.path):

@@ -1,7 +1,15 @@
 """Output of a verb: its answer, and the screen, files, pages and pictures that are made from it.
 
-In: results of `runs` and `campaigns`. Out: an `Answer`, files, and lines of text. A module imports only entries of this
-list that come before it:
+In: results of `runs` and `campaigns`. Out: an `Answer`, files, and lines of text.
+
+    Result -> runs (run_data: arrays, run_words: verdict) -> Answer
+    Answer -> show -> screen
+    Answer -> store (netcdf, columns) -> summary.json, NAME.json, result.nc, NAME.csv
+    these files -> store -> page (several; charts: table -> panels -> plotly) -> report.html
+    Answer -> charts: table -> panels -> axes -> --plot and `plot` in Python
+    Result -> fields: blocks -> vtkhdf -> fields.vtkhdf -> film of the page, pieces (view), grids (export)
+
+A module imports only entries of this list that come before it:
 
 1. `answer`: the record that every verb returns
 2. `surface_definitions`: definitions of the quantities of measured surfaces
