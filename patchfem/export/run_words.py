@@ -371,7 +371,8 @@ def describe_release(result: Result) -> tuple[str, str]:
         return "", ""
     amplitude = result.measures.get("relative_displacement_amplitude")
     error = getattr(amplitude, "error", None) or 0.0
-    motion = describe_rest(response.time, response.output, error)
+    last = getattr(amplitude, "value", None)
+    motion = describe_rest(response.time, response.output, error, last)
     start = format_length(float(response.output[0]), 3)
     sentence = f"Released at {start}, the output {motion}."
     return sentence, _describe_decay(result.extra.get("decay"))
@@ -392,7 +393,7 @@ def _describe_decay(decay) -> str:
     return f"It decays with {', with '.join(parts)}."
 
 
-def describe_rest(time, output, error: float = 0.0) -> str:
+def describe_rest(time, output, error: float = 0.0, last: float | None = None) -> str:
     """Describe where and when a released motion comes to rest, or how it moves at the end.
 
     Parameters
@@ -401,12 +402,15 @@ def describe_rest(time, output, error: float = 0.0) -> str:
         Stored samples with all reversals [s], [m].
     error : float
         Error of the amplitude [m]; an output that moves by no more is at rest.
+    last : float, optional
+        Amplitude of the last whole cycle [m]; by default that of the last tenth of the samples.
     """
     largest = np.abs(output).max()
     end = 0.0 if abs(output[-1]) < ZERO_FRACTION * largest else float(output[-1])
     rest_limit = max(error, REST_FRACTION * abs(end), ZERO_FRACTION * largest)
     last_tenth = time >= time[-1] - 0.1 * (time[-1] - time[0])
     amplitude = np.ptp(output[last_tenth]) / 2
+    amplitude = amplitude if last is None else min(last, amplitude)
     if amplitude > rest_limit:
         end_time = format_quantity(float(time[-1]), "s", 3)
         return f"still moves with an amplitude of {format_length(float(amplitude), 3)} after {end_time}"
