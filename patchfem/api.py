@@ -658,7 +658,7 @@ class SweepPlots:
     def sweep(dataset: Dataset, measure: str, ax: Axes | None = None) -> Axes:
         """Plot a measure of a sweep against the key with the most values, with error bars.
 
-        Hollow markers denote errors above the tolerance. An axis whose values span more than two decades is logarithmic.
+        Crosses mark cases that did not settle. An axis whose values span more than two decades is logarithmic.
 
         Parameters
         ----------
@@ -1539,8 +1539,7 @@ class Result(run_result.Result):
         The blocks are `lower`, `upper` and `interface`; over strips a field has its mean there. The pieces
         have the arrays `displacement`, `stress` (xx, yy, zz, xy, 0, 0; tension positive), `von_mises` and `material`. The
         interface has `normal_stress` (compression positive), `gap` and, after a motion, `shear_stress`, `slip` and
-        `status`. Stresses are in MPa and lengths in m. The field array `units` of each grid lists the unit of each array,
-        and `TimeValue` is the time [s].
+        `status`, all in SI units. The field array `TimeValue` of each grid is the time [s].
 
         Parameters
         ----------

@@ -51,7 +51,6 @@ class Effect(NamedTuple):
     - keys: required keys of a law or a waveform ("a|b" means one of two), and its optional keys.
     - supports: engines and features that support the law.
     - traits: traits of the law or the waveform.
-    - phrase: description of the waveform for the report page (see `Waveform`).
     """
 
     module: str
@@ -59,7 +58,6 @@ class Effect(NamedTuple):
     keys: tuple[str, str] = ("", "")
     supports: str = ""
     traits: str = ""
-    phrase: str = ""
 
 
 class Waveform(NamedTuple):
@@ -70,15 +68,11 @@ class Waveform(NamedTuple):
     - name: value of `drive.waveform`; "" for a release, which has no waveform.
     - keys: required and optional keys of the table [drive], each separated by blanks.
     - traits: words that set the properties below: "sine levels swept step random base-only endless".
-    - phrase: description of the drive for the report page. `{what}` is the driven quantity ("base acceleration"),
-      `{level}` its amplitude, `{place}` the driven mass; a key such as `{frequency}` is its value in the scene. "" for a
-      general description.
     """
 
     name: str = ""
     keys: tuple[str, str] = ("", "")
     traits: str = ""
-    phrase: str = ""
 
     def accepts_key(self, key: str) -> bool:
         """Return whether the waveform accepts a key of the table [drive]."""
@@ -149,7 +143,6 @@ def _make_waveform(
     equations: str,
     keys: tuple[str, str],
     traits: str = "",
-    phrase: str = "",
     module: str = "patchfem.structure.drives",
 ) -> Effect:
     """Return the effect of a waveform, which also accepts the keys `cycles` and `duration`."""
@@ -158,7 +151,7 @@ def _make_waveform(
         required = f"{required} cycles|duration".strip()
     else:
         optional = f"{optional} cycles|duration".strip()
-    return Effect(module, equations, (required, optional), traits=traits, phrase=phrase)
+    return Effect(module, equations, (required, optional), traits=traits)
 
 
 EFFECTS = {
@@ -298,38 +291,31 @@ EFFECTS = {
         "a(t) = a sin(2 pi f t)",
         (f"frequency {_DRIVE_SIZE_KEYS}", ""),
         "sine endless",
-        "{what} of {level} at {frequency}{place}",
         "patchfem.structure.drive_sizes",
     ),
     "drive.waveform=step": _make_waveform(
         "a(t) = a; or the base is displaced by X at t = 0: z(0) = -base X",
         (_DRIVE_SIZE_KEYS, ""),
         "step endless",
-        "a step of {level} in {what}{place}",
     ),
     "drive.waveform=sweep": _make_waveform(
         "a(t) = a sin(2 pi int f dt), f' or f'/f constant",
         (f"from to rate|log_rate {_DRIVE_SIZE_KEYS}", ""),
         "swept",
-        "{what} of {level} swept from {from} to {to}{place}",
     ),
     "drive.waveform=levels": _make_waveform(
         "a(t) = a_k sin(2 pi f t), level after level",
         ("frequency levels", "onset onset_length"),
         "levels endless",
-        "{count} levels of {what} from {first} to {last} at {frequency}{place}",
     ),
     "drive.waveform=file": _make_waveform(
         "a(t) is linear between the rows of a table",
         ("file", ""),
-        "",
-        "recorded {what} of {file}{place}",
     ),
     "drive.waveform=tones": _make_waveform(
         "a(t) = sum_k a_k sin(2 pi f_k t + phi_k)",
         ("frequencies accelerations", "phases"),
         "base-only endless",
-        "base acceleration of {accelerations} at {frequencies}",
         "patchfem.structure.tones",
     ),
     "drive.waveform=random": _make_waveform(
@@ -337,7 +323,6 @@ EFFECTS = {
         "G(f_k)/T",
         ("spectrum|file", "from to seed"),
         "random base-only endless",
-        "random {what} {density}, record {seed}",
         "patchfem.structure.noise",
     ),
     "structure.stiffening": Effect("patchfem.points.contacts", "F = k_3 x^3 at the output"),
@@ -422,7 +407,7 @@ GAP_SHAPES = {
 }
 WAVEFORMS = {
     name.removeprefix("drive.waveform="): Waveform(
-        name.removeprefix("drive.waveform="), effect.keys, effect.traits, effect.phrase
+        name.removeprefix("drive.waveform="), effect.keys, effect.traits
     )
     for name, effect in EFFECTS.items()
     if name.startswith("drive.waveform=")

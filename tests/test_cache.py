@@ -370,18 +370,3 @@ def test_always_instance_of_kernels_is_kept():
     first = compiled.instantiate("points.march_kernels", parts)
     assert compiled.instantiate("points.march_kernels", parts) is first
     assert compiled.instantiate("points.march_kernels", {}) is not first
-
-
-@pytest.mark.usefixtures("code_folder")
-def test_exact_message_on_full_cache():
-    """The message on compilation says that code is compiled at every command if the cache has no room, else once."""
-    messages = []
-    with limit_file_size(1000):
-        compiled._report_once.__wrapped__(messages.append)
-    compiled._report_once.__wrapped__(messages.append)
-    if compiled.IS_JIT_DISABLED:
-        assert not messages
-    else:
-        assert "at every command" in messages[0]
-        assert "is the limit on the size" in messages[0]
-        assert "once" in messages[1]

@@ -5,7 +5,6 @@ import shlex
 import sys
 from dataclasses import dataclass, replace
 from pathlib import Path
-from time import perf_counter
 from typing import Annotated, Literal
 
 from cyclopts import Parameter
@@ -147,7 +146,6 @@ def sweep(
             "sweep: --no-page and --keep pages contradict each other; use only one of them"
         )
 
-    start_time = perf_counter()
     by = by or WorkerOptions()
     part = by.part()
     output = output_options.make_output(f"{scene.stem}-sweep", is_verbose=verbose)
@@ -166,7 +164,7 @@ def sweep(
     if answer is None:
         _print_shard(by.shard, len(cases), output)
     else:
-        _print_sweep(answer, output, perf_counter() - start_time)
+        _print_sweep(answer, output)
 
 
 def _print_notes(sweep_scene, cases) -> None:
@@ -208,22 +206,10 @@ def _print_shard(shard: str, count: int, output: Output) -> None:
         )
 
 
-def _print_sweep(answer, output: Output, seconds: float) -> None:
+def _print_sweep(answer, output: Output) -> None:
     """Print the answer of a sweep; the exit code is 2 if all cases failed and 3 if some did or did not converge."""
-    cases = answer.details["cases"]
-    if output.as_json:
-        content = {
-            "cases": cases["count"],
-            "outcomes": cases["outcomes"],
-            "failed": cases["failed"],
-            "answer": answer.details["answer"],
-            "over_tolerance": cases["over_tolerance"],
-            "folder": str(output.target),
-            "seconds": round(seconds, 3),
-        }
-        print(json.dumps(content, ensure_ascii=False), flush=True)
-        output = output._replace(is_quiet=True, as_json=False)
     present(answer, output)
+    cases = answer.details["cases"]
     if cases["failed"] == cases["count"]:
         raise UsageError("sweep: no case could be run")
     if cases["failed"] or "not_converged" in cases["outcomes"]:

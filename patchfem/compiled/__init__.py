@@ -35,7 +35,6 @@ from threading import RLock
 from time import monotonic, sleep
 
 from ..disk import user_cache
-from ..disk.atomic_write import describe_space_shortage
 from ..disk.installed import find_package_version
 from . import cache_limit, machine, prebuilt
 
@@ -65,7 +64,6 @@ TUPLE_MODULES = (
 )
 # State of the environment variable that makes numba run all kernels as Python.
 IS_JIT_DISABLED = os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0")
-MIN_FREE_BYTES = 1 << 21  # disk space in bytes that the machine code of a run needs
 # Time to wait for another process that compiles [s]: ten times the longest compilation.
 MAX_LOCK_WAIT = 300.0
 # Time between two attempts to take the lock [s], short compared with a compilation.
@@ -610,7 +608,6 @@ def _report_once(report) -> None:
     if IS_JIT_DISABLED or _has_code_files():
         return
     reason = _choose_folder_once()[1]
-    reason = reason or describe_space_shortage(_set_cache_folder() / "code", MIN_FREE_BYTES)
     duration = "which takes 10 to 30 s and is needed only once"
     if reason:
         duration = (

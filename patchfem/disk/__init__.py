@@ -11,7 +11,6 @@ PUBLIC = {
     "atomic_write": (
         "RESUMABLE_FOLDERS",
         "WriteError",
-        "describe_space_shortage",
         "explain_mkdir_error",
         "explain_write_error",
         "is_partial_name",

@@ -1,6 +1,5 @@
-"""Replacement of a folder in one step, during which signals to the process are deferred."""
+"""Replacement of a folder, during which signals to the process are deferred."""
 
-import errno
 import os
 import shutil
 import signal
@@ -14,10 +13,6 @@ from .atomic_write import PLACED_PATHS
 END_SIGNALS = tuple(
     getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)
 )
-RENAME_EXCHANGE = 2  # flag of renameat2(2) on Linux that exchanges two paths
-AT_FDCWD = -100  # file descriptor for the working folder in renameat2(2)
-# Errors of a system or a disk that cannot exchange two folders.
-UNSUPPORTED_ERRNOS = (errno.EINVAL, errno.ENOSYS, errno.EOPNOTSUPP, errno.ENOTSUP)
 
 
 def make_old_folder_path(target: Path) -> Path:
@@ -30,19 +25,14 @@ def replace_folder(new: Path, target: Path) -> None:
     old = make_old_folder_path(target)
     with defer_signals():
         shutil.rmtree(old, ignore_errors=True)
-        if not target.exists():
-            os.rename(new, target)
-        elif exchange_folders(new, target):
-            os.rename(new, old)
-        else:
-            # For an instant, the folder does not exist; `restore_folder` recovers it if the process
-            # is killed then.
+        if target.exists():
+            # for an instant, the folder does not exist; if the process is killed then, `restore_folder` recovers it
             os.rename(target, old)
-            try:
-                os.rename(new, target)
-            except OSError:
-                os.rename(old, target)
-                raise
+        try:
+            os.rename(new, target)
+        except OSError:
+            restore_folder(target)
+            raise
         PLACED_PATHS.append(target)
         shutil.rmtree(old, ignore_errors=True)
 
@@ -55,23 +45,6 @@ def restore_folder(target: Path) -> None:
             shutil.rmtree(old, ignore_errors=True)
         else:
             os.rename(old, target)
-
-
-def exchange_folders(first: Path, second: Path) -> bool:
-    """Exchange two folders in one step; return False if the system cannot."""
-    import ctypes
-
-    try:
-        renameat2 = ctypes.CDLL(None, use_errno=True).renameat2
-    except (AttributeError, OSError, TypeError):
-        return False
-    paths = (os.fsencode(first), os.fsencode(second))
-    if renameat2(AT_FDCWD, paths[0], AT_FDCWD, paths[1], RENAME_EXCHANGE) == 0:
-        return True
-    number = ctypes.get_errno()
-    if number in UNSUPPORTED_ERRNOS:
-        return False
-    raise OSError(number, os.strerror(number), str(second))
 
 
 @contextmanager

@@ -1,7 +1,15 @@
 """Output of a verb: its answer, and the screen, files, pages and pictures that are made from it.
 
-In: results of `runs` and `campaigns`. Out: an `Answer`, files, and lines of text. A module imports only entries of this
-list that come before it:
+In: results of `runs` and `campaigns`. Out: an `Answer`, files, and lines of text.
+
+    Result -> runs (run_data: arrays, run_words: verdict) -> Answer
+    Answer -> show -> screen
+    Answer -> store (netcdf, columns) -> summary.json, NAME.json, result.nc, NAME.csv
+    these files -> store -> page (several; charts: table -> panels -> plotly) -> report.html
+    Answer -> charts: table -> panels -> axes -> --plot and `plot` in Python
+    Result -> fields: blocks -> vtkhdf -> fields.vtkhdf -> film of the page, pieces (view), grids (export)
+
+A module imports only entries of this list that come before it:
 
 1. `answer`: the record that every verb returns
 2. `surface_definitions`: definitions of the quantities of measured surfaces
@@ -15,19 +23,18 @@ list that come before it:
 10. `page`: report.html, made from the other files
 11. `folder`: the results folder, complete at every moment
 12. `show`: an answer as lines on the screen
-13. `driven`: the drive of a run in words
-14. `run_data`: arrays of a run
-15. `run_words`: verdict of a run
-16. `runs`: answer of a run
-17. `run_folder`: a run that writes its folder
-18. `sweeps`: answer of a sweep, and its folder
-19. `surfaces`: answers on measured surfaces
-20. `costs`: answer on error against time
-21. `backbones`: answer on frequency and damping over the amplitude
-22. `fits`: answer of a fit
-23. `lab`: histories and loops in the formats of laboratories
-24. `pieces`: pictures and films of the pieces
-25. `convert`: a results folder in another format, chosen by the suffix of a file
+13. `run_data`: arrays of a run
+14. `run_words`: verdict of a run
+15. `runs`: answer of a run
+16. `run_folder`: a run that writes its folder
+17. `sweeps`: answer of a sweep, and its folder
+18. `surfaces`: answers on measured surfaces
+19. `costs`: answer on error against time
+20. `backbones`: answer on frequency and damping over the amplitude
+21. `fits`: answer of a fit
+22. `lab`: histories and loops in the formats of laboratories
+23. `pieces`: pictures and films of the pieces
+24. `convert`: a results folder in another format, chosen by the suffix of a file
 
 Read `answer` first.
 """

@@ -190,7 +190,7 @@ class Answer:
         arrays become objects and lists, as in `to_plain`.
     origin : dict
         Where the answer comes from: `patchfem` (version), `scene` (text as written), `resolved` (scene with all defaults),
-        `command` (how to repeat it), `driven` (drive in words) and `versions` (package -> version), as far as they exist.
+        `command` (how to repeat it) and `versions` (package -> version), as far as they exist.
     """
 
     kind: str

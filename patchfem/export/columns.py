@@ -124,7 +124,7 @@ def _write_number(number: float | None) -> float | str:
 
 
 def list_rows(answer: Answer, source: str) -> list[Cells]:
-    """Return the rows of a table: a list or objects by name in the details, or the variables of a dimension.
+    """Return the rows of a table: a list, or objects or lists by name in the details, or the variables of a dimension.
 
     source: as in `Table`.
     """
@@ -132,7 +132,11 @@ def list_rows(answer: Answer, source: str) -> list[Cells]:
     for key in source.split("/"):
         content = content.get(key) if isinstance(content, dict) else None
     if isinstance(content, dict):
-        content = [{"name": name.replace("_", " "), **row} for name, row in content.items()]
+        content = [
+            {"name": name.replace("_", " "), **row}
+            for name, entry in content.items()
+            for row in (entry if isinstance(entry, list) else [entry])
+        ]
     if isinstance(content, list):
         # the quantities of an object may be in an object of their own
         rows = [row | row.get("measures", {}) for row in content]

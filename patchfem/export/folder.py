@@ -7,6 +7,7 @@ refused before a run starts.
 import os
 import re
 import shutil
+from contextlib import suppress
 from pathlib import Path
 
 from ..core import Missing, PatchfemError
@@ -130,11 +131,9 @@ class Folder:
 
     def _remove_new_parents(self) -> None:
         """Remove the parents that were made for the folder, unless they contain other files."""
-        for path in self.new_parents:
-            try:
+        with suppress(OSError):
+            for path in self.new_parents:
                 path.rmdir()
-            except OSError:
-                return
 
     def _refuse_others(self) -> None:
         """Raise PatchfemError if the target, or its partial or old folder, contains other files."""

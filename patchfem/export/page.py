@@ -21,21 +21,19 @@ from .charts import panels, plotly
 from .charts.table import CHARTS, TABLES, Column, parse_columns
 from .columns import Cells, list_rows, make_quantity
 
+# what a file beside a page is, by its name or its ending
 FILE_TEXTS = {
     "fields.vtkhdf": "fields of both pieces and their interface, frame by frame (ParaView 5.13 or newer)",
     "interfaces": "fields of every interface that has a patch of its own, in the same format",
-    "result.nc": "histories, curves and fields along the interface (xarray, MATLAB, ncdump)",
-    "backbone.nc": "curves (xarray, MATLAB, ncdump)",
-    "sweep.nc": "all cases (xarray, MATLAB, ncdump)",
-    "summary.json": "verdict, measures with their errors, warnings and notes, in SI units",
+    "summary.json": "verdict, quantities with their errors, warnings and notes, in SI units",
     "scene.resolved.toml": "the scene in SI units, with all default values",
     "scene.fitted.toml": "the scene with the fitted values, ready to run",
+    ".nc": "histories, curves and fields along the interface (xarray, MATLAB, ncdump)",
+    ".csv": "columns of a table or of a curve (spreadsheet)",
+    ".json": "all numbers of this answer, in SI units",
 }
-SURFACE_FILE_TEXTS = {"result.nc": "curves and maps (xarray, MATLAB, ncdump)"}
-WIDE_STYLES = ("relative", "menu", "maps", "film")  # styles of charts that take the whole width
-TALL_STYLES = ("relative", "menu", "maps", "shares", "film", "bars")
+WIDE_STYLES = ("relative", "menu", "maps", "film")  # charts of the whole width, which are taller
 COMPRESSION = 6  # level of the compression of the figures in a page
-MAX_LISTED_CASES = 25  # largest number of cases of a sweep that the page lists
 
 
 def write_page(folder: Path) -> Path:
@@ -73,7 +71,7 @@ def write_report(folders: list[Path], out: Path | None = None) -> Path:
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise explain_write_error(error, path, path) from None
+        raise explain_write_error(error, path) from None
     write_text(path, text)
     return path
 
@@ -89,7 +87,7 @@ def make_page(folders: list[Path]) -> str:
     if len(folders) == 1:
         figures += _draw_films(folders[0])
         _add_captions(figures, answers[""].details.get("captions", {}))
-        content |= _describe_answer(answers[""]) | {"files": _list_files(folders[0], answers[""])}
+        content |= _describe_answer(answers[""]) | {"files": _list_files(folders[0])}
     else:
         content |= _describe_several(answers)
 
@@ -128,8 +126,7 @@ def _draw_charts(answers: Answers) -> list[plotly.Figure]:
     """Return the figures of all charts for which the answers have data."""
     charts = CHARTS[next(iter(answers.values())).kind]
     return [
-        plotly.draw(panel)
-        | {"wide": panel.style in WIDE_STYLES, "tall": panel.style in TALL_STYLES}
+        plotly.draw(panel) | {"wide": panel.style in WIDE_STYLES}
         for panel in panels.make_panels(answers, charts)
     ]
 
@@ -179,7 +176,7 @@ def _describe_several(answers: Answers) -> JsonObject:
     return {
         "title": ", ".join(answers),
         "subtitle": f"{kind} · {len(answers)} results",
-        "verdict": headlines + several.compare_measures(answers),
+        "verdict": headlines,
         "heading": list(answers),
         "tables": several.list_scene_differences(answers),
     }
@@ -219,14 +216,13 @@ def _label_all(answers: Answers, get_sentences) -> list[str]:
 
 
 def _subtitle(answer: Answer) -> str:
-    """Return the line below the title: version, kind, drive, engine and time."""
+    """Return the line below the title: version, kind, outcome, engine and time."""
     details = answer.details
     engine = (details.get("numerics") or {}).get("engine", "") if answer.is_run else ""
     seconds = (details.get("seconds") or {}).get("total") if answer.is_run else None
     parts = (
         f"patchfem {answer.origin.get('patchfem', '')}".strip(),
         answer.kind,
-        answer.origin.get("driven", ""),
         answer.details.get("outcome", "") if answer.is_run else "",
         f"engine {engine}" if engine else "",
         f"computed in {seconds:.2f} s" if seconds is not None else "",
@@ -263,44 +259,19 @@ def _explain(name: str, answers: Answers) -> str:
 
 def make_tables(answer: Answer) -> list[several.Table]:
     """Return the tables of an answer that have rows: `title`, `headings` and `rows` of strings."""
-    tables = _list_cases(answer) if answer.kind == "sweep" else []
+    tables = []
     for table in TABLES.get(answer.kind, ()):
         rows = list_rows(answer, table.source)
-        columns = parse_columns(table.columns)
+        known = {name for row in rows for name in row}
+        columns = [one for one in parse_columns(table.columns) if one.name in known]
         tables.append(
-            _make_table(table.title, rows, [one for one in columns if _has_cells(rows, one.name)])
+            {
+                "title": table.title,
+                "headings": [column.heading.replace("_", " ") for column in columns],
+                "rows": [[_format_cell(row, column) for column in columns] for row in rows],
+            }
         )
     return [table for table in tables if table["rows"]]
-
-
-def _has_cells(rows: list[Cells], name: str) -> bool:
-    """Return whether a row of a table has a cell with this name."""
-    return any(name in row for row in rows)
-
-
-def _make_table(title: str, rows: list[Cells], columns: list[Column]) -> several.Table:
-    """Return a table as `title`, `headings` and `rows` of strings."""
-    return {
-        "title": title,
-        "headings": [column.heading.replace("_", " ") for column in columns],
-        "rows": [[_format_cell(row, column) for column in columns] for row in rows],
-    }
-
-
-def _list_cases(answer: Answer) -> list[several.Table]:
-    """Return a table of the main measures of each case, for a sweep of few cases over one key; else no table."""
-    dims = {variable.dims for variable in answer.data.values() if variable.dims}
-    key = next(iter(dims))[0] if len(dims) == 1 else ""
-    if key not in answer.data or answer.data[key].values.size > MAX_LISTED_CASES:
-        return []
-    rows = list_rows(answer, key)
-    known = [
-        name
-        for name in quantities.KEY
-        if any(name in row and row[name].value is not None for row in rows)
-    ]
-    names = [key, *known][: quantities.MAX_TILES]
-    return [_make_table("Cases", rows, [Column(name, name) for name in names])]
 
 
 def _format_cell(row: Cells, column: Column) -> str:
@@ -326,7 +297,7 @@ def _draw_films(folder: Path) -> list[plotly.Figure]:
     if not path.is_file():
         return []
     panel = make_stress_panel(path)
-    return [] if panel is None else [plotly.draw(panel) | {"wide": True, "tall": True}]
+    return [] if panel is None else [plotly.draw(panel) | {"wide": True}]
 
 
 def make_stress_panel(path: Path) -> panels.Panel | None:
@@ -339,22 +310,11 @@ def make_stress_panel(path: Path) -> panels.Panel | None:
     return panels.make_film(frames, "von Mises stress in both pieces", "Pa")
 
 
-def _list_files(folder: Path, answer: Answer) -> list[tuple[str, str]]:
+def _list_files(folder: Path) -> list[tuple[str, str]]:
     """Return name and description of the files beside the page of an answer."""
-    texts = FILE_TEXTS | (SURFACE_FILE_TEXTS if answer.kind in quantities.SURFACE_KINDS else {})
-    names = sorted(path.name for path in folder.iterdir() if not path.name.startswith("."))
-    csv_text = "columns of this curve (spreadsheet)"
-    known = [
-        (name, texts.get(name, csv_text))
-        for name in names
-        if name in texts or name.endswith(".csv")
-    ]
-    details = [
-        (name, "all numbers of this answer, in SI units")
-        for name in names
-        if name in store.DETAIL_FILES.values()
-    ]
-    return known + details
+    paths = sorted(path for path in folder.iterdir() if not path.name.startswith("."))
+    texts = {path.name: FILE_TEXTS.get(path.name) or FILE_TEXTS.get(path.suffix) for path in paths}
+    return [(name, text) for name, text in texts.items() if text]
 
 
 def _strip(figure: plotly.Figure) -> plotly.Figure:

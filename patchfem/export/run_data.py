@@ -184,13 +184,11 @@ VARIABLES = {
     "decay_amplitude": Row(
         "decay_time", "m", "half the peak-to-peak motion of the output", "extra.decay.amplitude"
     ),
-    "decay_frequency": Row("decay_time", "Hz", "frequency of the decay", "extra.decay.frequency"),
-    "decay_frequency_error": Row(
-        "decay_time", "Hz", "half-width of the interval", "extra.decay.frequency_error"
+    "decay_frequency": Row(
+        "decay_time", "Hz", "frequency of the decay", "extra.decay.frequency", has_error=True
     ),
-    "decay_damping": Row("decay_time", "1", "damping ratio of the decay", "extra.decay.damping"),
-    "decay_damping_error": Row(
-        "decay_time", "1", "half-width of the interval", "extra.decay.damping_error"
+    "decay_damping": Row(
+        "decay_time", "1", "damping ratio of the decay", "extra.decay.damping", has_error=True
     ),
     "frequency": Row("frequency", "Hz", "frequency", "extra.spectra.frequency"),
     "base_acceleration_spectrum": Row(

@@ -139,7 +139,7 @@ def _is_shown(measures: Quantities, name: str) -> bool:
 
 
 def _describe_interfaces(result: Result, measures: Quantities, text: str) -> list[str]:
-    """Return the dissipated energy of the interface, or of each of a few interfaces."""
+    """Return the dissipated energy of the interface, or of the first of several interfaces."""
     names = [
         name
         for name in measures
@@ -152,11 +152,8 @@ def _describe_interfaces(result: Result, measures: Quantities, text: str) -> lis
     if any(warning.startswith(OPEN_LOOP) for warning in result.warnings):
         text = "friction work of the last cycle {}"
     has_strips = any(name == "contact.strips" for name in result.plan.effects)
-    if len(names) == 1 or has_strips or len(names) > MAX_LISTED:
-        where = "" if len(names) == 1 or has_strips else f" at interface 1 of {len(names)}"
-        return [text.format(_format(names[0], measures)) + where]
-    values = [_format(name, measures) for name in names]
-    return [text.format(f"{', '.join(values[:-1])} and {values[-1]}") + " at the interfaces"]
+    where = "" if len(names) == 1 or has_strips else f" at interface 1 of {len(names)}"
+    return [text.format(_format(names[0], measures)) + where]
 
 
 def describe_outcome(result: Result, measures: Quantities, details: JsonObject) -> str:
@@ -325,65 +322,6 @@ def list_readings(result: Result) -> list[JsonObject]:
     return listed
 
 
-def make_captions(result: Result) -> dict[str, str]:
-    """Return sentences that are added to the captions of charts: {title of the chart: sentence}."""
-    captions = {
-        "Pressure on the interface": _explain_drawn_peak(result),
-        "Pressure while it wears": _describe_edge_peaks(result),
-        "Frequency response H1": _describe_gain_peak(result),
-    }
-    return {title: sentence for title, sentence in captions.items() if sentence}
-
-
-def _explain_drawn_peak(result: Result) -> str:
-    """Return why the largest pressure drawn for a static patch is not `pressure_peak`; "" if both are equal."""
-    peak = result.measures.get("pressure_peak")
-    if result.plan.kind != "patch" or peak is None or peak.value is None:
-        return ""
-    largest = format_quantity(float(np.max(result.fields["normal_stress"])), "Pa", 4)
-    estimate = format_quantity(peak.value, "Pa", 4)
-    if largest == estimate:
-        return ""
-    strips = " and over the strips" if result.patch.strips is not None else ""
-    return (
-        f"The drawn pressures are means over the elements beside a node{strips}, at most {largest}; the measure "
-        f"pressure_peak, {estimate}, is the estimated maximum of the continuous pressure."
-    )
-
-
-def _describe_edge_peaks(result: Result) -> str:
-    """Return after which cycles of wear the peak pressure lies at the edge of the contact."""
-    history = result.extra.get("wear", {})
-    above = np.asarray(history.get("pressure_peak_at_edge", ()))
-    if not (above > 0).any():
-        return ""
-    cycles = np.asarray(history["cycle"])[above > 0]
-    listed = ", ".join(format_number(float(cycle), 4) for cycle in cycles)
-    largest = format_quantity(float(above.max()), "Pa", 2)
-    return (
-        f"After {listed} cycles the peak pressure is that of a node at the edge of the contact, up to {largest} above "
-        "all pressures farther inside; it has an error of this size."
-    )
-
-
-def _describe_gain_peak(result: Result) -> str:
-    """Return the 95 % intervals of frequency and damping at the peak of H1 under a random drive."""
-    parts = []
-    for name, text in (
-        ("response_frequency", "the peak is at {}"),
-        ("response_damping", "its damping ratio is {}"),
-    ):
-        value = result.measures.get(name)
-        scatter = result.measures.get(name + SCATTER)
-        if value is None or scatter is None or None in (value.value, scatter.value):
-            return ""
-        low, high = max(value.value - scatter.value, 0.0), value.value + scatter.value
-        interval = Quantity(value.value, value.unit, None, low, high)
-        parts.append(text.format(quantities.format_quantity(name, interval)))
-    sentence = "; ".join(parts)
-    return f"{sentence[0].upper()}{sentence[1:]} (95 % interval over records of the random drive)."
-
-
 def describe_accuracy(result: Result, measures: Quantities) -> str:
     """Return a sentence that all errors are within the tolerance, with the largest; "" if a warning says more."""
     tolerance = result.plan.model.accuracy.tolerance
@@ -427,15 +365,17 @@ def _is_release(result: Result) -> bool:
 
 
 def describe_release(result: Result) -> tuple[str, str]:
-    """Return two sentences on a released output: first swing and rest, and its decay; "" for what does not exist."""
+    """Return two sentences on a released output: where it comes to rest, and its decay; "" for what does not exist."""
     response = result.response
     if not _is_release(result) or response is None or response.time.size < 2:
         return "", ""
     amplitude = result.measures.get("relative_displacement_amplitude")
     error = getattr(amplitude, "error", None) or 0.0
     last = getattr(amplitude, "value", None)
-    motion = describe_swing(response.time, response.output, error, last)
-    return f"{motion[0].upper()}{motion[1:]}.", _describe_decay(result.extra.get("decay"))
+    motion = describe_rest(response.time, response.output, error, last)
+    start = format_length(float(response.output[0]), 3)
+    sentence = f"Released at {start}, the output {motion}."
+    return sentence, _describe_decay(result.extra.get("decay"))
 
 
 def _describe_decay(decay) -> str:
@@ -453,8 +393,8 @@ def _describe_decay(decay) -> str:
     return f"It decays with {', with '.join(parts)}."
 
 
-def describe_swing(time, output, error: float = 0.0, amplitude: float | None = None) -> str:
-    """Describe a released motion: start, first swing, number of reversals, and where and when it comes to rest.
+def describe_rest(time, output, error: float = 0.0, last: float | None = None) -> str:
+    """Describe where and when a released motion comes to rest, or how it moves at the end.
 
     Parameters
     ----------
@@ -462,37 +402,22 @@ def describe_swing(time, output, error: float = 0.0, amplitude: float | None = N
         Stored samples with all reversals [s], [m].
     error : float
         Error of the amplitude [m]; an output that moves by no more is at rest.
-    amplitude : float, optional
+    last : float, optional
         Amplitude of the last whole cycle [m]; by default that of the last tenth of the samples.
     """
     largest = np.abs(output).max()
     end = 0.0 if abs(output[-1]) < ZERO_FRACTION * largest else float(output[-1])
-    distance = np.abs(output - end)
-    start_text = f"released at {format_length(float(output[0]), 3)}, the output"
-    if not np.isfinite(distance).all() or not distance.max() > 0:
-        return f"{start_text} does not move"
-
-    # reversals beyond the distance at which the output counts as being at rest
     rest_limit = max(error, REST_FRACTION * abs(end), ZERO_FRACTION * largest)
-    steps = np.diff(output)
-    moving = np.flatnonzero(np.abs(steps) > 1e-13 * largest)
-    reversals = 1 + moving[:-1][np.diff(np.sign(steps[moving])) != 0]
-    reversals = reversals[distance[reversals] > rest_limit]
-    goal = f"goes to {format_length(end, 3)}"
-    if reversals.size:
-        goal = f"first swings to {format_length(float(output[reversals[0]]), 3)}"
-
     last_tenth = time >= time[-1] - 0.1 * (time[-1] - time[0])
-    last = np.ptp(output[last_tenth]) / 2
-    last = last if amplitude is None else min(last, amplitude)
-    if last > rest_limit:
+    amplitude = np.ptp(output[last_tenth]) / 2
+    amplitude = amplitude if last is None else min(last, amplitude)
+    if amplitude > rest_limit:
         end_time = format_quantity(float(time[-1]), "s", 3)
-        size = format_length(float(last), 3)
-        return f"{start_text} {goal} and after {end_time} still moves with an amplitude of {size}"
+        return f"still moves with an amplitude of {format_length(float(amplitude), 3)} after {end_time}"
 
     # it rests from the sample after the last one that is far from the end
-    far = np.flatnonzero(distance > rest_limit)
-    rest = min(int(far[-1]) if far.size else 0, time.size - 2)
-    rest_time = format_quantity(float(time[rest + 1]), "s", 3)
-    count = f", reverses {reversals.size} times" if reversals.size else ""
-    return f"{start_text} {goal}{count} and rests at {format_length(end, 3)} after {rest_time}"
+    far = np.flatnonzero(np.abs(output - end) > rest_limit)
+    if not far.size:
+        return "does not move"
+    rest = format_quantity(float(time[min(far[-1] + 1, time.size - 1)]), "s", 3)
+    return f"rests at {format_length(end, 3)} after {rest}"

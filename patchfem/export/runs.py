@@ -5,6 +5,7 @@ import shlex
 import sys
 import tomllib
 from pathlib import Path
+from textwrap import shorten
 
 from .. import __version__
 from ..core import Measure, Outcome
@@ -14,9 +15,8 @@ from ..runs.patch import values
 from ..runs.results.result import Result, collect_used_settings, engine_by_measure
 from ..runs.rig import plan as rig_plan
 from .answer import Answer, JsonObject, Quantities, Quantity, Remarks
-from .driven import describe_drive, format_changed_keys
 from .run_data import collect_data
-from .run_words import list_readings, make_captions, make_verdict
+from .run_words import list_readings, make_verdict
 
 # ratio of a stiffness to its error above which the loss factor is computed
 MIN_STIFFNESS_ERRORS = 10.0
@@ -29,7 +29,7 @@ def make_answer(result: Result) -> Answer:
     source = run_plan.model.source
     measures = make_quantities(result.measures)
     details = make_details(result)
-    changed = format_changed_keys(source.sets)
+    changed = _format_changed_keys(source.sets)
     title = f"{source.title}; changed: {changed}" if source.title and changed else source.title
     return Answer(
         kind=run_plan.kind,
@@ -41,6 +41,12 @@ def make_answer(result: Result) -> Answer:
         details=details,
         origin=make_origin(source, "run"),
     )
+
+
+def _format_changed_keys(sets: tuple[str, ...]) -> str:
+    """Return the scene keys that options --set have changed, such as "load = 4 kN"; at most 160 characters."""
+    pairs = (assignment.partition("=") for assignment in sets)
+    return shorten(", ".join(f"{key} = {value}" for key, _, value in pairs), 160)
 
 
 def make_quantities(measures: dict[str, Measure]) -> Quantities:
@@ -68,15 +74,13 @@ def make_origin(source, verb: str) -> JsonObject:
     Returns
     -------
     dict
-        Keys `patchfem`, `scene`, `resolved`, `command`, `driven` and `versions`, all without the folder of the scene.
+        Keys `patchfem`, `scene`, `resolved`, `command` and `versions`, all without the folder of the scene.
     """
     return {
         "patchfem": __version__,
         "scene": source.text,
         "resolved": source.resolved,
         "command": make_command(verb, source.path, source.sets),
-        # other verbs ignore or vary the drive of the scene
-        "driven": describe_drive(tomllib.loads(source.resolved)) if verb == "run" else "",
         "versions": list_versions(),
     }
 
@@ -123,7 +127,6 @@ def make_details(result: Result) -> JsonObject:
         "run_away": _find_run_away(result),
         "loop": _find_loss_factor(result),
         "measured": list_readings(result),
-        "captions": make_captions(result),
     }
     return details | {name: value for name, value in optional.items() if value}
 

@@ -1,4 +1,4 @@
-"""Comparison of several answers of the same kind: what differs in their scenes and in their measures."""
+"""Comparison of several answers of the same kind: what differs in their scenes, and by how much each measure differs."""
 
 import tomllib
 from textwrap import shorten
@@ -6,9 +6,8 @@ from typing import Any
 
 from ..formatting import format_number
 from .answer import Answers, Quantity
-from .quantities import KEY, format_quantity
+from .quantities import format_quantity
 
-MAX_COMPARED_MEASURES = 5  # largest number of measures that are compared in words
 MIN_FACTOR = 10.0  # smallest ratio to the first value that is written as a factor
 # value in a scene file
 TomlValue = str | float | list[Any] | dict[str, Any]
@@ -54,33 +53,6 @@ def format_entry(name: str, quantity: Quantity | None, first: Quantity | None) -
         return f"{text} (x {format_number(factor, 2)})"
     change = (quantity.value - first.value) / abs(first.value)
     return f"{text} ({100 * change:+.{1 if abs(change) > 0.01 else 2}f} %)"
-
-
-def compare_measures(answers: Answers) -> list[str]:
-    """Return a sentence for each of at most five measures that differ by more than their errors, key measures first."""
-    first_name, *others = answers
-    first = answers[first_name].quantities
-    changed = [
-        name
-        for name in dict.fromkeys([*KEY, *first])
-        if any(differs(answers[other].quantities.get(name), first.get(name)) for other in others)
-    ]
-    if not changed:
-        return ["No measure differs by more than its error."]
-
-    sentences = []
-    for name in changed[:MAX_COMPARED_MEASURES]:
-        parts = []
-        for label, answer in answers.items():
-            text = format_entry(name, answer.quantities.get(name), first[name])
-            if text:  # the answer has this measure
-                parts.append(f"{text} in {label}")
-        sentences.append(f"{name[0].upper()}{name[1:].replace('_', ' ')}: {', '.join(parts)}.")
-    if len(changed) > MAX_COMPARED_MEASURES:
-        sentences.append(
-            f"{len(changed) - MAX_COMPARED_MEASURES} more measures differ; see the table."
-        )
-    return sentences
 
 
 def list_scene_differences(answers: Answers) -> list[Table]:

@@ -88,7 +88,6 @@ PUBLIC = {
     ),
     "rig.engines": (
         "ENGINES",
-        "collect_motion_features",
         "find_obstacle_of_map",
     ),
     "rig.numerics": ("choose_numerics",),

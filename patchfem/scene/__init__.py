@@ -74,7 +74,6 @@ PUBLIC = {
     ),
     "rules.methods": (
         "ENGINE_SUPPORT",
-        "EngineSupport",
         "Joint",
         "MotionFeatures",
         "find_unsupported_feature",

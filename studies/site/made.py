@@ -23,7 +23,7 @@ from reference import limits as limits_page
 from reference import tried
 
 import patchfem as pf
-from patchfem.commands.sources import SOURCES
+from patchfem.commands.sources import read_sources
 from patchfem.effects import EFFECTS, LAWS
 from patchfem.formatting import format_value
 from patchfem.response.rows import ROWS as MOTION
@@ -337,7 +337,7 @@ def refusing_sentences(name: str, other: str) -> list:
 
 def source(name: str) -> list:
     """Return the papers on which an effect is based."""
-    found = [entry for effects, (_, _, entry) in SOURCES if name in effects]
+    found = [one.fields for one in read_sources() if name in one.effects]
     return (
         [
             "## Source",

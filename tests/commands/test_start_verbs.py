@@ -14,7 +14,7 @@ import patchfem as pf
 from patchfem import load
 from patchfem.__main__ import app, register_verbs
 from patchfem.commands import examine
-from patchfem.commands.sources import SOURCES, bibtex
+from patchfem.commands.sources import bibtex, read_sources
 from patchfem.effects import EFFECTS
 from patchfem.scene import NEXT_VERBS, read_template
 
@@ -102,10 +102,12 @@ def test_exact_cite_lists_sources_of_effects(tmp_path):
     assert {"hueber2005", "archard1953"} <= set(
         keys(bibtex(load(read_template("wear")).effect_names()))
     )
-    assert {name for names, _ in SOURCES for name in names} <= set(EFFECTS)
-    for _, (_, key, fields) in SOURCES:  # A key is made of the first author's surname and the year.
+    of_effects = [source for source in read_sources() if source.effects]
+    assert len(of_effects) == 11
+    for text, fields, effects in of_effects:  # a key is the first author's surname and the year
         surname = re.sub(r"[^a-z ,]", "", fields["author"].lower()).replace(",", " ").split()[0]
-        assert key == surname + fields["year"]
+        assert keys(text) == [surname + fields["year"]] and set(effects) <= set(EFFECTS)
+        assert {"title", "journal", "volume", "pages"} <= fields.keys()
 
 
 @pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])

@@ -129,20 +129,30 @@ def remove_dataset(folder) -> None:
         file["time"] = h5py.SoftLink("/time")
 
 
-DAMAGES = {
-    "cut summary": cut_summary,
-    "wrong measure": change_summary(measures={"loop_area": {"value": "a"}}),
-    "huge number": change_summary(measures={"loop_area": {"value": [], "unit": "J"}}),
-    "unknown kind": change_summary(kind="b"),
-    "no verdict": change_summary(verdict=None),
-    "number in verdict": change_summary(verdict=[1]),
-    "byte in summary": break_text,
-    "cut netCDF": cut_netcdf,
-    "text as netCDF": lambda folder: (folder / "result.nc").write_text("a", "utf-8"),
-    "ring in netCDF": remove_dataset,
-    "no summary": lambda folder: (folder / "summary.json").unlink(),
-    "summary of 1.1": lambda folder: (folder / "summary.json").write_text(
-        '{"kind": "rig"}', "utf-8"
+DAMAGES = {  # damage, and part of the message on it
+    "cut summary": (cut_summary, "Invalid JSON"),
+    "wrong measure": (
+        change_summary(measures={"loop_area": {"value": "a"}}),
+        "measures.loop_area.value",
+    ),
+    "huge number": (
+        change_summary(measures={"loop_area": {"value": [], "unit": "J"}}),
+        "measures.loop_area.value: Input should be a valid number",
+    ),
+    "unknown kind": (change_summary(kind="b"), "kind: Input should be 'patch'"),
+    "no verdict": (change_summary(verdict=None), "verdict"),
+    "number in verdict": (
+        change_summary(verdict=[1]),
+        "verdict.0: Input should be a valid string",
+    ),
+    "byte in summary": (break_text, "Invalid JSON"),
+    "cut netCDF": (cut_netcdf, "damaged"),
+    "text as netCDF": (lambda folder: (folder / "result.nc").write_text("a", "utf-8"), "damaged"),
+    "ring in netCDF": (remove_dataset, "damaged"),
+    "no summary": (lambda folder: (folder / "summary.json").unlink(), "it has no summary.json"),
+    "summary of 1.1": (
+        lambda folder: (folder / "summary.json").write_text('{"kind": "rig"}', "utf-8"),
+        "patchfem before 2.0 wrote it",
     ),
 }
 
@@ -158,11 +168,12 @@ def bench_results(tmp_path_factory):
 
 @pytest.mark.parametrize("damage", DAMAGES)
 def test_refuses_damaged_folder(bench_results, tmp_path, damage):
-    """A damaged folder is refused by every verb that reads it, with code 2 and one sentence that names the folder."""
+    """A damaged folder is refused by every verb that reads it, with code 2 and one sentence that says what is wrong."""
     folder = tmp_path / "out"
     shutil.copytree(bench_results, folder)
-    DAMAGES[damage](folder)
-    with pytest.raises(PatchfemError):
+    harm, reason = DAMAGES[damage]
+    harm(folder)
+    with pytest.raises(PatchfemError, match=reason):
         store.read(folder)
     for command in (("report", folder), ("export", folder, "-o", tmp_path / "h.csv")):
         answer = run_cli(*command)
@@ -184,20 +195,3 @@ def test_exact_codes_of_many_texts_are_read_back(tmp_path, count, kind):
     with xr.open_dataset(tmp_path / "result.nc", engine="h5netcdf") as dataset:
         if count:  # CF conventions: the flags have the type of their variable
             assert dataset["drive"].attrs["flag_values"].dtype == dataset["drive"].dtype == kind
-
-
-@pytest.mark.parametrize(
-    "damage, reason",
-    [
-        ("byte in summary", "Invalid JSON"),
-        ("number in verdict", "verdict.0: Input should be a valid string"),
-        ("huge number", "measures.loop_area.value: Input should be a valid number"),
-        ("summary of 1.1", "patchfem before 2.0 wrote it"),
-    ],
-)
-def test_refusal_of_summary_says_what_is_wrong(bench_results, tmp_path, damage, reason):
-    """The message on a damaged summary names the entry or the byte; only one without a verdict is called an old one."""
-    folder = shutil.copytree(bench_results, tmp_path / "out")
-    DAMAGES[damage](folder)
-    with pytest.raises(PatchfemError, match=reason):
-        store.read_summary(folder)

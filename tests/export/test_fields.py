@@ -43,7 +43,7 @@ def assert_block_equal(grid, block, number: int) -> None:
         grid.cell_connectivity, np.concatenate([c[:n] for c, n in zip(block.cells, sizes)])
     )
     for data, written in ((grid.point_data, block.point_data), (grid.cell_data, block.cell_data)):
-        assert set(data.keys()) - {"part"} == written.keys()
+        assert set(data.keys()) == written.keys()
         for name, values in written.items():
             tolerance = MAX_ESTIMATE_ROUNDING if name == "stress_error" else MAX_ROUNDING
             np.testing.assert_allclose(
@@ -115,32 +115,35 @@ def test_exact_file_states_units_and_codes(tmp_path):
 
 
 def test_exact_vtu_agrees_in_meshio(tmp_path):
-    """A .vtu has the fields of all parts of one frame, NaN where a part has none, with units and time."""
+    """A .vtu has the fields of both pieces in one frame, with units and time."""
     small = write_small_series(tmp_path / "out")
     out = tmp_path / "new" / "a.vtu"
     assert run_cli("export", tmp_path / "out", "-o", out, "--frame", 1).out.startswith(
         f"{out}: frame 1 of 0 to 2"
     )
     mesh = meshio.read(out)
-    part = np.concatenate(mesh.cell_data["part"])
-    stress = np.concatenate(mesh.cell_data["von_mises"])
-    for code, name in enumerate(PARTS):
-        cells = stress[part == code]
-        if name in ("lower", "upper"):
-            np.testing.assert_allclose(
-                np.sort(cells), np.sort(small.blocks[name].cell_data["von_mises"][1]), MAX_ROUNDING
-            )
-        else:
-            assert np.isnan(cells).all()
-    n_pieces = 2 * len(small.pieces.lower.points)
-    gap = mesh.point_data["gap"]
-    assert np.isnan(gap[:n_pieces]).all()
-    np.testing.assert_allclose(
-        gap[n_pieces:][:4], small.pieces.interface["gap"][1], 2 * MAX_ROUNDING
-    )
+    written = [small.blocks[name] for name in ("lower", "upper")]
+    stress = np.concatenate([block.cell_data["von_mises"][1] for block in written])
+    found = np.concatenate(mesh.cell_data["von_mises"])
+    np.testing.assert_allclose(np.sort(found), np.sort(stress), MAX_ROUNDING)
     grid = pyvista.read(out)
+    assert np.array_equal(grid.points, np.concatenate([block.points for block in written]))
+    assert np.array_equal(grid["von_mises"], stress)
     assert grid.field_data["TimeValue"][0] == small.times[1]
-    assert read_unit(grid, "gap") == "m"
+    assert read_unit(grid, "displacement") == "m"
+
+
+def test_exact_pvd_lists_parts_of_all_frames(tmp_path):
+    """A .pvd is a time series of the parts, each a .vtu with the mesh and the fields of its block."""
+    small = write_small_series(tmp_path / "out")
+    assert run_cli("export", tmp_path / "out", "-o", tmp_path / "a.pvd").code == 0
+    reader = pyvista.get_reader(tmp_path / "a.pvd")
+    assert reader.time_values == list(small.times)
+    for number in range(3):
+        reader.set_active_time_point(number)
+        for part, grid in zip(PARTS, reader.read(), strict=True):
+            assert_block_equal(grid, small.blocks[part], number)
+            assert grid.field_data["TimeValue"][0] == small.times[number]
 
 
 def read_unit(grid, name: str) -> str:
@@ -199,7 +202,7 @@ def crowned_run():
 
 
 def test_exact_grids_of_result_agree_with_patch_and_file(crowned_run, tmp_path):
-    """Result.to_pyvista has the numbers of result.patch and of the file, with stresses in MPa, units and time."""
+    """Result.to_pyvista has the numbers of result.patch and of the file, in SI units."""
     all_frames = crowned_run.to_pyvista(frame=None)
     crowned_run.save(tmp_path / "run")
     for number, (time, written) in enumerate(read_with_vtk(tmp_path / "run" / NAME)):
@@ -207,22 +210,20 @@ def test_exact_grids_of_result_agree_with_patch_and_file(crowned_run, tmp_path):
         assert grids.keys() == written.keys() == PARTS
         assert grids["upper"].field_data["TimeValue"][0] == time
         for part in grids.keys():
-            units = dict(text.rstrip("]").split(" [") for text in grids[part].field_data["units"])
             for data, expected in (
                 (grids[part].point_data, written[part].point_data),
                 (grids[part].cell_data, written[part].cell_data),
             ):
                 for name in expected.keys():
-                    factor = 1e6 if units[name] == "MPa" else 1.0
                     tolerance = (
                         MAX_ESTIMATE_ROUNDING if name == "stress_error" else 2 * MAX_ROUNDING
                     )
-                    np.testing.assert_allclose(data[name] * factor, expected[name], tolerance, 0)
+                    np.testing.assert_allclose(data[name], expected[name], tolerance, 0)
     assert number == len(all_frames) - 1
 
     line = crowned_run.to_pyvista()["interface"]
     patch = crowned_run.patch
-    for name, unit in (("normal_stress", 1e6), ("shear_stress", 1e6), ("slip", 1.0), ("gap", 1.0)):
+    for name in ("normal_stress", "shear_stress", "slip", "gap"):
         values = getattr(patch, name)
-        np.testing.assert_allclose(line[name] * unit, values, 1e-6, 1e-6 * np.abs(values).max())
+        np.testing.assert_allclose(line[name], values, 1e-6, 1e-6 * np.abs(values).max())
     assert np.array_equal(line.points[:, 0], patch.x)

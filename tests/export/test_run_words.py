@@ -20,7 +20,7 @@ def get_verdict(scene, **sets) -> tuple:
 
 
 def test_exact_release_agrees_with_closed_form():
-    """Swings, reversals, position and time of rest of a Coulomb oscillator agree with the closed form within 0.5 %.
+    """Position and time of rest of a Coulomb oscillator agree with the closed form within 0.5 %.
 
     Each half swing reduces the amplitude by 2 mu N/k, and the block stops where the spring force is
     below mu N.
@@ -34,9 +34,7 @@ def test_exact_release_agrees_with_closed_form():
     text = re.sub(r"damping = \S+", "damping = 0", text)
     verdict, _ = get_verdict(text)
     match = re.fullmatch(
-        r"Released at 500 um, the output first swings to -(\S+) um, reverses (\d+) times and rests at (\S+) um after "
-        r"(\S+) ms\.",
-        verdict[0],
+        r"Released at 500 um, the output rests at (\S+) um after (\S+) ms\.", verdict[0]
     )
     assert match, verdict[0]
     load, mass, static = (
@@ -48,11 +46,8 @@ def test_exact_release_agrees_with_closed_form():
     reversals = [5e-4]
     while reversals[-1] > stick_limit:
         reversals.append(reversals[-1] - 2 * stick_limit)
-    assert float(match[1]) * 1e-6 == pytest.approx(reversals[1], rel=5e-3)
-    assert abs(abs(float(match[3])) * 1e-6 - abs(reversals[-1])) < 5e-3 * 5e-4
-    # the last reversal may lie within 1 % of the rest position and is then not counted
-    assert int(match[2]) in (len(reversals) - 2, len(reversals) - 1)
-    assert float(match[4]) == pytest.approx(1e3 * (len(reversals) - 1) / (2 * 143), rel=5e-3)
+    assert abs(abs(float(match[1])) * 1e-6 - abs(reversals[-1])) < 5e-3 * 5e-4
+    assert float(match[2]) == pytest.approx(1e3 * (len(reversals) - 1) / (2 * 143), rel=5e-3)
 
 
 def test_exact_loss_factor_agrees_with_parallelogram():

@@ -9,10 +9,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from command_line import run_cli
-from page_data import (
-    parse_quantity,
-    read_charts,
-)
+from page_data import find_strange_curves, find_wrong_numbers, read_charts
 from scene_texts import DRIVE, MODE, PLASTIC, POINT
 
 BENCH = (
@@ -107,34 +104,13 @@ def test_exact_displayed_numbers_equal_the_files(folders, name):
     page = read_page(folders / name)
     measures = read_json(folders / name / "summary.json")["measures"]
     shown = dict(re.findall(r'<tr id="measure-([^"]+)"><td>.*?</td><td class="v">(.*?)</td>', page))
-    assert shown and set(shown) <= set(measures)
-    for key, text in shown.items():
-        entry = measures[key]
-        value, _ = parse_quantity(text)
-        width = (entry["high"] - entry["low"]) / 2 if entry["low"] is not None else 0.0
-        assert value == pytest.approx(
-            entry["value"], rel=1e-2 if not width else 1e-5, abs=0.06 * width
-        ), key
-
+    assert shown and find_wrong_numbers(shown, measures, 5e-3) == []
     stored = folders / name / ("backbone.nc" if name == "backbone" else "result.nc")
     with xr.open_dataset(stored) as data:
-        numbers = [
-            data[one].values.ravel() for one in data.variables if data[one].dtype.kind in "fi"
-        ]
-    numbers = np.concatenate(numbers).astype(float)
-    charts = read_charts(page)
-    assert charts
-    for title, chart in charts.items():
-        for trace in chart["data"]:
-            values = np.asarray(trace["y"], float)
-            values = values[np.isfinite(values)]
-            if trace.get("hoverinfo") == "skip" or not values.size:
-                continue
-            largest = values[np.argmax(np.abs(values))]
-            scales = [*10.0 ** np.arange(-12, 13, 3), 1 / G_N]
-            assert min(
-                np.nanmin(np.abs(numbers * scale - largest)) for scale in scales
-            ) <= 1e-6 * abs(largest), (title, trace.get("name"))
+        arrays = {
+            name: one.values for name, one in data.variables.items() if one.dtype.kind in "fi"
+        }
+    assert read_charts(page) and find_strange_curves(page, arrays) == []
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -181,41 +157,6 @@ def test_exact_backbone_files_agree(folders):
             value = data[f"balance_{name}"]
             assert (data[f"balance_{name}_low"] <= value).all()
             assert (data[f"balance_{name}_high"] >= value).all()
-
-
-def test_exact_headline_of_backbone_is_that_of_closed_form(folders):
-    """In stick the frequency is sqrt(k/m + omega^2)/2 pi and the loss that of the structure, both in the measures."""
-    measures = read_json(folders / "backbone" / "summary.json")["measures"]
-    details = read_json(folders / "backbone" / "backbone.json")
-    free = details["free_frequency"]
-    stuck = measures["stuck_frequency"]["value"]
-    assert measures["frequency_at_smallest_amplitude"]["value"] == pytest.approx(stuck, rel=1e-6)
-    # the structure's constant c = 2 zeta omega_free m gives the ratio zeta omega_free/omega
-    damping = measures["damping_at_smallest_amplitude"]["value"]
-    assert damping * stuck / free == pytest.approx(0.003, rel=1e-3)
-    verdict = read_json(folders / "backbone" / "summary.json")["verdict"][0]
-    assert "Frequency falls from" in verdict and "damping ratio rises from" in verdict
-
-
-def test_exact_fits_recover_known_parameters(folders):
-    """The intervals of the fits contain the parameters from which the data were made; the fitted curve goes beyond them."""
-    loop = read_json(folders / "loop" / "fit.json")["values"]
-    for key, truth in (("friction.static", 0.3 * 100 / 115.65), ("friction.bond_length", 2e-6)):
-        assert loop[key]["low"] < loop[key]["high"]
-        if key == "friction.bond_length":
-            assert loop[key]["low"] <= truth <= loop[key]["high"]
-    force = loop["friction.static"]["value"] * 26 * 4.4482216152605
-    assert force == pytest.approx(30.0, rel=5e-3)
-    rows = read_json(folders / "rows" / "fit.json")
-    assert rows["values"]["structure.mode.axial.frequency"]["value"] == pytest.approx(
-        141.0, rel=1e-4
-    )
-    assert rows["values"]["structure.mode.axial.damping"]["value"] == pytest.approx(0.03, rel=1e-3)
-    assert rows["scores"]["held_out"]["all"] < 1e-3
-    with xr.open_dataset(folders / "curve" / "result.nc") as data:
-        assert data["curve_amplitude"].max() > 2.9 * data["amplitude"].max()
-        assert data["curve_amplitude"].min() < data["amplitude"].min() / 2.9
-        np.testing.assert_allclose(data["frequency_fitted"], data["frequency"], rtol=1e-5)
 
 
 def test_exact_cost_table_agrees_with_json(folders):

@@ -214,7 +214,7 @@ def test_always_run_continues_without_disk_space_for_its_state(tmp_path, save_co
     with limit_file_size(5000):
         answer = run_cli("run", scene, "--no-page", "-o", tmp_path / "out")
     # the results do not fit; the missing state alone does not end the run
-    assert answer.code == 4 and "result.nc: not enough space" in answer.err
+    assert answer.code == 4 and "result.nc: cannot be written (File too large)" in answer.err
     assert sorted(path.name for path in tmp_path.iterdir()) == ["scene.toml"]
 
 

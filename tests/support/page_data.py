@@ -72,7 +72,9 @@ def parse_quantity(text: str) -> tuple[float, float | None]:
     return float(match[1]) * power * unit, error
 
 
-def find_wrong_numbers(texts: dict[str, str], measures: dict[str, dict]) -> list[str]:
+def find_wrong_numbers(
+    texts: dict[str, str], measures: dict[str, dict], rounding: float = 1e-5
+) -> list[str]:
     """Return the displayed numbers that differ from those of summary.json by more than their last digit.
 
     Parameters
@@ -81,6 +83,8 @@ def find_wrong_numbers(texts: dict[str, str], measures: dict[str, dict]) -> list
         Displayed quantities by name.
     measures : dict
         Entries of summary.json by name.
+    rounding : float
+        Relative error by the rounding of numbers without an error.
     """
     wrong = []
     for name, text in texts.items():
@@ -89,13 +93,34 @@ def find_wrong_numbers(texts: dict[str, str], measures: dict[str, dict]) -> list
             wrong += [] if text.startswith("-") else [f"{name}: {text}, but null in the file"]
             continue
         value, error = parse_quantity(text)
-        tolerance = max(2e-3 * (entry["error"] or 0.0), 1e-5 * abs(entry["value"]))
+        tolerance = max(2e-3 * (entry["error"] or 0.0), rounding * abs(entry["value"]))
         tolerance = max(tolerance, 0.06 * (error or 0.0), entry["floor"])
         if abs(value - entry["value"]) > tolerance:
             wrong.append(f"{name}: {text}, but {entry['value']:g} in the file")
         if error is not None and abs(error - entry["error"]) > 0.06 * entry["error"]:
             wrong.append(f"{name}: error of {text}, but {entry['error']:g} in the file")
     return wrong
+
+
+def find_strange_curves(text: str, arrays: dict[str, np.ndarray]) -> list[str]:
+    """Return the charts of a page with a curve whose largest value is in no array, in SI, g or a power of ten of SI units.
+
+    arrays: numbers of the netCDF file by name. The stress in both pieces is from another file.
+    """
+    numbers = [np.abs(np.asarray(one, float)).ravel() for one in arrays.values()]
+    numbers = np.concatenate([one[np.isfinite(one)] for one in numbers])
+    scales = [10.0**k for k in range(-12, 13, 3)] + [1 / 9.80665]
+    strange = []
+    for title, figure in read_charts(text).items():
+        for trace in figure["data"] if "von Mises" not in title else ():
+            values = np.asarray(trace.get("z", trace["y"]), float)
+            # error bands have no text under the pointer
+            if not np.isfinite(values).any() or trace.get("hoverinfo") == "skip":
+                continue
+            largest = np.nanmax(np.abs(values))
+            distance = min(np.abs(numbers * scale - largest).min() for scale in scales)
+            strange += [title] if distance > 1e-6 * largest else []
+    return strange
 
 
 def strip_scripts(text: str) -> str:

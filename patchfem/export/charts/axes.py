@@ -10,16 +10,14 @@ from ...core import PatchfemError
 from ...disk.atomic_write import write_atomically
 from ..answer import Answer
 from .panels import Curve, Panel, make_panels
-from .plotly import BAND_OPACITY, CODE_COLOURS, choose_colour
+from .plotly import BAND_OPACITY, CODE_COLOURS, COLOURS
 from .table import CHARTS
 
-LINE_STYLES = ("-", "--", ":", "-.")
 PICTURE_ENDINGS = (".png", ".svg", ".pdf")
 # Number of charts of a picture, 1 for all other kinds of answers. A backbone needs frequency, damping and force.
 PICTURE_CHARTS = {"backbone": 3}
 
-# Marker and face of each symbol of a point; "" is the colour of the curve.
-MARKERS = {"circle": ("o", ""), "circle-open": ("o", "none"), "x": ("x", "")}
+MARKERS = {"circle": "o", "x": "x"}  # markers of matplotlib for the symbols of points
 # style of the pictures; two drawings of the same answer are equal files
 STYLE = {
     "svg.hashsalt": "patchfem",
@@ -49,7 +47,7 @@ def draw(panel: Panel, axes):
         _draw_map(panel, axes)
     else:
         for number, curve in enumerate(panel.curves):
-            _draw_curve(curve, panel.style, choose_colour(curve, number), axes)
+            _draw_curve(curve, panel.style, COLOURS[number % len(COLOURS)], axes)
     for position in panel.marks:
         axes.axvline(position, color="0.5", lw=1, ls=":")
     axes.set(title=panel.title, xlabel=panel.x.label, ylabel=panel.y.label)
@@ -60,37 +58,30 @@ def draw(panel: Panel, axes):
 
 
 def _draw_curve(curve: Curve, style: str, colour: str, axes) -> None:
-    """Draw bars, points with error bars, or a line with its band."""
-    interval = None
-    if curve.low is not None:
-        interval = np.nan_to_num([curve.y - curve.low, curve.high - curve.y])
-    if style == "bars":
-        names = [str(name) for name in curve.x]
-        axes.barh(names, curve.y, xerr=interval, color=colour, label=curve.name)
-    elif style in ("points", "dots") and not curve.is_line:
+    """Draw points with error bars, or a line with its band."""
+    if style in ("points", "dots") and not curve.is_line:
         if style == "dots":
             axes.plot(curve.x, curve.y, color=colour, lw=1)
-        axes.errorbar(curve.x, curve.y, interval, fmt="none", ecolor=colour)
-        _draw_points(curve, colour, axes)
-    else:
-        dash = LINE_STYLES[curve.dash % len(LINE_STYLES)]
-        axes.plot(curve.x, curve.y, color=colour, label=curve.name, ls=dash)
-        filling = {"color": colour, "alpha": BAND_OPACITY, "lw": 0}
         if curve.low is not None:
-            axes.fill_between(curve.x, curve.low, curve.high, **filling)
-        if style == "area":
-            axes.fill_between(curve.x, curve.y, **filling)
+            ends = np.nan_to_num([curve.y - curve.low, curve.high - curve.y])
+            axes.errorbar(curve.x, curve.y, ends, fmt="none", ecolor=colour)
+        _draw_points(curve, colour, axes)
+        return
+    axes.plot(curve.x, curve.y, color=colour, label=curve.name)
+    filling = {"color": colour, "alpha": BAND_OPACITY, "lw": 0}
+    if curve.low is not None:
+        axes.fill_between(curve.x, curve.low, curve.high, **filling)
+    if style == "area":
+        axes.fill_between(curve.x, curve.y, **filling)
 
 
 def _draw_points(curve: Curve, colour: str, axes) -> None:
     """Draw the points of a curve with their symbols."""
     symbols = np.full(curve.x.size, "circle") if curve.symbols is None else curve.symbols
-    # the first symbol has the entry of the legend, and is drawn above the others
-    for zorder, (symbol, (marker, face)) in zip((4, 3, 3), MARKERS.items()):
+    for symbol, marker in MARKERS.items():
         is_drawn = symbols == symbol
-        label = curve.name if symbol == "circle" else None
-        options = {"color": colour, "mfc": face or colour, "label": label, "zorder": zorder}
-        axes.plot(curve.x[is_drawn], curve.y[is_drawn], marker, **options)
+        label = curve.name if symbol == "circle" else None  # the entry of the legend
+        axes.plot(curve.x[is_drawn], curve.y[is_drawn], marker, color=colour, label=label, zorder=3)
 
 
 def _draw_map(panel: Panel, axes) -> None:

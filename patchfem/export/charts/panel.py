@@ -5,7 +5,6 @@ from itertools import pairwise
 
 import numpy as np
 
-from ...formatting import format_number
 from ..quantities import choose_scale
 
 MAX_CURVE_POINTS = 3000  # largest number of intervals of which a curve keeps the extremes
@@ -43,10 +42,8 @@ class Curve:
         Names of the codes of a map.
     is_line : bool
         Whether the curve is a line in a chart of points.
-    colour, dash : int
-        Numbers of the colour and of the dash pattern; -1 for the colour of its place among the curves.
     symbols : (k,) ndarray of str or None
-        Symbols of the points: "circle", "circle-open" or "x".
+        Symbols of the points: "circle" or "x".
     """
 
     name: str
@@ -57,8 +54,6 @@ class Curve:
     rows: np.ndarray | None = None
     meanings: tuple[str, ...] = ()
     is_line: bool = False
-    colour: int = -1
-    dash: int = 0
     symbols: np.ndarray | None = None
 
 
@@ -91,15 +86,9 @@ class Panel:
 
     @property
     def description(self) -> str:
-        """Text alternative of the chart: its axes, and the range of each curve."""
-        ranges = []
-        for curve in self.curves[:4]:
-            finite = np.asarray(curve.y, float)
-            finite = finite[np.isfinite(finite)]
-            if finite.size:
-                low, high = (format_number(float(end(finite)), 4) for end in (np.min, np.max))
-                ranges.append(f"{curve.name or self.y.label} from {low} to {high}")
-        return f"{self.title}: {self.y.label} against {self.x.label}; {'; '.join(ranges)}."
+        """Text alternative of the chart: its axes and its curves."""
+        names = ", ".join(curve.name for curve in self.curves if curve.name)
+        return f"{self.title}: {self.y.label} against {self.x.label}. {names}".strip()
 
 
 def make_axis(name: str, unit: str, values: np.ndarray, is_log: bool = False) -> Axis:

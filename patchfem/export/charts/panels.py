@@ -11,7 +11,7 @@ from .table import Chart
 
 MAX_MAP_COLUMNS = 400  # largest number of columns; a finer map keeps every n-th one
 N_SHOWN_CYCLES = 3  # number of cycles of the span "cycles"
-SWEEP_STYLES = ("relative", "menu", "maps", "shares")
+SWEEP_STYLES = ("relative", "menu", "maps")
 MARGIN_NODES = 3  # unloaded nodes beside the contact that the span "contact" shows
 MAX_INTERFACES = 6  # largest number of interfaces with charts of their own
 
@@ -32,7 +32,7 @@ def make_panels(answers: Answers, charts: tuple[Chart, ...]) -> list[Panel]:
             # answers whose variables have other units need axes of their own
             groups = {}
             for name, answer in answers.items():
-                names = (_find_x(answer.data, part), *map(_split_name, part.y.split()))
+                names = (_find_x(answer.data, part), *(y for y, _ in _split_names(part.y)))
                 units = tuple(answer.data[one].unit for one in names if one in answer.data)
                 groups.setdefault(units, {})[name] = answer
             panels += [make_panel(group, part) for group in groups.values()]
@@ -59,8 +59,7 @@ def make_panel(answers: Answers, chart: Chart) -> Panel | None:
         from .sweeps import STYLES
 
         return STYLES[chart.style](answers, chart)
-    has_several = len(answers) > 1
-    if has_several:
+    if len(answers) > 1:
         chart = replace(chart, by="")
     selected = {name: _select(answer.data, chart) for name, answer in answers.items()}
     selected = {name: data for name, data in selected.items() if data}
@@ -69,90 +68,30 @@ def make_panel(answers: Answers, chart: Chart) -> Panel | None:
     first = next(iter(selected.values()))
     axes = _make_axes(list(selected.values()), chart)
     if chart.style == "map":
-        return _make_map(first, chart, axes)
+        return _make_map(first, chart, *axes)
 
     curves = []
-    for number, (label, data) in enumerate(selected.items()):
-        own_curves = [
-            curve
-            for name in f"{chart.y} {chart.lines}".split()
-            for curve in _make_curves(data, chart, name, axes)
+    for label, data in selected.items():
+        own = [
+            replace(curve, is_line=names is chart.lines)
+            for names in (chart.y, chart.lines)
+            for name, own_x in _split_names(names)
+            for curve in _make_curves(data, chart, name, own_x, axes)
         ]
-        if len(own_curves) == 1:
-            own_curves = [replace(own_curves[0], name="")]
-        if has_several:  # a colour for each answer, and a dash for each of its curves
-            own_curves = [
-                replace(curve, name=join_names(label, curve.name), colour=number, dash=dash)
-                for dash, curve in enumerate(own_curves)
-            ]
-        curves += own_curves
-    if not curves:
-        return None
-    marks = [
-        float(value) * axes[0].scale
-        for name in chart.marks.split()
-        if name in first
-        for value in np.atleast_1d(first[name].values)
-        if np.isfinite(value)
-    ]
-    return Panel(chart.title, chart.style, *axes, curves, chart.caption, marks)
+        own_names = [""] if len(own) == 1 else [curve.name for curve in own]
+        curves += [
+            replace(curve, name=join_names(label, name))
+            for curve, name in zip(own, own_names, strict=True)
+        ]
+    marks = [_as_floats(first[name]).ravel() for name in chart.marks.split() if name in first]
+    marks = np.concatenate([*marks, np.zeros(0)]) * axes[0].scale
+    marks = marks[np.isfinite(marks)].tolist()
+    return Panel(chart.title, chart.style, *axes, curves, chart.caption, marks) if curves else None
 
 
-def _make_map(data: Variables, chart: Chart, axes: tuple[Axis, Axis]) -> Panel | None:
-    """Return the panel of a variable over x and its first dimension; `axes` are those of x and of the variable."""
-    variable = _reduce_strips(data[chart.y])
-    if not np.isfinite(_as_floats(variable)).any():
-        return None
-    x_axis, colours = axes
-    y_axis, rows = _find_map_rows(data, variable, x_axis)
-    x = _as_floats(data[_find_x(data, chart)]) * x_axis.scale
-    step = -(-x.size // MAX_MAP_COLUMNS)
-    # codes keep their numbers
-    scale = 1 if variable.meanings else colours.scale
-    values = np.atleast_2d(variable.values)[:, ::step] * scale
-    curve = Curve("", x[::step], values, rows=rows, meanings=variable.meanings)
-    label = colours.label
-    return Panel(chart.title, "map", x_axis, y_axis, [curve], chart.caption, colour_label=label)
-
-
-def _make_axes(selected: list[Variables], chart: Chart) -> tuple[Axis, Axis]:
-    """Return the horizontal and the vertical axis of a chart for the selected variables of each answer."""
-    first = selected[0]
-    x_name = _find_x(first, chart)
-    x_values = [data[_find_x(data, chart)].values for data in selected]
-    x_label = chart.x_label or x_name
-    names = [name for name in map(_split_name, chart.y.split()) if name in first]
-    main = first[names[0]]
-    y_values = [data[name].values for data in selected for name in names if name in data]
-    y_label = main.text if chart.y_label == "*" else chart.y_label or names[0]
-    return (
-        _make_axis(x_label, first[x_name].unit, x_values, chart.log, "x"),
-        _make_axis(y_label, main.unit, y_values, chart.log, "y"),
-    )
-
-
-def _make_axis(name: str, unit: str, arrays: list[np.ndarray], log: str, letter: str) -> Axis:
-    """Return the axis for some arrays [SI]; `log` as in Chart, `letter` is "x" or "y"."""
-    values = np.concatenate([np.asarray(values, float).ravel() for values in arrays])
-    is_log = letter in log or ("auto" in log and needs_log_scale(values))
-    return make_axis(name, unit, values, is_log)
-
-
-def _find_map_rows(data: Variables, variable: Variable, x_axis: Axis) -> tuple[Axis, np.ndarray]:
-    """Return the vertical axis of a map and its positions: a coordinate y in the units of x, the time, or frames."""
-    if variable.dims[0] == "y" and "y" in data:
-        axis = replace(x_axis, label=x_axis.label.replace("x [", "y ["))
-        return axis, data["y"].values * axis.scale
-    if "frame_time" in data and len(variable.values) > 1:
-        times = data["frame_time"].values - data["frame_time"].values[0]
-        axis = make_axis("time in the last cycle", "s", times)
-        return axis, times * axis.scale
-    return Axis("frame"), np.arange(len(variable.values))
-
-
-def _split_name(name: str) -> str:
-    """Return the variable of "NAME@X"."""
-    return name.partition("@")[0]
+def _split_names(names: str) -> list[tuple[str, str]]:
+    """Return the variables of "NAME NAME@X ...": name, and that of the own horizontal variable or ""."""
+    return [(name, x) for name, _, x in (word.partition("@") for word in names.split())]
 
 
 def _find_x(data: Variables, chart: Chart) -> str:
@@ -160,10 +99,35 @@ def _find_x(data: Variables, chart: Chart) -> str:
     return next((name for name in chart.x.split() if name in data), "")
 
 
+def _as_floats(variable: Variable) -> np.ndarray:
+    """Return the values of a variable as floats, with the mean over strips."""
+    values = np.asarray(variable.values, float)
+    return values.mean(axis=variable.dims.index("strip")) if "strip" in variable.dims else values
+
+
+def _make_axes(selected: list[Variables], chart: Chart) -> tuple[Axis, Axis]:
+    """Return the horizontal and the vertical axis of a chart for the selected variables of each answer."""
+    first = selected[0]
+    x_name = _find_x(first, chart)
+    names = [name for name, _ in _split_names(chart.y) if name in first]
+    main = first[names[0]]
+    y_label = main.text if chart.y_label == "*" else chart.y_label or names[0]
+    axes = []
+    for letter, label, unit, shown in (
+        ("x", chart.x_label or x_name, first[x_name].unit, [x_name]),
+        ("y", y_label, main.unit, names),
+    ):
+        arrays = [data[one].values for data in selected for one in shown if one in data]
+        values = np.concatenate([np.asarray(one, float).ravel() for one in arrays])
+        is_log = letter in chart.log or ("auto" in chart.log and needs_log_scale(values))
+        axes.append(make_axis(label, unit, values, is_log))
+    return axes[0], axes[1]
+
+
 def _select(data: Variables, chart: Chart) -> Variables:
     """Return the variables restricted to the span of a chart; {} if the chart has nothing to show."""
     x_name = _find_x(data, chart)
-    names = map(_split_name, chart.y.split())
+    names = [name for name, _ in _split_names(chart.y)]
     if not x_name or not any(name in data and np.any(data[name].values) for name in names):
         return {}
     if chart.style == "line" and np.ptp(np.asarray(data[x_name].values, float)) == 0:
@@ -190,109 +154,83 @@ def _find_span(data: Variables, span: str, x_name: str) -> np.ndarray | None:
         return None if is_longer else np.arange(0)
     pressure = data.get("normal_stress" + x_name.removeprefix("x"))
     if span == "contact" and pressure is not None:
-        is_loaded = (pressure.values > 0).any(axis=tuple(range(pressure.values.ndim - 1)))
-        loaded = np.flatnonzero(is_loaded)
+        size = pressure.values.shape[-1]
+        loaded = np.flatnonzero((pressure.values.reshape(-1, size) > 0).any(axis=0))
         if loaded.size:
             first = max(loaded[0] - MARGIN_NODES, 0)
-            return np.arange(first, min(loaded[-1] + MARGIN_NODES + 1, is_loaded.size))
+            return np.arange(first, min(loaded[-1] + MARGIN_NODES + 1, size))
     return None
 
 
 def _take(data: Variables, dimension: str, indices: np.ndarray) -> Variables:
     """Return the variables at some indices of a dimension; those without this dimension are unchanged."""
-    taken = {}
-    for name, one in data.items():
-        if dimension in one.dims:
-            values = np.take(one.values, indices, axis=one.dims.index(dimension))
-            taken[name] = replace(one, values=values)
+    taken = {
+        name: replace(one, values=np.take(one.values, indices, axis=one.dims.index(dimension)))
+        for name, one in data.items()
+        if dimension in one.dims
+    }
     return data | taken
 
 
 def _make_curves(
-    data: Variables, chart: Chart, source: str, axes: tuple[Axis, Axis]
+    data: Variables, chart: Chart, name: str, own_x: str, axes: tuple[Axis, Axis]
 ) -> list[Curve]:
-    """Return the curves of "NAME" or "NAME@X": one for each interface, case, code, or element of an overlay."""
-    name, _, own_x = source.partition("@")
+    """Return the curves of a variable: one for each interface, case, code, or element of an overlay."""
     own_x = own_x or _find_x(data, chart)
     if not {name, own_x} <= data.keys() or not np.isfinite(_as_floats(data[name])).any():
         return []
-    x_axis, y_axis = axes
-    x_values = _as_floats(data[own_x]) * x_axis.scale
-    variable = _reduce_strips(data[name])
-    values = _as_floats(variable)
-    ends_of_band = _find_band(data, name)
+    x_values = _as_floats(data[own_x]) * axes[0].scale
+    values = _as_floats(data[name])
+    bands = _find_band(data, name)
     labels = [name.replace("_", " ")]
-    first = variable.dims[0] if values.ndim == 2 else ""
-    if first in ("interface", "case") or (first and chart.style == "overlay"):
-        labels = _name_elements(data, first, labels[0])
+    first = data[name].dims[0] if values.ndim == 2 else ""
+    if first in ("interface", "case"):
+        labels = [join_names(labels[0], element) for element in _name_elements(data, first)]
+    elif first and chart.style == "overlay":
+        labels = _name_elements(data, first)
     elif first:
         values = values[-1:]  # the last frame
+        bands = [band[-1:] for band in bands]
 
     curves = []
-    is_line = source in chart.lines.split()
     for number, (label, row) in enumerate(zip(labels, np.atleast_2d(values), strict=True)):
+        x = x_values[number] if x_values.ndim == 2 else x_values
         # every case has points of its own
         keep = np.flatnonzero(np.isfinite(row)) if first == "case" else thin(row)
-        ends = [np.atleast_2d(end)[number] for end in ends_of_band if first in ("case", "")]
-        y, *ends = (one[keep] * y_axis.scale for one in (row, *ends))
-        x_row = x_values[number] if x_values.ndim == 2 else x_values
-        colour = number if first == "case" else -1
-        band = ends or (None, None)
-        curves.append(Curve(label, x_row[keep], y, *band, is_line=is_line, colour=colour))
-        if chart.by in data and not (first or is_line):
+        parts = (row, *(np.atleast_2d(band)[number] for band in bands))
+        curves.append(Curve(label, x[keep], *(one[keep] * axes[1].scale for one in parts)))
+        if chart.by in data and not first and name in chart.y:
             return _split_by_code(curves[0], data[chart.by], keep, chart.style != "points")
     return [curve for curve in curves if curve.x.size]
 
 
-def _as_floats(variable: Variable) -> np.ndarray:
-    """Return the values of a variable as floats."""
-    return np.asarray(variable.values, float)
-
-
-def _reduce_strips(variable: Variable) -> Variable:
-    """Return the mean of a variable over its strips."""
-    if "strip" not in variable.dims:
-        return variable
-    axis = variable.dims.index("strip")
-    dims = tuple(dimension for dimension in variable.dims if dimension != "strip")
-    return replace(variable, dims=dims, values=np.mean(variable.values, axis=axis))
-
-
-def _name_elements(data: Variables, dimension: str, label: str) -> list[str]:
-    """Return the legend of the elements of a dimension: the values of its coordinate, or their numbers.
-
-    `label` is the name of the variable in words.
-    """
+def _name_elements(data: Variables, dimension: str) -> list[str]:
+    """Return the legend of the elements of a dimension: the values of its coordinate, or their numbers."""
     coordinate = data.get(dimension)
     if coordinate is None:
-        places = ((one.dims, one.values.shape) for one in data.values() if dimension in one.dims)
-        dims, shape = next(places)
-        start = int(dimension == "interface")
-        names = [str(k + start) for k in range(shape[dims.index(dimension)])]
-    elif coordinate.values.dtype.kind in "UO":
-        names = [str(value) for value in coordinate.values]
-    else:
-        title = coordinate.text or dimension.replace("_", " ")
-        names = [f"{title} {format_number(float(value), 4)}" for value in coordinate.values]
-    if dimension == "interface":
-        return [join_names(label, f"interface {name}") for name in names]
-    if dimension == "case":  # the last part of the key, such as "load 4 kN"
-        key = coordinate.text.rpartition(".")[2].replace("_", " ")
-        return [f"{key} {name}" for name in names]
-    return names
+        sizes = (dict(zip(one.dims, one.values.shape, strict=True)) for one in data.values())
+        size = next(one[dimension] for one in sizes if dimension in one)
+        return [f"{dimension} {number}" for number in range(1, size + 1)]
+    # the last part of a key, such as "load 4 kN"
+    title = coordinate.text.rpartition(".")[2].replace("_", " ") or dimension.replace("_", " ")
+    values = coordinate.values.tolist()
+    if coordinate.values.dtype.kind in "UO":
+        return [f"{dimension if dimension == 'interface' else title} {value}" for value in values]
+    return [f"{title} {format_number(float(value), 4)}" for value in values]
 
 
-def _find_band(data: Variables, name: str) -> tuple[np.ndarray, ...]:
-    """Return both ends [SI] of the error band of a variable; () without one."""
-    if {f"{name}_low", f"{name}_high"} <= data.keys():
-        return _as_floats(data[f"{name}_low"]), _as_floats(data[f"{name}_high"])
+def _find_band(data: Variables, name: str) -> list[np.ndarray]:
+    """Return both ends [SI] of the error band of a variable; [] without one."""
+    ends = [f"{name}_low", f"{name}_high"]
+    if data.keys() >= set(ends):
+        return [_as_floats(data[end]) for end in ends]
     if f"{name}_error" not in data:
-        return ()
+        return []
     values = _as_floats(data[name])
     error = _as_floats(data[f"{name}_error"])
     # an error as large as the value, as at a fold, would only hide the curve
     error = np.where(error <= np.abs(values), error, np.nan)
-    return values - error, values + error
+    return [values - error, values + error]
 
 
 def _split_by_code(curve: Curve, codes: Variable, keep: np.ndarray, is_joined: bool) -> list[Curve]:
@@ -303,13 +241,41 @@ def _split_by_code(curve: Curve, codes: Variable, keep: np.ndarray, is_joined: b
         is_shown = numbers == code
         if is_joined:  # the line to the next point belongs to the code of its start
             is_shown |= np.concatenate([[False], is_shown[:-1]])
-        parts = {
-            part: None if values is None else np.where(is_shown, values, np.nan)
-            for part, values in (("y", curve.y), ("low", curve.low), ("high", curve.high))
-        }
+        hidden = np.where(is_shown, 0.0, np.nan)
+        parts = {part: getattr(curve, part) for part in ("y", "low", "high")}
+        parts = {part: one + hidden for part, one in parts.items() if one is not None}
         name = codes.meanings[int(code)] if codes.meanings else str(code)
         curves.append(replace(curve, name=name, **parts))
     return curves
+
+
+def _make_map(data: Variables, chart: Chart, x_axis: Axis, colours: Axis) -> Panel | None:
+    """Return the panel of a variable over x and its first dimension."""
+    variable = data[chart.y]
+    values = np.atleast_2d(_as_floats(variable))
+    if not np.isfinite(values).any():
+        return None
+    x = _as_floats(data[_find_x(data, chart)]) * x_axis.scale
+    step = -(-x.size // MAX_MAP_COLUMNS)
+
+    # the rows are a coordinate y in the units of x, the time, or frames
+    y_axis = Axis("frame")
+    rows = np.arange(len(values))
+    if variable.dims[0] == "y" and "y" in data:
+        y_axis = replace(x_axis, label=x_axis.label.replace("x [", "y ["))
+        rows = data["y"].values * y_axis.scale
+    elif "frame_time" in data and len(values) > 1:
+        times = data["frame_time"].values - data["frame_time"].values[0]
+        y_axis = make_axis("time in the last cycle", "s", times)
+        rows = times * y_axis.scale
+
+    if variable.meanings:  # codes keep their numbers
+        values = values.astype(np.int8)
+    else:
+        values = values * colours.scale
+    curve = Curve("", x[::step], values[:, ::step], rows=rows, meanings=variable.meanings)
+    label = colours.label
+    return Panel(chart.title, "map", x_axis, y_axis, [curve], chart.caption, colour_label=label)
 
 
 def make_film(frames: dict[str, np.ndarray], title: str, unit: str) -> Panel:

@@ -13,8 +13,6 @@ COLOURS = (
 )
 CODE_COLOURS = ("#c9ced6", "#2a78c0", "#d1592a", "#2f9e63", "#9166c9")  # open, stick, slip, ...
 OVERLAY_COLOURS = ((158, 178, 200), (42, 120, 192), (209, 89, 42))  # first, middle and last curve
-DASHES = ("solid", "dash", "dot", "dashdot")
-SYMBOLS = ("circle", "diamond", "square", "x")
 BAND_OPACITY = 0.18
 FRAME_MILLISECONDS = 120  # duration of a frame of a film
 # figure of plotly.js, or a part of it, as an object of its JSON
@@ -78,44 +76,34 @@ def _make_traces(panel: Panel) -> list[Figure]:
         return traces
     traces = []
     for number, curve in enumerate(panel.curves):
-        colour = choose_colour(curve, number)
+        colour = COLOURS[number % len(COLOURS)]
         if panel.style == "overlay":
             place = number / max(len(panel.curves) - 1, 1)
             mixed = [np.interp(place, (0, 0.5, 1), part) for part in zip(*OVERLAY_COLOURS)]
             colour = "rgb({:.0f},{:.0f},{:.0f})".format(*mixed)
-        if panel.style == "bars":
-            traces.append(_make_bar_trace(curve, colour))
-        else:
-            traces += _make_curve_traces(curve, "line" if curve.is_line else panel.style, colour)
+        traces += _make_curve_traces(curve, "line" if curve.is_line else panel.style, colour)
     return traces
-
-
-def choose_colour(curve: Curve, number: int) -> str:
-    """Return the colour of a curve at a place among the curves of a panel."""
-    return COLOURS[(number if curve.colour < 0 else curve.colour) % len(COLOURS)]
 
 
 def _make_curve_traces(curve: Curve, style: str, colour: str) -> list[Figure]:
     """Return the trace of a curve, and that of its error band if it is drawn as a line."""
-    dash = DASHES[curve.dash % len(DASHES)]
-    symbol = SYMBOLS[curve.dash % len(SYMBOLS)]
-    if curve.symbols is not None:
-        symbol = [str(one) for one in curve.symbols]
     trace = {
         "x": pack(curve.x),
         "y": pack(curve.y),
         "name": curve.name,
         "mode": {"points": "markers", "dots": "lines+markers"}.get(style, "lines"),
-        "line": {"color": colour, "width": 1.7, "dash": dash},
-        "marker": {"color": colour, "size": 7, "symbol": symbol},
+        "line": {"color": colour, "width": 1.7},
+        "marker": {"color": colour, "size": 7},
     }
+    if curve.symbols is not None:
+        trace["marker"]["symbol"] = curve.symbols.tolist()
     if style == "area":
         trace["fill"] = "tozeroy"
-    if style in ("points", "dots"):
-        bars = _make_error_bars(curve)
-        return [trace | ({"error_y": bars | {"color": colour}} if bars else {})]
     if curve.low is None:
         return [trace]
+    if style in ("points", "dots"):
+        ends = {"array": pack(curve.high - curve.y), "arrayminus": pack(curve.y - curve.low)}
+        return [trace | {"error_y": ends | {"symmetric": False, "thickness": 1.2, "color": colour}}]
 
     # the band is a closed line around the points whose ends are known
     known = np.isfinite(curve.low) & np.isfinite(curve.high)
@@ -132,22 +120,6 @@ def _make_curve_traces(curve: Curve, style: str, colour: str) -> list[Figure]:
         "showlegend": False,
     }
     return [band, trace]
-
-
-def _make_error_bars(curve: Curve) -> Figure:
-    """Return the distances of the ends of an interval from the values; {} without an interval."""
-    if curve.low is None:
-        return {}
-    ends = {"array": pack(curve.high - curve.y), "arrayminus": pack(curve.y - curve.low)}
-    return ends | {"symmetric": False, "thickness": 1.2}
-
-
-def _make_bar_trace(curve: Curve, colour: str) -> Figure:
-    """Return horizontal bars with their intervals; `x` has the names of the bars."""
-    trace = {"type": "bar", "orientation": "h", "x": pack(curve.y), "y": list(map(str, curve.x))}
-    bars = _make_error_bars(curve)
-    trace |= {"name": curve.name, "marker": {"color": colour}}
-    return trace | ({"error_x": bars} if bars else {})
 
 
 def _make_map_trace(curve: Curve, label: str) -> Figure:

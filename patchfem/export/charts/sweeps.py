@@ -1,4 +1,4 @@
-"""Charts of a sweep: panels of the styles `relative`, `menu`, `maps` and `shares`.
+"""Charts of a sweep: panels of the styles `relative`, `menu` and `maps`.
 
 They take answers of kind "sweep", from memory or from their folders.
 """
@@ -13,8 +13,8 @@ import numpy as np
 
 from ...campaigns.sweeps.changes import MAIN_MEASURES
 from ...campaigns.sweeps.limits import NEGLIGIBLE_CHANGE
-from ...campaigns.sweeps.sweep_table import FINAL_OUTCOMES, MeasureColumn
-from ..answer import Answer, Answers, JsonObject, Variables
+from ...campaigns.sweeps.sweep_table import FINAL_OUTCOMES
+from ..answer import Answer, Answers, Variables
 from ..quantities import format_value
 from .panel import Axis, Curve, Panel, join_names, make_axis, thin
 from .table import Chart
@@ -25,7 +25,6 @@ MAX_MAP_VALUES = 40  # values of each key in a map
 # Ratio of the largest to the smallest value of a key and of a measure at which an axis is logarithmic.
 MIN_KEY_RATIO = 10.0
 MIN_MEASURE_RATIO = 100.0
-SYMBOLS = np.array(["circle", "circle-open", "x"])  # settled, over the tolerance, not settled
 
 
 class SweepView(NamedTuple):
@@ -35,8 +34,6 @@ class SweepView(NamedTuple):
     ----------
     data : dict of str to Variable
         Variables of sweep.nc.
-    details : dict
-        Content of sweep.json.
     axis : str
         Variable of the key on the axis.
     others : list of str
@@ -44,7 +41,6 @@ class SweepView(NamedTuple):
     """
 
     data: Variables
-    details: JsonObject
     axis: str
     others: list[str]
 
@@ -62,17 +58,10 @@ class SweepView(NamedTuple):
         moved = np.moveaxis(variable.values, place, -1)
         return moved.reshape(-1, moved.shape[-1])
 
-    def find_symbols(self, name: str) -> np.ndarray:
-        """Return the symbol of each case (lines, values): settled, over the tolerance or not settled."""
-        parts = (
-            self.split_lines(name),
-            self.split_lines(f"{name}_error"),
-            self.split_lines(f"{name}_floor", 0.0),
-        )
-        tolerance = self.details.get("tolerance") or np.nan
-        is_over = MeasureColumn("", *parts).misses(tolerance)
+    def find_symbols(self) -> np.ndarray:
+        """Return the symbol of each case (lines, values): "circle", or "x" if the case did not settle."""
         has_settled = np.isin(self.split_lines("outcome", FINAL_OUTCOMES[0]), FINAL_OUTCOMES)
-        return SYMBOLS[np.where(has_settled, is_over.astype(int), 2)]
+        return np.where(has_settled, "circle", "x")
 
     def name_lines(self) -> list[str]:
         """Return the values of the other keys of each line as text; [""] for a single line."""
@@ -103,7 +92,7 @@ def view_sweep(answer: Answer, axis: str = "") -> SweepView:
     keys = list_keys(answer)
     columns = {key: answer.data[key].values for key in keys}
     counts = {key: (one.dtype.kind == "f", np.unique(one).size) for key, one in columns.items()}
-    view = SweepView(answer.data, answer.details, axis or max(keys, key=counts.__getitem__), [])
+    view = SweepView(answer.data, axis or max(keys, key=counts.__getitem__), [])
     return view._replace(others=[key for key in keys if view.is_grid and key != view.axis])
 
 
@@ -193,10 +182,9 @@ def make_measure_panel(answers: Answers, name: str) -> Panel:
         x_axis, x = view.scale(view.axis)
         axes = axes or (x_axis, view.scale(name, MIN_MEASURE_RATIO)[0])
 
-        # settled, over the tolerance and not settled cases have symbols of their own
         values = view.split_lines(name) * axes[1].scale
         errors = np.broadcast_to(view.split_lines(f"{name}_error") * axes[1].scale, values.shape)
-        symbols = np.broadcast_to(view.find_symbols(name), values.shape)
+        symbols = np.broadcast_to(view.find_symbols(), values.shape)
 
         texts = view.name_lines()
         lines = spread_indices(len(values), MAX_LINES)
@@ -207,9 +195,9 @@ def make_measure_panel(answers: Answers, name: str) -> Panel:
             least = 0.0 if np.nanmin(values, initial=0.0) >= 0 else -np.inf
             has_band = not np.isnan(error).all()
             band = (np.maximum(y - error, least), y + error) if has_band else (None, None)
-            is_plain = (marks == SYMBOLS[0]).all()
+            has_settled = (marks == "circle").all()
             label = join_names(title, texts[line])
-            curves.append(Curve(label, x[keep], y, *band, symbols=None if is_plain else marks))
+            curves.append(Curve(label, x[keep], y, *band, symbols=None if has_settled else marks))
     return Panel(name.replace("_", " "), "dots" if view.is_grid else "points", *axes, curves)
 
 
@@ -233,25 +221,8 @@ def make_map_menu(answers: Answers, chart: Chart) -> Panel | None:
     return _add_choices(chart, panels)
 
 
-def make_shares(answers: Answers, chart: Chart) -> Panel | None:
-    """Return bars of the shares of the variance with their intervals, with a menu of the measures."""
-    panels = []
-    ranking = next(iter(answers.values())).details.get("ranking", {})
-    for name, indices in ranking.items() if len(answers) == 1 else ():
-        # The first bar is at the bottom.
-        columns = {part: np.array([index[part] for index in indices[::-1]]) for part in indices[0]}
-        keys = columns.pop("key")
-        first, total, low, high = (100 * column for column in columns.values())
-        ends = (None, None) if (low == high).all() else (low, high)
-        curves = [Curve("with interactions", keys, total, *ends), Curve("alone", keys, first)]
-        axes = (Axis("share of the variance [%]"), Axis(""))
-        panels.append(Panel(name.replace("_", " "), "bars", *axes, curves))
-    return _add_choices(chart, panels)
-
-
 STYLES = {
     "relative": make_relative,
     "menu": make_menu,
     "maps": make_map_menu,
-    "shares": make_shares,
 }

@@ -21,9 +21,8 @@ class Chart:
         Variables of the vertical axis. "NAME@X" is drawn against its own variable X.
     style : str
         "line", "points", "area", "map" (colours over x and the first dimension), "overlay" (a line for each element of the
-        first dimension), "bars" (horizontal bars of the values of a dimension) or "film" (a map with a slider). Of a sweep:
-        "relative" (measures divided by their first value), "menu" (one measure at a time), "maps" (the same over two keys)
-        or "shares" (of the variance).
+        first dimension) or "film" (a map with a slider). Of a sweep: "relative" (measures divided by their first value),
+        "menu" (one measure at a time) or "maps" (the same over two keys).
     span : str
         "all", "cycles" (last three cycles), "run" (all cycles, if there are more) or "contact" (the loaded part of x).
     log : str
@@ -236,7 +235,8 @@ RUN = (
         "normal_stress",
         "area",
         span="contact",
-        caption="Normal stress at the end of the run, compression positive; only the part in contact.",
+        caption="Normal stress at the end of the run, compression positive; only the part in contact. The drawn values are "
+        "means over the elements beside a node; the measure pressure_peak is the maximum of the continuous pressure.",
     ),
     Chart(
         "Shear stress on the interface",
@@ -297,17 +297,9 @@ SWEEP = (
         "",
         "",
         "menu",
-        caption="Bars show the numerical error. Hollow points miss the tolerance, crosses mark cases that did not settle.",
+        caption="Bars show the numerical error. Crosses mark cases that did not settle.",
     ),
     Chart("One measure over two keys", "", "", "maps", caption="White cells have no value."),
-    Chart(
-        "Shares of the variance",
-        "",
-        "",
-        "shares",
-        caption="Fraction of the variance over the cases that a key contributes: alone (first-order Sobol index), and "
-        "with its interactions (total index), with the interval of the latter.",
-    ),
 )
 # Methods of a backbone; the first one with a curve is recommended.
 BACKBONE_METHODS = ("balance", "quasi_static")
@@ -707,6 +699,12 @@ TABLES: dict[str, tuple[Table, ...]] = {
             "Peaks over the frequency",
             "peaks",
             "measure:name, at = case, frequency = peak_frequency, height = peak_height, half-power width = half_power_width",
+        ),
+        Table(
+            "Shares of a key in the variance (Sobol indices)",
+            "ranking",
+            "measure = name, key, alone = first:rounded, with interactions = total:rounded, at least = low:rounded, "
+            "at most = high:rounded",
         ),
         Table(
             "Where 90 % of the cases lie",

@@ -6,7 +6,7 @@ import numpy as np
 
 from ...runs.pieces import PieceFields, Pieces
 
-# parts of a run in the order of their codes in the array `part`
+# parts of a run in the order in which they are stored
 PARTS = ("lower", "upper", "interface")
 CELL_TYPES = np.array([0, 1, 3, 5, 9], np.uint8)  # cell type of VTK by number of nodes
 
@@ -30,7 +30,6 @@ FIELDS = {
     "von_mises": Field("Pa"),
     "stress_error": Field("1"),
     "material": Field("1", codes=("substrate", "coating")),
-    "part": Field("1", codes=PARTS),
     "weight": Field("m2"),
     "normal_stress": Field("Pa"),
     "shear_stress": Field("Pa"),

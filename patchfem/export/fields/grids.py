@@ -49,6 +49,7 @@ def make_grids(blocks: dict[str, Block], number: int, time: float) -> MultiBlock
             for name, values in fields.items():
                 data[name] = values[number % len(values)]  # a constant field has one frame
         grid.field_data["TimeValue"] = [time]
+        grid.set_active_scalars(ACTIVE_FIELDS[part])
         _label_units(grid)
         grids.append(grid, part)
     return grids
@@ -65,30 +66,16 @@ def _label_units(grid) -> None:
 
 
 def make_result_grids(result: Result, numbers: Iterable[int]) -> list[MultiBlock]:
-    """Return frames of a run with a patch as pyvista.MultiBlock objects with stresses in MPa.
-
-    The field array `units` of every grid lists the unit of each array.
-    """
+    """Return frames of a run with a patch as pyvista.MultiBlock objects, in SI."""
     pieces = compute_pieces(result)
     blocks = make_blocks(pieces)
-    units = {name: "MPa" if field.unit == "Pa" else field.unit for name, field in FIELDS.items()}
-    frames = []
-    for number in numbers:
-        grids = make_grids(blocks, number, float(pieces.time[number]))
-        for part, grid in zip(grids.keys(), grids):
-            for data in (grid.point_data, grid.cell_data):
-                for name in data.keys():
-                    if units[name] == "MPa":
-                        data[name] = data[name] / 1e6
-            names = [*grid.point_data.keys(), *grid.cell_data.keys()]
-            grid.field_data["units"] = [f"{name} [{units[name]}]" for name in names]
-            grid.set_active_scalars(ACTIVE_FIELDS[part])
-        frames.append(grids)
-    return frames
+    return [make_grids(blocks, number, float(pieces.time[number])) for number in numbers]
 
 
 def export_frames(frames: Frames, out: Path, number: int) -> None:
     """Write fields as .vtu or .csv of one frame, or as .pvd or .vtkhdf of all frames.
+
+    A .vtu has both pieces, a .csv the interface.
 
     Parameters
     ----------
@@ -103,36 +90,26 @@ def export_frames(frames: Frames, out: Path, number: int) -> None:
         write_blocks(out, frames.blocks, frames.times)
     elif out.suffix == ".pvd":
         _write_pvd(frames, out)
+    elif out.suffix == ".vtu":
+        time = float(frames.times[number])
+        pieces = {side: frames.blocks[side] for side in ("lower", "upper")}
+        grid = make_grids(pieces, number, time).combine()
+        grid.field_data["TimeValue"] = [time]
+        _write_vtu(grid, out)
     else:
-        write = _write_vtu if out.suffix == ".vtu" else _write_csv
-        write(frames, out, number)
+        _write_csv(frames, out, number)
 
 
-def _write_vtu(frames: Frames, out: Path, number: int) -> None:
-    """Write a frame as one mesh with the array `part`; fields that a part lacks are NaN or -1 there.
+def _write_vtu(grid, out: Path) -> None:
+    """Write a grid of PyVista.
 
     VTK makes the text in memory, because it ends the process where it cannot write a file.
     """
     from vtkmodules.vtkIOXML import vtkXMLUnstructuredGridWriter
 
-    grids = make_grids(frames.blocks, number, float(frames.times[number]))
-    for code, name in enumerate(PARTS):
-        grids[name].cell_data["part"] = np.full(grids[name].n_cells, code, np.int8)
-    # one mesh has one list of fields, so that every part needs all of them
-    for kind in ("point_data", "cell_data"):
-        samples = {name: values for grid in grids for name, values in getattr(grid, kind).items()}
-        for grid in grids:
-            data = getattr(grid, kind)
-            count = grid.n_points if kind == "point_data" else grid.n_cells
-            for name in samples.keys() - set(data.keys()):
-                hole = np.nan if samples[name].dtype.kind == "f" else -1
-                data[name] = np.full((count, *samples[name].shape[1:]), hole, samples[name].dtype)
-
-    merged = grids.combine()
-    merged.field_data["TimeValue"] = [frames.times[number]]
-    _label_units(merged)
+    _label_units(grid)
     writer = vtkXMLUnstructuredGridWriter()
-    writer.SetInputData(merged)
+    writer.SetInputData(grid)
     writer.SetDataModeToBinary()
     writer.SetWriteToOutputString(True)
     writer.Write()
@@ -140,14 +117,18 @@ def _write_vtu(frames: Frames, out: Path, number: int) -> None:
 
 
 def _write_pvd(frames: Frames, out: Path) -> None:
-    """Write each frame as .vtu in a folder beside a .pvd, which lists them with their times."""
+    """Write each part in each frame as .vtu in a folder beside a .pvd, which lists them with their times."""
     folder = out.with_name(f"{out.stem}_frames")
     create_folder(folder)
     lines = []
-    for number, time in enumerate(frames.times):
-        name = f"frame_{number:04d}.vtu"
-        _write_vtu(frames, folder / name, number)
-        lines.append(f'<DataSet timestep="{float(time)!r}" file="{folder.name}/{name}"/>')
+    for number, time in enumerate(frames.times.tolist()):
+        grids = make_grids(frames.blocks, number, time)
+        for code, part in enumerate(PARTS):
+            name = f"{part}_{number:04d}.vtu"
+            _write_vtu(grids[part], folder / name)
+            lines.append(
+                f'<DataSet timestep="{time!r}" part="{code}" file="{folder.name}/{name}"/>'
+            )
     text = "\n".join(lines)
     write_text(out, f'<VTKFile type="Collection"><Collection>\n{text}\n</Collection></VTKFile>\n')
 

@@ -23,7 +23,6 @@ REQUIRED_FIELDS = {
     "upper": {"displacement", "von_mises"},
     "interface": {"displacement", "gap", "holder_slide", "normal_stress"},
 }
-MAX_LENGTH = 1e6  # [m]; a position beyond it belongs to a damaged file
 
 
 class Frames(NamedTuple):
@@ -169,8 +168,6 @@ def read_frames(path: Path) -> Frames:
             present = blocks[part].point_data.keys() | blocks[part].cell_data.keys()
             if not names <= present:
                 raise ValueError(f"{part} has no {', '.join(sorted(names - present))}")
-        if not np.isfinite(times).all():
-            raise ValueError("a time is not a number")
     except Exception as fault:  # a damaged file can raise exceptions of many classes
         reason = " ".join(str(fault).split())[:200] or type(fault).__name__
         raise PatchfemError(
@@ -186,8 +183,6 @@ def _read_block(group, count: int) -> Block:
     n_corners = 2 if (last - first).max() == 1 else 4
     corners = np.minimum(first[:, None] + np.arange(n_corners), last[:, None])
     cells = group["Connectivity"][:][corners]
-    if not np.abs(points).max() < MAX_LENGTH or not 0 <= cells.min() <= cells.max() < len(points):
-        raise ValueError("a node is not at a valid place")
     data = [
         {name: _read_field(rows, name, size, count) for name, rows in group[kind].items()}
         for kind, size in (("PointData", len(points)), ("CellData", len(cells)))
@@ -197,7 +192,7 @@ def _read_block(group, count: int) -> Block:
 
 def _read_field(rows, name: str, size: int, count: int) -> np.ndarray:
     """Read a field (f, size, ...), where f is `count`, or 1 if it does not change."""
-    values = rows[:]
-    if len(values) not in (size, count * size) or values.dtype.kind not in "if":
-        raise ValueError(f"{name} has {len(values)} values of type {values.dtype}")
-    return values.reshape(-1, size, *FIELDS[name].shape)
+    values = rows[:].reshape(-1, size, *FIELDS[name].shape)
+    if len(values) not in (1, count):
+        raise ValueError(f"{name} has {len(values)} frames")
+    return values

@@ -18,7 +18,7 @@ def to_dataset(answer: Answer):
 
 
 def draw_sweep(dataset, measure: str, axes=None):
-    """Draw a measure of a sweep on matplotlib Axes and return them; hollow points miss the tolerance.
+    """Draw a measure of a sweep on matplotlib Axes and return them; crosses mark cases that did not settle.
 
     Parameters
     ----------
@@ -44,6 +44,5 @@ def draw_sweep(dataset, measure: str, axes=None):
 
         axes = Figure(figsize=drawing.PANEL_SIZE, layout="constrained").subplots()
     keys = [str(name) for name in dataset.coords if name != "case"]
-    details = {"of": {"keys": keys}, "tolerance": dataset.attrs.get("tolerance")}
-    panel = make_measure_panel({"": replace(answer, details=details)}, measure)
+    panel = make_measure_panel({"": replace(answer, details={"of": {"keys": keys}})}, measure)
     return drawing.draw(panel, axes)
