@@ -66,7 +66,7 @@ def test_band_is_errors_and_difference_of_methods(both_curves):
     backbone = both_curves
     assert backbone.attrs["method"] == "balance"
     advice = backbone.attrs["advice"]
-    assert "Its band holds the numerical error" in advice
+    assert "The band of this curve holds the numerical error" in advice
     assert "Up to 105 um friction dissipates nothing" in advice
     assert "the sticking contact, friction would reach its limit at 120 um" in advice
     for name in ("frequency", "damping"):

@@ -156,8 +156,8 @@ def describe_band_width(backbone: Backbone) -> str:
     numbers = np.array([band.damping_low, band.damping_high, curve.damping])[:, k]
     low, high, best = (format_number(number, 4) for number in numbers.tolist())
     return (
-        "Its band holds the numerical error and, where both methods have a value, their difference; it is widest at "
-        f"{format_length(curve.amplitude[k], 3)}, where the damping ratio is {low} to {high} beside {best}, and the "
+        "The band of this curve holds the numerical error and, where both methods have a value, their difference; it is "
+        f"widest at {format_length(curve.amplitude[k], 3)}, where the damping ratio is {low} to {high} beside {best}, and the "
         f"frequency is within {100 * deviations['frequency'].max():.2g} % everywhere."
     )
 
