@@ -157,8 +157,8 @@ def describe_band_width(backbone: Backbone) -> str:
     low, high, best = (format_number(number, 4) for number in numbers.tolist())
     return (
         "The band of this curve holds the numerical error and, where both methods have a value, their difference; it is "
-        f"widest at {format_length(curve.amplitude[k], 3)}, where the damping ratio is {low} to {high} beside {best}, and the "
-        f"frequency is within {100 * deviations['frequency'].max():.2g} % everywhere."
+        f"widest at {format_length(curve.amplitude[k], 3)}, where the damping ratio is {low} to {high} beside {best}, and "
+        f"the frequency is within {100 * deviations['frequency'].max():.2g} % everywhere."
     )
 
 
