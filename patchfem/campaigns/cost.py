@@ -11,12 +11,11 @@ import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
-from math import inf
 from time import perf_counter, process_time
 from typing import NamedTuple
 
 from .. import compiled
-from ..core import NotConverged, PatchfemError
+from ..core import Measure, NotConverged, PatchfemError
 from ..formatting import format_number
 from ..model.model import Model
 from ..model.source import locate_errors
@@ -63,12 +62,8 @@ class Cost:
         Elapsed time of the same timing [s].
     timings : int
         Number of timings.
-    values : dict
-        Value of each measure.
-    errors : dict
-        Error estimate of each measure, in the unit of its value.
-    floors : dict
-        Absolute floor of the allowed error of each measure.
+    measures : dict of str to Measure
+        Measures with a value.
     tolerance : float
         Tolerance of the run.
     remedies : tuple of str
@@ -85,13 +80,15 @@ class Cost:
     seconds: float
     wall_seconds: float
     timings: int
-    values: dict[str, float]
-    errors: dict[str, float]
-    floors: dict[str, float]
+    measures: dict[str, Measure]
     tolerance: float = 0.0
     remedies: tuple[str, ...] = ()
     steps: int | None = None
     nodes: int | None = None
+
+    def has_error(self, name: str) -> bool:
+        """Return whether a measure has an error estimate."""
+        return name in self.measures and self.measures[name].error is not None
 
 
 def compute_setting_costs(
@@ -167,7 +164,6 @@ def _time_settings(settings: list[Setting], say: Callable | None) -> list[Cost]:
 
 def _make_cost(setting: Setting, timings: list[tuple[float, float]], result: Result) -> Cost:
     """Return the cost of a setting from its pairs of CPU time and elapsed time [s], and the result of its run."""
-    known = {name: one for name, one in result.measures.items() if one.value is not None}
     advice = [finding.advice for finding in result.findings if finding.advice is not None]
     seconds, wall_seconds = min(timings)
     return Cost(
@@ -177,9 +173,7 @@ def _make_cost(setting: Setting, timings: list[tuple[float, float]], result: Res
         seconds=seconds,
         wall_seconds=wall_seconds,
         timings=len(timings),
-        values={name: measure.value for name, measure in known.items()},
-        errors={name: one.error for name, one in known.items() if one.error is not None},
-        floors={name: measure.floor for name, measure in known.items()},
+        measures={name: one for name, one in result.measures.items() if one.value is not None},
         tolerance=setting.model.accuracy.tolerance,
         remedies=tuple(one.text for one in advice),
         steps=result.extra.get("steps_per_cycle") or result.extra.get("steps"),
@@ -236,19 +230,16 @@ def rate_run(run: Cost, names: Sequence[str], tolerance: float) -> Accuracy:
     tolerance : float
         Largest error, relative to the value, beside which a floor counts.
     """
-    worst = (0.0, "")
-    for name in names:
-        error = run.errors.get(name)
-        if error:
-            size = abs(run.values[name]) + run.floors[name] / tolerance
-            worst = max(worst, (error / size if size else inf, name))
-    return Accuracy(*worst, all(name in run.errors for name in names))
+    known = [name for name in names if run.has_error(name)]
+    ratios = [(tolerance * run.measures[name].error_ratio(tolerance), name) for name in known]
+    worst = max((pair for pair in ratios if pair[0] > 0), default=(0.0, ""))
+    return Accuracy(*worst, len(known) == len(names))
 
 
 def find_measures_with_error(runs: list[Cost]) -> list[str]:
     """Return the measures with an error estimate in any run; all measures if there is none."""
-    names = list(runs[-1].values)
-    return [name for name in names if any(name in run.errors for run in runs)] or names
+    names = list(runs[-1].measures)
+    return [name for name in names if any(run.has_error(name) for run in runs)] or names
 
 
 def find_coarsest_run(runs: list[Cost], tolerance: float) -> Cost | None:
@@ -286,7 +277,7 @@ def describe_best_setting(runs: list[Cost], tolerance: float) -> str:
     worst = rate_run(best, names, tolerance)
     seconds = format_number(best.seconds, 2)
     if find_coarsest_run(runs, tolerance) is not None:
-        estimated = " that has an error estimate" if best.values.keys() - set(names) else ""
+        estimated = " that has an error estimate" if best.measures.keys() - set(names) else ""
         return f"{best.words}: {seconds} CPU s per run, with every measure{estimated} within the tolerance {tolerance:g}"
     if not worst.is_complete:
         return f"no setting is known to meet the tolerance {tolerance:g}: no run has an error estimate of every measure"

@@ -74,8 +74,6 @@ class CaseOptions:
         """Return the request for cases; raise UsageError if the options are incompatible."""
         if self.random and self.sobol:
             raise UsageError("--random and --sobol: use only one of them")
-        if min(self.random, self.sobol, self.seed) < 0:
-            raise UsageError("--random, --sobol and --seed must be whole numbers >= 0")
         if (self.random or self.sobol) and not self.over:
             raise UsageError(
                 "--random and --sobol draw values from ranges; give each range by --over table.key=low..high"

@@ -1,5 +1,6 @@
 """The answer of `cost`: numerical error against CPU time, for several tolerances or values of a setting."""
 
+from dataclasses import replace
 from typing import NamedTuple
 
 from ..campaigns.cost import (
@@ -102,8 +103,9 @@ def make_answer(curves: dict[str, list[Cost]], model: Model) -> Answer:
 def describe_runs(knob: str, runs: list[Cost], tolerance: float) -> JsonObject:
     """Return the runs of a curve as an entry of cost.json, in SI units.
 
-    `runs`: the attributes of each `Cost`, with `worst` {`measure`, `error`} and `meets_tolerance`. `sentence`: the cost of
-    all measures; None for TOLERANCE, because its runs have different tolerances.
+    `runs`: the attributes of each `Cost`, with `values`, `errors` and `floors` of its measures, `worst` {`measure`,
+    `error`} and `meets_tolerance`. `sentence`: the cost of all measures; None for TOLERANCE, because its runs have
+    different tolerances.
 
     Parameters
     ----------
@@ -123,7 +125,12 @@ def describe_runs(knob: str, runs: list[Cost], tolerance: float) -> JsonObject:
             "meets_tolerance": worst.judge(run.tolerance) is Judgement.MEETS,
             "remedies": list(run.remedies),
         }
-        entries.append(to_plain(run) | entry)
+        for part in ("value", "error", "floor"):
+            numbers = {name: getattr(one, part) for name, one in run.measures.items()}
+            entry[f"{part}s"] = {name: one for name, one in numbers.items() if one is not None}
+        attributes = to_plain(replace(run, measures={}))
+        del attributes["measures"]
+        entries.append(attributes | to_plain(entry))
     is_setting = knob != TOLERANCE
     return {
         "runs": entries,
@@ -170,12 +177,6 @@ def _find_main_measure(runs: list[Cost]) -> str:
     return rate_run(runs[0], names, runs[0].tolerance).name or names[0]
 
 
-def _find_unit(name: str) -> str:
-    """Return the unit of a measure."""
-    definition = quantities.find_definition(name)
-    return definition.unit if definition else "1"
-
-
 def _make_quantities(row: Row, main: str, tolerance: float) -> Quantities:
     """Return CPU time and error of a run, the tolerance of the scene, and the main measure."""
     run = row.run
@@ -185,9 +186,9 @@ def _make_quantities(row: Row, main: str, tolerance: float) -> Quantities:
         "largest_error": Quantity(row.worst.fraction),
         "tolerance": Quantity(tolerance),
     }
-    if main in run.values:
-        error = run.errors.get(main)
-        out[main] = Quantity(run.values[main], _find_unit(main), error, floor=run.floors[main])
+    if main in run.measures:
+        one = run.measures[main]
+        out[main] = Quantity(one.value, one.unit, one.error, floor=one.floor)
     return out
 
 
@@ -197,10 +198,11 @@ def _make_data(rows: list[Row], main: str, tolerance: float) -> Variables:
     columns = {"knob": ([row.knob for row in rows], "")}
     for attribute, (name, unit) in RUN_COLUMNS.items():
         columns[name] = ([getattr(run, attribute) for run in runs], unit)
-    for name in dict.fromkeys(name for run in runs for name in run.values):
-        for prefix, part in (("", "values"), ("error_", "errors")):
-            values = [getattr(run, part).get(name) for run in runs]
-            columns[prefix + name] = (values, _find_unit(name))
+    units = {name: one.unit for run in runs for name, one in run.measures.items()}
+    for name, unit in units.items():
+        measures = [run.measures.get(name) for run in runs]
+        for prefix, part in (("", "value"), ("error_", "error")):
+            columns[prefix + name] = ([getattr(one, part, None) for one in measures], unit)
 
     # an exact run has no place on a logarithmic axis
     columns["largest_error"] = ([row.worst.fraction or None for row in rows], "1")

@@ -17,7 +17,7 @@ from patchfem.campaigns import (
     numerical_settings,
 )
 from patchfem.campaigns.cost import find_best_run
-from patchfem.core import NotConverged
+from patchfem.core import Measure, NotConverged
 from patchfem.export.costs import make_answer
 from patchfem.runs.run import run
 
@@ -65,17 +65,14 @@ def build_model(keys="", tolerance=0.05):
 
 def make_cost(label, seconds, error, value=1.0):
     """Return the Cost of a synthetic run with two measures of equal error."""
-    return Cost(
-        label,
-        value,
-        f"a knob at {label}",
-        seconds,
-        seconds,
-        3,
-        {"a": 1.0, "b": 2.0},
-        {"a": error, "b": error},
-        {"a": 0.0, "b": 0.0},
-    )
+    measures = {name: Measure(size, "1", error) for name, size in (("a", 1.0), ("b", 2.0))}
+    return Cost(label, value, f"a knob at {label}", seconds, seconds, 3, measures)
+
+
+def forget_errors(run_cost, *names):
+    """Remove the error estimates of measures of a run."""
+    for name in names:
+        run_cost.measures[name] = replace(run_cost.measures[name], error=None)
 
 
 @pytest.mark.share(0)
@@ -89,8 +86,10 @@ def test_exact_error_at_setting_of_scene_agrees_with_run(keys, own, monkeypatch)
     # The label of a row lists all settings with equal runs.
     row = next(one for one in compute_setting_costs(patch, "element_size") if own in one.label)
     measures = run(patch, fresh=True).measures
-    assert row.errors == pytest.approx({name: m.error for name, m in measures.items()}, rel=1e-9)
-    assert row.values == pytest.approx({name: m.value for name, m in measures.items()}, rel=1e-9)
+    assert row.measures.keys() == measures.keys()
+    for name, measure in measures.items():
+        assert row.measures[name].value == pytest.approx(measure.value, rel=1e-9)
+        assert row.measures[name].error == pytest.approx(measure.error, rel=1e-9)
 
 
 def test_exact_automatic_mesh_averages_profile_as_run(tmp_path):
@@ -162,11 +161,11 @@ def test_exact_unknown_error_is_not_within_tolerance():
     tolerance".
     """
     runs = [make_cost("4", 0.1, 1e-4), make_cost("8", 1, 1e-5), make_cost("16", 2, 1e-5)]
-    del runs[0].errors["b"]
+    forget_errors(runs[0], "b")
     assert find_best_run(runs, 1e-2).label == "8"
     assert find_best_run(runs, 1e-6).label == "8"
     for run_cost in runs:
-        run_cost.errors.clear()
+        forget_errors(run_cost, "a", "b")
     assert describe_best_setting(runs, 1e-2) == (
         "no setting is known to meet the tolerance 0.01: no run has an error estimate of every measure"
     )
@@ -204,7 +203,7 @@ def test_exact_notes_are_those_of_the_named_run():
 def test_exact_runs_with_unknown_errors_are_told_from_runs_that_miss():
     """A run without an error estimate neither meets nor misses its tolerance in sentences, table and page."""
     runs = [replace(make_cost(str(k), 1, 1e-4), tolerance=10.0**-k) for k in (2, 3, 4, 5)]
-    del runs[1].errors["b"]
+    forget_errors(runs[1], "b")
     answer = make_answer({"tolerance": runs}, build_model(tolerance=1e-3))
     assert answer.verdict[:2] == (
         "At its tolerance 0.001 the scene takes 1 CPU s and does not have an error estimate of every measure, with a "
@@ -214,8 +213,8 @@ def test_exact_runs_with_unknown_errors_are_told_from_runs_that_miss():
     entries = answer.details["tolerance"]["runs"]
     assert [entry["meets_tolerance"] for entry in entries] == [True, False, True, False]
     for known in runs[:1] + runs[2:]:
-        del known.errors["b"]
-    runs[-1].errors["b"] = 1e-3
+        forget_errors(known, "b")
+    runs[-1].measures["b"] = Measure(2.0, "1", 2e-3)
     answer = make_answer({"tolerance": runs}, build_model(tolerance=1e-3))
     assert answer.verdict[1] == "No run is known to meet its tolerance."
 

@@ -12,8 +12,8 @@ Campaign `made-fits` of `campaigns`: a row for each fitted value. A seed k makes
   cycle of the first mode for 60 cycles, with noise of 3 % of the first amplitude: the damping ratios by the fit of
   decaying sinusoids.
 
-Seeds below 8800 are for development; 8800 to 8829, 99180000 to 99180029 and 99190000 to 99190009 are scored once
-(tests/README.md).
+Seeds below 8800 are for development; 8800 to 8829, 99180000 to 99180029, 99190000 to 99190009 and 99282000 to 99282009 are
+scored once (tests/README.md).
 """
 
 from pathlib import Path

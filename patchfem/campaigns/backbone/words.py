@@ -153,10 +153,8 @@ def describe_band_width(backbone: Backbone) -> str:
         ends = np.array([getattr(band, f"{name}_low"), getattr(band, f"{name}_high")])
         deviations[name] = np.abs(ends - value).max(axis=0) / np.maximum(np.abs(value), 1e-300)
     k = int(np.argmax(deviations["damping"]))
-    low, high, best = (
-        format_number(float(values[k]), 4)
-        for values in (band.damping_low, band.damping_high, curve.damping)
-    )
+    numbers = np.array([band.damping_low, band.damping_high, curve.damping])[:, k]
+    low, high, best = (format_number(number, 4) for number in numbers.tolist())
     return (
         "The band of this curve holds the numerical error and, where both methods have a value, their difference; it is "
         f"widest at {format_length(curve.amplitude[k], 3)}, where the damping ratio is {low} to {high} beside {best}, and "

@@ -160,10 +160,8 @@ def estimate_random_indices(coordinates: np.ndarray, values: np.ndarray) -> list
     fractions = [find_unexplained(smoothing) for smoothing in SMOOTHING_PARAMETERS]
     best = int(np.argmin(np.median(fractions, axis=1)))
     unexplained = fractions[best]
-    surfaces = [
-        fit(cases, SMOOTHING_PARAMETERS[best])
-        for cases in (every, *(others for others, _ in folds))
-    ]
+    fitted = (every, *(others for others, _ in folds))
+    surfaces = [fit(cases, SMOOTHING_PARAMETERS[best]) for cases in fitted]
     first, total = np.transpose([_compute_surface_indices(one) for one in surfaces], (1, 0, 2, 3))
 
     margin = unexplained[:, None] + INDEX_ERROR
