@@ -193,7 +193,7 @@ def _have_bands_converged(layout: Layout, previous_layout: Layout) -> bool:
     return bool((np.abs(bands - previous_bands) <= BAND_CHANGE_TOL * cells).all())
 
 
-def _has_cells_of(layout: Layout, x, ratio: float, span: tuple[float, float]) -> bool:
+def _resolves_span(layout: Layout, x, ratio: float, span: tuple[float, float]) -> bool:
     """Return whether columns at x (k,) [m] have cells of a layout inside a span, up to a ratio of their lengths."""
     inside = (x[1:] > span[0]) & (x[:-1] < span[1])
     middle = (x[1:] + x[:-1])[inside] / 2
@@ -203,9 +203,9 @@ def _has_cells_of(layout: Layout, x, ratio: float, span: tuple[float, float]) ->
 def _resolves_contact(patch_model, x, layout: Layout, zones: Pairs) -> bool:
     """Return whether columns at x (k,) [m] resolve the maxima on a wavy surface and the slip zones [m]."""
     has_waves = _max_wave_cell(patch_model) < np.inf and x.size <= MAX_COLUMNS
-    if has_waves and not _has_cells_of(layout, x, MAX_WAVE_CELL_RATIO, (x[0], x[-1])):
+    if has_waves and not _resolves_span(layout, x, MAX_WAVE_CELL_RATIO, (x[0], x[-1])):
         return False
-    return all(_has_cells_of(layout, x, MAX_SEARCH_CELL_RATIO, zone) for zone in zones)
+    return all(_resolves_span(layout, x, MAX_SEARCH_CELL_RATIO, zone) for zone in zones)
 
 
 def _max_wave_cell(patch_model) -> float:

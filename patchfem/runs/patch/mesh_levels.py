@@ -265,7 +265,14 @@ def resolves_slip_work(patch_model, patches, tolerance: float) -> bool:
 def meets_tolerance(patch_model, patches, tolerance: float) -> bool:
     """Return whether the static measures of a patch and its friction work meet the tolerance.
 
-    patches: from fine to coarse; the first has its static measures, and None stands for a missing mesh.
+    Parameters
+    ----------
+    patch_model : PatchModel
+        Patch, with the prescribed displacement of its mesh settings.
+    patches : sequence of Patch or None
+        From fine to coarse; the first has its static measures, and None stands for a missing mesh.
+    tolerance : float
+        Relative error that the measures have to meet.
     """
     is_within = max_mesh_error_ratio(patches[0].measures, tolerance) <= 1
     return is_within and resolves_slip_work(patch_model, patches, tolerance)
