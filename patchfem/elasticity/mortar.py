@@ -11,9 +11,8 @@ D^-1 int psi_i phi^s_j:
 
 Rows of T_s sum to 1 and T_s x_s = x, so uniform pressure, force and moment are transferred exactly.
 
-The grid is that of the coarser piece, or of a much softer one: if the pressure has more freedom
-than the softer body has nodes, a stiff body follows the kinks of the other one, and the pressure
-ripples. Where the coarser piece changes along the interface, the grid changes, too.
+The grid is that of the coarser piece: if the pressure has more freedom than a body has nodes, it ripples.
+Where the coarser piece changes along the interface, the grid changes, too.
 """
 
 from dataclasses import dataclass
@@ -24,10 +23,6 @@ import numpy as np
 from ..core import frozen_array
 from ..mesh.grading import LENGTH_TOL, tributary_lengths
 from .elasticity import InterfaceCompliance
-
-# Largest ratio of compliances for which the pressure is defined on the nodes of the stiffer piece;
-# beyond it, the nodes of the softer piece are used even if they are finer
-MAX_SOFTNESS_RATIO = 20.0
 
 
 class PieceInterface(NamedTuple):
@@ -70,7 +65,7 @@ def join_pieces(lower: PieceInterface, upper: PieceInterface) -> Mortar:
     -------
     Mortar
     """
-    x = _choose_grid(lower, upper)
+    x = _join_nodes(lower.x, upper.x)
     to_lower = transfer_matrix(x, lower.x)
     to_upper = transfer_matrix(x, upper.x)
     nn, tt, nt = (
@@ -129,36 +124,20 @@ def _hat_functions(x, cell, positions) -> np.ndarray:
     return np.stack([(x[cell + 1] - positions) / width, (positions - x[cell]) / width])
 
 
-def _choose_grid(lower: PieceInterface, upper: PieceInterface) -> np.ndarray:
-    """Choose the nodes (m,) [m] of the pressure: at each place those of the coarser or of the much softer piece."""
-    node = lower.x[0]
-    end = lower.x[-1]
-    tolerance = LENGTH_TOL * (end - node)
-    grid = [node]
-    while node < end - tolerance:
-        softness = [_interpolate_softness(piece, node) for piece in (lower, upper)]
+def _join_nodes(lower_x, upper_x) -> np.ndarray:
+    """Return the nodes (k,) [m] of the coarser of two interfaces at each place.
+
+    After each node follows the farther one of the next nodes of both pieces.
+    lower_x, upper_x: nodes [m] of the pieces, with the same ends.
+    """
+    end = lower_x[-1]
+    tolerance = LENGTH_TOL * (end - lower_x[0])
+    grid = [lower_x[0]]
+    while grid[-1] < end - tolerance:
         following = []
-        for piece in (lower, upper):
-            number = int(np.searchsorted(piece.x, node + tolerance, "right"))
-            following.append(piece.x[min(number, piece.x.size - 1)])
-        if softness[0] > MAX_SOFTNESS_RATIO * softness[1]:
-            node = following[0]
-        elif softness[1] > MAX_SOFTNESS_RATIO * softness[0]:
-            node = following[1]
-        else:
-            node = max(following)
-        grid.append(node)
+        for x in (lower_x, upper_x):
+            number = int(np.searchsorted(x, grid[-1] + tolerance, "right"))
+            following.append(x[min(number, x.size - 1)])
+        grid.append(max(following))
     grid[-1] = end
     return np.array(grid)
-
-
-def _interpolate_softness(piece: PieceInterface, position: float) -> float:
-    """Return the compliance [m2/N] of a piece to a force at a node that its neighbours balance."""
-    x = piece.x
-    compliance = piece.compliance.nn
-    node = int(np.clip(np.searchsorted(x, position), 1, x.size - 2))
-    left = x[node] - x[node - 1]
-    right = x[node + 1] - x[node]
-    forces = np.array([-right, left + right, -left]) / (left + right)
-    three = slice(node - 1, node + 2)
-    return float(forces @ compliance[three, three] @ forces)

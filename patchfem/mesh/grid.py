@@ -13,7 +13,7 @@ from math import ceil, log
 
 import numpy as np
 
-from ..core import PatchfemError, frozen_array
+from ..core import frozen_array
 from .ends import SHARP_END, End
 from .grading import Layout, divide_into_rows, tributary_lengths
 
@@ -266,23 +266,8 @@ def graded_grid(
     Returns
     -------
     TensorGrid
-
-    Raises
-    ------
-    PatchfemError
-        If element_size exceeds the length, or the coating fills the height.
     """
-    if element_size > length * (1 + 1e-12):
-        raise PatchfemError(
-            f"contact.element_size: {element_size:.6g} m exceeds the length {length:.6g} m"
-        )
-    if coating >= height:
-        raise PatchfemError(
-            f"contact.coating.thickness: {coating:.6g} m leaves no substrate in a piece of height "
-            f"{height:.6g} m"
-        )
-
-    # Rows for N_REFERENCE_COLUMNS columns, which are then scaled with the columns
+    # Rows for N_REFERENCE_COLUMNS columns, which are then scaled with the columns.
     n_columns = max(2, ceil(length / element_size - 1e-9))
     scale = row_scale(n_columns)
     reference_cell = length / n_columns / scale

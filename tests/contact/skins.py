@@ -5,7 +5,6 @@ from typing import NamedTuple
 
 import numpy as np
 from pressed import press, press_to_approach
-from scipy.linalg import cho_factor, cho_solve
 
 from patchfem.contact import (
     ExponentialAsperities,
@@ -108,15 +107,3 @@ def stretch_law(law, factor: float):
     if isinstance(law, ExponentialAsperities):
         return replace(law, u0=law.u0 * factor)
     return replace(law, deviation=law.deviation * factor, density=law.density * factor**-1.5)
-
-
-def layer_stiffness(c, weight, stiffness) -> float:
-    """Return the stiffness [N/m] of the whole patch, layer and bodies in series, for a common rigid motion.
-
-    stiffness (m,) [Pa/m] of the layer; nodes without stiffness carry no load.
-    """
-    d = weight * stiffness
-    loaded = np.flatnonzero(d > 1e-18 * d.max())
-    root = np.sqrt(d[loaded])
-    system = np.eye(loaded.size) + root[:, None] * c[np.ix_(loaded, loaded)] * root
-    return float(root @ cho_solve(cho_factor(system, lower=True), root))

@@ -144,9 +144,11 @@ def test_exact_vanishing_load_scales_linearly(fraction, moment):
 
 @pytest.mark.parametrize("load", [1e201, 1.7e308, np.inf, np.nan, -1.0])
 def test_refuses_invalid_load(load):
-    """A negative, infinite, undefined or excessive load is refused."""
+    """A negative, infinite, undefined or excessive load is refused, and a load line that tips the piece over."""
     with pytest.raises(PatchfemError, match=r"contact\.load: "):
         press(make_coated_pair(100), np.zeros(101), load)
+    with pytest.raises(PatchfemError, match=r"contact\.load_line: .* tips over"):
+        press(make_coated_pair(100), np.zeros(101), 1.0, 0.51 * LENGTH)
 
 
 @pytest.mark.parametrize("moment", [None, LOAD * 1e-5])
@@ -187,9 +189,6 @@ def test_exact_load_line_near_tipping_limit(fraction, side):
             -1 if side > 0 else 0
         ]
         assert end_force == pytest.approx(LOAD, rel=200 * (0.5 - fraction))
-
-
-# ---- equal heights
 
 
 # ---- fallbacks of the active-set method

@@ -7,7 +7,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from patchfem.core import PatchfemError
 from patchfem.mesh import ROW_SLOPE, graded_grid, row_scale
 from patchfem.mesh.grid import MIN_PIECE_ROWS
 
@@ -72,17 +71,3 @@ def test_exact_tributary_lengths_integrate_linear_functions(piece):
     assert lengths.min() > 0
     # the nodal areas integrate a straight line exactly
     assert lengths @ (3 + 2 * grid.x) == pytest.approx(3 * piece[0], rel=1e-12)
-
-
-@pytest.mark.parametrize(
-    "size, coating, name",
-    [
-        (11e-3, 0.0, "contact.element_size"),
-        (1e-3, 5e-3, "contact.coating.thickness"),
-        (1e-3, 6e-3, "contact.coating.thickness"),
-    ],
-)
-def test_refuses_element_or_coating_larger_than_piece(size, coating, name):
-    """An element or a coating larger than the piece is refused with the key."""
-    with pytest.raises(PatchfemError, match=name):
-        graded_grid(10e-3, 5e-3, size, coating)

@@ -59,6 +59,8 @@ N_CELLS_PER_SLIP_ZONE = 4
 # Largest ratio of a search cell in a slip zone to the cell of the layout; above it the search is
 # repeated.
 MAX_SEARCH_CELL_RATIO = 4.0
+# The same ratio for the waves of a surface.
+MAX_WAVE_CELL_RATIO = 2.0
 # Largest number of contact searches; each search uses columns graded to the result of the previous
 # one.
 MAX_SEARCHES = 8
@@ -165,10 +167,7 @@ def _search_contact_region(patch_model) -> BaseGrids:
         previous_layout = layout
         layout = make_column_layout(patch_model, extents)
         edge_cell_ratio = max(extent.cell / extent.width for extent in extents)
-        is_resolved = _resolves_waves(patch_model, x, layout) and _resolves_slip_zones(
-            contact.slip_zones, x, layout
-        )
-
+        is_resolved = _resolves_contact(patch_model, x, layout, contact.slip_zones)
         if edge_cell_ratio <= 1 / (EDGE_CELLS[patch_model.mesh.is_static] - 1) and is_resolved:
             break
         if _have_bands_converged(layout, previous_layout):
@@ -194,30 +193,19 @@ def _have_bands_converged(layout: Layout, previous_layout: Layout) -> bool:
     return bool((np.abs(bands - previous_bands) <= BAND_CHANGE_TOL * cells).all())
 
 
-def _resolves_slip_zones(zones: Pairs, x, layout: Layout) -> bool:
-    """Return whether columns at x (k,) [m] resolve the slip zones of a patch.
-
-    Their cells may be up to MAX_SEARCH_CELL_RATIO times as long as those of the layout.
-    """
-    midpoint = (x[1:] + x[:-1]) / 2
-    cell_lengths = np.diff(x)
-    for low, high in zones:
-        inside = (x[1:] > low) & (x[:-1] < high)
-        if (
-            cell_lengths[inside] > MAX_SEARCH_CELL_RATIO * layout.cell_lengths(midpoint[inside])
-        ).any():
-            return False
-    return True
+def _resolves_span(layout: Layout, x, ratio: float, span: tuple[float, float]) -> bool:
+    """Return whether columns at x (k,) [m] have cells of a layout inside a span, up to a ratio of their lengths."""
+    inside = (x[1:] > span[0]) & (x[:-1] < span[1])
+    middle = (x[1:] + x[:-1])[inside] / 2
+    return bool((np.diff(x)[inside] <= ratio * layout.cell_lengths(middle)).all())
 
 
-def _resolves_waves(patch_model, x, layout: Layout) -> bool:
-    """Return whether columns at x (k,) [m] resolve the pressure maxima on a wavy surface.
-
-    Their cells may be up to twice as long as those of the layout.
-    """
-    if _max_wave_cell(patch_model) == np.inf or x.size > MAX_COLUMNS:
-        return True
-    return bool((np.diff(x) <= 2 * layout.cell_lengths((x[1:] + x[:-1]) / 2)).all())
+def _resolves_contact(patch_model, x, layout: Layout, zones: Pairs) -> bool:
+    """Return whether columns at x (k,) [m] resolve the maxima on a wavy surface and the slip zones [m]."""
+    has_waves = _max_wave_cell(patch_model) < np.inf and x.size <= MAX_COLUMNS
+    if has_waves and not _resolves_span(layout, x, MAX_WAVE_CELL_RATIO, (x[0], x[-1])):
+        return False
+    return all(_resolves_span(layout, x, MAX_SEARCH_CELL_RATIO, zone) for zone in zones)
 
 
 def _max_wave_cell(patch_model) -> float:

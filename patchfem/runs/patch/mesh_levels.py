@@ -13,7 +13,7 @@ from ...model.pieces import make_piece_meshes
 from . import profile_points, slip_zones, store
 from .condensed import condense, condense_on_shared_meshes
 from .grids import MAX_CONDENSING_SECONDS, MIN_LEVELS, make_base_grids, predict_condensing_seconds
-from .measures import estimate_static_measures, max_mesh_error_ratio, with_static_measures
+from .measures import max_mesh_error_ratio, with_static_measures
 from .press import Patches, solve_patch_contact
 
 # Tolerance at which a patch with prescribed partial slip may take as much CPU time as a patch in a
@@ -56,8 +56,9 @@ def solve_with_coarser(patch_model, tolerance: float, estimate: bool = True) -> 
     if mesh.shared is None:
         if mesh.is_automatic:
             return solve_on_refined_meshes(patch_model, tolerance, estimate)
-        bodies = make_piece_meshes(patch_model)
-        return _solve_on_given_meshes(patch_model, bodies, tolerance, estimate)
+        meshes = make_given_meshes(patch_model)[: None if estimate else 1]
+        pairs = [condense(patch_model, *level) for level in meshes]
+        return solve_on_pairs(patch_model, pairs, tolerance)
     patches = store.get_or_compute_in_sweep(
         patch_model,
         ("patches", store.content_key(patch_model), tolerance, estimate),
@@ -97,40 +98,23 @@ def solve_on_pairs(patch_model, pairs, tolerance: float, estimate: bool = True) 
     return with_static_measures((*patches, *(3 - len(patches)) * [None]), tolerance)
 
 
-def _solve_on_given_meshes(
-    patch_model, bodies: tuple, tolerance: float | None, estimate: bool
-) -> Patches:
-    """Solve a patch on given meshes and on the meshes of its error estimate."""
-    levels = [bodies, *(make_comparison_meshes(*bodies) if estimate else ())]
-    pairs = [condense(patch_model, *level) for level in levels]
-    return solve_on_pairs(patch_model, pairs, tolerance)
+def make_given_meshes(patch_model) -> list:
+    """Return the meshes of a patch with prescribed element size or mesh file, from fine to coarse.
 
-
-def make_file_meshes(patch_model) -> list:
-    """Return the meshes of a patch with prescribed element size or mesh file.
-
-    Their order is that of `solve_with_coarser`.
+    The error follows from two coarser grids, or from the unstructured mesh with all edges halved. Meshes with few columns
+    have none of them.
     """
-    bodies = make_piece_meshes(patch_model)
-    return [bodies, *make_comparison_meshes(*bodies)]
-
-
-def make_comparison_meshes(lower, upper) -> list:
-    """Return the meshes with which the error on given meshes is estimated.
-
-    These are two coarser grids, or the unstructured mesh with all edges halved. The list is empty
-    for meshes with few columns.
-    """
-    if lower.x.size <= MAX_COLUMNS_WITHOUT_COARSER:
-        return []
+    lower, upper = make_piece_meshes(patch_model)
+    levels = [(lower, upper)]
     if not isinstance(lower, TensorGrid):
-        return [tuple(None if body is None else body.refine() for body in (lower, upper))]
-    out = []
-    while len(out) < 2 and lower.x.size > MAX_COLUMNS_WITHOUT_COARSER:
+        if lower.x.size > MAX_COLUMNS_WITHOUT_COARSER:
+            levels.append(tuple(None if body is None else body.refine() for body in (lower, upper)))
+        return levels
+    while len(levels) < 3 and lower.x.size > MAX_COLUMNS_WITHOUT_COARSER:
         lower = lower.coarsen()
         upper = None if upper is None else upper.coarsen()
-        out.append((lower, upper))
-    return out
+        levels.append((lower, upper))
+    return levels
 
 
 def solve_on_refined_meshes(patch_model, tolerance: float, estimate: bool = True) -> Patches:
@@ -278,6 +262,22 @@ def resolves_slip_work(patch_model, patches, tolerance: float) -> bool:
     return slip_zones.max_slip_error_ratio(solved, slip, tolerance) <= 1
 
 
+def meets_tolerance(patch_model, patches, tolerance: float) -> bool:
+    """Return whether the static measures of a patch and its friction work meet the tolerance.
+
+    Parameters
+    ----------
+    patch_model : PatchModel
+        Patch, with the prescribed displacement of its mesh settings.
+    patches : sequence of Patch or None
+        From fine to coarse; the first has its static measures, and None stands for a missing mesh.
+    tolerance : float
+        Relative error that the measures have to meet.
+    """
+    is_within = max_mesh_error_ratio(patches[0].measures, tolerance) <= 1
+    return is_within and resolves_slip_work(patch_model, patches, tolerance)
+
+
 def needs_finer_mesh(patch_model, patches, tolerance: float) -> bool:
     """Return whether a patch would get a finer mesh at a smaller tolerance.
 
@@ -294,6 +294,5 @@ def needs_finer_mesh(patch_model, patches, tolerance: float) -> bool:
     if predict_condensing_seconds(finer) > max_condensing_seconds(patch_model, tolerance):
         return False
     # Values are extrapolated where they miss the tolerance.
-    measures = estimate_static_measures(*patches, tolerance=tolerance)
-    is_within = max_mesh_error_ratio(measures, tolerance) <= 1
-    return not (is_within and resolves_slip_work(patch_model, patches, tolerance))
+    patches = with_static_measures(patches, tolerance, patches[0].points)
+    return not meets_tolerance(patch_model, patches, tolerance)

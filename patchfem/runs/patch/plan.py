@@ -11,13 +11,7 @@ from ...model.model import Model
 from ...model.pieces import make_piece_meshes
 from ..results.patch_rows import Values
 from . import skin, store
-from .grids import (
-    MAX_CONDENSING_SECONDS,
-    MIN_LEVELS,
-    make_base_grids,
-    predict_condensing_seconds,
-)
-from .mesh_levels import make_comparison_meshes
+from .grids import MIN_LEVELS, make_base_grids
 
 # Tolerance below which a contact that ends inside the interface or at a step needs another
 # refinement level.
@@ -31,29 +25,21 @@ MAX_FULL_CONTACT_TILT = 0.7
 StiffnessChain = dict[str, float | str]
 
 
-def _predict_mesh_levels(patch_model, tolerance: float) -> list:
-    """Return the meshes of the pieces on each expected level, from fine to coarse.
+def _predict_finest_mesh(patch_model, tolerance: float) -> list:
+    """Return the meshes of the pieces on the expected finest level.
 
-    The coarsest automatic mesh is that of the run. A mesh file is not read; an automatic mesh takes its place.
+    A mesh file is not read; an automatic mesh takes its place.
+    tolerance: relative error that the static measures have to meet.
     """
     if patch_model.mesh.shared is not None:
-        return list(patch_model.mesh.shared.levels)
+        return patch_model.mesh.shared.levels[0]
     if not patch_model.mesh.is_automatic:
-        lower_mesh, upper_mesh = make_piece_meshes(patch_model.with_mesh(file=None))
-        return [(lower_mesh, upper_mesh), *make_comparison_meshes(lower_mesh, upper_mesh)]
+        return make_piece_meshes(patch_model.with_mesh(file=None))
     bodies, contact = make_base_grids(patch_model)
     has_edges = bool(patch_model.gap.jumps or (contact is not None and contact.places))
-    levels = [bodies]
-    while len(levels) < MIN_LEVELS + (has_edges and tolerance < TIGHT_TOL):
+    for _ in range(MIN_LEVELS - 1 + (has_edges and tolerance < TIGHT_TOL)):
         bodies = [body.refine() for body in bodies]
-        if (
-            len(levels) >= MIN_LEVELS
-            and predict_condensing_seconds(bodies)
-            > MAX_CONDENSING_SECONDS[patch_model.mesh.is_static]
-        ):
-            break
-        levels.insert(0, bodies)
-    return levels
+    return bodies
 
 
 def count_unknowns(model: Model) -> dict[str, int]:
@@ -66,7 +52,7 @@ def count_unknowns(model: Model) -> dict[str, int]:
     points = 0
     nodes = 0
     for patch in patches.values():
-        bodies = _predict_mesh_levels(patch, model.accuracy.tolerance)[0]
+        bodies = _predict_finest_mesh(patch, model.accuracy.tolerance)
         finest = [body for body in bodies if body is not None]
         points += finest[0].x.size
         nodes += sum(body.n_nodes for body in finest)

@@ -429,15 +429,14 @@ def solve_contact(
         StripLayout(pieces.interface.x, strip.weight, offsets),
         None if skin is None else make_skin_law(patch_model),
     )
-    is_loaded = loading.approach is None
 
-    # A prescribed approach leaves load and moment to the solution; otherwise they are given.
+    # Under a prescribed approach, at which no piece rotates, the load follows from the solution.
     holder = Holder(
-        load=loading.load if is_loaded else None,
+        load=loading.load,
         approach=loading.approach,
-        moment=loading.moment if is_loaded else None,
+        moment=loading.moment,
         roll_moment=None if offset is None else loading.load * offset,
-        spring=loading.rotational_stiffness if is_loaded else 0.0,
+        spring=loading.rotational_stiffness,
         rotation=patch_model.gap.angle,
         roll=roll,
     )

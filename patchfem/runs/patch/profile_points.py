@@ -120,11 +120,8 @@ class HolderState(NamedTuple):
 def can_use_points(patch_model) -> bool:
     """Return whether a `PatchModel` can be solved on equally spaced points.
 
-    This holds for pieces of equal length with a profile and without asperity layer, under a load,
-    or under an approach without rotation.
+    This holds for pieces of equal length with a profile and without asperity layer.
     """
-    loading = patch_model.loading
-    can_rotate = loading.can_rotate or loading.rotational_stiffness > 0
     return (
         patch_model.gap.profile is not None
         and patch_model.mesh.is_automatic
@@ -132,7 +129,6 @@ def can_use_points(patch_model) -> bool:
         and patch_model.interface.skin is None
         and patch_model.interface.strips is None
         and not patch_model.pieces.has_overhang
-        and (loading.approach is None or not can_rotate)
     )
 
 
@@ -402,15 +398,9 @@ def _solve_nodal_forces(patch_model, normal: PointCompliance, gap, start) -> Poi
     initial_force = None if start is None else np.repeat(start, 2) / 2
     has_approach = loading.approach is not None
     offset = loading.approach if has_approach else gap.min()
-    moment = None if has_approach else loading.moment
+    moment = loading.moment
 
-    problem = patch_problem(
-        x,
-        gap - offset,
-        None if has_approach else loading.load,
-        moment,
-        loading.rotational_stiffness,
-    )
+    problem = patch_problem(x, gap - offset, loading.load, moment, loading.rotational_stiffness)
     force, n_iterations = solve_by_gradients(
         normal, problem, CONTACT_TOL, MAX_ITERATIONS, initial_force
     )

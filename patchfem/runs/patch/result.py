@@ -7,8 +7,6 @@ clamping.
 
 from dataclasses import replace
 
-import numpy as np
-
 from ...contact.press import NEGLECTED_SHEAR_NOTE
 from ...core import Outcome
 from ...formatting import format_length, format_quantity
@@ -200,9 +198,7 @@ def notes_on_neglected_effects(face) -> list[str]:
         out.append(NEGLECTED_SHEAR_NOTE)
 
     # Coupling of shear and normal motion, which acts only between dissimilar pieces.
-    if model.kind == "patch":
-        out += note_on_normal_shear_coupling(patch_model, patch)
-    elif patch.pair.coupling > MIN_COUPLING_RATIO:
+    if patch.pair.coupling > MIN_COUPLING_RATIO:
         out.append(
             "the pieces have different elasticity, which couples shear and normal motion; this coupling is "
             f"neglected; under a shear force the largest normal displacement is {patch.pair.coupling:.2g} times "
@@ -234,44 +230,3 @@ def _describe_results_on_mesh(model, patch) -> str:
             f"computed on {where}"
         )
     return f"fields and motion are computed on {where}"
-
-
-def note_on_normal_shear_coupling(patch_model, patch) -> list[str]:
-    """Return a list with a note on the coupling of normal and shear displacement of dissimilar pieces.
-
-    The surfaces of dissimilar pieces slide on each other under pressure. If they stick, shear stresses
-    prevent this sliding and stiffen the contact.
-    """
-    pair = patch.pair
-    loaded = np.flatnonzero(patch.active)
-    if not pair.closing.any() or not loaded.size:
-        return []
-    rows = np.ix_(loaded, loaded)
-    unit = np.ones(loaded.size)
-    normal = patch.pieces.normal[rows]
-    closing = pair.closing[rows]
-    stuck_normal = normal - closing @ np.linalg.solve(patch.pieces.tangential[rows], closing.T)
-    increase = (
-        unit @ np.linalg.solve(stuck_normal, unit) / (unit @ np.linalg.solve(normal, unit)) - 1
-    )
-    beta = abs(_compute_dundurs_beta(patch_model))
-    return [
-        f"the pieces have different elasticity (Dundurs' beta {beta:.2g} at the interface), and the pressure is "
-        f"computed without friction; if the pieces stuck perfectly, normal_stiffness would be {100 * increase:.2g} % "
-        "larger; with friction the stiffness lies between the two values"
-    ]
-
-
-def _compute_dundurs_beta(patch_model) -> float:
-    """Return Dundurs' parameter beta of the materials at the two surfaces."""
-    is_plane_strain = patch_model.pieces.plane == "strain"
-    shear = []
-    kappa = []
-    for piece in patch_model.pieces.both:
-        face = piece.face_material
-        nu = face.poisson
-        shear.append(face.young / (2 + 2 * nu))
-        kappa.append(3 - 4 * nu if is_plane_strain else (3 - nu) / (1 + nu))
-    lower = shear[0] * (kappa[1] - 1), shear[0] * (kappa[1] + 1)
-    upper = shear[1] * (kappa[0] - 1), shear[1] * (kappa[0] + 1)
-    return (lower[0] - upper[0]) / (lower[1] + upper[1])

@@ -3,13 +3,11 @@
 In: a `PatchModel` with a skin. Out: its pressure law, and a note on asperity stiffnesses that come from a profile.
 """
 
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from ...contact import asperity_laws
-from ...core import PatchfemError
 from ...formatting import format_length, format_quantity
 from ...model import peaks as traces
 from ...surface.roughness import peaks
@@ -56,14 +54,11 @@ def note_on_asperity_stiffness(patch_model, pressure: float) -> list[str]:
     # Persson: stiffness = pressure / u_0, with u_0 = 0.4 to 0.5 of the rms height.
     soft, stiff = peaks.persson_stiffness(pressure, skin.rms_height)
 
-    # The stiffness of Hertzian peaks depends on the shortest waves, so that half the samples of the
-    # trace show how uncertain it is.
-    half = ""
+    # Dust and heights that are not Gaussian make the peaks of a trace uncertain.
     remarks = []
     waves = f" of the waves below {format_quantity(skin.cutoff, 'm', 3)}" if skin.cutoff else ""
     if skin.from_ is not None:
         moments = traces.read_spectral_moments(Path(skin.from_), skin.cutoff)
-        half = f" (from every second sample: {_format_coarse_stiffness(patch_model, moments.coarse, pressure)})"
         texts = (*moments.dust, moments.not_gaussian)
         remarks = [f"contact.asperities: {text}" for text in texts if text]
     # Waves that the profile contains must not count again in the layer.
@@ -75,30 +70,9 @@ def note_on_asperity_stiffness(patch_model, pressure: float) -> list[str]:
         ]
     return [
         f"contact.asperities: under the mean pressure of {format_quantity(pressure, 'Pa', 3)} the peaks{waves} have "
-        f"a stiffness of {asperity_layer_stiffness(patch_model, pressure):.3g} Pa/m{half}; Persson's theory, which includes "
+        f"a stiffness of {asperity_layer_stiffness(patch_model, pressure):.3g} Pa/m; Persson's theory, which includes "
         "waves of all lengths, "
         f'gives {soft:.3g} to {stiff:.3g} Pa/m; to use the stiffness of that theory, set law = "exponential" and '
         f'decay_length = "{sum(peaks.PERSSON) / 2 * skin.rms_height * 1e6:.3g} um"',
         *remarks,
     ]
-
-
-def _format_coarse_stiffness(patch_model, coarse, pressure: float) -> str:
-    """Format the asperity stiffness that every second sample of a profile gives."""
-    try:
-        surface_peaks = peaks.gaussian_peaks(coarse) if coarse else None
-    except PatchfemError:
-        surface_peaks = None
-    if surface_peaks is None:
-        return "no surface of such peaks"
-    new = {
-        "radius": surface_peaks.radius,
-        "density": surface_peaks.density,
-        "height_deviation": surface_peaks.deviation,
-    }
-    interface = replace(
-        patch_model.interface, skin=patch_model.interface.skin.model_copy(update=new)
-    )
-    return (
-        f"{asperity_layer_stiffness(replace(patch_model, interface=interface), pressure):.3g} Pa/m"
-    )

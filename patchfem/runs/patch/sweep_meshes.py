@@ -17,7 +17,6 @@ from ...mesh.grading import Layout
 from ...model.patch import SharedMeshes
 from . import grids, mesh_levels
 from .condensed import CondensedPair, cache_condensed_pairs, condense
-from .measures import max_mesh_error_ratio
 from .press import solve_patch_contact
 
 # Largest number of cases that determine the mesh; of more cases, the most different ones are
@@ -81,7 +80,7 @@ def choose_shared_meshes(
     """
     patch_model = patches[0]
     if not patch_model.mesh.is_automatic:
-        return name_shared_meshes(mesh_levels.make_file_meshes(patch_model))
+        return name_shared_meshes(mesh_levels.make_given_meshes(patch_model))
     cases, are_all_patches = select_distinct_patches(patches)
     load_variants = chain.from_iterable(map(grids.make_load_variants, cases))
     has_partial_slip = any(patch.interface.partial_slip for patch in patches)
@@ -299,5 +298,4 @@ def _meets_tolerance(patch_model, pairs: list[CondensedPair], tolerance: float) 
         patches = mesh_levels.solve_on_pairs(patch_model, pairs, tolerance)
     except PatchfemError:  # The error is reported when this case is run alone.
         return True
-    is_within = max_mesh_error_ratio(patches[0].measures, tolerance) <= 1
-    return is_within and mesh_levels.resolves_slip_work(patch_model, patches, tolerance)
+    return mesh_levels.meets_tolerance(patch_model, patches, tolerance)

@@ -15,6 +15,7 @@ from time import perf_counter
 from typing import NamedTuple
 
 import numpy as np
+from scipy.optimize import brentq
 
 from ...contact.press import strip_offsets
 from ...core import PatchfemError, frozen_array
@@ -38,8 +39,6 @@ STATE_FIELDS = tuple(WearState.__slots__)  # Fields of the wear state in a saved
 MOMENT_FIELDS = ("cycle", "depth", "used", "pressure", "gap", "miss")
 # Largest remaining fraction of the coating thickness at which the coating counts as worn through.
 THIN_FRACTION = 1e-6
-# Largest number of jumps in the search for the cycle in which a coating is worn through.
-MAX_SEARCH_JUMPS = 60
 # Smallest distance to the next row of the friction table, relative to the row spacing, at which a
 # jump ends at this row.
 MIN_RELATIVE_ROW_DISTANCE = 0.1
@@ -306,53 +305,26 @@ def _most_worn_coating(model, depth) -> WornCoating:
 
 
 def _take_next_jump(model, problem: WearProblem, state: WearState) -> WearState:
-    """Compute the state after the next jump; the jump ends early if a coating is worn through.
-
-    The cycle in which the coating is worn through is found by the Illinois variant of regula falsi.
-    """
-
-    def excess(state: WearState) -> float:
-        """Return the largest worn fraction of a coating thickness, minus 1."""
-        return _most_worn_coating(model, state.depth).fraction - 1
+    """Compute the state after the next jump; the jump ends early if a coating is worn through."""
 
     def jump_to(cycle: float) -> WearState:
         """Compute the state after a jump that ends at a given cycle or earlier."""
         return take_jump(problem, state, model.accuracy.tolerance, model.wear.jumps, until=cycle)
 
+    def find_excess(cycle: float) -> float:
+        """Return the largest worn fraction of a coating thickness after a jump, minus 1."""
+        end = state if cycle == state.cycle else jump_to(cycle)
+        return _most_worn_coating(model, end.depth).fraction - 1
+
     problem.press.start_from_forces(state.force)
     next_state = jump_to(find_cycle_of_next_table_row(model.wear, problem, state))
+    if _most_worn_coating(model, next_state.depth).fraction <= 1 + THIN_FRACTION:
+        return next_state
 
-    # Bracket: worn fraction - 1 is negative at `low` and positive at `high`.
-    low = state.cycle
-    high = np.inf
-    previous = 0.0
-    low_value = excess(state)
-    high_value = excess(next_state)
-    end = next_state.cycle
-    for _ in range(MAX_SEARCH_JUMPS):
-        value = excess(next_state)
-        if abs(value) <= THIN_FRACTION or (
-            value < 0 and (next_state.cycle < end or high == np.inf)
-        ):
-            return next_state
-
-        # Illinois: an end that is kept twice has its value halved, so that the bracket shrinks from
-        # both sides.
-        if value > 0:
-            if high < np.inf and previous > 0:
-                low_value = low_value / 2
-            high = next_state.cycle
-            high_value = value
-        else:
-            if previous < 0:
-                high_value = high_value / 2
-            low = next_state.cycle
-            low_value = value
-
-        previous = value
-        end = low - low_value * (high - low) / (high_value - low_value)
-        next_state = jump_to(end)
-    return next_state
+    # The wear rate changes little within a jump, so that the worn fraction is exact to THIN_FRACTION.
+    length = next_state.cycle - state.cycle
+    cycle = brentq(find_excess, state.cycle, next_state.cycle, xtol=0.1 * THIN_FRACTION * length)
+    return jump_to(cycle)
 
 
 def find_cycle_of_next_table_row(wear, problem: WearProblem, state: WearState) -> float:

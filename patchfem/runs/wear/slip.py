@@ -1,7 +1,8 @@
 """Slip path of each interface node in one periodic cycle of a bench or a rig.
 
-In: a model and its worn patch. Out: `CycleSlip` with the path, its error and the outcome of the
-motion.
+In: a model and its worn patch. Out: `CycleSlip` with the path, its error and the outcome of the motion. A point with
+the pressure p wears by L p per cycle with the path L, the integral of w |ds|/p over its slip s: w is the normal
+traction (Archard), or the friction traction with form 'energy'. The points are the whole patch, its strips or its nodes.
 """
 
 from math import ceil, sqrt
@@ -48,6 +49,85 @@ class CycleSlip(NamedTuple):
     outcome: Outcome | None = None
 
 
+class _Cycle(NamedTuple):
+    """Histories of a whole interface at the k samples of one cycle.
+
+    - slide, slip: relative displacement and slip [m].
+    - force, load: friction force and normal load [N].
+    """
+
+    slide: np.ndarray
+    slip: np.ndarray
+    force: np.ndarray
+    load: np.ndarray
+
+
+class _NodeFrames(NamedTuple):
+    """Motion of the m interface nodes in f frames of one cycle.
+
+    - slide (f,), load (f,): displacement of the holder [m] and vertical force [N].
+    - slip, shear_stress (f, m): slip [m] and traction parallel to the interface [Pa].
+    - is_closed: whether the first frame follows the last one.
+    """
+
+    slide: np.ndarray
+    load: np.ndarray
+    slip: np.ndarray
+    shear_stress: np.ndarray
+    is_closed: bool
+
+
+class _PointSlip(NamedTuple):
+    """Slip of p points at the k samples of one cycle.
+
+    - slip (k, p): slip [m].
+    - weight (k, p): traction that wears each point, as a fraction of its pressure.
+    - is_closed: whether the first sample follows the last one.
+    """
+
+    slip: np.ndarray
+    weight: np.ndarray
+    is_closed: bool = False
+
+    def integrate_path(self, samples) -> np.ndarray:
+        """Integrate the paths (p,) [m] over selected samples by the trapezoidal rule."""
+        if self.is_closed:
+            samples = np.append(samples[-1:], samples)
+        weight = self.weight[samples]
+        steps = np.abs(np.diff(self.slip[samples], axis=0))
+        return (steps * (weight[1:] + weight[:-1]) / 2).sum(axis=0)
+
+    @property
+    def path(self) -> np.ndarray:
+        """Paths (p,) [m] over all samples."""
+        return self.integrate_path(np.arange(len(self.slip)))
+
+    def estimate_reversal_error(self, force) -> float:
+        """Estimate the relative error of the path due to reversals between samples.
+
+        A reversal at the distance d <= 1/2 from the nearest sample hides a part f(d) of the path. With
+        every third sample it hides f(d), f(1 - d) or f(1 + d), depending on which samples are used. 3/2
+        of the mean increase is at least f(d) for any d, both for a sharp reversal, f = c d, and for a
+        smooth one, f = c d^2.
+
+        Parameters
+        ----------
+        force : (p,) ndarray
+            Normal forces [N], the weights of the points in the mean.
+        """
+        path = self.path
+        total = float(path @ force)
+        if total <= 0:
+            return 0.0
+        count = len(self.slip)
+        ends = [] if self.is_closed else [0, count - 1]
+        changes = []
+        for first in range(3):
+            samples = np.unique([*ends, *range(first, count, 3)]).astype(int)
+            changes.append(abs(float((path - self.integrate_path(samples)) @ force)))
+        return REVERSAL_ERROR_FACTOR * float(np.mean(changes)) / total
+
+
 def choose_frame_count(tolerance: float) -> int:
     """Return the number of frames per cycle for a slip path accurate to tolerance/100.
 
@@ -57,7 +137,10 @@ def choose_frame_count(tolerance: float) -> int:
 
 
 def slips_uniformly(model, per_point: bool = False) -> bool:
-    """Return whether all points of a patch, or of each of its strips, slip by equal distances."""
+    """Return whether all points of a patch, or of each of its strips, slip by equal distances.
+
+    per_point: whether the engine of a rig follows each node by itself.
+    """
     return (
         not model.partial_slip
         and model.side == "upper"
@@ -82,76 +165,67 @@ def compute_cycle_slip(model, patch, frames: int) -> CycleSlip:
     frames : int
         Number of frames per cycle from which the path is computed.
     """
-    if model.rig is None:
-        return _compute_bench_slip(model, patch, frames)
-    return _compute_rig_slip(model, patch, frames)
+    follow = _compute_bench_slip if model.rig is None else _compute_rig_slip
+    return follow(model, patch, frames)
 
 
-class _CycleHistories(NamedTuple):
-    """Displacement, slip, forces and load at the k samples of one cycle.
+def compute_point_slip_path(model, window, values: dict) -> tuple[float, float]:
+    """Return the slip path [m] per cycle of a single point under [normal], and its relative error.
 
-    - slide, slip: relative displacement and slip [m].
-    - force, load: friction force and normal load [N].
+    The path is weighted with the load. The error comes from differences between cycles.
+
+    Parameters
+    ----------
+    model : Model
+        Model of a bench or a rig with [normal].
+    window
+        Histories of a bench or a rig.
+    values : dict
+        Measures by name.
     """
-
-    slide: np.ndarray
-    slip: np.ndarray
-    force: np.ndarray
-    load: np.ndarray
-
-
-class Frames(NamedTuple):
-    """Slip and shear stress of the interface nodes in f frames of a cycle.
-
-    - slip, tau (f, m): slip [m] and shear stress [Pa] at the nodes.
-    - is_closed: whether the first frame follows the last one.
-    """
-
-    slip: np.ndarray
-    tau: np.ndarray
-    is_closed: bool
+    load = None if model.rig is None else model.point.load
+    cycle = _select_last_cycle(model, window, load)
+    path, error = _integrate_uniform_slip(model, cycle, cycle.load[0])
+    if model.rig is not None:
+        error += _slip_amplitude_change(values, cycle)
+    return path, error
 
 
 def _compute_bench_slip(model, patch, frames: int) -> CycleSlip:
     """Compute the slip path of the interface nodes in the last cycle of a bench."""
     cycles = max(1, round(model.slide.cycles or 1))
     is_uniform = slips_uniformly(model)
-    run = bench.run_bench(
-        model, patch, steps_per_cycle(model), 0 if is_uniform else frames * cycles
-    )
+    n_frames = 0 if is_uniform else frames * cycles
+    run = bench.run_bench(model, patch, steps_per_cycle(model), n_frames)
     outcome = check_pieces_overlap(None, model.patch, patch, run.slide)
 
     # Pieces that do not deform in shear slip alike at all nodes: one path for all.
     if is_uniform:
-        cycle = _select_last_bench_cycle(run)
-        slip = _compute_uniform_slip(model, patch, cycle, cycle.load[0])
-        return slip._replace(values=run.values, outcome=outcome)
+        cycle = _select_last_cycle(model, run)
+        path, error = _integrate_uniform_slip(model, cycle, cycle.load[0])
+        return CycleSlip(_spread_over_nodes(model, patch, path), error, run.values, outcome)
 
     is_last = run.frames >= run.first
+    slide = run.slide[run.frames[is_last]]
     local = run.local[is_last]
     tau = run.tau[is_last]
-    slide = run.slide[run.frames[is_last]]
 
-    # A path that is not cyclic begins at rest, before its first frame.
+    # A path that is not cyclic begins at rest, before its first frame. The load then rests on the flank of a groove.
     if run.first == 0:
-        start = np.zeros((1, patch.x.size))
-        local = np.concatenate([start, local])
-        tau = np.concatenate([start, tau])
         slide = np.append(0.0, slide)
-        if model.grooves is not None:  # At the start the load rests on the flank of a groove.
+        local = np.pad(local, ((1, 0), (0, 0)))
+        tau = np.pad(tau, ((1, 0), (0, 0)))
+        if model.grooves is not None:
             tau[0] = model.grooves.slope(0.0) * patch.pressure.sigma_n
-    if model.grooves is not None:
-        load = np.full(slide.size, patch.pressure.load)
-        local, tau = compute_flank_slip(model, patch, slide, load, local, tau)
 
-    slip = compute_frame_slip(model, patch, Frames(local, tau, is_closed=False))
-    return slip._replace(values=run.values, outcome=outcome)
+    load = np.full(slide.size, patch.pressure.load)
+    path, error = _integrate_node_slip(model, patch, _NodeFrames(slide, load, local, tau, False))
+    return CycleSlip(path, error, run.values, outcome)
 
 
 def _compute_rig_slip(model, patch, frames: int) -> CycleSlip:
     """Compute the slip path of the interface nodes in the last cycle of a rig."""
     settings = numerics.choose_numerics(model)
-    pressed_load = patch.pressure.load
     is_uniform = slips_uniformly(model, settings.per_point and model.grooves is None)
     solution = solve.solve_rig(model, settings, patch, 0 if is_uniform else frames)
 
@@ -171,36 +245,33 @@ def _compute_rig_slip(model, patch, frames: int) -> CycleSlip:
     )
 
     # The slip follows from the histories if it is uniform, else from the frames of the cycle.
-    cycle = _select_last_rig_cycle(model, solution.window, pressed_load)
-    if strips_slide_independently(model) and is_uniform:
-        slip = _compute_strip_slip(model, patch, solution.window)
-    elif is_uniform:
-        slip = _compute_uniform_slip(model, patch, cycle, pressed_load)
+    load = patch.pressure.load
+    cycle = _select_last_cycle(model, solution.window, load)
+    if not is_uniform:
+        node_frames = _collect_rig_frames(model, settings, patch, solution)
+        path, error = _integrate_node_slip(model, patch, node_frames)
+    elif strips_slide_independently(model):
+        path, error = _integrate_strip_slip(model, patch, solution.window)
     else:
-        frame_fields = fields.collect_interface_fields(model, settings, patch, solution)
-        frame_fields = {name: values[1:] for name, values in frame_fields.items()}
-        local = frame_fields["slip"]
-        tau = frame_fields["shear_stress"]
-
-        # The load on the flanks varies with the lift of the rig.
-        if model.grooves is not None:
-            response = solution.response
-            constant = np.full(response.time.size, pressed_load)
-            load = np.interp(
-                frame_fields["time"],
-                response.time,
-                response.extra.get("normal_load", constant),
-            )
-            local, tau = compute_flank_slip(
-                model, patch, frame_fields["holder_slide"], load, local, tau
-            )
-        slip = compute_frame_slip(model, patch, Frames(local, tau, is_closed=True))
-
-    error = slip.error + _slip_amplitude_change(solution.values, cycle)
-    return slip._replace(error=error, values=solution.values, outcome=outcome)
+        path, error = _integrate_uniform_slip(model, cycle, load)
+        path = _spread_over_nodes(model, patch, path)
+    error += _slip_amplitude_change(solution.values, cycle)
+    return CycleSlip(path, error, solution.values, outcome)
 
 
-def _slip_amplitude_change(values: dict, cycle: _CycleHistories) -> float:
+def _collect_rig_frames(model, settings, patch, solution) -> _NodeFrames:
+    """Return the frames of the last cycle of a rig; over grooves the load varies with the lift."""
+    frames = fields.collect_interface_fields(model, settings, patch, solution)
+    frames = {name: values[1:] for name, values in frames.items()}
+    response = solution.response
+    loads = np.full(response.time.size, patch.pressure.load)
+    if model.grooves is not None:
+        loads = response.extra.get("normal_load", loads)
+    load = np.interp(frames["time"], response.time, loads)
+    return _NodeFrames(frames["holder_slide"], load, frames["slip"], frames["shear_stress"], True)
+
+
+def _slip_amplitude_change(values: dict, cycle: _Cycle) -> float:
     """Return the relative difference between the slip amplitudes of the last cycle and the window.
 
     A mode that still beats causes this difference.
@@ -212,45 +283,18 @@ def _slip_amplitude_change(values: dict, cycle: _CycleHistories) -> float:
     return abs(window_amplitude / amplitude - 1)
 
 
-def compute_point_slip_path(model, window, values: dict) -> tuple[float, float]:
-    """Return the slip path [m] per cycle of a single point under [normal], and its relative error.
+def _select_last_cycle(model, window, load: float | None = None) -> _Cycle:
+    """Return the histories of the last cycle of a bench or a rig.
 
-    The path is weighted with the load. The error comes from differences between cycles.
-
-    Parameters
-    ----------
-    model : Model
-        Model of a bench or a rig with [normal].
-    window
-        Histories of a bench or a rig.
-    values : dict
-        Measures by name.
+    load: constant load [N] of a rig; over grooves the window has the vertical force.
     """
-    beat_error = 0.0
     if model.rig is None:
-        cycle = _select_last_bench_cycle(window)
+        rows = slice(window.first, None)
+        loads = window.load
     else:
-        cycle = _select_last_rig_cycle(model, window, model.point.load)
-        beat_error = _slip_amplitude_change(values, cycle)
-    slip = _compute_uniform_slip(model, None, cycle, cycle.load[0])
-    return float(slip.path[0]), slip.error + beat_error
-
-
-def _select_last_bench_cycle(run) -> _CycleHistories:
-    """Return the histories of the last cycle of a bench."""
-    histories = (run.slide, run.slip, run.force, run.load)
-    return _CycleHistories(*(history[run.first :] for history in histories))
-
-
-def _select_last_rig_cycle(model, window, load: float) -> _CycleHistories:
-    """Return the histories of the last cycle of a rig.
-
-    load: constant load [N]; over grooves the vertical force.
-    """
-    is_last = _is_in_last_cycle(model, window)
-    loads = window.extra.get("normal_load", np.full(window.time.size, load))
-    histories = (window.slide, window.slip, window.force, loads)
-    return _CycleHistories(*(history[is_last] for history in histories))
+        rows = _is_in_last_cycle(model, window)
+        loads = window.extra.get("normal_load", np.full(window.time.size, load))
+    return _Cycle(window.slide[rows], window.slip[rows], window.force[rows], loads[rows])
 
 
 def _is_in_last_cycle(model, window) -> np.ndarray:
@@ -259,182 +303,118 @@ def _is_in_last_cycle(model, window) -> np.ndarray:
     return window.time >= window.time[-1] - period * (1 + 1e-9)
 
 
-def _compute_strip_slip(model, patch, window) -> CycleSlip:
-    """Return the slip path of each strip of a rig with yaw, in the direction of the drive.
+def _compute_wearing_traction(model, slope, normal, friction) -> np.ndarray:
+    """Return the traction that wears a point, per unit of relative displacement.
 
-    An open strip has the slip of the nearest strip in contact.
+    On flat faces it is the normal traction V, or with form 'energy' |F| of the friction traction F, which opposes the
+    slip also in a step with a reversal. On a flank of slope t = dz/dq with the path ds, it is R ds/dq = V + F t of the
+    normal traction R on the flank; with form 'energy' it is |f| ds/dq = |F - V t| of the friction f along the flank.
+
+    Parameters
+    ----------
+    model : Model
+        Model with [wear].
+    slope : ndarray
+        Slope of the flank; 0 for flat faces.
+    normal, friction : ndarray
+        Vertical and horizontal tractions [Pa], or forces [N].
+    """
+    if model.wear.uses_friction_work:
+        return np.abs(friction - slope * normal)
+    return np.maximum(normal + slope * friction, 0.0)
+
+
+def _slope_of_grooves(model, slide) -> np.ndarray:
+    """Return the slope (k,) of the groove flanks at displacements [m]; zero for flat faces."""
+    return np.zeros(slide.size) if model.grooves is None else model.grooves.slope(slide)
+
+
+def _divide_by_pressure(traction, pressure) -> np.ndarray:
+    """Return tractions (k, p) as fractions of the pressures (p,) of points; zero for open points."""
+    return np.divide(traction, pressure, out=np.zeros(traction.shape), where=pressure > 0)
+
+
+def _integrate_uniform_slip(model, cycle: _Cycle, load: float) -> tuple[float, float]:
+    """Return the path [m] of points that slip alike, and its relative error.
+
+    The samples of the histories contain every reversal. Only the slope of grooves varies between them.
+    load: normal load [N] to which the tractions are related.
+    """
+    slope = _slope_of_grooves(model, cycle.slide)
+    traction = _compute_wearing_traction(model, slope, cycle.load, cycle.force)
+    weight = _divide_by_pressure(traction[:, None], np.array([load]))
+    slip = _PointSlip(cycle.slip[:, None], weight)
+    path = float(slip.path[0])
+    if model.grooves is None or not path > 0:
+        return path, 0.0
+    coarse = float(slip.integrate_path(np.arange(0, len(weight), 2))[0])
+    return path, abs(path - coarse) / path
+
+
+def _spread_over_nodes(model, patch, path: float) -> np.ndarray:
+    """Return one path [m] at all nodes, (m,) or (s, m)."""
+    return np.full(nodal_areas(model.patch, patch.pieces.interface).shape, path)
+
+
+def _integrate_strip_slip(model, patch, window) -> tuple[np.ndarray, float]:
+    """Return the paths (s, m) [m] of the strips of a rig with yaw, and their relative error.
+
+    The slip is that in the direction of the drive. An open strip has the path of the nearest strip in contact.
     """
     loads = patch.strips.force.sum(axis=1)
     is_last = _is_in_last_cycle(model, window)
     slips = window.extra.get("slips", window.extra["slides"])[is_last]
-    weight = np.ones_like(slips)
-    if model.wear.uses_friction_work:
-        forces = window.extra["forces"][is_last]
-        weight = np.abs(forces) / np.where(loads > 0, loads, 1.0)
-
-    def path(samples) -> np.ndarray:
-        """Return the slip paths (s,) [m] of the strips from selected samples."""
-        columns = zip(slips[samples].T, weight[samples].T)
-        return np.array(
-            [_integrate_over_path(slip, strip_weight) for slip, strip_weight in columns]
-        )
-
-    paths = path(np.arange(len(slips)))
-    error = _estimate_reversal_error(path, len(slips), paths, loads)
-    nearest = _find_nearest_contact_nodes(patch.strips.offsets, loads > 0)
-    return CycleSlip(np.repeat(paths[nearest, None], patch.x.size, axis=1), error)
+    forces = window.extra["forces"][is_last]
+    traction = _compute_wearing_traction(model, 0.0, np.broadcast_to(loads, slips.shape), forces)
+    slip = _PointSlip(slips, _divide_by_pressure(traction, loads))
+    nearest = _find_nearest_contact(patch.strips.offsets, loads > 0)
+    path = np.repeat(slip.path[nearest, None], patch.x.size, axis=1)
+    return path, slip.estimate_reversal_error(loads)
 
 
-def _estimate_reversal_error(
-    compute_path, count: int, fine_path, weight, is_closed: bool = False
-) -> float:
-    """Estimate the relative error of a slip path due to reversals between samples.
+def _integrate_node_slip(model, patch, frames: _NodeFrames) -> tuple[np.ndarray, float]:
+    """Return the paths (m,) [m] of the nodes from frames of a cycle, and their relative error.
 
-    A reversal at the distance d <= 1/2 from the nearest sample hides a part f(d) of the path. With
-    every third sample it hides f(d), f(1 - d) or f(1 + d), depending on which samples are used. 3/2
-    of the mean increase is at least f(d) for any d, both for a sharp reversal, f = c d, and for a
-    smooth one, f = c d^2.
-
-    Parameters
-    ----------
-    compute_path : callable
-        Function from sample indices to the slip paths (m,) [m].
-    count : int
-        Number of samples.
-    fine_path, weight : (m,)
-        Slip paths from all samples [m], and their weights in the mean.
-    is_closed : bool
-        Whether the first sample follows the last one.
-    """
-    total = float(fine_path @ weight)
-    if total <= 0:
-        return 0.0
-    ends = [] if is_closed else [0, count - 1]
-    changes = []
-    for first in range(3):
-        samples = np.unique([*ends, *range(first, count, 3)]).astype(int)
-        changes.append(abs(float((fine_path - compute_path(samples)) @ weight)))
-    return REVERSAL_ERROR_FACTOR * float(np.mean(changes)) / total
-
-
-def _compute_uniform_slip(model, patch, cycle: _CycleHistories, load: float) -> CycleSlip:
-    """Return the slip path of a cycle with uniform slip at all points."""
-    slip = cycle.slip
-    # Friction opposes the slip, also in a step with a reversal.
-    weight = np.abs(cycle.force) if model.wear.uses_friction_work else cycle.load
-    error = 0.0
-    if model.grooves is not None:
-        weight = wear_force_on_flanks(model, cycle.slide, cycle.force, cycle.load)
-    path = _integrate_over_path(slip, weight) / load if load > 0 else 0.0
-    if model.grooves is not None and path > 0:
-        error = abs(path - _integrate_over_path(slip[::2], weight[::2]) / load) / path
-    shape = 1 if patch is None else nodal_areas(model.patch, patch.pieces.interface).shape
-    return CycleSlip(np.full(shape, path), error)
-
-
-def _integrate_over_path(slip, weight) -> float:
-    """Integrate a weight over the slip path |ds| by the trapezoidal rule."""
-    return float(np.sum(np.abs(np.diff(slip)) * (weight[1:] + weight[:-1]) / 2))
-
-
-def wear_force_on_flanks(model, slide, force, load) -> np.ndarray:
-    """Return the force (k,) [N] that wears groove flanks, per unit of relative displacement.
-
-    With the slope t of the flank, it is R ds/dq = V + F t of the normal force R on the flank; with
-    form 'energy' it is |f| ds/dq = |F - V t| of the friction force f along the flank.
+    Each node carries its part of the vertical force, V sigma/N. Over grooves a node slips along the flank by s - e, the
+    path s of the holder less the elastic part e, and the tractions are those per length of the flank. An open node has
+    the path of the nearest node in contact.
 
     Parameters
     ----------
     model : Model
-        Model with grooves and [wear].
-    slide : (k,)
-        Relative displacement [m].
-    force, load : (k,)
-        Horizontal force F and vertical force V [N].
-    """
-    t = model.grooves.slope(slide)
-    if model.wear.uses_friction_work:
-        return np.abs(force - load * t)
-    return np.maximum(load + force * t, 0.0)
-
-
-def compute_flank_slip(model, patch, slide, vertical, local, tau) -> tuple:
-    """Return the slip along groove flanks [m] and the stress that wears them [Pa], (f, m) each.
-
-    The slip is s - e with the path s along the flank and its elastic part e. A point with pressure
-    sigma carries the vertical stress V sigma/N. Its normal stress on the flank is R = (V sigma/N +
-    tau t)/sqrt(1 + t^2); its friction along the flank, which form 'energy' uses, is |tau - t V
-    sigma/N|/sqrt(1 + t^2).
-
-    Parameters
-    ----------
-    model : Model
-        Model with grooves and [wear].
+        Model with [wear].
     patch : Patch
         Patch at the present wear, whose pressure distributes the load.
-    slide : (f,)
-        Displacement of the holder [m] in each frame.
-    vertical : (f,)
-        Vertical force V [N].
-    local, tau : (f, m)
-        Slip [m] and traction parallel to the interface [Pa].
-    """
-    grooves = model.grooves
-    sigma = patch.pressure.sigma_n
-    slope = grooves.slope(slide)[:, None]
-    # Ratio of the path along the flank to the relative displacement.
-    path_ratio = np.sqrt(1 + slope**2)
-    vertical_stress = (vertical / patch.pressure.load)[:, None] * sigma
-    steps = integrate_steps(slide, lambda places: np.hypot(1, grooves.slope(places)))
-    path = np.append(0.0, np.cumsum(steps))
-    if model.wear.uses_friction_work:
-        stress = np.abs(tau - slope * vertical_stress)
-    else:
-        stress = np.maximum(vertical_stress + tau * slope, 0.0)
-    return path[:, None] - (slide[:, None] - local) * path_ratio, stress / path_ratio
-
-
-def compute_frame_slip(model, patch, frames: Frames) -> CycleSlip:
-    """Compute the slip path of each node from frames of slip and shear stress.
-
-    Parameters
-    ----------
-    model : Model
-        Model with [wear], whose form decides.
-    patch : Patch
-        Patch at the present wear.
-    frames : Frames
+    frames : _NodeFrames
         Slip and shear stress of the nodes along the cycle.
     """
-    count = len(frames.slip)
-
-    def path(indices) -> np.ndarray:
-        """Return the slip paths (m,) [m] of the nodes from selected frames."""
-        return _integrate_node_paths(model, patch, frames, indices)
-
-    paths = path(np.arange(count))
-    force = patch.pressure.sigma_n * patch.pieces.interface.weight
-    return CycleSlip(paths, _estimate_reversal_error(path, count, paths, force, frames.is_closed))
-
-
-def _integrate_node_paths(model, patch, frames: Frames, indices) -> np.ndarray:
-    """Integrate the slip paths (m,) [m] of the nodes over selected frames."""
-    if frames.is_closed:
-        indices = np.append(indices[-1:], indices)
-    steps = np.abs(np.diff(frames.slip[indices], axis=0))
     sigma = patch.pressure.sigma_n
-    path = steps.sum(axis=0)
-    if model.wear.uses_friction_work or model.grooves is not None:
-        tau = np.abs(frames.tau[indices])
-        work = np.sum(steps * (tau[1:] + tau[:-1]) / 2, axis=0)
-        path = np.divide(work, sigma, out=np.zeros_like(work), where=sigma > 0)
-    return path[_find_nearest_contact_nodes(patch.x, sigma > 0)]
+    slope = _slope_of_grooves(model, frames.slide)[:, None]
+    load_ratio = (
+        np.ones(frames.load.size) if model.grooves is None else frames.load / patch.pressure.load
+    )
+    normal = load_ratio[:, None] * sigma
+    traction = _compute_wearing_traction(model, slope, normal, frames.shear_stress)
+    local = frames.slip
+
+    if model.grooves is not None:
+        # ds/dq, the path along the flank by the relative displacement.
+        path_ratio = np.sqrt(1 + slope**2)
+        steps = integrate_steps(frames.slide, lambda q: np.hypot(1, model.grooves.slope(q)))
+        along_flank = np.append(0.0, np.cumsum(steps))[:, None]
+        local = along_flank - (frames.slide[:, None] - local) * path_ratio
+        traction = traction / path_ratio
+
+    slip = _PointSlip(local, _divide_by_pressure(traction, sigma), frames.is_closed)
+    error = slip.estimate_reversal_error(sigma * patch.pieces.interface.weight)
+    return slip.path[_find_nearest_contact(patch.x, sigma > 0)], error
 
 
-def _find_nearest_contact_nodes(x, active) -> np.ndarray:
-    """Return for each node the index (m,) of the nearest node in contact.
+def _find_nearest_contact(x, active) -> np.ndarray:
+    """Return for each point the index (p,) of the nearest point in contact.
 
-    A node that comes into contact during a jump has the slip of this node.
+    A point that comes into contact during a jump of wear has the slip of this point.
+    x, active (p,): positions [m], and whether each point is in contact.
     """
     touching = np.flatnonzero(active)
     if not touching.size:

@@ -59,13 +59,12 @@ class Peaks(NamedTuple):
 class TraceMoments(NamedTuple):
     """Spectral moments of a trace, with notes on their reliability.
 
-    fine: from all samples; coarse: from every second sample, None if these are too few;
+    fine: from all samples;
     not_gaussian: a clause if the heights are not Gaussian, else ""; dust: clauses on heights that
     were left out or that look like dust.
     """
 
     fine: Moments
-    coarse: Moments | None
     not_gaussian: str
     dust: tuple[str, ...] = ()
 
@@ -97,7 +96,6 @@ def trace_moments(trace: Profile, cutoff: float | None = None) -> TraceMoments:
     if cutoff is not None and cutoff < flat.length:
         flat = filter_surface(flat, cutoff)[1]
     fine = rms_moments(flat)
-    coarse = rms_moments(flat, 2) if flat.z.size >= 2 * MIN_SAMPLES - 1 else None
 
     # A few heights, such as those of wide dust, may make up most of m_4.
     bend = np.diff(flat.z, 2) ** 2
@@ -107,17 +105,17 @@ def trace_moments(trace: Profile, cutoff: float | None = None) -> TraceMoments:
             f"{order.size} of {flat.z.size} heights, the sharpest at x = {format_length(flat.x[order[0] + 1])}, make up "
             "most of the mean square curvature, as dust does; if they are dust, write nan for them",
         )
-    return TraceMoments(fine, coarse, _describe_skew(flat.z, fine, flat.length), dust)
+    return TraceMoments(fine, _describe_skew(flat.z, fine, flat.length), dust)
 
 
-def rms_moments(trace: Profile, every: int = 1) -> Moments:
-    """Compute the spectral moments of a levelled trace from every n-th sample.
+def rms_moments(trace: Profile) -> Moments:
+    """Compute the spectral moments of a levelled trace.
 
     Slope and curvature are first and second differences, which see a wave of length L as
     sinc(step/L) and its square.
     """
-    z = trace.z[::every]
-    step = every * trace.length / (trace.z.size - 1)
+    z = trace.z
+    step = trace.length / (z.size - 1)
     if z.size < MIN_SAMPLES:
         raise PatchfemError(
             f"{trace.source}: {z.size} samples give no curvature; at least {MIN_SAMPLES} are needed"
