@@ -142,8 +142,8 @@ def _suggest_name(
     """Return the key or table that was probably meant by an unknown one, or "" if none is similar."""
     if _is_table(raw[key]):
         table = _suggest_table(model, key, raw[key])
-        # A second table of this name would be refused, unless both are items of an array.
-        return table if table not in raw or isinstance(raw[key], list) else ""
+        # A table with another name is no second one of a table that the scene has.
+        return table if table not in raw or _list_similar(key, [table]) else ""
     if not table_key:
         # --set may name a key without its table; the key then belongs to a table that has a key of this name.
         owners = _list_tables_with_key(key)
