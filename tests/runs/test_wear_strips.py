@@ -1,4 +1,4 @@
-"""Wear of patches in strips, each by its own pressure and slip: comparison with the single patch
+"""Wear of patches in strips, each by its own pressure and slip: comparison with slip amplitudes
 and closed forms."""
 
 import numpy as np
@@ -10,12 +10,11 @@ from patchfem.scene import loads
 
 STRIPS = "[contact.strips]\ncount = 4\n"
 ROLLED = STRIPS + 'roll = "0.1 mrad"\n'
-TILTED = COATED + '[contact.tilt]\nangle = "0.1 mrad"\n'
 SINE = '[slide]\nkind = "sine"\namplitude = "10 um"\nfrequency = "143 Hz"\ncycles = 2\n'
 WEAR = '[wear]\ncoefficient = "1e-14 m^2/N"\ncycles = 135723\n'
 LARGE_TOLERANCE = "[accuracy]\ntolerance = 1e-2\n"
 BASE_DRIVE = '[drive]\nkind = "base"\nfrequency = "143 Hz"\nacceleration = "5 g"\ncycles = 60\n'
-LOAD, VOLUME = 26 * 4.4482216152605, 1e-14 * 26 * 4.4482216152605 * 40e-6 * 135723
+LOAD = 26 * 4.4482216152605
 
 
 def run_text(text, **sets):
@@ -26,23 +25,6 @@ def run_text(text, **sets):
 def final_depth(result) -> np.ndarray:
     """Return the worn depth of the last frame [m]."""
     return result.fields["worn_depth"][-1]
-
-
-def test_exact_worn_depth_of_strips_mirrors_with_roll():
-    """Reversing the roll mirrors the worn depth over the width, and the volume is kappa N s n."""
-    positive, negative = (
-        run_text(TILTED + ROLLED.replace("0.1", roll) + COULOMB + SINE + WEAR + LARGE_TOLERANCE)
-        for roll in ("0.1", "-0.1")
-    )
-    assert positive.measures["worn_volume"].value == pytest.approx(VOLUME, rel=1e-12)
-    assert (
-        np.abs(final_depth(positive) - final_depth(negative)[::-1]).max()
-        < 1e-9 * final_depth(positive).max()
-    )
-    assert final_depth(positive).max(axis=1)[0] == positive.measures["worn_depth_max"].value
-    assert (
-        np.diff(final_depth(positive).max(axis=1)) <= 0
-    ).all()  # A positive roll opens the contact at +y.
 
 
 def test_exact_worn_depth_of_rolled_rigid_pad_agrees_with_closed_form():
