@@ -15,7 +15,6 @@ from time import perf_counter
 from typing import NamedTuple
 
 import numpy as np
-from scipy.optimize import brentq
 
 from ...contact.press import strip_offsets
 from ...core import PatchfemError, frozen_array
@@ -320,6 +319,9 @@ def _take_next_jump(model, problem: WearProblem, state: WearState) -> WearState:
     next_state = jump_to(find_cycle_of_next_table_row(model.wear, problem, state))
     if _most_worn_coating(model, next_state.depth).fraction <= 1 + THIN_FRACTION:
         return next_state
+
+    # scipy.optimize takes half a second to import, and most runs never wear a coating through.
+    from scipy.optimize import brentq
 
     # The wear rate changes little within a jump, so that the worn fraction is exact to THIN_FRACTION.
     length = next_state.cycle - state.cycle
