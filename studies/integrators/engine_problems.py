@@ -42,7 +42,7 @@ class Problem:
 
     `limit` is the friction limit [N] of one Coulomb interface, `elements` are (stiffness [N/m],
     yield displacement [m]) of elastic-plastic elements. `numbers` describes the same problem for
-    another program, as in `switched`. `size` is the size of a state for absolute tolerances,
+    the rates of `switched`. `size` is the size of a state for absolute tolerances,
     `longest` the largest step in cycles that does not pass over an event. The error is taken over
     the `last` cycles, against the slide `truth` (k,) [m] at `times`.
     """
