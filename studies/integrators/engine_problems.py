@@ -25,13 +25,6 @@ from patchfem.structure import make_release
 FOLDER = Path(__file__).parent
 POINTS = 20  # points per cycle at which relative displacements are compared
 TRUTH = 204800  # steps per cycle of the reference solution of the patch, a time march
-# names of the problems in `switched`
-KIND = {
-    "decay": "block",
-    "block": "block",
-    "two": "two",
-    "patch": "patch",
-}
 POINT = ("decay", "block", "two")  # problems with point contacts
 ALL = ("decay", "block", "two", "patch")  # all problems
 

@@ -48,7 +48,20 @@ def measure(names=ALL, ours=OURS, repeats: int = 3) -> list[dict]:
 
 
 def measure_once(rows: dict, one: Problem, name: str, knob: float, work) -> None:
-    """Run an engine once; add its row, or keep the smaller CPU seconds."""
+    """Run an engine once; add its row, or keep the smaller CPU seconds.
+
+    Parameters
+    ----------
+    rows : dict
+        Rows by problem, engine and setting, which are changed.
+    one : Problem
+    name : str
+        Engine.
+    knob : float
+        Steps per cycle or tolerance.
+    work : callable
+        work(one, knob) returns the slide.
+    """
     key = one.name, name, knob
     row = {"problem": one.name, "engine": name, "knob": knob, "error": None, "seconds": None}
     start = process_time()
@@ -136,7 +149,11 @@ def interpolate_seconds(error: float, errors, seconds) -> tuple:
     order = np.argsort(errors)
     e = np.asarray(errors, float)[order]
     t = np.asarray(seconds, float)[order]
-    sign = "<" if error > e[-1] else ">" if error < e[0] else ""
+    sign = ""
+    if error > e[-1]:
+        sign = "<"
+    elif error < e[0]:
+        sign = ">"
     return float(np.exp(np.interp(np.log(error), np.log(e), np.log(t)))), sign
 
 

@@ -123,7 +123,8 @@ def main(names=ALL, ours=OURS, repeats: int = 3, path: Path | None = TABLE) -> d
     table = json.loads(TABLE.read_text())
     with threadpool_limits(1):
         rows = measure(names, ours, repeats)
-    table["rows"] = rows + [row for row in table["rows"] if row["engine"] not in OURS]
+    others = [row for row in table["rows"] if row["engine"] not in OURS and row["problem"] in names]
+    table["rows"] = rows + others
     if path is not None:
         path.write_text(json.dumps(table, indent=0) + "\n")
     report(table)

@@ -1,8 +1,9 @@
 """Measures of whole scenes agree within their errors with closed forms, independent programs and far finer runs.
 
-The scenes of the folder `found` had errors that were too small in earlier versions. The scenes of its file
-`random_patches.json` were drawn by chance, two of each kind; their references and the uncertainties of these are those of
-elements of order 4 with an interior-point method (`tests/support/patch_of_order_four.py` of version 1.10).
+The scenes of the folder `found` had errors that were too small in earlier versions. Those of its files
+`random_patches.json`, two of each kind, and `random_rigs.json`, some in time steps, were drawn by chance. Their references
+with uncertainties are those of elements of order 4 with an interior-point method and of DOP853 between located events
+(`patch_of_order_four.py` and `random_rigs.py` in `tests/support` of version 1.10).
 """
 
 import json
@@ -189,7 +190,9 @@ def test_always_errors_of_patch_cover_reference_and_decrease(name):
 MISSES = {(name, "rotational_stiffness", 1e-3) for name in ("601", "609")}
 MAX_MISS = 1.5  # Largest ratio of true to stated error of an exception.
 KNOWN = 3.0  # Smallest ratio of the stated error to the uncertainty of the reference at which a row counts.
-RANDOM_PATCHES = json.loads((FOUND / "random_patches.json").read_text("utf-8"))
+RANDOM_PATCHES, RANDOM_RIGS = (
+    json.loads((FOUND / f"random_{kind}.json").read_text("utf-8")) for kind in ("patches", "rigs")
+)
 
 
 @pytest.mark.share(1, 3, 5)
@@ -209,6 +212,18 @@ def test_always_errors_of_random_patch_cover_independent_program(name):
         assert {(name, row.name, tolerance) for row in misses} <= MISSES
         assert all(row.true_error <= MAX_MISS * row.error + row.doubt for row in misses)
         assert len(rows) > 3
+
+
+@pytest.mark.share(0, 1, 2, 3)
+@pytest.mark.parametrize("name", RANDOM_RIGS)
+def test_always_errors_of_random_rig_cover_independent_program(name):
+    """All errors of a random rig cover the independent program, but for the work of one rig (1.03 times its error)."""
+    rig = RANDOM_RIGS[name]
+    rows = measure_rows(pf.run(rig["scene"]).measures, rig["true"], rig["doubt"])
+    assert len(rows) == len(rig["true"])
+    misses = [row for row in rows if not row.holds]
+    assert [row.name for row in misses] == ["friction_work"] * (name == "march 304")
+    assert all(row.true_error < 1.1 * row.error for row in misses)
 
 
 def test_always_peak_at_loaded_step_has_no_value():
