@@ -10,7 +10,7 @@ import pytest
 import surfaces
 from command_line import run_cli
 from lab_files import SI, make_record, write_universal
-from scene_texts import COATED, COULOMB, DRIVE, MODE, NONLOCAL, POINT, TRIANGLE
+from scene_texts import COATED, COULOMB, DRIVE, MODE, POINT
 
 import patchfem as pf
 from patchfem.inputs import read_slide
@@ -20,11 +20,6 @@ from patchfem.structure import universal
 from patchfem.surface import read_surface
 
 RIG = POINT + COULOMB + MODE + DRIVE
-GROOVED = (
-    MODE.join([POINT + 'grooves = {wavelength = "80 um", amplitude = "7.5 um"}\n', DRIVE]) + COULOMB
-)
-WORN = COATED + COULOMB + TRIANGLE + '[wear]\ncoefficient = "1e-15 1/Pa"\ncycles = 100\n'
-BONDS = POINT + NONLOCAL + MODE + DRIVE
 FILES = 'stiffness = "{0}"\nmass = "m.mtx"\nboundary = [1]\nmodes = 1\n'
 MASSES = """[structure]
 masses = ["1 kg", "1 kg"]
