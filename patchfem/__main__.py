@@ -260,12 +260,12 @@ def _is_traced() -> bool:
     return bool(sys.getprofile() or sys.gettrace() or has_tool)
 
 
-def run_command(arguments: list, before=lambda: None) -> int:
+def run_command(arguments: list[str], before=lambda: None) -> int:
     """Run a command and return its exit code; errors are printed to stderr.
 
     Parameters
     ----------
-    arguments : list
+    arguments : list of str
         Arguments of the command line after `patchfem`.
     before : callable
         Function that is called first; its errors are printed as well.
@@ -278,6 +278,8 @@ def run_command(arguments: list, before=lambda: None) -> int:
             "verb `run`"
         )
         return 2
+
+    # The verb itself; cyclopts parses its options and calls it.
     try:
         before()
         if arguments in ([], ["--help"], ["-h"]):
@@ -293,6 +295,8 @@ def run_command(arguments: list, before=lambda: None) -> int:
                 raise
         sys.stdout.flush()
         return 0
+
+    # Mistakes of the user, and what stops a command from outside.
     except (UsageError, CycloptsError) as error:
         unused = getattr(error, "unused_tokens", None)
         message = str(error)
@@ -311,6 +315,8 @@ def run_command(arguments: list, before=lambda: None) -> int:
     except OSError as error:
         print_message(make_printable(_describe_os_error(error)))
         return 4
+
+    # Errors of the package have their exit code; any other one is an internal fault.
     except Exception as error:
         code = _report_error(error)
         if code == 1 and os.environ.get("PATCHFEM_DEBUG"):
@@ -333,18 +339,21 @@ def _report_error(error: Exception) -> int:
     if isinstance(error, ImportError) and "failed to map" in str(error):
         print_message(OUT_OF_MEMORY)
         return 4
+
     # Only a SceneError has this attribute; an import of the class would load pydantic, which takes 20 ms.
     if hasattr(error, "mistakes"):
         for line in error.mistakes:
             print_message(make_printable(rewrite_powers_of_ten(line)))
         return 2
+
+    # The message of an error of this package may be followed by tables for the scene file.
     code = getattr(error, "code", None)
     if isinstance(code, int) and type(error).__module__.startswith("patchfem"):
-        for line in str(error).split(
-            "\n"
-        ):  # some messages are followed by tables for the scene file
+        for line in str(error).split("\n"):
             print_message(make_printable(rewrite_powers_of_ten(line)))
         return code
+
+    # Any other error is a fault of the package.
     message = " ".join(f"{type(error).__name__}: {error}".split())
     print_message(make_printable(f"patchfem: internal fault{_locate_fault(error)}: {message}"))
     print_message(

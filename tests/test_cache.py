@@ -364,6 +364,14 @@ def test_always_generated_module_needs_no_file(code_folder):
         sys.modules.pop(f"patchfem.compiled.{name}_file")
 
 
+def test_always_instance_of_kernels_is_kept():
+    """Runs with the same parts share one kernel module: a module of its own would keep 1 MB in each run of a sweep."""
+    parts = {"lists": "points.no_lists_kernels"}
+    first = compiled.instantiate("points.march_kernels", parts)
+    assert compiled.instantiate("points.march_kernels", parts) is first
+    assert compiled.instantiate("points.march_kernels", {}) is not first
+
+
 @pytest.mark.usefixtures("code_folder")
 def test_exact_message_on_full_cache():
     """The message on compilation says that code is compiled at every command if the cache has no room, else once."""

@@ -225,7 +225,7 @@ def test_always_joint_and_pad_recipes_run(run_recipe):
     depth, low, high = map(
         float,
         re.search(
-            r"Worn depth (\S+) nm \((\S+) to (\S+)\), the mean over the common length",
+            r"Worn depth (\S+) nm \((\S+) to (\S+)\), the mean of the lost material over the common length",
             run_recipe("is my pad worn"),
         ).groups(),
     )

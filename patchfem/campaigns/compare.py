@@ -15,8 +15,9 @@ from ..model.model import Model
 from ..runs.plan import plan
 from ..runs.results.result import Result, patch_surface
 from ..runs.run import run
+from ..surface.areal import level
 from ..surface.compare.records import Comparison
-from ..surface.profile import Profile, level, resample_evenly
+from ..surface.profile import Profile, resample_evenly
 
 SIDES = ("before", "after")
 COMPARED_MEASURES = (

@@ -35,8 +35,6 @@ MIN_RUNS = 3  # smallest number of runs of a curve over a setting
 N_TIMINGS = 3
 # Smallest CPU time [s] of a run that is timed only once; longer runs scatter by a few percent.
 MIN_SECONDS_TIMED_ONCE = 0.3
-EQUAL_COST_RATIO = 1.1  # Largest ratio of the CPU times of equally expensive runs.
-TIMING_SCATTER = 2e-3  # Scatter of the CPU time of repeated short runs [s].
 
 
 class Judgement(StrEnum):
@@ -208,101 +206,25 @@ def _run_setting(setting: Setting, say: Callable | None) -> Result | None:
         return None
 
 
-def find_fastest_run(runs: list[Cost], tolerance: float) -> Cost | None:
-    """Return the run with the shortest CPU time whose errors are within a tolerance; None if there is none.
-
-    An error that is unknown is not within the tolerance. A coarse run that is accurate by chance is excluded: those of all
-    finer values must be within the tolerance as well. The automatic setting is judged independently of the others. Among
-    equally expensive runs, the one with the coarsest setting is returned.
-
-    Parameters
-    ----------
-    runs : list of Cost
-        Runs from coarse to fine.
-    tolerance : float
-        Largest error, relative to the value.
-    """
-    names = find_measures_with_error(runs)
-    confirmed = []
-    is_confirmed = True
-    for run in reversed(runs):
-        is_accurate = judge_run(run, names, tolerance) is Judgement.MEETS
-        if run.value is not None:
-            is_confirmed = is_confirmed and is_accurate
-        if is_accurate and (is_confirmed or run.value is None):
-            confirmed.append(run)
-
-    # The times of repeated runs scatter.
-    shortest = min((run.seconds for run in confirmed), default=inf)
-    limit = EQUAL_COST_RATIO * shortest + TIMING_SCATTER
-    return next((run for run in reversed(confirmed) if run.seconds <= limit), None)
-
-
-def find_best_run(runs: list[Cost], tolerance: float) -> Cost:
-    """Return the fastest run within a tolerance, else that with the smallest errors, else the last one.
-
-    Only a run without unknown errors can have the smallest ones.
-    """
-    names = find_measures_with_error(runs)
-    fastest = find_fastest_run(runs, tolerance)
-    known = [run for run in runs if all(name in run.errors for name in names)]
-    if fastest is not None or not known:
-        return fastest or runs[-1]
-    return min(known, key=lambda run: find_worst_error(run, names, tolerance))
-
-
-def judge_run(run: Cost, names: Sequence[str], tolerance: float) -> Judgement:
-    """Judge whether the errors of some measures of a run are within a tolerance.
-
-    Parameters
-    ----------
-    run : Cost
-        Run whose errors are judged.
-    names : sequence of str
-        Measures that count.
-    tolerance : float
-        Largest error, relative to the value.
-
-    Returns
-    -------
-    Judgement
-        UNKNOWN if the run has no error estimate of one of the measures, and no other error is too large.
-    """
-    if find_worst_error(run, names, tolerance).fraction > tolerance:
-        return Judgement.MISSES
-    return Judgement.MEETS if all(name in run.errors for name in names) else Judgement.UNKNOWN
-
-
-def describe_fastest_setting(runs: list[Cost], tolerance: float) -> str:
-    """Describe the fastest setting that meets a tolerance, or the worst measure of the best run if none meets it."""
-    names = find_measures_with_error(runs)
-    best = find_best_run(runs, tolerance)
-    seconds = format_number(best.seconds, 2)
-    worst = find_worst_error(best, names, tolerance)
-    if find_fastest_run(runs, tolerance) is not None:
-        estimated = " that has an error estimate" if best.values.keys() - set(names) else ""
-        return f"{best.words}: {seconds} CPU s per run, with every measure{estimated} within the tolerance {tolerance:g}"
-    # a run without error estimates may be accurate enough
-    is_unknown = any(judge_run(run, names, tolerance) is Judgement.UNKNOWN for run in runs)
-    text = f"no setting {'is known to meet' if is_unknown else 'meets'} the tolerance {tolerance:g}"
-    if not all(name in best.errors for name in names):
-        return f"{text}: no run has an error estimate of every measure"
-    error = format_number(worst.fraction, 2)
-    return f"{text}: the best run, with {best.words}, has an error of {error} in {worst.name} and takes {seconds} CPU s"
-
-
-class WorstError(NamedTuple):
-    """Measure with the largest error of a run, relative to the error that the tolerance allows.
+class Accuracy(NamedTuple):
+    """Largest error of a run, relative to the error that the tolerance allows.
 
     fraction: error over the allowed error at a tolerance of 1, to be compared with the tolerance;
-    name: name of the measure, "" if no error is known.
+    name: name of the measure, "" if no error is known; is_complete: whether the errors of all measures are known.
     """
 
     fraction: float
     name: str
+    is_complete: bool
+
+    def judge(self, tolerance: float) -> Judgement:
+        """Judge whether the errors are within a tolerance."""
+        if self.fraction > tolerance:
+            return Judgement.MISSES
+        return Judgement.MEETS if self.is_complete else Judgement.UNKNOWN
 
 
-def find_worst_error(run: Cost, names: Sequence[str], tolerance: float) -> WorstError:
+def rate_run(run: Cost, names: Sequence[str], tolerance: float) -> Accuracy:
     """Find the measure with the largest error relative to a tolerance.
 
     Parameters
@@ -310,24 +232,65 @@ def find_worst_error(run: Cost, names: Sequence[str], tolerance: float) -> Worst
     run : Cost
         Run whose errors are compared.
     names : sequence of str
-        Names of the measures to compare.
+        Names of the measures that count.
     tolerance : float
         Largest error, relative to the value, beside which a floor counts.
-
-    Returns
-    -------
-    WorstError
     """
-    worst = WorstError(0.0, "")
+    worst = (0.0, "")
     for name in names:
         error = run.errors.get(name)
         if error:
             size = abs(run.values[name]) + run.floors[name] / tolerance
-            worst = max(worst, WorstError(error / size if size else inf, name))
-    return worst
+            worst = max(worst, (error / size if size else inf, name))
+    return Accuracy(*worst, all(name in run.errors for name in names))
 
 
 def find_measures_with_error(runs: list[Cost]) -> list[str]:
     """Return the measures with an error estimate in any run; all measures if there is none."""
     names = list(runs[-1].values)
     return [name for name in names if any(name in run.errors for run in runs)] or names
+
+
+def find_coarsest_run(runs: list[Cost], tolerance: float) -> Cost | None:
+    """Return the coarsest of the runs, from coarse to fine, that is within a tolerance; None if there is none.
+
+    A coarse run that is accurate by chance is excluded: those of all finer values must be within the tolerance as well. The
+    automatic setting, which is the last one, is judged independently of the others.
+    """
+    names = find_measures_with_error(runs)
+    coarsest = None
+    for run in reversed(runs):
+        if rate_run(run, names, tolerance).judge(tolerance) is Judgement.MEETS:
+            coarsest = run
+        elif run.value is not None:
+            break
+    return coarsest
+
+
+def find_best_run(runs: list[Cost], tolerance: float) -> Cost:
+    """Return the coarsest run within a tolerance, else that with the smallest errors, else the last one.
+
+    Only a run without unknown errors can have the smallest ones.
+    """
+    names = find_measures_with_error(runs)
+    rated = [(rate_run(run, names, tolerance), run) for run in runs]
+    known = [(accuracy, run) for accuracy, run in rated if accuracy.is_complete]
+    _, best = min(known, key=lambda pair: pair[0], default=rated[-1])
+    return find_coarsest_run(runs, tolerance) or best
+
+
+def describe_best_setting(runs: list[Cost], tolerance: float) -> str:
+    """Describe the coarsest setting that meets a tolerance, or the worst measure of the best run if none meets it."""
+    names = find_measures_with_error(runs)
+    best = find_best_run(runs, tolerance)
+    worst = rate_run(best, names, tolerance)
+    seconds = format_number(best.seconds, 2)
+    if find_coarsest_run(runs, tolerance) is not None:
+        estimated = " that has an error estimate" if best.values.keys() - set(names) else ""
+        return f"{best.words}: {seconds} CPU s per run, with every measure{estimated} within the tolerance {tolerance:g}"
+    if not worst.is_complete:
+        return f"no setting is known to meet the tolerance {tolerance:g}: no run has an error estimate of every measure"
+    return (
+        f"no setting is known to meet the tolerance {tolerance:g}: the best run, with {best.words}, has an error of "
+        f"{format_number(worst.fraction, 2)} in {worst.name} and takes {seconds} CPU s"
+    )

@@ -68,20 +68,18 @@ def make_setting_values(model: Model, name: str) -> list[Setting]:
     words = name.replace("_", " ")
     if name == TOLERANCE:
         values = sorted({*TOLERANCES, model.accuracy.tolerance}, reverse=True)
-        texts = [(f"{value:g}", f"{words} {value:g}") for value in values]
     elif name == "element_size":
         length = model.patch.pieces.length
         cells = round(length / model.patch.uniform_element_size)
         values = [length / count for count in _scale_count(cells, CELL_FACTORS, CELL_LIMITS)]
-        labels = [f"{1e6 * size:.4g} um" for size in values]
-        texts = [(label, f"{words} {label}") for label in labels]
     else:
         values = _scale_count(_find_count(model, name), COUNT_FACTORS, COUNT_LIMITS[name])
-        texts = [(str(count), f"{count} {words}") for count in values]
 
     settings = []
-    for value, (label, text) in zip(values, texts):
-        settings.append(Setting(label, float(value), text, _change_setting(model, name, value)))
+    for value in values:
+        label = f"{1e6 * value:.4g} um" if name == "element_size" else f"{value:g}"
+        changed = _change_setting(model, name, value)
+        settings.append(Setting(label, float(value), f"{words} {label}", changed))
     if name == TOLERANCE:
         return settings
     automatic = _change_setting(model, name, None)

@@ -3,7 +3,7 @@
 import json
 import shlex
 import sys
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from time import perf_counter
 from typing import Annotated, Literal
@@ -23,6 +23,7 @@ from .shared import (
     Sets,
     UsageError,
     Verbose,
+    describe_command,
     flag_option,
     note,
     present,
@@ -152,6 +153,7 @@ def sweep(
     output = output_options.make_output(f"{scene.stem}-sweep", is_verbose=verbose)
     target = output.target
     sweep_scene, cases = parse_request.read_sweep(scene, set_, (what or CaseOptions()).request())
+    cases = replace(cases, command=describe_command())
 
     # a shard has no answer, because its tables would lack the cases of the others
     if by.collect:

@@ -279,7 +279,9 @@ class KernelFunction:
         # Loaded function for each tuple of type codes; False if numba runs the function itself.
         self.loaded_functions = {}
 
-    def bind_arguments(self, *arguments) -> tuple:
+    def bind_arguments(
+        self, *arguments
+    ) -> tuple[tuple[str, ...] | None, bytes, tuple[object, ...]]:
         """Convert the last arguments of many calls once, for `call_with_bound_args`.
 
         They must be the same objects in every call, but the content of their arrays may change.
@@ -297,7 +299,9 @@ class KernelFunction:
             return None, b"", arguments
         return type_codes, b"".join(words), arguments
 
-    def call_with_bound_args(self, bound: tuple, *first):
+    def call_with_bound_args(
+        self, bound: tuple[tuple[str, ...] | None, bytes, tuple[object, ...]], *first
+    ):
         """Call the function with first arguments and the last arguments of `bind_arguments`."""
         last_codes, last_words, last = bound
         if last_codes is None:
@@ -326,7 +330,9 @@ class KernelFunction:
     def _make_file_name(self, type_codes) -> str:
         return f"{self.file_prefix}{hash_text(','.join(type_codes))}.code"
 
-    def _call_first_time(self, type_codes: tuple, words: tuple, arguments: tuple):
+    def _call_first_time(
+        self, type_codes: tuple[str, ...], words: tuple[bytes, ...], arguments: tuple[object, ...]
+    ):
         """Load or compile the code for arguments of these types, and return the result of the call."""
         path = _prepare_cache() / "code" / self._make_file_name(type_codes)
         function = machine.load_file(path) or _load_prebuilt(path)
@@ -343,7 +349,7 @@ class KernelFunction:
         self.loaded_functions[type_codes] = function
         return function(b"".join(words))
 
-    def _build_machine_code(self, path: Path, arguments: tuple):
+    def _build_machine_code(self, path: Path, arguments: tuple[object, ...]):
         """Compile code for arguments of these types, or load it if another process has compiled it.
 
         Returns None if the function cannot be compiled in this way.
@@ -389,7 +395,7 @@ def _read_names(source: Path | str) -> tuple[dict, set]:
     return constants, functions
 
 
-def _add_constants(constants: dict, target: ast.expr, value) -> None:
+def _add_constants(constants: dict[str, object], target: ast.expr, value) -> None:
     """Add what an assignment of a value to a name, or to a tuple of names, defines."""
     is_tuple = isinstance(target, ast.Tuple)
     names = target.elts if is_tuple else [target]
@@ -398,7 +404,7 @@ def _add_constants(constants: dict, target: ast.expr, value) -> None:
             constants[name.id] = element
 
 
-def _evaluate(node: ast.expr, names: dict):
+def _evaluate(node: ast.expr, names: dict[str, object]):
     """Evaluate an expression of constants, known names, arithmetic and ranges.
 
     Raises KeyError for any other expression.
@@ -454,7 +460,12 @@ def _find_source(module: str) -> Path:
     return PACKAGE_FOLDER.joinpath(*module.split(".")).with_suffix(".py")
 
 
-def instantiate(module: str, replacements: dict, report=None) -> KernelModule:
+_INSTANCES = {}  # `KernelModule` for each name that `instantiate` has made
+
+
+def instantiate(
+    module: str, replacements: dict[str, str | KernelModule], report=None
+) -> KernelModule:
     """Write a kernel module in which other modules replace some of its imports.
 
     The source differs from the file in these imports only, so the line numbers of tracebacks are those of the file. It is
@@ -464,12 +475,12 @@ def instantiate(module: str, replacements: dict, report=None) -> KernelModule:
     Parameters
     ----------
     module : str
-        Name as in `load`.
+        Name of the module without that of the package.
     replacements : dict
         Name under which the module imports another one (`from . import other as name`) -> the module that replaces it,
-        or its name as in `load`. It must have the same functions.
+        or its name without that of the package. It must have the same functions.
     report : callable or None
-        Callback as in `load`.
+        Callback that receives a message if the cache is empty.
 
     Returns
     -------
@@ -490,7 +501,12 @@ def instantiate(module: str, replacements: dict, report=None) -> KernelModule:
         if count != 1:
             raise ValueError(f"patchfem.{module} imports its part {alias} {count} times, not once")
     imported = [other for other in replacements.values() if isinstance(other, KernelModule)]
-    return write_kernel_module(f"{module}_{hash_text(text)}", text, report, imported)
+
+    # Each new module would load its machine code (about 1 MB) again, in every run of a long sweep.
+    name = f"{module}_{hash_text(text)}"
+    if name not in _INSTANCES:
+        _INSTANCES[name] = write_kernel_module(name, text, report, imported)
+    return _INSTANCES[name]
 
 
 def hash_text(text: str) -> str:
@@ -504,11 +520,11 @@ def write_kernel_module(module: str, text: str, report=None, imported=()) -> Ker
     Parameters
     ----------
     module : str
-        Name as in `load`.
+        Name of the module without that of the package.
     text : str
         Source.
     report : callable or None
-        Callback as in `load`.
+        Callback that receives a message if the cache is empty.
     imported : sequence of KernelModule
         Modules that the source imports; they are imported before it.
 
@@ -538,7 +554,7 @@ def write_kernel_module(module: str, text: str, report=None, imported=()) -> Ker
     return KernelModule(name, path if is_stored else text, import_written_module)
 
 
-def _list_code_folders(machine_folder: Path | None = None) -> list:
+def _list_code_folders(machine_folder: Path | None = None) -> list[Path]:
     """List the folders of compiled code: that of this machine and, if any, that of the wheel."""
     wheel_folder = prebuilt.find_folder(hash_sources)
     return [machine_folder or _choose_folder_once()[0], *filter(None, [wheel_folder])]

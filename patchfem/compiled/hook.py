@@ -88,6 +88,7 @@ def build_machine_code(target: Path, commands=list_usual_commands) -> None:
     """
     python = [sys.executable, "-P"]
     with TemporaryDirectory() as work:
+        # Without its own CPU features numba compiles for the common CPU alone.
         cache = Path(work) / "cache"
         environment = os.environ | {
             "NUMBA_CPU_FEATURES": "",
@@ -102,6 +103,8 @@ def build_machine_code(target: Path, commands=list_usual_commands) -> None:
             stdout=subprocess.PIPE,
             text=True,
         ).stdout.split()
+
+        # Each command compiles the kernels that it calls into the empty cache.
         for number, arguments in enumerate(commands(Path(work))):
             subprocess.run(
                 [
@@ -117,7 +120,8 @@ def build_machine_code(target: Path, commands=list_usual_commands) -> None:
                 cwd=work,
                 check=True,
             )
-        # The cache also has a folder of compliance matrices.
+
+        # The cache also has a folder of compliance matrices, which no wheel needs.
         [code_folder] = (cache / "patchfem").glob("*/code")
         for name in ("code", "kinds"):
             copytree(
@@ -132,7 +136,7 @@ def get_build_hook():
     class MachineCode(BuildHookInterface):
         """Build hook that adds machine code to a wheel if PATCHFEM_MACHINE_CODE is set."""
 
-        def initialize(self, version: str, build_data: dict) -> None:
+        def initialize(self, version: str, build_data: dict[str, object]) -> None:
             """Compile the kernels, add their files to the wheel and tag it for this platform.
 
             `version` is "editable" for an installation that refers to the source folder; it gets no machine code.

@@ -11,8 +11,9 @@ from types import SimpleNamespace
 
 import numba
 from numba.core import typed_passes, types, untyped_passes
+from numba.core.base import BaseContext
 from numba.core.codegen import JITCodeLibrary
-from numba.core.compiler import Compiler
+from numba.core.compiler import Compiler, CompileResult
 from numba.core.compiler_machinery import PassManager
 from numba.core.options import DefaultOptions
 from numba.core.registry import CPUDispatcher
@@ -159,7 +160,7 @@ class InlinedDispatcher(CPUDispatcher):
         return self._standalone
 
 
-def compile_optimised(function, arguments: tuple) -> tuple:
+def compile_optimised(function, arguments: tuple[object, ...]) -> tuple[BaseContext, CompileResult]:
     """Compile a function to optimised LLVM code, but not to machine code.
 
     This saves a tenth of the compile time.
@@ -167,6 +168,7 @@ def compile_optimised(function, arguments: tuple) -> tuple:
     Parameters
     ----------
     function : numba dispatcher
+        Function before its compilation.
     arguments : tuple
         Arguments by whose types the function is compiled.
 

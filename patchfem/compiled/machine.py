@@ -18,6 +18,7 @@ import threading
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path
+from types import ModuleType
 from typing import NamedTuple
 
 import numpy as np
@@ -43,7 +44,7 @@ class ArgumentConverter:
         self.known_tuples = {}
         self.lock = threading.Lock()
 
-    def convert(self, value) -> tuple:
+    def convert(self, value) -> tuple[str, bytes]:
         """Return the type code and the words (bytes) of an argument; raise UnsupportedError for other types.
 
         A tuple that contains only numbers is not cached.
@@ -79,11 +80,11 @@ class ArrayFormat(NamedTuple):
     """
 
     type_code: str
-    pack: Callable
+    pack: Callable[..., bytes]
     is_buffer: bool
 
 
-def _convert_array(array) -> tuple:
+def _convert_array(array) -> tuple[str, bytes]:
     """Return the type code and the machine words (bytes) of an array."""
     key = array.dtype, array.ndim, array.flags.num
     known = _ARRAY_FORMATS.get(key)
@@ -191,7 +192,7 @@ def load_code(content: bytes) -> LoadedFunction | None:
 
 
 @cache
-def _create_engine() -> tuple:
+def _create_engine() -> tuple[object, ModuleType]:
     """Return the engine that owns loaded code and the binding module of llvmlite.
 
     Both are kept until the process ends, because loaded functions need them.
@@ -223,12 +224,13 @@ def _load_c_library():
         return object()
 
 
-def store_code(path: Path, function, arguments: tuple) -> bool:
+def store_code(path: Path, function, arguments: tuple[object, ...]) -> bool:
     """Write the machine code of a compiled function to a file; return False on failure.
 
     Parameters
     ----------
     path : Path
+        File of the machine code.
     function : numba dispatcher
         Function that has been called with these arguments.
     arguments : tuple
@@ -249,13 +251,17 @@ def store_code(path: Path, function, arguments: tuple) -> bool:
         return False
 
 
-def compile_and_store(path: Path, function, arguments: tuple, compiler) -> LoadedFunction | None:
+def compile_and_store(
+    path: Path, function, arguments: tuple[object, ...], compiler
+) -> LoadedFunction | None:
     """Compile a function for such a file, write the file if possible, and load the code.
 
     Parameters
     ----------
     path : Path
+        File of the machine code.
     function : numba dispatcher
+        Function before its compilation.
     arguments : tuple
         Arguments whose types select the version to compile.
     compiler : callable
@@ -277,7 +283,7 @@ def compile_and_store(path: Path, function, arguments: tuple, compiler) -> Loade
     return load_code(content)
 
 
-def _make_file_content(file_name: str, target, result, options: dict) -> bytes:
+def _make_file_content(file_name: str, target, result, options: dict[str, object]) -> bytes:
     """Return the content of the file of this name for a function that numba compiled.
 
     Parameters
@@ -285,7 +291,9 @@ def _make_file_content(file_name: str, target, result, options: dict) -> bytes:
     file_name : str
         The name of the entry function is made from it.
     target : numba target context
+        Context with the calling convention and the code generator.
     result : numba CompileResult
+        The compiled function.
     options : dict
         Options of the function.
 
@@ -333,13 +341,15 @@ def _describe_result(kind):
     raise UnsupportedError
 
 
-def _emit_object_code(target, result, name: str, n_result_words: int) -> tuple:
+def _emit_object_code(target, result, name: str, n_result_words: int) -> tuple[bytes, list[str]]:
     """Emit the object code of a function with an entry function, and list its external calls.
 
     Parameters
     ----------
     target : numba target context
+        Context with the calling convention and the code generator.
     result : numba CompileResult
+        The compiled function.
     name : str
         Name of the entry function.
     n_result_words : int
@@ -378,8 +388,14 @@ def _write_entry_function(target, result, name: str, n_result_words: int, linked
 
     Parameters
     ----------
-    target, result, name, n_result_words
-        As in `_emit_object_code`.
+    target : numba target context
+        Context with the calling convention.
+    result : numba CompileResult
+        The compiled function.
+    name : str
+        Name of the entry function.
+    n_result_words : int
+        Number of words of the results, which follow the first word of the buffer.
     linked : llvmlite module
         Module with the code of the function, whose triple and data layout the entry function gets.
 
@@ -392,6 +408,7 @@ def _write_entry_function(target, result, name: str, n_result_words: int, linked
 
     from .pass_by_reference import ReferencedTuple, count_words
 
+    # A module of its own declares the function, and defines the entry function that calls it.
     signature = result.signature
     function_type = target.call_conv.get_function_type(signature.return_type, signature.args)
     word = ir.IntType(64)
@@ -401,6 +418,8 @@ def _write_entry_function(target, result, name: str, n_result_words: int, linked
     function = ir.Function(module, function_type, result.fndesc.llvm_func_name)
     entry = ir.Function(module, ir.FunctionType(ir.VoidType(), [word.as_pointer()]), name)
     builder = ir.IRBuilder(entry.append_basic_block())
+
+    # The arguments stand in the buffer behind the result.
     buffer = entry.args[0]
     arguments = []
     offset = 1 + n_result_words
@@ -421,6 +440,7 @@ def _write_entry_function(target, result, name: str, n_result_words: int, linked
                 address = builder.gep(buffer, [word(offset + k)])
                 arguments.append(builder.load(builder.bitcast(address, kind.as_pointer())))
         offset += n_words
+
     returned = builder.bitcast(builder.gep(buffer, [word(1)]), result_type)
     exception = builder.bitcast(builder.alloca(ir.IntType(8).as_pointer()), exception_type)
     status = builder.call(function, [returned, exception, *arguments])

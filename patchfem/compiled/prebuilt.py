@@ -25,7 +25,7 @@ class CommonCpu(NamedTuple):
     """Common CPU: its name in LLVM and the instruction sets that its code needs."""
 
     name: str
-    instruction_sets: tuple
+    instruction_sets: tuple[str, ...]
 
 
 COMMON_CPUS = {  # common CPU for each value of `platform.machine()`

@@ -19,7 +19,6 @@ PUBLIC = {
         "make_free_balance",
     ),
     "harmonic.branch": (
-        "find_branches",
         "find_point_between",
         "measure_distance",
         "trace_over_frequency",
@@ -42,6 +41,7 @@ PUBLIC = {
     "harmonic.stability": ("add_stability",),
     "harmonic.steady": (
         "find_steady_motion",
+        "list_coexisting_slides",
         "refine_steady_motion",
     ),
     "limit_cycles": (

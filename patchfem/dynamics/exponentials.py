@@ -4,7 +4,6 @@ import numpy as np
 
 # Norm below which the Taylor series of order 9 is exact to round-off: the relative error 0.1^9/10! is 3e-16.
 MAX_SERIES_NORM = 0.1
-BLOCK_ENTRIES = 2**15  # entries of the matrices that are computed together, few enough for a cache
 
 
 def find_exponentials(matrices) -> np.ndarray:
@@ -27,16 +26,6 @@ def find_exponentials(matrices) -> np.ndarray:
     ----------
     Moler and Van Loan, SIAM Review 45, 3 (2003), method 3.
     """
-    out = np.empty_like(matrices)
-    count = max(BLOCK_ENTRIES // matrices.shape[1] ** 2, 1)
-    for begin in range(0, len(matrices), count):
-        block = slice(begin, begin + count)
-        out[block] = _sum_series(matrices[block])
-    return out
-
-
-def _sum_series(matrices) -> np.ndarray:
-    """Return the exponentials of a block of matrices (k, m, m)."""
     norms = np.abs(matrices).sum(axis=2).max(axis=1)
     halvings = np.ceil(np.log2(np.maximum(norms / MAX_SERIES_NORM, 1.0))).astype(int)
     x = matrices / 2.0 ** halvings[:, None, None]

@@ -161,29 +161,37 @@ def _make_verdict(backbone: Backbone, measures: Quantities) -> tuple[str, ...]:
         headline = f"No method found frequency and damping of mode {backbone.mode}."
         return (headline, natural, *backbone.advice[:1])
 
-    # first and last point of the recommended curve
+    # First and last point of the recommended curve, and the peak of the damping ratio between them.
+    peak = f"{show('largest_damping')} at {show('amplitude_of_largest_damping')}"
+    has_peak = False
     changes = []
     for name, label in NAMES.items():
         first, last = (measures[f"{name}_at_{size}_amplitude"] for size in ("smallest", "largest"))
         texts = [show(f"{name}_at_{size}_amplitude") for size in ("smallest", "largest")]
-        if abs(last.value - first.value) <= (first.error or 0.0) + (last.error or 0.0):
+        higher = max(first, last, key=lambda one: one.value)
+        rise = measures["largest_damping"].value - higher.value
+        if name == "damping" and rise > (measures["largest_damping"].error or 0.0) + (
+            higher.error or 0.0
+        ):
+            has_peak = True
+            changes.append(f"{label} rises from {texts[0]} to {peak} and falls to {texts[1]}")
+        elif abs(last.value - first.value) <= (first.error or 0.0) + (last.error or 0.0):
             changes.append(f"{label} stays at {texts[0]}")
         else:
             verb = "rises" if last.value > first.value else "falls"
             changes.append(f"{label} {verb} from {texts[0]} to {texts[1]}")
     ends = [format_quantity(float(curve.amplitude[k]), "m", 3) for k in (0, -1)]
     span = f"from {ends[0]} to {ends[1]}" if curve.amplitude.size > 1 else f"at {ends[0]}"
-    headline = f"{changes[0][0].upper()}{changes[0][1:]}, {changes[1]}, {span}."
+    sentences = [f"{changes[0][0].upper()}{changes[0][1:]}, {changes[1]}, {span}.", natural]
 
-    if backbone.flutter is None:
-        amplitude = show("amplitude_of_largest_damping")
-        extreme = f"The damping ratio is largest, {show('largest_damping')}, at {amplitude}."
-    else:
-        extreme = (
+    if backbone.flutter is not None:
+        sentences.append(
             f"Above {show('flutter_amplitude')} the mode gains energy: friction dissipates less than the "
             "negative damping supplies."
         )
-    return (headline, natural, extreme, *backbone.advice[:1])
+    elif not has_peak:
+        sentences.append(f"The largest damping ratio is {peak}.")
+    return (*sentences, *backbone.advice[:1])
 
 
 def _make_data(backbone: Backbone) -> Variables:

@@ -4,14 +4,13 @@ from typing import NamedTuple
 
 from ..campaigns.cost import (
     TOLERANCE,
+    Accuracy,
     Cost,
     Judgement,
-    WorstError,
-    describe_fastest_setting,
+    describe_best_setting,
     find_best_run,
     find_measures_with_error,
-    find_worst_error,
-    judge_run,
+    rate_run,
 )
 from ..formatting import format_number
 from ..model.model import Model
@@ -47,14 +46,17 @@ SCENE_JUDGEMENTS = {
 class Row(NamedTuple):
     """A run of a curve, and its least accurate measure.
 
-    knob: TOLERANCE, or the setting that varies; worst: of the measures with an error estimate in any run of the curve;
-    judgement: of their errors.
+    knob: TOLERANCE, or the setting that varies; worst: of the measures with an error estimate in any run of the curve.
     """
 
     knob: str
     run: Cost
-    worst: WorstError
-    judgement: Judgement
+    worst: Accuracy
+
+    @property
+    def judgement(self) -> Judgement:
+        """Whether the errors are within the tolerance of the run."""
+        return self.worst.judge(self.run.tolerance)
 
 
 def make_answer(curves: dict[str, list[Cost]], model: Model) -> Answer:
@@ -72,9 +74,7 @@ def make_answer(curves: dict[str, list[Cost]], model: Model) -> Answer:
     rows = []
     for one, curve in curves.items():
         names = find_measures_with_error(curve)
-        for run in curve:
-            worst = find_worst_error(run, names, run.tolerance)
-            rows.append(Row(one, run, worst, judge_run(run, names, run.tolerance)))
+        rows += [Row(one, run, rate_run(run, names, run.tolerance)) for run in curve]
     main = _find_main_measure(runs)
 
     # the scene as it is, or the run that the sentence names
@@ -117,17 +117,17 @@ def describe_runs(knob: str, runs: list[Cost], tolerance: float) -> JsonObject:
     names = find_measures_with_error(runs)
     entries = []
     for run in runs:
-        worst = find_worst_error(run, list(run.values), run.tolerance)
+        worst = rate_run(run, names, run.tolerance)
         entry = {
             "worst": {"measure": worst.name, "error": worst.fraction},
-            "meets_tolerance": judge_run(run, names, run.tolerance) is Judgement.MEETS,
+            "meets_tolerance": worst.judge(run.tolerance) is Judgement.MEETS,
             "remedies": list(run.remedies),
         }
         entries.append(to_plain(run) | entry)
     is_setting = knob != TOLERANCE
     return {
         "runs": entries,
-        "sentence": describe_fastest_setting(runs, tolerance) if is_setting else None,
+        "sentence": describe_best_setting(runs, tolerance) if is_setting else None,
     }
 
 
@@ -167,7 +167,7 @@ def _find_main_measure(runs: list[Cost]) -> str:
     """Return the least accurate of the key quantities in the first and coarsest run, else of all measures."""
     names = find_measures_with_error(runs)
     names = [name for name in quantities.KEY if name in names] or names
-    return find_worst_error(runs[0], names, runs[0].tolerance).name or names[0]
+    return rate_run(runs[0], names, runs[0].tolerance).name or names[0]
 
 
 def _find_unit(name: str) -> str:

@@ -224,7 +224,7 @@ def _describe_search(fit: FittedLoop | FittedCurve | FittedRows) -> JsonObject:
         "correlation": intervals.correlation,
         "evaluations": keys.fit.counts.evaluations,
         "failures": keys.fit.counts.failures,
-        "descents_agreed": keys.fit.descents.n_best,
+        "descents_agreed": keys.fit.n_best,
         "warnings": keys.warnings,
         "seconds": round(keys.seconds, 6),
     }
@@ -332,13 +332,13 @@ def describe_rows_fit(fit: FittedRows) -> Parts:
 
     Scores are root mean squares of ln(computed/measured).
     """
-    search = fit.search
+    search = fit.keys.fit
     scores = fit.compute_scores()
     totals = {name: score["all"] for name, score in scores.items() if score is not None}
     texts = [f"{name.replace('_', ' ')} {value:.3f}" for name, value in totals.items() if value]
     residual = (
-        f"The rms of ln(computed/measured) is {', '.join(texts)}; {search.n_best} of {search.rms.size} starts led to within "
-        "1 % of the best."
+        f"The rms of ln(computed/measured) is {', '.join(texts)}; {search.n_best} of {search.descent_rms.size} starts "
+        "led to within 1 % of the best."
     )
 
     rows, data = _collect_rows(fit)
@@ -352,7 +352,6 @@ def describe_rows_fit(fit: FittedRows) -> Parts:
         "readings": (~fit.held_out).sum(),
         "held": fit.held_out.sum(),
         "rms": fit.keys.fit.rms,
-        "starts": _list_starts(fit),
         "rows": rows,
         "motions": fit.n_motions,
         "notes": [fit.advice] if fit.advice else [],
@@ -371,20 +370,6 @@ def _describe_instrument(fit: FittedRows) -> JsonObject:
         if table == "measured":
             instrument[key] = value
     return instrument
-
-
-def _list_starts(fit: FittedRows) -> list[JsonObject]:
-    """Return the values of the keys at each start and end of the search, with the rms; no end where it failed."""
-    search = fit.search
-    names = [bound.key for bound in fit.keys.ranges]
-    return [
-        {
-            "from": dict(zip(names, first, strict=True)),
-            "to": dict(zip(names, last, strict=True)) if np.isfinite(rms) else None,
-            "training": rms,
-        }
-        for first, last, rms in zip(search.starts, search.ends, search.rms, strict=True)
-    ]
 
 
 def _collect_rows(fit: FittedRows) -> tuple[list[JsonObject], Variables]:

@@ -8,7 +8,6 @@ parameters that the data do not determine; frequencies, damping ratios and shape
 # Names that other folders use, by module.
 PUBLIC = {
     "least_squares": (
-        "Descents",
         "Fit",
         "Problem",
         "Search",

@@ -87,7 +87,13 @@ class _DrivenRecord:
         is_seen = frequency > WINDOW_WIDTH_LINES * line_width
         is_seen &= frequency <= MAX_NYQUIST_FRACTION / (2 * self.step)
         is_seen &= densities.input > MIN_INPUT_POWER * densities.input[is_seen].max()
-        explained = np.where(is_seen, power * densities.coherence(), 0.0)
+        if not is_seen.any():
+            raise PatchfemError(
+                "the input is zero or constant after the start of the record, so there is no response to it; begin the "
+                "record earlier"
+            )
+
+        explained = np.where(is_seen, power * densities.coherence(), -1.0)
         peak = frequency[int(np.argmax(explained))]
         zetas = np.clip(np.multiply(START_PEAK_WIDTHS, line_width / peak), 1e-4, 0.2)
         return [2 * np.pi * peak * np.array([1.0, zeta]) for zeta in zetas]

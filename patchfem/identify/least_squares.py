@@ -65,23 +65,6 @@ class Descent(NamedTuple):
     rows: int
 
 
-class Descents(NamedTuple):
-    """Descents of a search.
-
-    starts, ends: parameters (s, n) at the starting and at the final points, NaN if a descent failed; rms: (s,) root mean
-    square of the residual at the ends.
-    """
-
-    starts: np.ndarray
-    ends: np.ndarray
-    rms: np.ndarray
-
-    @property
-    def n_best(self) -> int:
-        """Number of descents that ended within 1 % of the smallest residual."""
-        return int((self.rms <= np.nanmin(self.rms) * SAME_MINIMUM_RATIO).sum())
-
-
 @dataclass(frozen=True, eq=False, slots=True)
 class Fit:
     """Result of a least-squares fit of n parameters.
@@ -93,7 +76,7 @@ class Fit:
     - counts: number of evaluations of the residual.
     - outcome: DONE if the best descent converged, or if another one reached the same minimum. With
       round-off noise in the residual, a descent may not converge formally.
-    - descents: starting and final points of all descents.
+    - descent_rms: root mean square (s,) of the residual at the end of each descent, infinite if the descent failed.
     """
 
     values: np.ndarray
@@ -102,11 +85,17 @@ class Fit:
     rms: float
     counts: SearchCounts
     outcome: Outcome
-    descents: Descents
+    descent_rms: np.ndarray
+
+    @property
+    def n_best(self) -> int:
+        """Number of descents that ended within 1 % of the smallest residual."""
+        return _count_best(self.descent_rms, self.descent_rms.min())
 
     def count_earlier_search(self, earlier: "Fit") -> "Fit":
         """Return this fit with evaluations and descents of an earlier search, which gave its only start."""
-        return replace(self, counts=earlier.counts.add(self.counts), descents=earlier.descents)
+        counts = earlier.counts.add(self.counts)
+        return replace(self, counts=counts, descent_rms=earlier.descent_rms)
 
 
 @dataclass(frozen=True, slots=True)
@@ -194,17 +183,14 @@ class Problem:
             raise NotConverged(
                 f"fit: all {len(ends)} searches failed; the first failed for this reason: {model.counts.reason}"
             )
-        descents = _collect_descents(model, starts[: len(ends)], ends)
-        if not is_random:
-            return _assemble_fit(model, best, descents, interval_kind)
-
-        # the best descent is continued with central differences
-        search.before_descent()
-        central = UnitCubeResidual(self.residual, model.space)
-        best = descend(central, best.u, range(n))
-        model.sum_of_squares(best.u)
-        fit = _assemble_fit(model, best, descents, interval_kind)
-        return replace(fit, counts=fit.counts.add(central.counts))
+        descent_rms = np.sqrt([end.cost / max(end.rows, 1) for end in ends])
+        if is_random:
+            # the best descent is continued with central differences
+            search.before_descent()
+            model.is_expensive = False
+            best = descend(model, best.u, range(n))
+            model.is_expensive = True
+        return _assemble_fit(model, best, descent_rms, interval_kind)
 
     def _choose_starts(self, model: UnitCubeResidual, max_points: int) -> list[np.ndarray]:
         """Return the starting points (n,) in the unit cube: that of the problem, then the best of some trial points."""
@@ -227,19 +213,14 @@ class Problem:
         return points[: max(1, max_points)]
 
 
-def _collect_descents(model: UnitCubeResidual, starts: Sequence, ends: list[Descent]) -> Descents:
-    """Return the record of descents from starting points (s, n) of the unit cube."""
-    rms = np.sqrt([end.cost / max(end.rows, 1) for end in ends])
-    values = np.array([model.space.to_values(end.u) for end in ends])
-    is_known = np.isfinite(rms)
-    return Descents(
-        starts=np.array([model.space.to_values(start) for start in starts]),
-        ends=np.where(is_known[:, None], values, np.nan),
-        rms=np.where(is_known, rms, np.nan),
-    )
+def _count_best(descent_rms: np.ndarray, smallest: float) -> int:
+    """Return the number of descents within 1 % of the smallest root mean square."""
+    return int(np.count_nonzero(descent_rms <= SAME_MINIMUM_RATIO * smallest))
 
 
-def _assemble_fit(model: UnitCubeResidual, best: Descent, descents: Descents, kind: str) -> Fit:
+def _assemble_fit(
+    model: UnitCubeResidual, best: Descent, descent_rms: np.ndarray, kind: str
+) -> Fit:
     """Return the result of a fit from its best descent; `kind` is a value of `IntervalKind`."""
     u = best.u
     cost = best.cost
@@ -248,16 +229,16 @@ def _assemble_fit(model: UnitCubeResidual, best: Descent, descents: Descents, ki
         u, cost = _move_onto_bounds(model, u, cost)
         is_series = kind == IntervalKind.SERIES
         intervals = compute_intervals(model, u, cost, descend, is_series=is_series)
-    n_near = np.count_nonzero(descents.rms <= SAME_MINIMUM_RATIO * np.sqrt(cost / model.rows))
-    is_converged = best.is_converged or n_near > 1
+    rms = float(np.sqrt(cost / best.rows))
+    is_converged = best.is_converged or _count_best(descent_rms, rms) > 1
     return Fit(
         values=model.space.to_values(u),
         at_bound=tuple(np.where(u <= 0, "low", np.where(u >= 1, "high", "")).tolist()),
         intervals=intervals,
-        rms=float(np.sqrt(cost / model.rows)),
+        rms=rms,
         counts=model.counts,
         outcome=Outcome.DONE if is_converged else Outcome.NOT_CONVERGED,
-        descents=descents,
+        descent_rms=descent_rms,
     )
 
 

@@ -17,6 +17,7 @@ from .measured import UNIVERSAL_EXTENSIONS
 from .records import (
     Channel,
     Records,
+    RequestedChannel,
     select_channels,
 )
 from .tables import NUMBER_PATTERN, has_decimal_comma, parse_number, read_text
@@ -28,7 +29,9 @@ MOTION_CHANNELS = {"absolute_acceleration", "base_acceleration"}
 MAX_COLUMNS = 1000  # largest number of columns in a table or an array
 
 
-def read_records(path, requests: list, exported_names: Mapping = EXPORTED_NAMES) -> Records:
+def read_records(
+    path, requests: list[RequestedChannel], exported_names: Mapping = EXPORTED_NAMES
+) -> Records:
     """Read measured records over time from a laboratory file.
 
     Parameters
@@ -62,7 +65,9 @@ def read_records(path, requests: list, exported_names: Mapping = EXPORTED_NAMES)
     raise PatchfemError(f"{path}: the name of an imported file must end in {', '.join(EXTENSIONS)}")
 
 
-def _read_universal(path: Path, requests: list, exported_names: Mapping) -> Records:
+def _read_universal(
+    path: Path, requests: list[RequestedChannel], exported_names: Mapping
+) -> Records:
     notes = []
     channels = universal.make_channels(path, universal.read_datasets(path), notes)
     names = [channel.name for channel in channels]
@@ -80,13 +85,13 @@ def _read_universal(path: Path, requests: list, exported_names: Mapping) -> Reco
     return select_channels(path, channels, requests, notes)
 
 
-def _find_quantity(name: str, names: list, exported_names: Mapping) -> str:
+def _find_quantity(name: str, names: list[str], exported_names: Mapping) -> str:
     """Return the quantity that the name of a column states, or "" if it states none."""
     quantity = find_standard_name(name, names, exported_names)
     return quantity if quantity in CHANNEL_UNITS else ""
 
 
-def _read_table(path: Path, exported_names: Mapping) -> list:
+def _read_table(path: Path, exported_names: Mapping) -> list[Channel]:
     """Read the numeric columns of a table as channels; columns that contain text are left out."""
     table = read_text(path, "a measured table")
     names = table.names
@@ -111,7 +116,7 @@ def _read_table(path: Path, exported_names: Mapping) -> list:
     return channels
 
 
-def _read_matlab(path: Path, requests: list) -> Records:
+def _read_matlab(path: Path, requests: list[RequestedChannel]) -> Records:
     """Read the requested variables of a MATLAB file, such as `F`, `data(:,2)` or `run.load.F`.
 
     Only real arrays are read; nothing in the file is executed.

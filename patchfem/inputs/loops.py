@@ -31,7 +31,7 @@ class Loop:
     displacement: np.ndarray
     reading: np.ndarray
     quantity: str
-    labels: dict
+    labels: dict[str, tuple[str, ...]]
 
     def select_rows(self, condition: str) -> np.ndarray:
         """Return a mask of the rows (k,) whose label fulfils a condition "column=value,value".

@@ -85,7 +85,7 @@ def _make_record_error(path: Path) -> PatchfemError:
     )
 
 
-def _parse_row(location: str, cells: dict, factors: dict) -> MeasuredRow:
+def _parse_row(location: str, cells: dict[str, str], factors: dict[str, float]) -> MeasuredRow:
     flag = cells.get("flag", "")
     if set(flag) - set(FLAG_MEANINGS):
         raise PatchfemError(

@@ -54,8 +54,8 @@ class Records:
     """
 
     path: Path
-    values: dict
-    notes: list = field(default_factory=list)
+    values: dict[str, np.ndarray]
+    notes: list[str] = field(default_factory=list)
     channel_list: str = ""
 
 
@@ -101,7 +101,9 @@ def parse_requests(texts: Iterable, quantities: Iterable = CHANNEL_UNITS) -> lis
     return list(requests.values())
 
 
-def select_channels(path: Path, channels: list, requests: list, notes: list) -> Records:
+def select_channels(
+    path: Path, channels: list[Channel], requests: list[RequestedChannel], notes: list[str]
+) -> Records:
     """Select the requested channels, or by default those for which the file states a quantity.
 
     Parameters
@@ -156,13 +158,13 @@ def select_channels(path: Path, channels: list, requests: list, notes: list) -> 
     return make_records(path, values, notes, channel_list)
 
 
-def _make_requested_channel(path, channels: list, request: RequestedChannel) -> Channel:
+def _make_requested_channel(path, channels: list[Channel], request: RequestedChannel) -> Channel:
     """Return a channel with the quantity of a request, and the unit if the request has one."""
     channel = find_channel(path, channels, request.source)._replace(quantity=request.quantity)
     return channel._replace(unit=request.unit, factor=None) if request.unit else channel
 
 
-def find_channel(path, channels: list, source: str) -> Channel:
+def find_channel(path, channels: list[Channel], source: str) -> Channel:
     """Find a channel by name, by degree of freedom such as 12:+x, or by number, counted from 1.
 
     Parameters
@@ -199,7 +201,7 @@ def find_channel(path, channels: list, source: str) -> Channel:
     )
 
 
-def describe_channels(channels: list) -> str:
+def describe_channels(channels: list[Channel]) -> str:
     """Return a list of the channels as text, with number, name, degree of freedom and unit."""
     texts = []
     for number, channel in enumerate(channels[:MAX_LISTED_CHANNELS], 1):
@@ -211,7 +213,9 @@ def describe_channels(channels: list) -> str:
     return listed + (f" and {n_unlisted} more" if n_unlisted > 0 else "")
 
 
-def make_records(path, values: dict, notes: list, channel_list: str = "") -> Records:
+def make_records(
+    path, values: dict[str, np.ndarray], notes: list[str], channel_list: str = ""
+) -> Records:
     """Check arrays in SI and return them as `Records`.
 
     Parameters
@@ -264,7 +268,7 @@ def make_records(path, values: dict, notes: list, channel_list: str = "") -> Rec
     return Records(Path(path), frozen, notes, channel_list)
 
 
-def shift_to_zero(values: dict) -> dict:
+def shift_to_zero(values: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
     """Subtract the first row from time and displacements, as a prescribed displacement requires."""
     return {
         name: column - column[0] if name in ("time", "displacement") else column
@@ -286,7 +290,9 @@ def _convert_to_si(path, channel: Channel) -> np.ndarray:
     return np.asarray(channel.values, float) * factor
 
 
-def _find_shared_time(path, selected: list, channels: list, channel_list: str) -> np.ndarray | None:
+def _find_shared_time(
+    path, selected: list[Channel], channels: list[Channel], channel_list: str
+) -> np.ndarray | None:
     """Return the time [s] of the selected channels, or of the only channel that contains times."""
     times = [channel.time for channel in selected if channel.time is not None]
     if not times:

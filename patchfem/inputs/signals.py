@@ -24,7 +24,7 @@ SPECTRUM_FORMAT = TableFormat(
 )
 
 
-def read_signal(path, quantity: str) -> tuple:
+def read_signal(path, quantity: str) -> tuple[np.ndarray, np.ndarray]:
     """Read a recorded drive signal.
 
     Parameters
@@ -69,7 +69,7 @@ def read_signal(path, quantity: str) -> tuple:
     return time - time[0], np.array(value)
 
 
-def read_spectrum(path) -> tuple:
+def read_spectrum(path) -> tuple[np.ndarray, np.ndarray]:
     """Read the spectrum of a random drive signal from a table of frequency and level.
 
     Returns
@@ -99,7 +99,7 @@ def read_spectrum(path) -> tuple:
     return frequency, level
 
 
-def _read_universal(path: Path, quantity: str) -> tuple:
+def _read_universal(path: Path, quantity: str) -> tuple[np.ndarray, np.ndarray]:
     """Read time and values of the only time response of a quantity in a universal file."""
     kind = OrdinateType[quantity.upper()]
     datasets = read_datasets(path)

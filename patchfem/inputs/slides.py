@@ -14,7 +14,7 @@ from .units import CHANNEL_UNITS
 COLUMN_NAMES = ("time", "displacement")
 
 
-def read_slide(path) -> tuple:
+def read_slide(path) -> tuple[np.ndarray, np.ndarray]:
     """Read a prescribed displacement from a table, a measured loop or a `patchfem import` file.
 
     Parameters

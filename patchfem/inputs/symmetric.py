@@ -103,7 +103,7 @@ def read_numbers(values, subject: str, *shapes: tuple) -> np.ndarray:
     )
 
 
-def _format_shape(shape: tuple) -> str:
+def _format_shape(shape: tuple[int | None, ...]) -> str:
     """Return a shape as text, such as (k, 2), where k stands for any length."""
     lengths = ["k" if length is None else str(length) for length in shape]
     return f"({', '.join(lengths)}{',' if len(shape) == 1 else ''})"

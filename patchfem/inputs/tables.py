@@ -38,7 +38,7 @@ class TableFormat(NamedTuple):
     """
 
     units: Mapping
-    required: tuple
+    required: tuple[str, ...]
     example: str
     contents: str
     remedy: str = ""
@@ -51,8 +51,8 @@ class Columns:
     values: column -> (k,) in SI; labels: column that is not known as a number -> k strings; rows: k.
     """
 
-    values: dict
-    labels: dict
+    values: dict[str, np.ndarray]
+    labels: dict[str, tuple[str, ...]]
     rows: int
 
 

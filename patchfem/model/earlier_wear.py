@@ -64,14 +64,10 @@ class EarlierWear:
     @property
     def sentence(self) -> str:
         """Sentence that tells the user from which state the run continues."""
-        all_cycles = float(self.scene["wear"]["cycles"])
-        cycles = f"{self.cycles:.6g}"
-        if self.cycles < all_cycles * (1 - 1e-9):
-            cycles += f" of {all_cycles:.6g}"
         return (
             f"continues from {self.path.parent.name}/{self.path.name}, where up to "
-            f"{format_length(float(self.depth.max()), 3)} was worn off in {cycles} cycles; the cycles of this run are "
-            "counted from that state, but its worn_volume and worn_depth_max are measured from the unworn pieces"
+            f"{format_length(float(self.depth.max()), 3)} was worn off in {self.cycles:.6g} cycles; the cycles of this "
+            "run are counted from that state, but its worn_volume and worn_depth_max are measured from the unworn pieces"
         )
 
     def depth_at(self, x) -> np.ndarray:
@@ -128,7 +124,7 @@ def read_end_state(path: Path) -> EarlierWear:
     try:
         earlier = _read_state(path)
         has_strips = "strips" in earlier.scene["contact"]
-        is_usable = _has_depth_along_patch(earlier) and bool(earlier.sentence)
+        is_usable = _has_depth_along_patch(earlier) and "cycles" in earlier.scene["wear"]
     except FILE_ERRORS:
         raise PatchfemError(
             f"{path}: not the result.nc of a run with [wear] and [contact]; give such a file",

@@ -9,9 +9,10 @@ import numpy as np
 from ..core import PatchfemError, frozen_array
 from ..exceptions import UnresolvedTrace
 from ..formatting import format_length
+from ..surface.areal import level
 from ..surface.files.read import read_profile
 from ..surface.nodes import MEANS_OVER_WAVES, average_at_nodes, place_over_patch
-from ..surface.profile import Profile, clean, level, resample_evenly
+from ..surface.profile import Profile, clean, resample_evenly
 from ..surface.roughness.filter import mean_line
 from ..surface.spectrum import ELEMENTS_PER_WAVE, describe_lost_waves, wave_spectrum
 from .file_cache import cache_by_file

@@ -22,7 +22,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..core import DriveSegment, PatchfemError
+from ..core import DriveSegment
 from .drive_sizes import DriveKeys, count_cycles_per_level
 
 
@@ -192,12 +192,6 @@ class RecordedDrive:
     is_periodic: bool = False
     segments = ()  # a recorded signal does not consist of constants and sines
     max_frequency_ratio = 1.0  # its cycle is that of the rig
-
-    def __post_init__(self):
-        if len(self.time) < 2 or self.time[0] != 0 or not np.all(np.diff(self.time) > 0):
-            raise PatchfemError(
-                "drive.file: at least two rows with times that rise from 0 s are needed"
-            )
 
     @property
     def breaks(self) -> np.ndarray:

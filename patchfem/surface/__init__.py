@@ -12,6 +12,7 @@ PUBLIC = {
         "read_profile",
         "read_surface",
     ),
+    "areal": ("level",),
     "nodes": (
         "average_at_nodes",
         "place_over_patch",
@@ -19,7 +20,6 @@ PUBLIC = {
     "profile": (
         "Profile",
         "clean",
-        "level",
         "resample_evenly",
     ),
     "quantity": (

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..core import PatchfemError, frozen_array
-from .profile import robust_deviation
+from .profile import Profile, robust_deviation
 
 SPIKE_THRESHOLDS = (10.0, 40.0, 160.0)  # |height - median of 5 x 5| in standard deviations
 MAX_SPIKE_POINTS = 12  # number of points of a spike; a larger group is a feature of the surface
@@ -55,10 +55,10 @@ def find_scan_spikes(scan: Areal) -> np.ndarray:
 
     filled = fill_nearest(scan.z)
     distance = np.abs(filled - ndimage.median_filter(filled, SPIKE_WINDOW))
-    deviation = robust_deviation(distance[distance > 0]) if (distance > 0).any() else 0.0
     spikes = np.zeros(filled.shape, bool)
-    if not deviation > 0:
+    if not distance.any():
         return spikes
+    deviation = robust_deviation(distance[distance > 0])
     for threshold in SPIKE_THRESHOLDS:
         groups, count = ndimage.label(distance > threshold * deviation, np.ones((3, 3)))
         sizes = np.bincount(groups.ravel(), minlength=count + 1)
@@ -66,19 +66,20 @@ def find_scan_spikes(scan: Areal) -> np.ndarray:
     return spikes & ~scan.missing
 
 
-def level_plane(scan: Areal) -> Areal:
-    """Subtract the least-squares plane of the measured heights of a scan.
+def level(surface: Profile | Areal) -> Profile | Areal:
+    """Subtract the least-squares line from the measured heights of a trace, or the plane from those of a scan.
 
     Raises PatchfemError if the measured heights do not determine it, such as all of them in one line.
     """
-    known = ~scan.missing
+    known = ~surface.missing
+    axes = (surface.x,) if surface.z.ndim == 1 else (surface.x, surface.y[:, None])
     # Positions from -1 to 1 make the rank independent of units.
-    x, y = (2 * (axis - axis[0]) / np.ptp(axis) - 1 for axis in (scan.x, scan.y))
-    plane = np.array([np.broadcast_to(part, known.shape) for part in (1.0, x, y[:, None])])
-    factors, _, rank, _ = np.linalg.lstsq(plane[:, known].T, scan.z[known], rcond=RANK_TOL)
-    if rank < 3:
+    unit = [2 * (axis - axis[0]) / np.ptp(axis) - 1 for axis in axes]
+    base = np.array([np.broadcast_to(part, known.shape) for part in (1.0, *unit)])
+    factors, _, rank, _ = np.linalg.lstsq(base[:, known].T, surface.z[known], rcond=RANK_TOL)
+    if rank < len(base):
         raise PatchfemError(
-            f"{scan.source}: {known.sum()} heights, which all lie on one straight line; a plane needs "
+            f"{surface.source}: {known.sum()} heights, which all lie on one straight line; a plane needs "
             "three points that do not"
         )
-    return replace(scan, z=frozen_array(scan.z - np.tensordot(factors, plane, 1)))
+    return replace(surface, z=frozen_array(surface.z - np.tensordot(factors, base, 1)))

@@ -40,8 +40,6 @@ def place_over_patch(profile: Profile, x: np.ndarray) -> Profile:
     Profile
     """
     known = profile.x[~profile.missing]
-    if known.size < 2:
-        raise PatchfemError(f"{profile.source}: {known.size} heights; a trace needs at least two")
 
     # A trace that does not cover the patch is centred on it.
     shift = 0.0
@@ -98,10 +96,6 @@ def average_at_nodes(profile: Profile, x: np.ndarray, integral=None) -> np.ndarr
     -------
     (m,) array [m]
     """
-    if profile.missing.any():
-        raise PatchfemError(
-            f"{profile.source}: {profile.missing.sum()} heights are missing; clean the trace first"
-        )
     _require_cover(profile.source, profile.x, x)
     edges = np.concatenate([x[:1], (x[1:] + x[:-1]) / 2, x[-1:]])
     if integral is None:

@@ -55,15 +55,6 @@ def measure_step(axis: np.ndarray) -> float:
     return float(axis[-1] - axis[0]) / (axis.size - 1)
 
 
-def level(profile: Profile) -> Profile:
-    """Subtract the least-squares line from a trace."""
-    known = ~profile.missing
-    x = (profile.x - profile.x[known].mean()) / profile.length
-    z = profile.z - profile.z[known].mean()
-    slope = x[known] @ z[known] / (x[known] @ x[known])
-    return replace(profile, z=frozen_array(z - x * slope))
-
-
 def resample_evenly(profile: Profile) -> Profile:
     """Resample a trace to a constant sampling interval, with gaps closed, for filters and spectra.
 

@@ -6,7 +6,8 @@ import numpy as np
 
 from ..core import PatchfemError
 from ..formatting import format_length
-from .profile import Profile, level, resample_evenly
+from .areal import level
+from .profile import Profile, resample_evenly
 
 BAND = (60e-6, 110e-6)  # wavelengths [m] of `band_amplitude`: the 80 um waves of the 1985 report
 N_SMOOTHED = 9  # number of neighbouring waves whose mean is the density at their middle
@@ -109,13 +110,11 @@ def describe_lost_waves(profile: Profile, element: float) -> str | None:
     lost = spectrum.lost_fraction(length)
     if lost <= MAX_LOST:
         return None
-    sufficient = spectrum.element_length(1 - MAX_LOST)
-    # It is rounded down to two digits, since a larger one would not suffice.
-    unit = 10.0 ** (np.floor(np.log10(sufficient)) - 1)
-    sufficient = float(np.floor(sufficient / unit * (1 + 1e-12)) * unit)
+    # A length that is rounded up would not suffice.
+    sufficient = 0.99 * spectrum.element_length(1 - MAX_LOST)
     return (
         f"{profile.source} has {100 * lost:.0f} % of its rms height in waves shorter than "
         f"{ELEMENTS_PER_WAVE} elements ({format_length(length)}), which the mesh cannot resolve: add "
         "[contact.asperities], or set element_size = "
-        f'"{format_length(sufficient)}", which keeps {100 - 100 * MAX_LOST:g} % of the height'
+        f'"{format_length(sufficient, 3)}", which keeps {100 - 100 * MAX_LOST:g} % of the height'
     )

@@ -210,14 +210,14 @@ def main(path: Path | None = FOLDER / "steps.svg", fits: bool = True) -> tuple:
         )
     fit = {gauge: fit_gauge(gauge) for gauge in ((False, True) if fits else ())}
     for one in fit.values():
-        names = [free.key.rpartition(".")[2] for free in one.models.ranges]
+        names = [free.key.rpartition(".")[2] for free in one.keys.ranges]
         values = ", ".join(
             f"{name} {value:.4g} [{low:.4g}, {high:.4g}]"
             for name, value, (low, high) in zip(
                 names, one.keys.fit.values, one.keys.fit.intervals.ends
             )
         )
-        best = int((one.search.rms < 1.01 * np.nanmin(one.search.rms)).sum())
+        best = one.keys.fit.n_best
         scored = one.compute_scores()
         print(
             f"{values}; fitted {format_score(scored['fitted'])}, predicted {format_score(scored['held_out'])}; "

@@ -114,7 +114,7 @@ def main(starts: int = 8) -> dict:
             + ", ".join(
                 f"{one.key} {value:.4g}" for one, value in zip(keys.ranges, keys.fit.values)
             )
-            + f"; {np.sum(found.search.rms < 1.01 * keys.fit.rms)} of {starts} starts end here; {seconds:.0f} s"
+            + f"; {np.sum(keys.fit.descent_rms < 1.01 * keys.fit.rms)} of {starts} starts end here; {seconds:.0f} s"
         )
         out[name] = {**each["model"], "values": keys.fit.values, "seconds": seconds}
     return out

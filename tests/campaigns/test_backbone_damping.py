@@ -55,10 +55,9 @@ def compute_balance(law: str, damping: float):
 @pytest.mark.share(0, 1)
 @pytest.mark.parametrize("damping", DAMPING)
 @pytest.mark.parametrize("law", LAWS)
-def test_balance_gives_curve_or_reason_for_each_sign_of_damping(law, damping, tmp_path):
+def test_balance_gives_curve_or_reason_for_each_sign_of_damping(law, damping):
     """Harmonic balance gives a curve with errors, or a reason, for negative, zero and positive damping."""
     backbone = compute_balance(law, damping)
-    assert "<html" in write_page(backbone, law, damping, tmp_path)
     assert ("balance" in backbone.curves) != ("balance" in backbone.missing)
     for curve in backbone.curves.values():
         for error in (curve.frequency_error, curve.damping_error):

@@ -166,15 +166,6 @@ def test_exact_force_of_coupled_linear_modes_is_where_their_receptance_is_imagin
         assert force == pytest.approx([1e-5 / abs(receptance(resonance))], rel=1e-9)
 
 
-def test_exact_force_of_a_linear_rig():
-    """Without friction the force of the phase resonance is 2 zeta m omega^2 A, within 1e-9."""
-    scene = JOINT.replace("100 N", "0 N")
-    curve = pf.backbone(scene, amplitudes=[1e-5, 1e-3])
-    expected = 2 * 0.005 * OMEGA**2 * np.array([1e-5, 1e-3])
-    for method in ("balance", "quasi_static"):
-        assert curve[f"{method}_force"].values == pytest.approx(expected, rel=1e-9)
-
-
 def test_force_of_rigid_friction_agrees_with_energy():
     """Under rigid friction far above its onset the force is 4 mu N s/pi and that of the structure, within 0.1 %."""
     scene = JOINT.replace("elastic-plastic", "coulomb").replace('bond_length = "60 um"\n', "")

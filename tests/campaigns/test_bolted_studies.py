@@ -82,17 +82,6 @@ def write_free_scene(contact: str, joint_stiffness: float) -> str:
     return contact + free.replace("0.002", repr(damping)) + DRIVE
 
 
-def test_exact_sweep_over_load_keeps_the_structure():
-    """A sweep over the load of a point equals runs of the same structure given by its free modes."""
-    stiffness = 0.3 * 4000 / 1.5e-6
-    free = write_free_scene(POINT, stiffness)
-    swept = pf.sweep(POINT + MODE + DRIVE, {"normal.load": list(LOADS)})
-    assert len(set(swept["relative_displacement_amplitude"].values.tolist())) == 3
-    for name in ("relative_displacement_amplitude", "friction_force_peak"):
-        single = [pf.run(free, **{"normal.load": load}).measures[name].value for load in LOADS]
-        assert swept[name].values == pytest.approx(single, rel=1e-9)
-
-
 def test_exact_sweep_over_load_of_patch_equals_single_runs():
     """A case of a sweep of a patch equals, to round-off, the run of a model with the same joint subtracted,
     and its measures are those of the structure given by its free modes within their errors."""
@@ -142,13 +131,6 @@ def test_exact_modes_given_beside_the_scene_keep_their_slide():
         for changes in ({}, {"contact.load": "4.8 kN"})
     ]
     assert free[1] == pytest.approx(free[0], rel=1e-12)
-
-
-def test_exact_joint_of_each_case_is_subtracted_if_asked():
-    """With measured_joint = "case" every load has the measured frequency while it sticks."""
-    text = (POINT + MODE + DRIVE).replace('"stuck"', '"stuck"\nmeasured_joint = "case"')
-    curves = pf.backbone(text, amplitudes="0.1 um", method="balance", **{"normal.load": "3.2 kN"})
-    assert curves.attrs["stuck_frequency"] == pytest.approx(212.0, rel=1e-9)
 
 
 def test_exact_fit_of_the_bolted_joint_finds_its_stiffness(tmp_path: Path):

@@ -1,6 +1,5 @@
 """Tests of fitting the parameters of a joint to its frequency and damping over the amplitude."""
 
-import json
 import re
 
 import numpy as np
@@ -20,7 +19,7 @@ from scene_texts import (
 import patchfem as pf
 from patchfem.campaigns.fits import curve as curves
 from patchfem.campaigns.fits.curve import read_damping_curve
-from patchfem.campaigns.fits.problem import FitOptions, parse_ranges
+from patchfem.campaigns.fits.problem import parse_ranges
 from patchfem.core import PatchfemError
 
 IWAN = (
@@ -173,6 +172,19 @@ def test_fit_command_reads_curve_and_refuses_invalid_curves(tmp_path, monkeypatc
         and page.count("<figure") == 4
         and "the residual is" in page
     )
+    # without columns of errors they follow from the scatter, which screen, file and page say
+    rows = np.loadtxt("decay.csv", delimiter=",", skiprows=1)[:, [0, 1, 3]]
+    head = "amplitude [m],frequency [Hz],damping"
+    np.savetxt("decay.csv", rows, delimiter=",", header=head, comments="")
+    answer = run_cli(*command, "--set", "friction.stiffness=1e6 N/m", "--starts", "1", "-o", "out")
+    assert "The errors of the measured values are their scatter around the fit." in answer.out
+    for name in ("fit.json", "report.html"):
+        assert "from their scatter around the fit: " in (tmp_path / "out" / name).read_text("utf-8")
+    # a table of no kind is refused with the header of each kind
+    (tmp_path / "decay.csv").write_text("a [m],f [Hz],z\n1e-6,100,0.1\n")
+    answer = run_cli(*command)
+    for header in ("amplitude [um],frequency [Hz],damping [%]", "frequency [Hz],input [g],"):
+        assert answer.code == 2 and f"`{header}" in answer.err
     table = tmp_path / "backbone.csv"
     table.write_text(
         "method,amplitude [m],frequency [Hz],damping\na,1e-6,100,0.1\nb,2e-6,100,0.1\n"
@@ -227,36 +239,6 @@ def test_scatter_replaces_errors_that_a_table_does_not_give(tmp_path):
     fit = curves.fit_curve(pf.load(joint + drive), path, free).keys.fit
     for value, (low, high) in zip((0.27, 2.5e5), fit.intervals.ends, strict=True):
         assert low < value < high and high - low < 0.3 * value
-
-
-def test_assumed_errors_and_computed_curves_are_printed(tmp_path, monkeypatch):
-    """Screen, fit.json and page state assumed errors; fit.json counts all curves of the model."""
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "rig.toml").write_text(START)
-    rows = np.loadtxt(write_decay(tmp_path / "a.csv", IWAN), delimiter=",", skiprows=1)[
-        :, [0, 1, 3]
-    ]
-    head = "amplitude [m],frequency [Hz],damping"
-    np.savetxt("curve.csv", rows, delimiter=",", header=head, comments="")
-    free = ["friction.chi=-0.9..-0.05"]
-    command = ["fit", "rig.toml", "--free", *free, "--starts", "1", "-o", "out"]
-    answer = run_cli(*command, "--set", "friction.stiffness=1e6 N/m", "--to", "curve.csv")
-    assumed = "from their scatter around the fit: "
-    assert answer.code == 0 and assumed in answer.out + answer.err
-    assert "The errors of the measured values are their scatter around the fit." in answer.out
-    fitted = pf.load(tmp_path / "out/scene.fitted.toml")
-    options = FitOptions(starts=1)
-    fit = curves.fit_curve(fitted, tmp_path / "curve.csv", parse_ranges(free), options)
-    # repeated evaluations at a new start are computed once
-    assert abs(fit.n_computed - fit.keys.fit.counts.evaluations) < 10
-    details = json.loads((tmp_path / "out/fit.json").read_text("utf-8"))
-    assert details["evaluations"] >= 10 and assumed in details["notes"][0]
-    assert assumed in (tmp_path / "out/report.html").read_text("utf-8")
-    (tmp_path / "curve.csv").write_text("a [m],f [Hz],z\n1e-6,100,0.1\n")
-    answer = run_cli(*command, "--to", "curve.csv")
-    assert answer.code == 2
-    for header in ("amplitude [um],frequency [Hz],damping [%]", "frequency [Hz],input [g],"):
-        assert f"`{header}" in answer.err
 
 
 def test_refuses_fewer_values_than_parameters(tmp_path):

@@ -38,7 +38,7 @@ def test_exact_compare_reports_shift_and_worn_depth(trace_pair, comparison):
     p, (answer, out) = trace_pair[2], comparison
     assert answer.code == 0
     assert re.match(
-        r"Worn depth \S+ um \(\S+ to \S+\), the mean over the common length.",
+        r"Worn depth \S+ um \(\S+ to \S+\), the mean of the lost material over the common length.",
         answer.out.splitlines()[1],
     )
     assert f"results: {out}" in answer.out
@@ -53,7 +53,9 @@ def test_exact_compare_reports_shift_and_worn_depth(trace_pair, comparison):
     assert found["shift"]["value"] == pytest.approx(-p.shift, abs=0.1 * UM)
     assert found["worn_depth_max"]["value"] == pytest.approx(p.worn.max(), abs=0.1 * UM)
     page = (out / "report.html").read_text()
-    assert page.index("the mean over the common length.") < page.index("<figure")
+    assert page.index("the mean of the lost material over the common length.") < page.index(
+        "<figure"
+    )
     assert page.count("<figure ") == 3 == page.count('role="img" aria-label="')
 
 

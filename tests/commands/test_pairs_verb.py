@@ -3,15 +3,12 @@
 import csv
 import json
 
-import numpy as np
 import pytest
 from command_line import run_cli
 from surface_pairs import draw_pair, write_traces
 
 import patchfem as pf
 from patchfem.campaigns import read_pairs
-from patchfem.surface import Quantity
-from patchfem.surface.quantity import average_quantities
 
 COUNT = 1201
 
@@ -71,23 +68,6 @@ def test_exact_table_has_a_line_for_each_pair(pairs_table, pairs_answer):
     assert lines[2]["worn_depth_mean [m]"] == ""
     stored = json.loads((out / "pairs.json").read_text())
     assert json.loads(json.dumps(pf.compare(pairs=pairs_table))) == stored
-
-
-def test_always_interval_of_mean_covers_true_value():
-    """The 95 % interval of a mean of four pairs covers the true value in more than 92 % of 400 samples.
-
-    The pairs differ by scatter or by their measurement errors.
-    """
-    random = np.random.default_rng(11)
-    for scatter, error in ((3.0, 0.3), (0.0, 1.0)):
-        covers = []
-        for _ in range(400):
-            values = 50 + random.normal(0, np.hypot(scatter, error), 4)
-            one = average_quantities(
-                [Quantity(v, v - 1.96 * error, v + 1.96 * error, "m", "") for v in values], ""
-            )
-            covers.append(one.mean.low <= 50 <= one.mean.high)
-        assert np.mean(covers) > 0.92
 
 
 @pytest.mark.parametrize(

@@ -157,31 +157,21 @@ cycles = 2
 
 @pytest.mark.share(0)
 @pytest.mark.parametrize("words", [("--random", "5", "--seed", "3"), ("--sobol", "8")])
-def test_exact_printed_command_repeats_random_cases(tmp_path, monkeypatch, words):
-    """The command printed in the report of random cases computes the same table again."""
-    scene, (first, again, listed) = (
-        tmp_path / "bench.toml",
-        (tmp_path / name for name in ("first", "again", "listed")),
-    )
+def test_exact_stored_command_repeats_random_cases(tmp_path, monkeypatch, words):
+    """The command in the answer of random cases, and the rows of its table, compute the same table again."""
+    scene = tmp_path / "bench.toml"
     scene.write_text(BENCH, encoding="utf-8")
-    sweep_into(
-        first, scene, "--over", "friction.static=0.24..0.36", *words, "--set", "normal.load=90 N"
-    )
     monkeypatch.chdir(tmp_path)
+    given = ["sweep", "bench.toml", "--over", "friction.static=0.24..0.36", *words]
+    monkeypatch.setattr("sys.argv", ["patchfem", *given, "-o", "first"])
+    assert run_cli(*given, "-o", "first").code == 0
 
-    def read_command(folder):
-        """Return the arguments of the command in the answer of a sweep."""
-        return shlex.split(store.read(folder).origin["command"])
-
-    command = read_command(first)
-    assert command[:2] == ["patchfem", "sweep"] and run_cli(*command[1:], "-o", again).code == 0
-    assert (
-        sweep_into(listed, scene, "--set", "normal.load=90 N", "--cases", first / "sweep.csv").code
-        == 0
-    )
-    assert run_cli(*read_command(listed)[1:], "-o", tmp_path / "third").code == 0
-    for other in (again, listed, tmp_path / "third"):
-        assert (other / "sweep.csv").read_bytes() == (first / "sweep.csv").read_bytes()
+    command = shlex.split(store.read(tmp_path / "first").origin["command"])
+    assert command == ["patchfem", *given] and run_cli(*given, "-o", "again").code == 0
+    listed = sweep_into(tmp_path / "listed", scene, "--cases", tmp_path / "first" / "sweep.csv")
+    assert listed.code == 0
+    tables = [(tmp_path / name / "sweep.csv").read_bytes() for name in ("first", "again", "listed")]
+    assert tables[1:] == tables[:1] * 2
 
 
 def test_refuses_sweep_without_valid_case(rig_scene, tmp_path):

@@ -122,6 +122,10 @@ def test_refuses_invalid_records_with_reason():
         identify_decay_modes({"time": TIME, "force": force})
     with pytest.raises(PatchfemError, match="the input is zero"):
         fit_driven_modes(STEP, 0 * force, response, "acceleration")
+    # the windows of all segments hide an impact at the first sample
+    impact = np.where(TIME > 0, 0.0, 100.0)
+    with pytest.raises(PatchfemError, match="constant after the start of the record"):
+        fit_driven_modes(STEP, impact, response, "acceleration")
     with pytest.raises(PatchfemError, match="the record has 500 samples; at least 512"):
         fit_driven_modes(STEP, force[:500], response[:500], "acceleration")
     with pytest.raises(PatchfemError, match="evenly sampled"):

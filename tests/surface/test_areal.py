@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from patchfem.core import PatchfemError, frozen_array
-from patchfem.surface.areal import Areal, level_plane
+from patchfem.surface.areal import Areal, level
 
 
 def make_scan(z, notes=("one",)) -> Areal:
@@ -32,7 +32,7 @@ def test_exact_levelling_agrees_with_least_squares():
     rows, columns = np.nonzero(~surface.missing)
     basis = np.column_stack([np.ones(rows.size), surface.x[columns] * 1e3, surface.y[rows] * 1e3])
     plane = basis @ np.linalg.lstsq(basis, surface.z[rows, columns], rcond=None)[0]
-    assert level_plane(surface).z[rows, columns] == pytest.approx(
+    assert level(surface).z[rows, columns] == pytest.approx(
         surface.z[rows, columns] - plane, abs=1e-18
     )
 
@@ -47,4 +47,4 @@ def test_refuses_collinear_heights():
         with pytest.raises(
             PatchfemError, match="all lie on one straight line; a plane needs three points"
         ):
-            level_plane(make_scan(heights))
+            level(make_scan(heights))

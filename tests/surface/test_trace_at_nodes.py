@@ -103,14 +103,3 @@ def test_refuses_trace_that_does_not_cover_patch():
     )
     with pytest.raises(PatchfemError, match=message):
         average_at_nodes(make_trace(2 * x, x), NODES)
-
-
-def test_refuses_missing_heights():
-    """Missing heights, and a trace of a single height, are refused."""
-    x = np.linspace(-HALF_LENGTH, HALF_LENGTH, 100)
-    with pytest.raises(
-        PatchfemError, match=r"before\.csv: 1 heights are missing; clean the trace first"
-    ):
-        average_at_nodes(make_trace(x, np.where(x == x[50], np.nan, x)), NODES)
-    with pytest.raises(PatchfemError, match=r"before\.csv: 1 heights; a trace needs at least two"):
-        place_over_patch(make_trace(x, np.where(x == x[50], 0, np.nan)), NODES)

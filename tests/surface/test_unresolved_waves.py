@@ -72,9 +72,9 @@ def test_exact_lost_waves_are_reported_with_remedy():
     profile = Profile(X, make_cosines([20, 500], [2.0, 1.0]).z, "profile.csv")
     assert describe_lost_waves(profile, 100e-6) == (
         "profile.csv has 45 % of its rms height in waves shorter than 2 elements (200 um), which the mesh cannot "
-        'resolve: add [contact.asperities], or set element_size = "25 um", which keeps 90 % of the height'
+        'resolve: add [contact.asperities], or set element_size = "25.1 um", which keeps 90 % of the height'
     )
-    assert describe_lost_waves(profile, 25e-6) is None
+    assert describe_lost_waves(profile, 25.1e-6) is None
     assert describe_lost_waves(make_cosines([20, 500], [2.0, 0.1]), 100e-6) is None
     assert describe_lost_waves(Profile(X, 0 * X, "flat.csv"), 1.0) is None
 

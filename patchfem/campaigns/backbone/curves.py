@@ -32,6 +32,10 @@ from .records import (
 )
 
 CURVES = {"balance": compute_balance_curve, "quasi-static": compute_static_curve}
+# Smallest ratio of a loss to its error at which the loss is used to determine an exponent.
+MIN_LOSS_RATIO = 4.0
+# Largest ratio of an amplitude of micro-slip to the amplitude at the onset of gross slip.
+MAX_MICRO_SLIP_RATIO = 0.3
 # Ratio of the smallest amplitude of gross slip to the amplitude at which the complete contact
 # begins to slip.
 MIN_GROSS_SLIP_RATIO = 3.0
@@ -294,11 +298,11 @@ def _fit_exponents(joint: JointMode, curve: Curve | None) -> LossExponents:
     # Energy m v^2 of the mode with its largest speed v; a loss below the errors has no slope.
     speed = 2 * np.pi * curve.frequency * amplitude / joint.reach
     energy = joint.modes.mass * speed**2
-    relative_error = words.MIN_LOSS_RATIO * 2 * np.pi * curve.damping_error
+    relative_error = MIN_LOSS_RATIO * 2 * np.pi * curve.damping_error
     known = loss > np.maximum(ROUND_OFF_ERROR, relative_error) * energy
     slip = joint.slip_amplitude
     ranges = (
-        known & (amplitude < words.MAX_MICRO_SLIP_RATIO * slip),
+        known & (amplitude < MAX_MICRO_SLIP_RATIO * slip),
         known & (amplitude > MIN_GROSS_SLIP_RATIO * slip),
     )
 

@@ -5,14 +5,8 @@ import numpy as np
 from ...formatting import format_length, format_number, format_quantity
 from ...runs.patch import faces
 from .joint import JointMode
-from .records import ROUND_OFF_ERROR, Backbone, Curve, match_amplitudes
+from .records import ROUND_OFF_ERROR, Backbone, Curve
 
-# Largest ratio of an amplitude of micro-slip to the amplitude at the onset of gross slip.
-MAX_MICRO_SLIP_RATIO = 0.3
-# Smallest ratio of a loss to its error at which the loss is used to determine an exponent.
-MIN_LOSS_RATIO = 4.0
-MAX_LISTED_AMPLITUDES = 6  # Largest number of amplitudes that a sentence lists individually.
-AGREEMENT = 0.02  # Largest relative difference of the damping at which two methods agree.
 MIN_REPORTED_LOSS = 0.05  # Smallest decrease of the amplitude per cycle that is reported.
 # Smallest shift of the phase resonance by other modes that is reported, in half-widths of the resonance.
 MIN_REPORTED_RATIO = 0.05
@@ -49,12 +43,6 @@ def write_notes(joint: JointMode, amplitudes, backbone: Backbone) -> tuple[str, 
         notes += _note_gaps(amplitudes, method, curve)
         notes += _note_missing_forces(joint, method, curve)
     if not joint.is_linear:
-        if (joint.has_cells or joint.has_partial_slip) and backbone.exponents.micro is None:
-            edge = format_length(MAX_MICRO_SLIP_RATIO * joint.slip_amplitude, 2)
-            notes.append(
-                f"the exponent of micro-slip cannot be determined: fewer than two amplitudes below {edge} have an energy "
-                f"loss of at least {MIN_LOSS_RATIO:g} times the error of the loss"
-            )
         notes += _note_missing_mesh(joint)
     if model.wear is not None:
         notes.append("these curves are for unworn pieces: [wear] is ignored")
@@ -96,21 +84,16 @@ def _note_gaps(amplitudes, method: str, curve: Curve) -> list[str]:
     count = curve.amplitude.size
     if not missing.size or count == amplitudes.size:
         return []
-    if missing.size > MAX_LISTED_AMPLITUDES:
-        ends = [format_length(missing[k], 3) for k in (0, -1)]
-        places = f"lie from {ends[0]} to {ends[1]}"
-    else:
-        places = f"are {', '.join(format_length(amplitude, 3) for amplitude in missing)}"
+    low, high = (format_length(missing[k], 3) for k in (0, -1))
     return [
-        f"method {method}: {count} of {amplitudes.size} amplitudes have a result; the amplitudes "
-        f"without a result {places}: {REASONS_OF_GAPS[method]}"
+        f"method {method}: {count} of {amplitudes.size} amplitudes have a result; those without lie from {low} to {high}: "
+        f"{REASONS_OF_GAPS[method]}"
     ]
 
 
 def write_advice(joint: JointMode, backbone: Backbone) -> tuple[str, ...]:
     """Write the advice on which curve to use, its band, and the ranges of validity of the methods."""
     band = backbone.band
-    curves = backbone.curves
     if band is None:
         return (NO_CURVE,)
     if joint.is_linear:
@@ -120,7 +103,6 @@ def write_advice(joint: JointMode, backbone: Backbone) -> tuple[str, ...]:
         f"Use the curve of method {band.method}: {PURPOSES[band.method]}.",
         *_describe_slip(joint, curve),
         describe_band_width(backbone),
-        *describe_static_curve(curves),
         *_describe_coupling(joint, curve),
     ]
 
@@ -165,54 +147,21 @@ def describe_band_width(backbone: Backbone) -> str:
     """Describe where the band of the damping ratio is widest, and the largest deviation of the frequency."""
     band = backbone.band
     curve = backbone.best
-    deviations = []
+    deviations = {}
     for name in ("frequency", "damping"):
         value = getattr(curve, name)
-        above = getattr(band, f"{name}_high") - value
-        below = value - getattr(band, f"{name}_low")
-        deviations.append(np.maximum(above, below) / np.maximum(np.abs(value), 1e-300))
-    frequency, damping = deviations
-    k = int(np.argmax(damping))
-
-    # a second curve widens the band only where it has a value
-    others = [other for other in backbone.curves.values() if other is not curve]
-    content = "the numerical error"
-    if any(match_amplitudes(curve, other)[0].size for other in others):
-        content += " and the difference of the two methods"
-    ends = np.array([band.damping_low, band.damping_high, curve.damping])[:, k].tolist()
-    low, high, best = (format_number(value, 4) for value in ends)
-    return (
-        f"Its band is {content}; it is widest at {format_length(curve.amplitude[k], 3)}, where the damping ratio is "
-        f"{low} to {high} beside {best}, and the frequency is "
-        f"within {100 * frequency.max():.2g} % everywhere."
+        ends = np.array([getattr(band, f"{name}_low"), getattr(band, f"{name}_high")])
+        deviations[name] = np.abs(ends - value).max(axis=0) / np.maximum(np.abs(value), 1e-300)
+    k = int(np.argmax(deviations["damping"]))
+    low, high, best = (
+        format_number(float(values[k]), 4)
+        for values in (band.damping_low, band.damping_high, curve.damping)
     )
-
-
-def describe_static_curve(curves: dict[str, Curve]) -> list[str]:
-    """Describe up to which amplitude frequency and damping of the quasi-static curve agree with harmonic balance.
-
-    Nothing is said without an amplitude at which both curves have a value.
-    """
-    if len(curves) < 2:
-        return []
-    here, there = match_amplitudes(curves["balance"], curves["quasi-static"])
-    balance = curves["balance"].at(here)
-    static = curves["quasi-static"].at(there)
-    agrees = np.ones(here.size, bool)
-    for name in ("frequency", "damping"):
-        value = getattr(balance, name)
-        error = getattr(balance, f"{name}_error") + getattr(static, f"{name}_error")
-        limit = AGREEMENT * np.abs(value) + error + ROUND_OFF_ERROR
-        agrees &= np.abs(getattr(static, name) - value) <= limit
-
-    # the range ends at the first amplitude at which they differ
-    count = agrees.size if agrees.all() else int(np.argmin(agrees))
-    if not count:
-        return []
-    edge = format_length(balance.amplitude[count - 1], 3)
-    return [
-        f"The quasi-static curve holds up to {edge} within {100 * AGREEMENT:g} % and both errors."
-    ]
+    return (
+        "The band of this curve holds the numerical error and, where both methods have a value, their difference; it is "
+        f"widest at {format_length(curve.amplitude[k], 3)}, where the damping ratio is {low} to {high} beside {best}, and "
+        f"the frequency is within {100 * deviations['frequency'].max():.2g} % everywhere."
+    )
 
 
 def _describe_coupling(joint: JointMode, curve: Curve) -> list[str]:

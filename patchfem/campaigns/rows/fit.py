@@ -13,7 +13,7 @@ import numpy as np
 
 from ...core import G_N, PatchfemError
 from ...identify.advice import advise_test
-from ...identify.least_squares import Descents, Fit, Search
+from ...identify.least_squares import Fit, Search
 from ...scene.assignments import Range
 from ...scene.scene import Scene
 from ..fits.options import FitOptions
@@ -60,11 +60,6 @@ class FittedRows:
     left_out_logs: np.ndarray
     n_motions: int
     advice: str
-
-    @property
-    def search(self) -> Descents:
-        """Descents from random starting points."""
-        return self.keys.fit.descents
 
     def compute_scores(self, *, only_stable: bool = False) -> dict[str, dict | None]:
         """Return the scores of the fitted, the held-out and the left-out readings.
@@ -171,7 +166,7 @@ def fit_rows(
         fold_logs = cells.compute_log_ratios(*computed.predict(fold.values, conditions))
         left_out_logs[group] = fold_logs[group]
     return FittedRows(
-        keys=models.make_fitted_keys(best, _warn_of_doubtful_fit(cells, best.descents, logs)),
+        keys=models.make_fitted_keys(best, _warn_of_doubtful_fit(cells, best, logs)),
         instrument=models.instrument,
         cells=cells,
         held_out=held_out,
@@ -229,7 +224,7 @@ def _advise_condition(
     return advise_test(fit, [bound.key for bound in ranges], information, places)
 
 
-def _warn_of_doubtful_fit(readings: Readings, search: Descents, logs: np.ndarray) -> list[str]:
+def _warn_of_doubtful_fit(readings: Readings, fit: Fit, logs: np.ndarray) -> list[str]:
     """Return warnings about rows without readings, unstable readings and an unreliable search.
 
     logs: log ratios (n,) of the best fit.
@@ -259,9 +254,9 @@ def _warn_of_doubtful_fit(readings: Readings, search: Descents, logs: np.ndarray
             f"counts as if the model were wrong by a factor of {np.exp(MAX_LOG_RATIO):.0f}"
         )
 
-    if search.n_best == 1 and search.rms.size > 1:
+    if fit.n_best == 1 and fit.descent_rms.size > 1:
         warnings.append(
-            f"only one of {search.rms.size} searches ended within 1 % of the best training score, so "
+            f"only one of {fit.descent_rms.size} searches ended within 1 % of the best training score, so "
             "a better fit may exist; raise --starts"
         )
     return warnings

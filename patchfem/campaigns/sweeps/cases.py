@@ -45,8 +45,8 @@ class Cases:
         the values, in which the last axis varies fastest.
     is_random : bool
         Whether the values of a table are random.
-    arguments : tuple of str
-        Command-line arguments that request the same cases; () for those of the table [sweep].
+    command : str
+        Command line that computes them; "" in Python.
     warning : str
         Warning if some of the cases are invalid; "" otherwise.
     """
@@ -54,7 +54,7 @@ class Cases:
     axes: tuple[Axis, ...]
     is_table: bool = False
     is_random: bool = False
-    arguments: tuple[str, ...] = ()
+    command: str = ""
     warning: str = ""
 
     def __len__(self) -> int:

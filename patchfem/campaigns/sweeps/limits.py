@@ -43,8 +43,6 @@ class KeyLimit(NamedTuple):
         Names of measure and key, and unit of the key.
     change : float
         Relative change at the limit; negative if the measure decreases.
-    total_change : float
-        Relative change up to the last case that counts.
     value : float
         The limit; NaN if no case is surely beyond it.
     low : float
@@ -59,7 +57,6 @@ class KeyLimit(NamedTuple):
     key: str
     unit: str
     change: float
-    total_change: float
     value: float
     low: float
     high: float
@@ -85,11 +82,15 @@ def find_limits(table: SweepTable) -> list[KeyLimit]:
             continue
         values = table.select_trusted(name)
         errors = np.nan_to_num(column.errors)
+        blank = KeyLimit(name, key.key, key.unit, largest, np.nan, np.nan, np.nan, False)
         on_lines = [
-            _find_limit_on_line(name, key, along[order], values[line], errors[line], largest)
+            _find_limit_on_line(blank, key, along[order], values[line], errors[line])
             for line in lines[:, order]
         ]
-        limits += sorted(filter(None, on_lines), key=_rank_limit)[:1]
+        known = filter(None, on_lines)
+        limits += sorted(
+            known, key=lambda one: (one.is_never_reached, np.fmax(one.low, one.value))
+        )[:1]
     return limits
 
 
@@ -104,24 +105,8 @@ def _choose_axis(table: SweepTable) -> int | None:
     return max(axes, key=lambda axis: table.shape[axis], default=None)
 
 
-def explain_missing_limits(table: SweepTable) -> str:
-    """Return why no limit is known of a key that can have one; "" without such a key, or without two settled cases."""
-    axis = _choose_axis(table)
-    if axis is None or np.count_nonzero(table.has_settled) < 2:
-        return ""
-    return (
-        f"No limit of {table.keys[axis].key} is known: no measure has a value that counts at the smallest value of this key "
-        "and at another one."
-    )
-
-
 def _find_limit_on_line(
-    name: str,
-    key: SweptKey,
-    sizes: np.ndarray,
-    values: np.ndarray,
-    errors: np.ndarray,
-    largest: float,
+    blank: KeyLimit, key: SweptKey, sizes: np.ndarray, values: np.ndarray, errors: np.ndarray
 ) -> KeyLimit | None:
     """Find the limit of a key along one line of cases, of which the first one is the reference.
 
@@ -129,60 +114,51 @@ def _find_limit_on_line(
 
     Parameters
     ----------
-    name : str
-        Measure.
+    blank : KeyLimit
+        Names and relative change of the limit.
     key : SweptKey
         Key that changes along the line.
     sizes : (m,) array
         Increasing values of the key [SI].
     values, errors : (m,) array
         The measure and its errors [SI]; NaN for a value that does not count.
-    largest : float
-        Relative change at the limit.
     """
-    valid = np.flatnonzero(np.isfinite(values))
-    if valid.size < 2 or valid[0] != 0 or values[0] == 0:
+    largest = blank.change
+    counts = np.isfinite(values)
+    if np.count_nonzero(counts) < 2 or not counts[0] or values[0] == 0:
         return None
-    change = (values[valid] - values[0]) / abs(values[0])
-    error = (errors[valid] + errors[0]) / abs(values[0])
+    change = (values[counts] - values[0]) / abs(values[0])
+    error = (errors[counts] + errors[0]) / abs(values[0])
+    error[0] = 0.0  # the first case does not differ from itself
     # Only a pressure that increases can double.
     size = np.abs(change) if largest < DOUBLING else change
 
-    not_surely_within = np.flatnonzero(size[1:] + error[1:] > largest)
-    inside = int(not_surely_within[0]) if not_surely_within.size else valid.size - 1
-    covers_line = not not_surely_within.size and valid[-1] == values.size - 1
-    low = float(sizes[valid[inside]])
-    limit = KeyLimit(
-        measure=name,
-        key=key.key,
-        unit=key.unit,
-        change=largest,
-        total_change=float(change[-1]),
-        value=np.nan,
-        low=low,
-        high=np.nan,
-        is_never_reached=bool(covers_line),
+    is_doubtful = size + error > largest
+    inside = int(np.argmax(is_doubtful)) - 1 if is_doubtful.any() else size.size - 1
+    limit = blank._replace(
+        low=float(sizes[counts][inside]),
+        is_never_reached=bool(counts[-1] and not is_doubtful.any()),
     )
-    surely_beyond = np.flatnonzero(size - error > largest)
-    if not surely_beyond.size:
+    is_beyond = size - error > largest
+    if not is_beyond.any():
         return limit
 
-    beyond = int(surely_beyond[0])
-    high = float(sizes[valid[beyond]])
-    change_at_limit = float(np.copysign(largest, change[beyond]))
-    ends = np.array([change[inside], change[beyond], change_at_limit])
-    positions = np.array([low, high])
-    is_logarithmic = key.is_logarithmic
-    if is_logarithmic:
-        positions = np.log(positions)
-        # A power law of the key is a straight line in logarithmic coordinates.
-        ends = np.log1p(ends) if largest >= DOUBLING else ends
-    fraction = (ends[2] - ends[0]) / (ends[1] - ends[0])
-    value = positions[0] + fraction * (positions[1] - positions[0])
-    value = float(np.exp(value) if is_logarithmic else value)
-    return limit._replace(change=change_at_limit, value=value, high=high)
-
-
-def _rank_limit(limit: KeyLimit) -> tuple[bool, float]:
-    """Return a sort key that puts the smallest limit first and one that is never reached last."""
-    return limit.is_never_reached, limit.low if np.isnan(limit.value) else limit.value
+    # Interpolation of the change in the direction of the case beyond, whose sign the limit has.
+    beyond = int(np.argmax(is_beyond))
+    sign = float(np.sign(change[beyond]))
+    ends = [inside, beyond]
+    places = sizes[counts][ends]
+    changes = sign * change[ends]
+    target = largest
+    if key.is_logarithmic:
+        places = np.log(places)
+        if largest >= DOUBLING:
+            # A power law of the key is a straight line in logarithmic coordinates.
+            changes = np.log1p(changes)
+            target = np.log1p(target)
+    value = float(np.interp(target, changes, places))
+    return limit._replace(
+        change=sign * largest,
+        value=float(np.exp(value)) if key.is_logarithmic else value,
+        high=float(sizes[counts][beyond]),
+    )

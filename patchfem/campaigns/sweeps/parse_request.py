@@ -3,7 +3,6 @@
 In: a file, --set strings and a `Request`. Out: `SweepScene` and `Cases`, or a SceneError.
 """
 
-import os
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -24,7 +23,6 @@ N_CHECKED = 32  # Largest number of cases that are validated before a sweep star
 MAX_PRINTED = 12  # Largest number of validation errors that are printed.
 # Largest number of cases; the hashes and columns of more cases take gigabytes.
 MAX_CASES = 3_000_000
-MAX_PRINTED_LENGTH = 2000  # Largest number of characters of the values in a printed command.
 
 
 @dataclass(frozen=True, slots=True)
@@ -157,29 +155,7 @@ def read_cases(sweep_scene: SweepScene, request: Request) -> Cases:
         parts.append(Cases(tuple(axes)))
 
     cases = combine_cases(parts)
-    warning = _check_cases(sweep_scene, cases)
-    arguments = _format_arguments(request, sweep_scene.path.parent)
-    return replace(cases, arguments=arguments, warning=warning)
-
-
-def _format_arguments(request: Request, folder: Path) -> tuple[str, ...]:
-    """Return the command-line arguments that request the same cases again, relative to a folder.
-
-    They name the rows of sweep.csv if the values are a long list, or if the table of cases is a pipe,
-    which cannot be read again.
-    """
-    arguments = []
-    is_pipe = request.file is not None and not request.file.is_file()
-    if is_pipe or sum(map(len, request.over)) > MAX_PRINTED_LENGTH:
-        return ("--cases", "sweep.csv")
-    if request.file is not None:
-        arguments += ["--cases", os.path.relpath(request.file, folder)]
-    for text in request.over:
-        arguments += ["--over", text]
-    if request.count:
-        arguments.append("--sobol" if request.sobol else "--random")
-        arguments += [str(request.count), "--seed", str(request.seed)]
-    return tuple(arguments)
+    return replace(cases, warning=_check_cases(sweep_scene, cases))
 
 
 def _find_duplicate_keys(sweep_scene: SweepScene, keys: Sequence[str]) -> list[str]:

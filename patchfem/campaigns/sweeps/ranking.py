@@ -31,9 +31,9 @@ RANKED_MEASURES = (
 MAX_SURFACE_CASES = 640  # largest number of cases of a surface, whose equations are dense
 N_SOBOL_POINTS = 1024  # sample points on a surface, for an error of about INDEX_ERROR
 INDEX_ERROR = 0.005  # sampling error of an index
-N_HALVES = 6  # surfaces that are fitted to random halves of the cases
 # Smoothing parameters of a surface, from interpolation to nearly a plane.
 SMOOTHING_PARAMETERS = (1e-8, 1e-4, 1e-2, 1.0)
+N_FOLDS = 3  # parts of the cases, each of which checks a surface through the others
 MIN_CASES_PER_KEY = 16  # with fewer, half of the cases do not show the error of an index
 MIN_EXPLAINED = 0.5  # fraction of the variance of the other half that a usable surface explains
 MIN_KNOWN_FRACTION = (
@@ -136,11 +136,9 @@ def estimate_random_indices(coordinates: np.ndarray, values: np.ndarray) -> list
     from scipy.interpolate import RBFInterpolator
 
     rng = np.random.default_rng(0)
-    every = np.arange(len(coordinates))
-    if every.size > MAX_SURFACE_CASES:
-        every = rng.choice(every, MAX_SURFACE_CASES, replace=False)
+    every = rng.permutation(len(coordinates))[:MAX_SURFACE_CASES]
+    folds = [(np.setdiff1d(every, fold), fold) for fold in np.array_split(every, N_FOLDS)]
     scaled = (values - values.mean(axis=0)) / values.std(axis=0)
-    halves = [np.array_split(rng.permutation(every), 2) for _ in range(N_HALVES)]
 
     def fit(cases: np.ndarray, smoothing: float) -> RBFInterpolator:
         """Return the surface through some of the cases."""
@@ -148,25 +146,29 @@ def estimate_random_indices(coordinates: np.ndarray, values: np.ndarray) -> list
             coordinates[cases], scaled[cases], kernel="cubic", smoothing=smoothing
         )
 
-    def find_unexplained(surface: RBFInterpolator, cases: np.ndarray) -> np.ndarray:
-        """Return the fraction (measures,) of the variance of cases that a surface does not explain."""
-        deviation = surface(coordinates[cases]) - scaled[cases]
-        return np.mean(deviation**2, axis=0) / np.maximum(scaled[cases].var(axis=0), ROUND_OFF)
+    def find_unexplained(smoothing: float) -> np.ndarray:
+        """Return the fraction (measures,) of the variance of each fold that a surface through the others leaves."""
+        left = []
+        for others, fold in folds:
+            deviation = fit(others, smoothing)(coordinates[fold]) - scaled[fold]
+            left.append(
+                np.mean(deviation**2, axis=0) / np.maximum(scaled[fold].var(axis=0), ROUND_OFF)
+            )
+        return np.mean(left, axis=0)
 
-    # The smoothing is that with the smallest median over the measures.
-    fitted, others = halves[0]
-    medians = [
-        np.median(find_unexplained(fit(fitted, one), others)) for one in SMOOTHING_PARAMETERS
+    # The smoothing is that with the smallest median over the measures (cross-validation).
+    fractions = [find_unexplained(smoothing) for smoothing in SMOOTHING_PARAMETERS]
+    best = int(np.argmin(np.median(fractions, axis=1)))
+    unexplained = fractions[best]
+    surfaces = [
+        fit(cases, SMOOTHING_PARAMETERS[best])
+        for cases in (every, *(others for others, _ in folds))
     ]
-    smoothing = SMOOTHING_PARAMETERS[int(np.argmin(medians))]
-    surfaces = [fit(fitted, smoothing) for fitted, _ in halves]
-    left = [find_unexplained(surface, half[1]) for surface, half in zip(surfaces, halves)]
-    unexplained = np.mean(left, axis=0)
-    first, total = _compute_surface_indices(fit(every, smoothing))
-    totals = [total, *(_compute_surface_indices(surface)[1] for surface in surfaces)]
+    first, total = np.transpose([_compute_surface_indices(one) for one in surfaces], (1, 0, 2, 3))
+
     margin = unexplained[:, None] + INDEX_ERROR
-    limits = [np.min(totals, axis=0) - margin, np.max(totals, axis=0) + margin]
-    arrays = np.clip([first, total, *limits], 0.0, 1.0).transpose(1, 0, 2)
+    limits = [total.min(axis=0) - margin, total.max(axis=0) + margin]
+    arrays = np.clip([first[0], total[0], *limits], 0.0, 1.0).transpose(1, 0, 2)
     is_usable = unexplained < 1 - MIN_EXPLAINED
     return [array if usable else None for array, usable in zip(arrays, is_usable)]
 
@@ -189,8 +191,8 @@ def _compute_surface_indices(surface) -> tuple[np.ndarray, np.ndarray]:
 def compute_quantiles(table: SweepTable) -> dict[str, np.ndarray]:
     """Return the quantiles of QUANTILE_LEVELS [SI] of each ranked measure over the random cases.
 
-    Measures of which fewer than 90 % of the cases have a
-    settled value have none, because the others may be the extreme ones.
+    Measures of which fewer than 90 % of the cases have a settled value have none, because the others may be the extreme
+    ones.
     """
     quantiles = {}
     settled = table.has_settled

@@ -12,9 +12,9 @@ Cost: 1 to 10 ms per motion with 15 harmonics and one row.
 | first: the equations | `equations` |
 | Fourier series, slides at the nodes of a cycle | `series`, `slides` |
 | laws along a cycle, their harmonics | `laws`, `forces` |
-| one motion, and its error | `steady` |
+| one motion, its error, and those that coexist with it | `steady` |
 | its amplitude, energies and histories | `motion` |
-| curves through folds, coexisting motions | `continuation`, `branch` |
+| curves through folds | `continuation`, `branch` |
 | Floquet multipliers | `stability` |
 | free motions | `backbone`, `quasi_static` |
 """

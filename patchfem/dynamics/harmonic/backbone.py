@@ -112,9 +112,9 @@ class FreeBalance:
         amplitude : float
             At the output [m].
         """
-        y = np.zeros((self.balance.rank, self.h + 1), complex)
+        y = np.zeros((len(self.balance.rows), self.h + 1), complex)
         reach = 1.0 if self.output is None else abs(float(self.output @ shape))
-        y[:, 1] = self.balance.faces @ shape * amplitude / reach
+        y[:, 1] = self.balance.rows @ shape * amplitude / reach
         return np.append(pack_harmonics(y), [omega / self.omega, 0.0, amplitude / reach])
 
     def evaluate(self, x, amplitude: float | None) -> FreeEquations:
@@ -143,7 +143,7 @@ class FreeBalance:
         stiffness[1, self.mode, self.mode] += spring
         exciting = np.zeros((self.h + 1, modes.omega.size), complex)
         exciting[1, self.mode] = spring * a
-        rows = [balance.faces, np.eye(modes.omega.size)[[self.mode]]]
+        rows = [balance.rows, np.eye(modes.omega.size)[[self.mode]]]
         rows += [] if self.output is None else [self.output[None]]
         measured = np.vstack(rows)
         linear = LinearPart(invert_matrices(stiffness), by_omega)
@@ -161,7 +161,7 @@ class FreeBalance:
         )
 
         # Equations: slides, amplitude and phase of the coordinate, and the condition of the motion.
-        r = balance.rank
+        r = len(balance.rows)
         residual = np.empty(x.size)
         jacobian = np.zeros((x.size, x.size))
         residual[:-3] = x[:-3] - split_equations(values[:, :r])

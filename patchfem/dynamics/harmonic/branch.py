@@ -1,19 +1,18 @@
-"""Solution branches of steady motions over the drive frequency, and coexisting steady motions at one drive."""
+"""Solution branches of steady motions over the drive frequency."""
 
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ...core import NotConverged, PatchfemError, SineDrive
+from ...core import NotConverged, SineDrive
 from .continuation import NEWTON_TOL, PathEquations, PathSettings, correct_point, follow_curve
 from .equations import HarmonicBalance
 from .motion import SteadyMotion
-from .series import pad_harmonics
+from .series import pack_harmonics, pad_harmonics
 from .stability import add_stability
 from .steady import (
     HARMONIC_COUNTS,
     find_amplitudes,
-    find_one_harmonic_roots,
     find_steady_motion,
     make_group,
     make_motion,
@@ -24,7 +23,6 @@ PATH = PathSettings(first_step=0.0125, max_step=0.05)
 FIRST_REDUCTION = 4
 TRUNCATION_RATIO = 0.25  # part of the tolerance that the harmonics above H may have
 MAX_SAMPLE_CHANGES = 3  # largest number of curves with more samples each
-SAME_MOTION = 10.0  # distance of two motions that are the same, in tolerances
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -60,14 +58,12 @@ def trace_over_frequency(
     group : LawGroup, or what `steady.make_group` takes
         Laws of the interfaces.
     ends : tuple of float
-        First and last frequency [Hz].
+        First and last frequency [Hz], above 0.
     harmonics : int, optional
         Number of harmonics; as many as the tolerance needs by default, the same at all points.
     tolerance : float, optional
         Relative error of each motion.
     """
-    if not (np.isfinite(ends).all() and min(ends) > 0):
-        raise PatchfemError("drive.frequency: a frequency response needs two positive frequencies")
     omegas = [2 * np.pi * float(frequency) for frequency in ends]
     drive = replace(drive, omega=omegas[0])
     first = find_steady_motion(modes, drive, make_group(modes, group), harmonics, tolerance)
@@ -91,7 +87,7 @@ def _trace_with_harmonics(modes, drive: SineDrive, omegas, first: SteadyMotion, 
     samples = group.samples_for(h, find_amplitudes(first.slides))
     for _ in range(MAX_SAMPLE_CHANGES):
         balance = HarmonicBalance(modes, group, samples)
-        x = balance.pack_slides(pad_harmonics(first.slides, h))
+        x = pack_harmonics(pad_harmonics(first.slides, h))
         evaluate = _differentiate(balance, drive)
         path = follow_curve(evaluate, x, omegas[0], sorted(omegas), omegas[1] > omegas[0], PATH)
         slides = np.array([balance.unpack_slides(x) for x in path.x])
@@ -121,7 +117,7 @@ def _pack_points(
 ) -> tuple[HarmonicBalance, np.ndarray, np.ndarray, np.ndarray]:
     """Return the balance of two points on a branch, both points (packed slides, omega), and their unit, (N + 1,) each."""
     balance = HarmonicBalance(first.group.modes, first.group, first.samples)
-    packed = [balance.pack_slides(motion.slides) for motion in (first, second)]
+    packed = [pack_harmonics(motion.slides) for motion in (first, second)]
     size = max(float(np.linalg.norm(x)) for x in packed) or 1.0
     unit = np.append(np.full(packed[0].size, size), width)
     points = [np.append(x, motion.omega) for x, motion in zip(packed, (first, second))]
@@ -178,44 +174,3 @@ def find_point_between(
         )
     w = corrected[0]
     return make_motion(balance, w[:-1], replace(drive, omega=float(w[-1])))
-
-
-def find_branches(modes, drive: SineDrive, group, tolerance: float = 1e-3) -> list[SteadyMotion]:
-    """Find coexisting steady motions at one drive, starting from all roots of the balance with one harmonic.
-
-    Parameters
-    ----------
-    modes : ModalBasis
-        Modes of the structure without the contact.
-    drive : SineDrive
-        Frequency and level.
-    group : LawGroup, or what `steady.make_group` takes
-        Laws of the interfaces.
-    tolerance : float, optional
-        Relative error of each motion.
-
-    Returns
-    -------
-    list of SteadyMotion
-        With their stability, in increasing size. A motion that no such root leads to (an isola of a higher harmonic) is
-        not found.
-    """
-    group = make_group(modes, group)
-    balance = HarmonicBalance(modes, group, group.samples_for(1))
-    motions = []
-    for start in [None, *find_one_harmonic_roots(balance, drive.omega, drive.acceleration)]:
-        try:
-            motion = find_steady_motion(modes, drive, group, None, tolerance, start)
-        except NotConverged:
-            continue
-        limit = SAME_MOTION * tolerance * max(np.abs(motion.slides).max(), 1e-300)
-        count = motion.slides.shape[1] - 1
-        others = [pad_harmonics(other.slides, count) for other in motions]
-        if all(np.abs(other - motion.slides).max() >= limit for other in others):
-            motions.append(motion)
-    if not motions:
-        raise NotConverged(
-            f"accuracy.method: no steady motion was found at {drive.omega / (2 * np.pi):.6g} Hz"
-        )
-    motions.sort(key=lambda motion: float(np.linalg.norm(motion.slides)))
-    return [add_stability(motion, modes) for motion in motions]

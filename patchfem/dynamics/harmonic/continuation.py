@@ -51,14 +51,12 @@ class PathSettings(NamedTuple):
       the motion count 1
     - max_points: largest number of points
     - tolerance: change of the motion, relative to its size, at which Newton's method ends
-    - size: scale of the unknowns; 0 for the larger of that at the start and half of the present size
     """
 
     first_step: float = 0.02
     max_step: float = 0.1
     max_points: int = 2000
     tolerance: float = NEWTON_TOL
-    size: float = 0.0
 
 
 class _PathPoint(NamedTuple):
@@ -101,7 +99,7 @@ def follow_curve(
     settings = settings or PathSettings()
     low, high = bounds
     w = np.append(np.asarray(x, float), float(p))
-    unit = np.full(w.size, settings.size or float(np.linalg.norm(x)) or 1.0)
+    unit = np.full(w.size, float(np.linalg.norm(x)) or 1.0)
     unit[-1] = high - low
     along = np.append(np.zeros(w.size - 1), 1.0)
     first = correct_point(evaluate, w, along, unit, settings.tolerance, is_fixed=True)
@@ -118,8 +116,8 @@ def follow_curve(
 
     # A step without a solution is halved.
     while len(points) < settings.max_points:
-        if not settings.size:
-            unit[:-1] = max(unit[0], 0.5 * float(np.linalg.norm(point.w[:-1])))
+        # The scale of the unknowns rises with their size.
+        unit[:-1] = max(unit[0], 0.5 * float(np.linalg.norm(point.w[:-1])))
         taken = _take_step(evaluate, point, step, unit, settings.tolerance)
         if taken is None:
             step /= 2

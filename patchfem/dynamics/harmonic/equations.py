@@ -21,9 +21,9 @@ from scipy.linalg.lapack import dgetrf, dgetrs
 
 from ...core import ModalBasis, NotConverged, PatchfemError
 from .forces import ForceHarmonics, LawGroup
-from .series import find_harmonics, pack_harmonics, unpack_harmonics
+from .series import find_harmonics, unpack_harmonics
 
-RANK_TOL = 1e-12  # singular values of dependent rows are below it, relative to the largest
+RANK_TOL = 1e-12  # singular values of a singular matrix are below it, relative to the largest
 RESONANCE_TOL = 1e-10  # dynamic stiffness of an undamped resonance, relative to the largest
 SINGULAR_RATIO = 1e-13  # smallest pivot of a regular matrix, relative to the largest
 BALANCE_TOL = 1e-10  # change of the unknowns, relative to their size, at which Newton's method ends
@@ -77,14 +77,13 @@ def split_equations(equations) -> np.ndarray:
 class HarmonicBalance:
     """Harmonic balance of a modal basis with the laws of a group, at a number of samples per cycle.
 
-    The unknowns are the packed harmonics of `rank` independent combinations y of the slides, q = lift y = lift faces z.
-    PatchfemError is raised if no mode moves the rows.
+    The unknowns are the packed harmonics of the slides of all `rows` (r, n); Newton's method keeps dependent rows
+    dependent, because the equations are linear but for the forces. PatchfemError is raised if no mode moves the rows.
     """
 
     def __init__(self, modes: ModalBasis, group: LawGroup, samples: int):
-        u, s, vt = np.linalg.svd(group.rows, full_matrices=False)
-        rank = int(np.sum(s > RANK_TOL * s[0])) if s[0] > 0 else 0
-        if rank == 0:
+        size = float(np.linalg.norm(group.rows, 2))
+        if size == 0:
             raise PatchfemError(
                 "structure.mode.slide: no mode moves the interface, so no friction acts and harmonic "
                 "balance is not needed; give a mode the key `slide`"
@@ -92,24 +91,14 @@ class HarmonicBalance:
         self.modes = modes
         self.group = group
         self.samples = samples
-        self.lift = u[:, :rank]
-        self.faces = s[:rank, None] * vt[:rank]
+        self.rows = group.rows
         # The springs have the size of the smallest modal stiffness.
         omega = float(modes.omega[modes.omega > 0].min(initial=np.inf))
-        self.spring = modes.mass * (omega**2 if np.isfinite(omega) else 1.0) / s[0] ** 2
-
-    @property
-    def rank(self) -> int:
-        """Number of independent combinations of the slides."""
-        return self.lift.shape[1]
+        self.spring = modes.mass * (omega**2 if np.isfinite(omega) else 1.0) / size**2
 
     def unpack_slides(self, x) -> np.ndarray:
-        """Return the harmonics (i, H + 1) [m] of the slides for the unknowns (N,)."""
-        return self.lift @ unpack_harmonics(x, self.rank)
-
-    def pack_slides(self, q) -> np.ndarray:
-        """Return the unknowns (N,) for the harmonics (i, H + 1) [m] of the slides."""
-        return pack_harmonics(self.lift.T @ q)
+        """Return the harmonics (r, H + 1) [m] of the slides for the unknowns (N,)."""
+        return unpack_harmonics(x, len(self.rows))
 
     def make_springs(self, harmonics: int) -> np.ndarray:
         """Return the complex stiffness (H + 1,) [N/m] of the springs on the rows."""
@@ -138,7 +127,7 @@ class HarmonicBalance:
         stiffness = np.diag(modes.omega**2) - (k * omega) ** 2 * eye + 1j * k * omega * damping
         if has_springs:
             springs = self.make_springs(harmonics)[:, None, None] / modes.mass
-            stiffness = stiffness + springs * (self.faces.T @ self.faces)
+            stiffness = stiffness + springs * (self.rows.T @ self.rows)
         return stiffness, 1j * k * damping - 2 * k**2 * omega * eye
 
     def find_motion(self, x, omega: float, linear: LinearPart, exciting, measured) -> Motion:
@@ -147,7 +136,7 @@ class HarmonicBalance:
         Parameters
         ----------
         x : (r (2 H + 1),) array
-            Packed harmonics y of the combinations of slides [m].
+            Packed harmonics of the slides [m].
         omega : float
             [rad/s].
         linear : LinearPart
@@ -157,29 +146,24 @@ class HarmonicBalance:
         measured : (p, n) array
             Rows of the displacements whose derivatives are computed.
         """
-        y = unpack_harmonics(x, self.rank)
-        h = y.shape[1] - 1
+        q = self.unpack_slides(x)
+        h = q.shape[1] - 1
         springs = self.make_springs(h)
-        contact = self.group.compute_harmonics(self.lift @ y, omega, self.samples)
-        friction = self.lift.T @ contact.force - springs * y
-        modal_force = exciting - friction.T @ self.faces / self.modes.mass
+        contact = self.group.compute_harmonics(q, omega, self.samples)
+        friction = contact.force - springs * q
+        modal_force = exciting - friction.T @ self.rows / self.modes.mass
         modal = np.einsum("kab,kb->ka", linear.inverse, modal_force)
 
-        # Derivatives of friction by the unknowns, (H + 1, r, r, 2 H + 1), less those of the springs.
-        r = self.rank
-        count = len(self.lift)
-        pairs = (self.lift[:, :, None] * self.lift[:, None, :]).reshape(count, r * r)
-        slope = (pairs.T @ contact.slope.reshape(count, -1)).reshape(r, r, h + 1, 2 * h + 1)
-        slope = np.moveaxis(slope, 2, 0)
+        # Derivatives of friction by the unknowns of the same row, (r, H + 1, 2 H + 1), less those of the springs.
+        slope = contact.slope.copy()
         k = np.arange(h + 1)
-        for row in range(r):
-            slope[k, row, row, k] -= springs
-            slope[k[1:], row, row, h + k[1:]] -= 1j * springs[1:]
+        slope[:, k, k] -= springs
+        slope[:, k[1:], h + k[1:]] -= 1j * springs[1:]
         transfer = measured @ linear.inverse
-        by_force = -transfer @ self.faces.T / self.modes.mass
-        by_unknowns = by_force @ slope.reshape(h + 1, r, -1)
+        by_force = -transfer @ self.rows.T / self.modes.mass
+        by_unknowns = np.einsum("kpr,rkl->kprl", by_force, slope).reshape(*by_force.shape[:2], -1)
         by_omega = -np.einsum("kpa,kab,kb->kp", transfer, linear.by_omega, modal)
-        by_omega += np.einsum("kpr,rk->kp", by_force, self.lift.T @ contact.by_omega)
+        by_omega += np.einsum("kpr,rk->kp", by_force, contact.by_omega)
         return Motion(modal, contact, transfer, by_unknowns, by_omega)
 
     def evaluate(self, x, omega: float, level: float) -> Equations:
@@ -192,18 +176,18 @@ class HarmonicBalance:
         omega, level : float
             Frequency [rad/s] and amplitude [m s-2] of the drive.
         """
-        h = (x.size // self.rank - 1) // 2
+        h = (x.size // len(self.rows) - 1) // 2
         stiffness, by_omega = self.make_stiffness(omega, h)
         linear = LinearPart(invert_matrices(stiffness), by_omega)
         exciting = np.zeros((h + 1, self.modes.omega.size), complex)
         if h:
             exciting[1] = 1j * level * self.modes.base
-        motion = self.find_motion(x, omega, linear, exciting, self.faces)
-        by_level = np.zeros((h + 1, self.rank), complex)
+        motion = self.find_motion(x, omega, linear, exciting, self.rows)
+        by_level = np.zeros((h + 1, len(self.rows)), complex)
         if h:
             by_level[1] = -1j * motion.transfer[1] @ self.modes.base
         return Equations(
-            x - split_equations(motion.modal @ self.faces.T),
+            x - split_equations(motion.modal @ self.rows.T),
             np.eye(x.size) - split_equations(motion.by_unknowns),
             -split_equations(motion.by_omega),
             split_equations(by_level),
@@ -234,7 +218,7 @@ class HarmonicBalance:
 
         solution = solve_damped(lambda v: self.evaluate(v, omega, level), x, is_solved, max_steps)
         if solution is None:
-            count = (x.size // self.rank - 1) // 2
+            count = (x.size // len(self.rows) - 1) // 2
             conditions = f"{count} harmonics at {omega / (2 * np.pi):.6g} Hz"
             raise NotConverged(
                 f"accuracy.harmonics: harmonic balance with {conditions} did not converge in {max_steps} iterations; "
@@ -252,7 +236,7 @@ class HarmonicBalance:
         harmonics : int
             Number of harmonics H.
         """
-        equations = self.evaluate(np.zeros(self.rank * (2 * harmonics + 1)), omega, level)
+        equations = self.evaluate(np.zeros(len(self.rows) * (2 * harmonics + 1)), omega, level)
         return -factor(equations.jacobian)(equations.residual)
 
     def find_higher_harmonics(self, q, omega: float) -> np.ndarray:
@@ -260,8 +244,8 @@ class HarmonicBalance:
         h = q.shape[1] - 1
         force = find_harmonics(self.group.compute_forces(q, omega, self.samples), 2 * h)
         stiffness = self.make_stiffness(omega, 2 * h, has_springs=False)[0][h + 1 :]
-        modal_force = -force[:, h + 1 :].T @ self.group.rows / self.modes.mass
-        return np.einsum("ia,kab,kb->ik", self.group.rows, invert_matrices(stiffness), modal_force)
+        modal_force = -force[:, h + 1 :].T @ self.rows / self.modes.mass
+        return np.einsum("ia,kab,kb->ik", self.rows, invert_matrices(stiffness), modal_force)
 
 
 def has_undamped_resonance(modes: ModalBasis, omega: float) -> bool:

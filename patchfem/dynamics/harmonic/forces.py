@@ -49,11 +49,6 @@ class LawGroup:
                 vector = np.asarray(row, float)
                 key = vector.tobytes()
             else:
-                count = len(modes.interfaces)
-                if not 0 <= row < count:
-                    raise PatchfemError(
-                        f"there is no interface {row}; the rig has {count} interfaces, counted from 0"
-                    )
                 vector = modes.interfaces[row]
                 key = int(row)
 

@@ -97,7 +97,7 @@ class Jenkins(Law):
     On first loading to the slide x the force is B(x) = sum k min(x, w). From a reversal at (q_r, F_r) in the direction
     d it is F_r + 2 d B(d (q - q_r)/2), until the branch before the last one is met.
 
-    stiffness: (t,) [N/m] > 0; limit_slide: (t,) slides w [m] >= 0 at which the elements yield.
+    stiffness: (t,) [N/m] >= 0; limit_slide: (t,) slides w [m] >= 0 at which the elements yield.
     """
 
     stiffness: np.ndarray
@@ -106,11 +106,6 @@ class Jenkins(Law):
 
     def __post_init__(self):
         k, w = (np.atleast_1d(np.asarray(v, float)) for v in (self.stiffness, self.limit_slide))
-        is_finite = np.isfinite(k).all() and np.isfinite(w).all()
-        if k.shape != w.shape or not is_finite or k.min() <= 0 or w.min() < 0:
-            raise PatchfemError(
-                "each Jenkins element needs a finite stiffness > 0 and a finite limit slide >= 0"
-            )
         object.__setattr__(self, "stiffness", frozen_array(k))
         object.__setattr__(self, "limit_slide", frozen_array(w))
 
@@ -137,7 +132,8 @@ class Jenkins(Law):
 
     def count_samples(self, amplitude: float) -> int:
         """Return the number of samples that resolve the phases of stick at an amplitude [m]."""
-        return _count_stick_samples(self.limit / self.total / max(amplitude, 1e-300))
+        yield_slide = self.limit / max(self.total, 1e-300)
+        return _count_stick_samples(yield_slide / max(amplitude, 1e-300))
 
     def load_first(self, x) -> np.ndarray:
         """Return force, stretch times limit, and stiffness (3, ...) on first loading to slides x >= 0 [m]."""

@@ -6,10 +6,7 @@ N_SAMPLES = 4096  # samples per cycle from which the extremes of a motion are fo
 
 
 def evaluate_series(x, samples: int) -> np.ndarray:
-    """Evaluate series (..., H + 1) at N equal samples of a cycle (..., N)."""
-    if 2 * x.shape[-1] > samples:
-        stride = -(-2 * x.shape[-1] // samples)
-        return evaluate_series(x, samples * stride)[..., ::stride]
+    """Evaluate series (..., H + 1) at N > 2 H equal samples of a cycle (..., N)."""
     spectrum = np.zeros((*x.shape[:-1], samples // 2 + 1), complex)
     spectrum[..., : x.shape[-1]] = x * (samples / 2)
     spectrum[..., 0] *= 2

@@ -29,7 +29,7 @@ ROUND_OFF_DIGITS = 6  # digits of the weight in the mean stiffness of a cell
 MIN_FADING = 1e-9  # smallest decay in a cell that is told from none
 
 
-def add_stability(motion: SteadyMotion, modes, cells: int = 0) -> SteadyMotion:
+def add_stability(motion: SteadyMotion, modes) -> SteadyMotion:
     """Return a steady motion with its Floquet multipliers, in decreasing magnitude, and its stability.
 
     Parameters
@@ -38,10 +38,8 @@ def add_stability(motion: SteadyMotion, modes, cells: int = 0) -> SteadyMotion:
         Solution of the harmonic balance.
     modes : ModalBasis
         Modes of the structure without the contact.
-    cells : int
-        Number of cells of the cycle; 0 for MIN_CELLS, or for the samples of the motion if they are more.
     """
-    values = find_multipliers(find_monodromy(motion, modes, cells))
+    values = find_multipliers(find_monodromy(motion, modes))
     is_stable = bool(np.abs(values).max(initial=0.0) <= MAX_STABLE_MULTIPLIER)
     return replace(motion, multipliers=values, stable=is_stable)
 

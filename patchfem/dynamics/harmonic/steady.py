@@ -3,28 +3,24 @@
 The number of harmonics is doubled until the motion changes by less than the tolerance.
 """
 
-from itertools import pairwise
-
 import numpy as np
-from scipy.optimize import brentq, minimize_scalar
 
 from ...core import NotConverged
-from .continuation import PathEquations, PathSettings, follow_curve
+from .continuation import CurvePath, PathEquations, PathSettings, follow_curve
 from .equations import HarmonicBalance, has_undamped_resonance
 from .forces import LawGroup
 from .motion import SteadyMotion
-from .series import evaluate_series, pad_harmonics
+from .series import evaluate_series, pack_harmonics, pad_harmonics
 
 # Numbers of harmonics that are tried in turn, each about twice the previous one.
 HARMONIC_COUNTS = (7, 15, 31, 63, 127, 255, 511)
 MAX_FIRST_COUNT = 63  # largest number of harmonics that is tried first
-N_ROOT_SAMPLES = 512  # samples per cycle of the balance with one harmonic
-N_ROOT_AMPLITUDES = 240  # amplitudes at which this balance is evaluated
-# Smallest and largest of these amplitudes, relative to that of the linear motion.
-ROOT_RANGE = (1e-7, 1e4)
 # Weakest drive from which a motion is followed, relative to the drive, and the settings of this curve.
 WEAK_DRIVE = 1e-3
 LEVEL_PATH = PathSettings(0.05, 0.5, 1000, 1e-6)
+# Strongest drive to which coexisting motions are followed, relative to the drive, and the settings of this curve.
+MAX_LEVEL_RATIO = 10.0
+COEXISTING_PATH = PathSettings(0.005, 0.02, 2000, 1e-6)
 
 
 class Unbounded(NotConverged):
@@ -54,8 +50,7 @@ def find_steady_motion(
     tolerance : float, optional
         Largest change of the motion, relative to it, with twice the harmonics.
     start : SteadyMotion or (i, K + 1) array, optional
-        Initial guess, a motion or harmonics of the slides [m]; otherwise the stuck contact, the motions with one
-        harmonic and weaker drives are tried.
+        Initial guess, a motion or harmonics of the slides [m]; otherwise the stuck contact and weaker drives are tried.
 
     Raises
     ------
@@ -168,52 +163,53 @@ def refine_steady_motion(motion: SteadyMotion, modes, drive) -> SteadyMotion:
         If no solution is found.
     """
     balance = HarmonicBalance(modes, motion.group, 2 * motion.samples)
-    start = balance.pack_slides(pad_harmonics(motion.slides, max(2 * motion.harmonics, 3)))
+    start = pack_harmonics(pad_harmonics(motion.slides, max(2 * motion.harmonics, 3)))
     x, _, n_steps = balance.solve(start, drive.omega, drive.acceleration)
     return make_motion(balance, x, drive, motion.slides, n_steps)
 
 
-# ---- search for a first solution
+def list_coexisting_slides(motion: SteadyMotion, drive) -> list[np.ndarray]:
+    """Return slides (i, H + 1) [m] near the motions that coexist under a drive, as starts of `find_steady_motion`.
+
+    The curve of the motions over the drive level begins at rest and passes the level once for each of them, through its
+    folds up to MAX_LEVEL_RATIO of the level.
+
+    Parameters
+    ----------
+    motion : SteadyMotion
+        A motion under the drive, with as many harmonics and samples.
+    drive : core.SineDrive
+        Frequency and level.
+    """
+    balance = HarmonicBalance(motion.group.modes, motion.group, motion.samples)
+    level = drive.acceleration
+    path = _follow_levels(
+        balance, drive.omega, level, motion.harmonics, MAX_LEVEL_RATIO, COEXISTING_PATH
+    )
+    is_above = path.p > level
+    return [balance.unpack_slides(x) for x in path.x[:-1][is_above[1:] != is_above[:-1]]]
 
 
 def _solve_from_guesses(balance: HarmonicBalance, drive, h: int, slides) -> tuple[np.ndarray, int]:
-    """Solve a balance from several initial guesses in turn, and finally from weaker drives.
+    """Solve a balance from slides (i, K + 1) [m] or None, from the stuck contact, and finally from weaker drives.
 
     Returns the unknowns, and the number of Newton steps.
     """
     omega = drive.omega
     level = drive.acceleration
-
-    def make_guesses():
-        """Yield initial guesses, the most promising first."""
-        if slides is not None:
-            yield balance.pack_slides(pad_harmonics(slides, h))
-        yield balance.solve_stuck(omega, level, h)
-        for root in find_one_harmonic_roots(balance, omega, level):
-            yield balance.pack_slides(pad_harmonics(root, h))
-
-    for guess in make_guesses():
+    guesses = [] if slides is None else [pack_harmonics(pad_harmonics(slides, h))]
+    for guess in (*guesses, balance.solve_stuck(omega, level, h)):
         try:
             x, _, count = balance.solve(guess, omega, level)
             return x, count
         except NotConverged:
             pass
 
-    x, _, count = balance.solve(_follow_levels(balance, omega, level, h), omega, level)
-    return x, count
-
-
-def _follow_levels(balance: HarmonicBalance, omega: float, level: float, h: int) -> np.ndarray:
-    """Return the unknowns at a drive level by continuation from WEAK_DRIVE of it."""
-
-    def evaluate(x, level):
-        equations = balance.evaluate(x, omega, level)
-        return PathEquations(equations.residual, equations.jacobian, equations.by_level)
-
-    start = balance.solve_stuck(omega, level, h) * WEAK_DRIVE
-    path = follow_curve(evaluate, start, WEAK_DRIVE * level, (0.0, level), settings=LEVEL_PATH)
+    # The curve of the motions over the drive level leads to one of them.
+    path = _follow_levels(balance, omega, level, h)
     if path.ended == "end":
-        return path.x[-1]
+        x, _, count = balance.solve(path.x[-1], omega, level)
+        return x, count
     failure = (
         f"accuracy.harmonics: harmonic balance with {h} harmonics found no steady motion at "
         f"{omega / (2 * np.pi):.6g} Hz; "
@@ -228,67 +224,20 @@ def _follow_levels(balance: HarmonicBalance, omega: float, level: float, h: int)
     )
 
 
-def find_one_harmonic_roots(
-    balance: HarmonicBalance, omega: float, level: float
-) -> list[np.ndarray]:
-    """Find the slides (i, 2) [m] of all solutions of the balance with one harmonic.
+def _follow_levels(
+    balance: HarmonicBalance,
+    omega: float,
+    level: float,
+    h: int,
+    ratio: float = 1.0,
+    settings: PathSettings = LEVEL_PATH,
+) -> CurvePath:
+    """Follow the motions with h harmonics over the drive level, from WEAK_DRIVE up to a ratio of a level [m s-2]."""
 
-    The balance is evaluated at amplitudes of the linear motion. For one row the result is exact, because a phase turns
-    slide and force alike; for several it is an initial guess.
+    def evaluate(x, level):
+        equations = balance.evaluate(x, omega, level)
+        return PathEquations(equations.residual, equations.jacobian, equations.by_level)
 
-    Parameters
-    ----------
-    balance : HarmonicBalance
-        Balance of modes and laws.
-    omega, level : float
-        Frequency [rad/s] and amplitude [m s-2] of the drive.
-    """
-    balance = HarmonicBalance(balance.modes, balance.group, N_ROOT_SAMPLES)
-    unmoved = balance.evaluate(np.zeros(3 * balance.rank), omega, level)
-    drive = (unmoved.motion.modal @ balance.faces.T)[1]
-    size = float(np.linalg.norm(drive))
-    if size == 0:
-        return []
-    direction = drive / size
-
-    def find_drive(log: float) -> complex:
-        """Return the complex amplitude of the drive that an amplitude of the slide needs, in units of the drive."""
-        y = np.zeros((balance.rank, 2), complex)
-        y[:, 1] = direction * np.exp(log)
-        motion = balance.evaluate(balance.pack_slides(balance.lift @ y), omega, 0.0).motion
-        return complex(direction.conj() @ (y[:, 1] - balance.faces @ motion.modal[1])) / size
-
-    def find_mismatch(log: float) -> float:
-        return abs(find_drive(log)) - 1
-
-    # An amplitude of the slide is a root if it needs the given drive; its phase turns that of the drive to 0.
-    grid = np.log(size) + np.linspace(*np.log(ROOT_RANGE), N_ROOT_AMPLITUDES)
-    values = [find_mismatch(log) for log in grid]
-    roots = []
-    for low, high in _bracket_roots(find_mismatch, grid, values):
-        log = brentq(find_mismatch, low, high, xtol=1e-10)
-        phase = find_drive(log).conjugate()
-        slide = balance.lift @ direction * np.exp(log) * phase / abs(phase)
-        roots.append(np.stack([0 * slide, slide], axis=1))
-    return roots
-
-
-def _bracket_roots(function, grid, values) -> list[tuple[float, float]]:
-    """Return intervals (a, b) that enclose the sign changes of a function on a grid (k,).
-
-    A sample closer to zero than its neighbours may hide two roots; its minimum is then located.
-    """
-    points = list(zip(grid, values))
-    for k in range(1, len(grid) - 1):
-        sign = np.sign(values[k])
-        if all(0 < sign * values[k] < sign * value for value in (values[k - 1], values[k + 1])):
-            low = minimize_scalar(
-                lambda x, sign=sign: sign * function(x),
-                bounds=(grid[k - 1], grid[k + 1]),
-                method="bounded",
-                options={"xatol": 1e-8},
-            )
-            if low.fun < 0:
-                points.append((float(low.x), sign * low.fun))
-    points.sort()
-    return [(a, b) for (a, u), (b, v) in pairwise(points) if u * v <= 0]
+    start = balance.solve_stuck(omega, level, h) * WEAK_DRIVE
+    bounds = (0.0, ratio * level)
+    return follow_curve(evaluate, start, WEAK_DRIVE * level, bounds, settings=settings)

@@ -10,10 +10,11 @@ from ... import __version__
 from ...campaigns import compare as pressing
 from ...campaigns.compare import SurfaceRuns
 from ...core import PatchfemError
+from ...surface.areal import level
 from ...surface.compare import compare
 from ...surface.compare.compare import DEFAULTS, Options
 from ...surface.compare.records import Comparison, Track
-from ...surface.profile import level, resample_evenly
+from ...surface.profile import resample_evenly
 from ...surface.quantity import LEVEL, SIDE, Quantity
 from ...surface.spectrum import BAND
 from ..answer import Answer, Remarks, Variable
@@ -32,7 +33,6 @@ SHOWN_ELSEWHERE = (
     "worn_from_after",
     "worn_to_before",
     "worn_to_after",
-    "track_pile_up",
 )
 MIN_BAND_FRACTION = 0.01  # width of a band relative to the axis, below which the line hides it
 MATERIAL_RATIOS = np.linspace(0.0, 1.0, 201)

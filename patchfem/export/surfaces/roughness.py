@@ -1,6 +1,7 @@
 """Answer of the roughness of one or several measured surfaces: parameters, profiles, Abbott curve and spectrum."""
 
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -8,7 +9,7 @@ from ... import __version__
 from ...core import PatchfemError
 from ...formatting import format_length
 from ...surface.files.read import read_surface
-from ...surface.quantity import LEVEL, Mean, Quantity, average_quantities
+from ...surface.quantity import LEVEL, Quantity
 from ...surface.roughness import peaks, report
 from ...surface.roughness.parameters import abbott_curve
 from ...surface.roughness.report import RoughnessReport
@@ -37,6 +38,13 @@ MEANS_NOTE = (
 )
 SIZES_NOTE = "The files differ in length or step, so that the means of extremes and slopes mix different quantities."
 TWICE_NOTE = "One file is given twice, so that it counts twice in the means."
+
+
+class Mean(NamedTuple):
+    """Mean of a parameter over several files, and the standard deviation of the files about it."""
+
+    mean: Quantity
+    scatter: float
 
 
 def answer_files(paths: list[Path], units: tuple[str, str] | None = None, **options) -> Answer:
@@ -101,26 +109,36 @@ def make_answer(reports: list[RoughnessReport]) -> Answer:
 
 
 def _average(members: list[RoughnessReport]) -> dict[str, Mean]:
-    """Return the means of the parameters that all files have; the interval comes from their scatter alone.
+    """Return the means of the parameters that all files have, with 95 % intervals from the scatter of the files.
 
     Student's t of the logarithm keeps the interval of a positive parameter above 0. An interval that is wider than
     a factor of two either way, such as that of most pairs of files, is left out with the reason.
     """
+    from scipy.special import stdtrit
+
+    count = len(members)
+    student = float(stdtrit(count - 1, (1 + LEVEL) / 2))
     means = {}
-    for name in (value.name for value in members[0].values):
-        values = [each[name]._replace(low=None, high=None) for each in members]
-        if any(value.value is None for value in values):
+    for quantity in members[0].values:
+        name = quantity.name
+        values = [each[name].value for each in members]
+        if None in values:
             continue
-        mean = average_quantities(values, values[0].text)
-        quantity = mean.mean
-        if not name.endswith("sk") and quantity.value > 0:
-            factor = float(np.exp(quantity.high / quantity.value - 1))
-            ends = (quantity.value / factor, quantity.value * factor)
+        mean = float(np.mean(values))
+        scatter = float(np.std(values, ddof=1))
+        error = student * scatter / float(np.sqrt(count))
+
+        # A skewness may have either sign.
+        ends = (mean - error, mean + error)
+        reason = ""
+        if not name.endswith("sk") and mean > 0:
+            factor = float(np.exp(error / mean))
+            ends = (mean / factor, mean * factor)
             if factor > MAX_FACTOR:
                 ends = (None, None)
-                quantity = quantity._replace(reason="few_files")
-            quantity = quantity._replace(low=ends[0], high=ends[1])
-        means[name] = mean._replace(mean=quantity)
+                reason = "few_files"
+        averaged = quantity._replace(value=mean, low=ends[0], high=ends[1], reason=reason)
+        means[name] = Mean(averaged, scatter)
     return means
 
 
@@ -164,8 +182,6 @@ def describe_treatment(each: RoughnessReport) -> str:
     size, treatment = each.sampling, each.treatment
     shape = " x ".join(map(str, size.shape))
     text = f"{shape} heights over {format_length(size.length)}, every {format_length(size.step)}"
-    if size.measured not in (None, size.shape[-1]):
-        text = f"{size.measured} heights, resampled to {text}"
     text += f", about the least-squares {treatment.form}"
     if treatment.window is not None:
         text += f", window {', '.join(map(format_length, treatment.window))}"

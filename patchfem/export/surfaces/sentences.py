@@ -13,14 +13,15 @@ from .. import answer, quantities
 
 ROUNDING = 1e-6  # largest difference of a ratio from 1 that is round-off
 MAX_SENTENCES = 4  # largest number of sentences of a verdict
-INTERVALS = "Numbers in brackets are 95 % intervals, which hold for the place that was measured."
+INTERVALS = "Numbers in brackets are 95 % intervals for the measured place; another place on the surface may differ by more."
 
 # Headline for each code of the verdict. {mean}: worn depth with its interval; {region}: what it is the mean of.
 VERDICTS = {
-    "worn": "Worn depth {mean}, the mean over {region}.",
+    "worn": "Worn depth {mean}, the mean of the lost material over {region}.",
     "no_wear": "No wear is shown: the mean worn depth over {region} is at most {at_most}.",
     "grown": "Material grew: {grown} stand above the first surface, {lost} are lost; deposits, or files in the wrong order.",
-    "worn_and_grown": "Worn depth {mean}, the mean over {region}, and material grew: {lost} lost, {grown} grown.",
+    "worn_and_grown": "Worn depth {mean}, the mean of the lost material over {region}, and material grew: {lost} lost, "
+    "{grown} grown.",
     "growth_at_ends": "Either a scar of {scar_depth} over the rest of the surface, or {growth_height} of material that "
     "grew at the ends: both are possible.",
     "scar_or_bow": "Either a scar over all of the surface, up to {scar_depth} deep on average, or a bent datum of the "
@@ -93,7 +94,6 @@ REASONS = {
     "noise": "the noise is as large as the roughness",
     "short_track": "the track, or the surface beside it, is too short for a standard cut-off",
     "scans": "only that of traces is compared",
-    "other_step": "the steps differ",
     "unresolved": "it is shorter than two steps, which do not resolve it",
     "not_falling": "the autocorrelation does not fall to 0.2 within half of each side",
     "no_limit": "even or wedge-shaped wear of any size looks like an offset or tilt of the datum",
@@ -241,7 +241,9 @@ def describe_waves(ratio: Quantity | None) -> list[str]:
     elif ratio.low > 1 + ROUNDING:
         change = "they are increased"
     text = format_value("amplitude_ratio", ratio)
-    return [f"The waves from 60 to 110 um have {text} times their amplitude before wear: {change}."]
+    return [
+        f"On the whole surface the waves from 60 to 110 um have {text} times their amplitude before wear: {change}."
+    ]
 
 
 def _format_numbers(numbers: dict[str, float | str | None], is_areal: bool) -> dict[str, str]:

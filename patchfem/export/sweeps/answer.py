@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shlex
 from collections import Counter
 from collections.abc import Sequence
 from contextlib import suppress
@@ -64,7 +63,7 @@ def make_answer(
         origin={
             "patchfem": __version__,
             "scene": sweep_scene.text,
-            "command": _make_command(sweep_scene, cases),
+            "command": cases.command,
             "versions": list_versions(),
         },
     )
@@ -81,14 +80,6 @@ def read_tolerance(sweep_scene: SweepScene, cases: Cases) -> float:
         with suppress(PatchfemError):
             return sweep_scene.read_scene(cases.assignments(number)).accuracy.tolerance
     return np.nan
-
-
-def _make_command(sweep_scene: SweepScene, cases: Cases) -> str:
-    """Return the command line that computes the same cases."""
-    words = ["patchfem", "sweep", sweep_scene.path.name]
-    for assignment in sweep_scene.sets:
-        words += ["--set", assignment]
-    return shlex.join([*words, *cases.arguments])
 
 
 def _make_details(table: SweepTable, analysis: SweepAnalysis) -> dict[str, object]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ...campaigns.sweeps.changes import MAIN_MEASURES, SweepAnalysis
-from ...campaigns.sweeps.limits import DOUBLING, KeyLimit, explain_missing_limits
+from ...campaigns.sweeps.limits import DOUBLING, KeyLimit
 from ...campaigns.sweeps.peaks import FREQUENCY_KEY, PeakOnLine
 from ...campaigns.sweeps.ranking import SobolIndex
 from ...campaigns.sweeps.sweep_table import SweepTable
@@ -32,8 +32,6 @@ def make_verdict(table: SweepTable, analysis: SweepAnalysis) -> tuple[str, ...]:
         sentences.append(_describe_peaks(table, analysis.peaks))
     elif analysis.limits:
         sentences.append(_describe_limit(analysis.limits))
-    else:
-        sentences.append(explain_missing_limits(table))
     return (*(sentence for sentence in sentences if sentence), _describe_cases(table, analysis))
 
 

@@ -35,7 +35,6 @@ def check_scene(draft: SceneDraft) -> str:
         check_together,
         check_quadrature,
         check_settings,
-        _remark_unused,
         _check_sliding,
         check_length,
         check_energy_gain,
@@ -76,17 +75,6 @@ def find_kind(draft: SceneDraft) -> str:
     if "slide" in tables:
         return "bench"
     return "linear" if tables == {"structure", "drive"} else "rig"
-
-
-def _remark_unused(draft: SceneDraft, kind: str) -> None:
-    """Add remarks on motions of modes that have no effect because the scene has no friction."""
-    for index, mode in enumerate(draft.values.structure.mode if kind == "linear" else ()):
-        for key in ("normal", "pitch", "yaw"):
-            if mode[key]:
-                draft.add_remark(
-                    f"structure.mode.{index}.{key}",
-                    "has no meaning in a linear scene, which has no friction, and is not used",
-                )
 
 
 def _check_sliding(draft: SceneDraft, kind: str) -> None:

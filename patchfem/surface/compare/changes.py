@@ -10,6 +10,7 @@ from .statistics import (
     compute_threshold,
     estimate_correlation,
     estimate_one_sided_scale,
+    make_polynomials,
 )
 
 WINDOWS = {1: (1, 4, 16, 64), 2: (1, 3, 9, 25)}  # sides of the windows whose mean depth is tested
@@ -90,7 +91,7 @@ class Boxes(NamedTuple):
 @lru_cache(maxsize=2)
 def make_boxes(degree: int, n_beside: int, n_inside: int) -> Boxes:
     """Return boxes with at least `n_inside` parts, and `n_beside` on each side, free of a polynomial datum."""
-    datum = np.linalg.qr(np.vander(np.linspace(-1, 1, N_PARTS), degree + 1))[0]
+    datum = make_polynomials(N_PARTS, degree)
     spans = []
     for first in range(n_beside, N_PARTS - n_beside):
         for stop in range(first + n_inside, N_PARTS - n_beside + 1):

@@ -15,7 +15,7 @@ from scipy import ndimage
 from ...core import PatchfemError
 from ..areal import Areal
 from ..files.read import read_surface
-from ..profile import Profile, robust_deviation
+from ..profile import Profile, measure_step, robust_deviation
 from ..quantity import SIDE, Quantity
 from . import waves
 from .alignment import SURE_SIGNIFICANCE, Aligned, align
@@ -23,7 +23,7 @@ from .changes import find_detection_limit
 from .depth_map import UNWORN_LIMIT, DepthMap
 from .depths import make_depths, measure_largest
 from .flanks import find_flanked_track
-from .raster import Raster, clean_surface, fill_gaps, make_raster
+from .raster import Raster, clean_surface, make_raster
 from .records import (
     Comparison,
     Evidence,
@@ -47,7 +47,6 @@ MIN_SCAR_FRACTION = 0.9  # fraction of worn heights in such a scar; worn tops ha
 # Mean height of a bow relative to the short waves, from which on it may be a scar.
 MIN_BOW = 3.0
 MIN_OTHER_LENGTH = 5e-4  # smallest error of length that is reported
-MAX_STEP_RATIO = 1.01  # ratio of two sampling intervals that counts as equal
 # Fraction of worn heights in a track below which it consists of worn tops.
 MIN_TOPS_FRACTION = 0.6
 
@@ -156,7 +155,7 @@ def compare_surfaces(
     else:
         aligned = align(first, second, options.shift, is_straight=bool(options.datum))
         result = _measure(surfaces, (first, second), aligned)
-        ratios = _compare_waves((first, second), result, options.direction)
+        ratios = _compare_waves(result, options.direction)
         result = replace(result, values=result.values | ratios)
 
     evidence = replace(result.evidence, removed=removed)
@@ -453,26 +452,16 @@ def _name_ends(
     return values
 
 
-def _compare_waves(
-    rasters: tuple[Raster, Raster], result: Comparison, direction: str
-) -> dict[str, Quantity]:
-    """Compare the waves along the lines of the common part, or of both surfaces without one."""
-    axis = 0 if direction == "y" else -1
+def _compare_waves(result: Comparison, direction: str) -> dict[str, Quantity]:
+    """Compare the waves along the lines of the common part; without one, the ratios have no value."""
     depths = result.evidence.curves
-    steps = [float(raster.steps[axis]) for raster in rasters]
-    # A mirror finish has no depths, but the noise of each surface is known.
-    noise = np.sqrt(2) * result.verdict.numbers.get("noise", 0.0)
-    ends = []
-    if depths is not None:
-        noise = depths.noise_level
-        places = [track.values[name].value for track in result.tracks for name in ("from", "to")]
-        ends = np.searchsorted(depths.x, [place for place in places if place is not None])
-    heights = [fill_gaps(raster.z) for raster in rasters]
-    if depths is not None and result.evidence.placement.basis == "place":
-        # Depths stand at the samples of the second trace, or of the first scan.
-        heights = [depths.before, depths.after]
-        steps = steps[1:] if depths.y is None else steps[:1]
-    if max(steps) > MAX_STEP_RATIO * min(steps):
-        return _name_unknowns(waves.RATIO_NAMES, "other_step")
-    lines = [np.atleast_2d(np.moveaxis(z, axis, -1)) for z in heights]
-    return waves.compare_waves(lines, steps[0], noise, ends)
+    if depths is None:
+        return _name_unknowns(waves.RATIO_NAMES, result.verdict.code)
+    if result.evidence.placement.basis != "place":
+        return _name_unknowns(waves.RATIO_NAMES, "elsewhere")
+    axis = 0 if direction == "y" else -1
+    places = depths.x if axis or depths.y is None else depths.y
+    ends = [track.values[name].value for track in result.tracks for name in ("from", "to")]
+    ends = np.searchsorted(depths.x, [end for end in ends if end is not None])
+    lines = [np.atleast_2d(np.moveaxis(z, axis, -1)) for z in (depths.before, depths.after)]
+    return waves.compare_waves(lines, measure_step(places), depths.noise_level, ends)

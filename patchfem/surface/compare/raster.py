@@ -7,13 +7,12 @@ import numpy as np
 
 from ...core import PatchfemError
 from ..areal import Areal, fill_nearest, find_scan_spikes
-from ..profile import Profile, remove_spikes
+from ..profile import MAX_SAMPLES, Profile, remove_spikes
 
 MIN_HEIGHTS = 40  # smallest number of heights of a trace that is compared
 MIN_SIDE = 16  # smallest number of points along each side of a scan
 MAX_GAP_STEPS = 2.5  # distance of two samples, in median steps, above which heights are missing
 MAX_UNEVEN = 0.1  # largest distance from even places, in steps, of a trace that is not resampled
-MAX_SAMPLES = 2_097_152  # largest number of samples in a resampled trace, which limits the memory
 
 
 class Raster(NamedTuple):

@@ -45,7 +45,7 @@ DEFINITIONS = {
     "amplitude_ratio": ("1", "rms of the waves from 60 to 110 um after wear divided by before"),
     "slope_ratio": (
         "1",
-        "rms slope of the waves up to 110 um after wear divided by before, at the same step",
+        "rms slope of the waves up to 110 um after wear divided by before, at the same step; with the noise of both",
     ),
     "hidden_wear": ("m", "largest mean wear that an even or wedge-shaped loss may hide"),
     "worn_volume": ("m3", "volume lost in the common part"),
@@ -58,7 +58,7 @@ DEFINITIONS = {
     "to": ("m", "x in the second trace at which the track ends"),
     "width": ("m", "width of the track"),
     "depth_mean": ("m", "lost area divided by width"),
-    "depth_floor": ("m", "mean depth of the deepest fifth of the width"),
+    "depth_floor": ("m", "mean depth of the deepest part that is a fifth of the width long"),
     "area_gross": ("m2", "area lost in the track"),
     "pile_up": ("m2", "area above the first trace within one width of the track on both sides"),
     "area_net": ("m2", "lost area less pile-up"),

@@ -59,6 +59,11 @@ def solve_biweight_step(depth, jacobian, sigma: float, excluded=None) -> np.ndar
     return step / scale
 
 
+def make_polynomials(count: int, degree: int) -> np.ndarray:
+    """Return orthonormal columns (count, degree + 1) that span the polynomials up to a degree at even places."""
+    return np.linalg.qr(np.vander(np.linspace(-1, 1, count), degree + 1))[0]
+
+
 def find_mode(values) -> float:
     """Return the mean of the shortest interval that contains 30 % of the values."""
     ordered = np.sort(values)

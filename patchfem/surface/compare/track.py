@@ -37,7 +37,7 @@ MAX_CANDIDATES = 80  # number of places that are tried as an end
 END_STEPS = 2  # number of samples beyond the likely places that belong to the interval of an end
 MAX_SQUARE = 16.0  # squared residual of a single depth beyond which it counts no more
 RIDGE_TAIL = 0.5  # length of the low outer flank of a ridge relative to what is found as grown
-N_FIFTHS = 5  # number of parts of a track, of which the deepest is the floor
+N_FIFTHS = 5  # the floor is the deepest part of a track that is as long as a fifth of it
 
 
 class End(NamedTuple):
@@ -249,17 +249,15 @@ def measure_track(
 
 
 def _measure_floor(depths: DepthMap, start: float, width: float) -> Quantity:
-    """Return the mean depth of the deepest fifth of the width."""
+    """Return the mean depth of the deepest fifth of the width, which is one piece."""
     inside = np.flatnonzero((depths.x >= start) & (depths.x <= start + width))
-    parts = []
-    for samples in np.array_split(inside, min(N_FIFTHS, inside.size)):
-        length = samples.size * depths.cell
-        mean, error = (
-            number / length
-            for number in depths.integrate(np.isin(np.arange(depths.x.size), samples))
-        )
-        parts.append(name_estimate("depth_floor", mean, error, 0.0))
-    return max(parts, key=lambda part: part.value)
+    count = max(inside.size // N_FIFTHS, 1)
+    first = inside[np.argmax(np.convolve(depths.depth[inside], np.ones(count), "valid"))]
+
+    samples = np.arange(depths.x.size)
+    area, error = depths.integrate((samples >= first) & (samples < first + count))
+    length = count * depths.cell
+    return name_estimate("depth_floor", area / length, error / length, 0.0)
 
 
 def _measure_pile_up(depths: DepthMap, ends: tuple[End, End], width: float) -> tuple[float, float]:

@@ -12,7 +12,7 @@ from ..roughness.report import fitting_cutoff
 from ..spectrum import BAND
 from .depth_map import DepthMap
 from .records import DEFINITIONS, name_quantity, name_unknown
-from .statistics import smooth
+from .statistics import make_polynomials, smooth
 from .track import get_margin
 
 MAX_BLOCKS = 12  # largest number of blocks whose ratios show the scatter of a ratio
@@ -37,7 +37,7 @@ def compare_waves(
     """Compute the ratios of amplitude and slope, after divided by before, with their intervals.
 
     Each line is levelled. The band is cut out by two Gaussian filters, and longer waves have no part in the slope. The
-    ends of tracks, whose flanks have all waves, do not count, unless too little would be left. The interval of the
+    ends of tracks, whose flanks have all waves, do not count. The interval of the
     logarithm follows from the scatter of the ratios of blocks, which aligned surfaces share.
 
     Parameters
@@ -51,17 +51,15 @@ def compare_waves(
     ends : sequence of float, optional
         Ends of tracks, in samples.
     """
-    n_lines, count = np.min([line.shape for line in lines], axis=0)
-    length = count * step
+    kept = np.ones(lines[0].shape[1], bool)
+    for end in ends:
+        kept &= np.abs(np.arange(kept.size) - end) > BAND[1] / step
+    length = kept.sum() * step
     if length < MIN_WAVES * BAND[1] or step > BAND[0] / MIN_STEPS:
         return {name: name_unknown(name, "band") for name in RATIO_NAMES}
 
-    columns = np.arange(count)
-    kept = np.all([np.abs(columns - end) > BAND[1] / step for end in ends], axis=0)
-    if kept.sum() * step < MIN_WAVES * BAND[1]:
-        kept = np.ones(count, bool)
     # The shape of a track has no part in its waves: the second filter removes what the first one leaves of a bend.
-    lines = [_subtract_polynomial(line[:n_lines, :count], 1) for line in lines]
+    lines = [_subtract_polynomial(line, 1) for line in lines]
     deviations = [(0.0, CUTOFF_TO_DEVIATION * wave / step) for wave in BAND]
     lines = [z - smooth(z, deviations[1]) for z in lines]
     passed = [(smooth(z, deviations[0]) - smooth(z, deviations[1]))[:, kept] for z in lines]
@@ -69,16 +67,11 @@ def compare_waves(
 
     # White noise has the slope noise sqrt(2)/step, and the fraction of its band in the amplitude.
     band_noise = noise / np.sqrt(2) * np.sqrt(2 * step * (1 / BAND[0] - 1 / BAND[1]))
-    # Blocks are parts of a single line, or groups of lines.
     n_blocks = int(np.clip(length / (BLOCK_WAVES * BAND[1]), MIN_BLOCKS, MAX_BLOCKS))
-    axis = 1
-    if n_lines >= MAX_BLOCKS:
-        n_blocks = MAX_BLOCKS
-        axis = 0
     values = {}
     errors = (band_noise, noise / step)
     for name, sizes, error in zip(RATIO_NAMES, (passed, slopes), errors):
-        blocks = [_average_squares(np.array_split(size, n_blocks, axis)) for size in sizes]
+        blocks = [_average_squares(np.array_split(size, n_blocks, 1)) for size in sizes]
         smallest = min(block.mean() for block in blocks)
         if not smallest > 0 or error**2 > MAX_NOISE_FRACTION * smallest:
             values[name] = name_unknown(name, "noise")
@@ -89,7 +82,7 @@ def compare_waves(
 
 def _subtract_polynomial(z, degree: int) -> np.ndarray:
     """Subtract the polynomial of least squares from heights (n,), or from each line of heights (k, n)."""
-    basis = np.linalg.qr(np.vander(np.linspace(-1, 1, z.shape[-1]), degree + 1))[0]
+    basis = make_polynomials(z.shape[-1], degree)
     return z - z @ basis @ basis.T
 
 

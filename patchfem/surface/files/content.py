@@ -14,32 +14,27 @@ MAX_TEXT_BYTES = 64 * MIB  # largest size of a text file, in bytes: four million
 HEAD_BYTES = 4096  # number of bytes at the start of a file that determine its format
 _FIRST_BYTES = {  # format of a file by its first bytes
     b"\x1f\x8b": "gzip",
-    b"PK\x03\x04": "instrument",  # such as X3P
     b"\x93NUMPY": "npy",
     b"MATLAB 5.0 MAT-file": "mat",
     b"MATLAB 7.3 MAT-file": "mat",
     b"aISO-1.0": "instrument",
-    b"bISO-1.0": "instrument",
     b"aBCR-1.0": "instrument",
-    b"bBCR-1.0": "instrument",
     b"Wyko ASCII": "instrument",
     b"\xff\xfe": "text",
     b"\xfe\xff": "text",
 }
-TEXT_SUFFIXES = (".txt", ".csv", ".tsv", ".dat", ".prn", ".xyz", ".prf")
 DAMAGED = "the file is cut off or damaged; save or export it anew"
 
 
 class Content(NamedTuple):
     """Content of a surface file after unpacking.
 
-    path: name for messages; kind: "text", "npy", "mat" or "instrument"; suffix: of the unpacked
-    file in lower case; data: bytes; is_packed: whether the file itself has other bytes.
+    path: name for messages; kind: "text", "npy", "mat" or "instrument"; data: bytes; is_packed: whether the file itself
+    has other bytes.
     """
 
     path: Path
     kind: str
-    suffix: str
     data: bytes
     is_packed: bool = False
 
@@ -51,8 +46,6 @@ def fetch(path) -> Content:
     """
     try:
         file_path = Path(path)
-        if file_path.exists() and not file_path.is_file():
-            raise PatchfemError(f"{path}: not a file; a profile is a text file with two columns")
         with open(file_path, "rb") as file:
             content = _read_limited(file_path, file_path.suffix, file)
     except FileNotFoundError:
@@ -73,9 +66,8 @@ def fetch(path) -> Content:
 def _read_limited(path: Path, suffix: str, file) -> Content:
     """Read a file up to the limit for its format; suffix: of its name, such as ".CSV"."""
     data = bytearray(file.read(HEAD_BYTES))
-    suffix = suffix.lower()
     # Numbers below five are control characters, which a text has only if it is damaged.
-    is_binary = bool(set(data) & set(range(5))) and suffix not in (".csv", ".txt")
+    is_binary = bool(set(data) & set(range(5))) and suffix.lower() not in (".csv", ".txt")
     kind = "instrument" if is_binary else "text"
     kind = next((name for mark, name in _FIRST_BYTES.items() if data.startswith(mark)), kind)
 
@@ -84,4 +76,4 @@ def _read_limited(path: Path, suffix: str, file) -> Content:
     if len(data) > limit:
         remedy = " of text; thin out the samples of the profile" if kind == "text" else ""
         raise PatchfemError(f"{path}: more than {limit // MIB} MiB{remedy}")
-    return Content(path, kind, suffix, bytes(data))
+    return Content(path, kind, bytes(data))

@@ -12,7 +12,7 @@ import numpy as np
 
 from ...core import Missing, PatchfemError
 from .content import Content
-from .table import MAX_POINTS, Table
+from .table import Table
 from .units import HEADER_EXAMPLE, shorten
 
 
@@ -41,8 +41,6 @@ def read_instrument(content: Content) -> Table:
     try:
         reader = open_topography(io.BytesIO(content.data) if content.is_packed else str(path))
         channel = reader.default_channel
-        if np.prod(channel.nb_grid_pts, dtype=float) > MAX_POINTS:
-            raise ValueError(f"more than {MAX_POINTS:.0e} heights; export a part of the scan")
         if channel.physical_sizes is None:
             raise ValueError("the file does not give the size of the scan")
         topography = channel.topography()

@@ -1,12 +1,10 @@
 """Reader of a measured surface, a trace or an areal scan, from a file of any format."""
 
-from importlib.util import find_spec
-
 from ...core import PatchfemError
 from ..areal import Areal
 from ..profile import Profile
 from .arrays import read_mat, read_npy
-from .content import TEXT_SUFFIXES, fetch
+from .content import fetch
 from .instruments import read_instrument
 from .table import make_surface
 from .text import read_text
@@ -40,14 +38,9 @@ def read_surface(path, units: tuple[str, str] | None = None) -> Profile | Areal:
     if units is not None:
         _require_units(path, units)
     content = fetch(path)
-    if content.kind != "text":
-        return make_surface(READERS[content.kind](content), units)
-    try:
+    if content.kind == "text":
         return make_surface(read_text(content, has_units=units is not None), units)
-    except PatchfemError:
-        if content.suffix in ("", *TEXT_SUFFIXES) or find_spec("SurfaceTopography") is None:
-            raise
-    return make_surface(read_instrument(content), units)
+    return make_surface(READERS[content.kind](content), units)
 
 
 def _require_units(path, units) -> None:

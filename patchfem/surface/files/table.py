@@ -111,10 +111,8 @@ def make_surface(table: Table, units: tuple[str, str] | None = None) -> Profile 
         table, places = _undo_rounding(table, role, places)
         _require_increase(table, role, places)
         axes.append(frozen_array(places))
-    unit_source = "--units" if units else ""
-    if table.are_units_fixed:
-        unit_source = "the file format"
-    notes = _check_span(table.path, max(map(np.ptp, axes)), z, unit_source)
+    has_sure_units = table.are_units_fixed or units is not None
+    notes = _check_span(table.path, max(map(np.ptp, axes)), z, has_sure_units=has_sure_units)
     surface = Profile if z.ndim == 1 else Areal
     return surface(*reversed(axes), frozen_array(z), str(table.path), table.notes + notes)
 
@@ -204,12 +202,11 @@ def _require_increase(table: Table, role: str, places) -> None:
     pair = [first, first + 1]
     if table.lines is not None and table.lines[first] > table.lines[first + 1]:
         pair.reverse()
-    before, after = places[pair]
-    reason = f"{role} reverses: {format_length(before)} and then {format_length(after)}; {role} must only rise or only "
-    reason += "fall, so keep one trace or scan per file"
-    if before == after:
-        reason = f"two samples have {role} = {format_length(before)}; delete one of them, or write the mean of their heights"
-    raise PatchfemError(f"{table.locate(pair[1])}: {reason}")
+    before, after = map(format_length, places[pair])
+    raise PatchfemError(
+        f"{table.locate(pair[1])}: {role} is {before} and then {after}, but it must only rise or only fall; keep one trace "
+        "or scan per file, and one height at each place"
+    )
 
 
 def _undo_rounding(table: Table, role: str, x) -> tuple[Table, np.ndarray]:
@@ -219,7 +216,7 @@ def _undo_rounding(table: Table, role: str, x) -> tuple[Table, np.ndarray]:
     gives the step, else the regression on the positions. Rounded even steps are two multiples of the printed digit, and
     differ by it; uneven steps, such as 1.0 and 1.4 um in turn, are no multiples of their difference.
     """
-    if x.size < MIN_ROUNDED or not x[-1] > x[0]:
+    if x.size < MIN_ROUNDED:
         return table, x
 
     # The printed digit is the smallest difference of two steps.
@@ -252,32 +249,25 @@ def _undo_rounding(table: Table, role: str, x) -> tuple[Table, np.ndarray]:
     return table, x
 
 
-def _check_span(path, length: float, z, unit_source: str) -> tuple[str, ...]:
-    """Return a note on heights [m] that span more than the length [m], if few of them do, or their units are given.
+def _check_span(path, length: float, z, *, has_sure_units: bool) -> tuple[str, ...]:
+    """Return a note on heights [m] that span more than the length [m] in units that the user or the format gives.
 
-    Raises PatchfemError for a tiny length, and if most heights span more than the length in units from a header, which
-    have no other source.
+    Raises PatchfemError for a tiny length, and for such heights in units from a header, which have no other source.
     """
     if length < MIN_LENGTH:
         raise PatchfemError(
             f"{path}: the profile is {format_length(length, 3)} long; is the unit of x right?"
         )
 
-    # A few heights that stand out, such as 999 um for no signal, do not count.
+    # A few heights that stand out, such as 999 um for no signal, are spikes and do not count.
     low, first, last, high = np.nanquantile(z, [0.0, FAULT_FRACTION, 1 - FAULT_FRACTION, 1.0])
-    if high - low <= length:
+    if last - first <= length:
         return ()
     text = (
         f"{path}: heights span {format_length(high - low)} over a length of {format_length(length)}"
     )
-    if last - first <= length:
-        note = (
-            f"{text}, but only {format_length(last - first)} without the highest and the lowest hundredth; write nan for "
-            "each height that is a fault of the measurement"
-        )
-        return (note,)
-    if unit_source:
-        return (f"{text} in the units of {unit_source}; are they right?",)
+    if has_sure_units:
+        return (f"{text}; are the units right?",)
     raise PatchfemError(
         f"{text}; is the unit of z right? If not, correct the header or give --units to profile and compare; write a "
         "missing height as nan"

@@ -23,7 +23,6 @@ from .header import COMMENT, MISSING, Column, Header, parse_fact, read_header, s
 from .table import Table
 from .units import HEADER_EXAMPLE, SIZE_LINES, parse_length_unit, shorten
 
-NOT_TEXT = f"export the profile as text with two columns and {HEADER_EXAMPLE}"
 # Largest relative range of the steps of coordinates; the steps of heights vary more.
 MAX_UNEVEN = 1e-6
 _QUOTED_NUMBER = re.compile(r'"\s*([+-]?[0-9]*),([0-9]+(?:[eE][+-]?[0-9]+)?)\s*"')
@@ -67,10 +66,10 @@ def _decode(content: Content) -> str:
             text = data.decode("utf-8-sig")
         except UnicodeDecodeError:
             text = data.decode("latin-1")
-    if not text.strip():
-        raise PatchfemError(f"{content.path}: the profile is empty; {NOT_TEXT}")
     if _CONTROL.search(text):
-        raise PatchfemError(f"{content.path}: not a text file; {NOT_TEXT}")
+        raise PatchfemError(
+            f"{content.path}: not a text file; export the profile as text with two columns and {HEADER_EXAMPLE}"
+        )
     text = text.replace("\r\n", "\n").replace("\r", "\n")
     return _QUOTED_NUMBER.sub(r"\1.\2", text).replace('"', "")
 

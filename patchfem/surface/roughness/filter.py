@@ -8,8 +8,8 @@ from scipy import fft
 
 from ...core import PatchfemError, frozen_array
 from ...formatting import format_length
-from ..areal import Areal
-from ..profile import Profile, level, measure_step, resample_evenly
+from ..areal import Areal, level
+from ..profile import Profile, measure_step, resample_evenly
 
 # Width of the weights relative to the cut-off; a wave of the cut-off keeps half its height.
 ALPHA = np.sqrt(np.log(2) / np.pi)

@@ -6,8 +6,8 @@ import numpy as np
 
 from ...core import PatchfemError, frozen_array
 from ...formatting import format_length
-from ..areal import Areal, level_plane
-from ..profile import Profile, level
+from ..areal import Areal, level
+from ..profile import Profile
 
 CIRCLE = "circle"
 MIN_HEIGHTS = 10  # smallest number of heights that determine a circle
@@ -18,7 +18,7 @@ def parse_form_option(text: str) -> int | str:
     text = text.strip()
     if text == "1":
         return 1
-    if text in (CIRCLE, "cylinder"):
+    if text == CIRCLE:
         return CIRCLE
     raise PatchfemError(
         f"the form '{text}' is not possible; use 1 (a line or a plane) or {CIRCLE} (of a trace); polynomials "
@@ -31,15 +31,14 @@ def subtract_form(surface: Profile | Areal, form: int | str = 1) -> tuple[Profil
 
     Raises PatchfemError if the heights do not determine it, and for a circle under a scan.
     """
-    if isinstance(surface, Areal):
-        if form == CIRCLE:
-            raise PatchfemError(
-                f"{surface.source}: the form of a scan is its plane; cylinders were removed in 2.0, so "
-                "evaluate one line of the scan with --form circle"
-            )
-        return level_plane(surface), "plane"
+    is_scan = isinstance(surface, Areal)
     if form != CIRCLE:
-        return level(surface), "line"
+        return level(surface), "plane" if is_scan else "line"
+    if is_scan:
+        raise PatchfemError(
+            f"{surface.source}: the form of a scan is its plane; cylinders were removed in 2.0, so "
+            "evaluate one line of the scan with --form circle"
+        )
 
     known = ~surface.missing
     if known.sum() < MIN_HEIGHTS:

@@ -15,7 +15,8 @@ import numpy as np
 
 from ...core import PatchfemError
 from ...formatting import format_length
-from ..profile import Profile, level, remove_spikes, resample_evenly
+from ..areal import level
+from ..profile import Profile, remove_spikes, resample_evenly
 from .filter import filter_surface
 from .parameters import MIN_SAMPLES, ROUND_OFF
 

@@ -34,12 +34,11 @@ CONFIDENCE_TAIL = 0.05  # probability of a true value below, and above, the inte
 
 
 class Sampling(NamedTuple):
-    """Length, step [m] and numbers of samples of a surface; measured: of a trace before resampling."""
+    """Length, step [m] and numbers of samples of a surface, after resampling."""
 
     length: float
     step: float
     shape: tuple[int, ...]
-    measured: int | None = None
 
 
 class Treatment(NamedTuple):
@@ -144,12 +143,7 @@ def make_report(
 
     return RoughnessReport(
         source=whole.source,
-        sampling=Sampling(
-            float(np.ptp(whole.x)),
-            measure_step(whole.x),
-            whole.z.shape,
-            None if is_scan else part.x.size,
-        ),
+        sampling=Sampling(float(np.ptp(whole.x)), measure_step(whole.x), whole.z.shape),
         treatment=Treatment(form_name, short, cutoff, window),
         values=tuple(quantities),
         notes=whole.notes + _describe_spikes(part) + notes,

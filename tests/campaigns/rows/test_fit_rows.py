@@ -167,30 +167,11 @@ def friction_rows(tmp_path_factory):
     return out
 
 
-def test_exact_friction_rig_is_recovered_from_its_rows(tmp_path, friction_rows):
-    """A fit recovers friction coefficient and stiffness of a rig from computed rows at three frequencies within 1e-5."""
-    found = fit_to_rows(
-        write_and_load(tmp_path, RUBS),
-        write_rows(tmp_path, friction_rows[1::2]),
-        read_free_keys(*RUBS_FREE),
-        starts=1,
-    )
-    assert found.keys.fit.values == pytest.approx([0.45, 2.4e6], rel=1e-5)
-    assert any("steady motions are computed" in text for text in found.keys.warnings)
-
-
-@pytest.mark.parametrize("rig", ["oscillator", pytest.param("friction", marks=pytest.mark.slow)])
-def test_always_held_out_rows_do_not_affect_fit(tmp_path, request, rig):
+def test_always_held_out_rows_do_not_affect_fit(tmp_path):
     """Other values in rows held out or left out change neither the fit nor any of its starts."""
-    if rig == "friction":
-        stiffness = f"structure.bonded.stiffness={TRUE['structure.bonded.stiffness']}"
-        scene = write_and_load(tmp_path, RUBS, stiffness)
-        wanted = read_free_keys("friction.static=0.3..0.6")
-        rows = request.getfixturevalue("friction_rows")[1::2]
-    else:
-        scene = write_and_load(tmp_path, LINEAR)
-        wanted = read_free_keys(*LINEAR_FREE)
-        rows = make_linear_rows()
+    scene = write_and_load(tmp_path, LINEAR)
+    wanted = read_free_keys(*LINEAR_FREE)
+    rows = make_linear_rows()
     other = [
         (f, level, a * 3, y / 2, flag) if f == 150 else (f, level, a, y, flag)
         for f, level, a, y, flag in rows
@@ -200,9 +181,7 @@ def test_always_held_out_rows_do_not_affect_fit(tmp_path, request, rig):
         for each in (rows, other)
     )
     assert np.array_equal(first.keys.fit.values, second.keys.fit.values)
-    assert np.array_equal(first.search.ends, second.search.ends) and np.array_equal(
-        first.search.rms, second.search.rms
-    )
+    assert np.array_equal(first.keys.fit.descent_rms, second.keys.fit.descent_rms)
     assert not np.array_equal(first.logs, second.logs)
     one, two = (
         fit_to_rows(scene, write_rows(tmp_path, each), wanted, leave_out="frequency", starts=1)
@@ -224,6 +203,7 @@ def test_exact_fit_readings_equal_marched_rows(tmp_path, friction_rows):
     asked = ConditionModels(
         write_and_load(tmp_path, RUBS), cells.conditions, read_free_keys(*RUBS_FREE), path
     )
+    assert any("steady motions are computed" in text for text in asked.notes)
     computed = ModelReadings(asked)
     cold = np.array(computed([0.45, 2.4e6], range(6)))
     assert (
@@ -256,14 +236,7 @@ def test_exact_rows_flagged_u_are_lower_bounds(tmp_path):
     assert whole != without
 
 
-@pytest.mark.parametrize(
-    "wanted",
-    [
-        "measured.acceleration_gain=0.5..2",
-        pytest.param("friction.static=0.1..0.3", marks=pytest.mark.slow),
-    ],
-)
-def test_always_unbounded_motion_has_capped_residual(tmp_path, wanted):
+def test_always_unbounded_motion_has_capped_residual(tmp_path):
     """A rig without a bounded motion gets a residual of log 1000 and a warning, and the fit does not fail."""
     text = RUBS.replace("elastic-plastic", "coulomb").replace('bond_length = "0.5 um"\n', "")
     text = text.replace("damping = 0.003", "damping = 0.0").replace(
@@ -275,7 +248,7 @@ def test_always_unbounded_motion_has_capped_residual(tmp_path, wanted):
     found = fit_to_rows(
         write_and_load(tmp_path, text, "friction.static=0.2"),
         path,
-        read_free_keys(wanted),
+        read_free_keys("measured.acceleration_gain=0.5..2"),
         starts=1,
     )
     assert found.keys.fit.counts.failures == 0
@@ -355,13 +328,8 @@ def test_exact_fit_command_writes_documented_json(tmp_path):
 @pytest.mark.parametrize(
     "words, message",
     [
-        (["--offset", "force"], "fit --offset was removed"),
-        (["--resume"], "fit --resume was removed"),
-        (["--placebo", "friction.static=0.1"], "fit --placebo was removed"),
-        (["--from-patch"], "fit --from-patch was removed"),
         (["--leave-out", "displacement"], "no column"),
         (["--leave-out", "input"], "leaves no rows"),
-        (["--unstable", "out"], "hold them out with --hold flag=U"),
     ],
 )
 def test_refuses_unsuitable_rows_options(tmp_path, words, message):
@@ -398,4 +366,4 @@ def test_exact_fit_uses_reading_and_gains_of_scene(tmp_path):
         for seed in (0, 1)
     )
     assert one.keys.fit.values == pytest.approx([141.0, 0.03], rel=1e-4)
-    assert not np.array_equal(one.search.starts, two.search.starts)
+    assert one.keys.fit.descent_rms != two.keys.fit.descent_rms

@@ -1,4 +1,4 @@
-"""Clusters: workers with other versions or files, a lost scheduler, TLS, and no public web pages."""
+"""Clusters: workers with other versions or files, a lost scheduler, and no public web pages."""
 
 import os
 import pickle
@@ -10,7 +10,6 @@ from concurrent.futures import Future
 from pathlib import Path
 
 import pytest
-from command_line import run_cli
 from scene_texts import BENCH
 
 from patchfem.campaigns import Cases, SweepScene, WorkerData
@@ -36,6 +35,14 @@ def make_work(place: Path, text=BENCH, values="0.2,0.3,-1") -> WorkerData:
     return WorkerData(
         SweepScene(place, text), Cases(tuple(read_assignments([f"friction.static={values}"])[0]))
     )
+
+
+def start_cluster():
+    """Return a running cluster with a worker in this process."""
+    import distributed
+
+    place = {"protocol": "tcp", "host": "127.0.0.1", "dashboard_address": None}
+    return distributed.LocalCluster(1, processes=False, silence_logs="CRITICAL", **place)
 
 
 @pytest.fixture
@@ -80,14 +87,7 @@ def test_refuses_worker_with_other_version(monkeypatch):
     """A worker with another version of patchfem, or without it, is refused before the sweep."""
     import distributed
 
-    with distributed.LocalCluster(
-        1,
-        processes=False,
-        protocol="tcp",
-        host="127.0.0.1",
-        dashboard_address=None,
-        silence_logs="CRITICAL",
-    ) as one:
+    with start_cluster() as one:
         Cluster(one.scheduler.address).client.close()
         ask = distributed.Client.get_versions
         for other in ("0.3.0", None):
@@ -106,30 +106,13 @@ def test_refuses_worker_with_other_version(monkeypatch):
                 Cluster(one.scheduler.address)
 
 
-def test_refuses_tls_without_certificates(tmp_path):
-    """A TLS address without certificates is refused with the reason of Dask."""
-    (tmp_path / "bench.toml").write_text(BENCH)
-    words = ["--over", "friction.static=0.2,0.3", "--executor", "dask:tls://127.0.0.1:1"]
-    answer = run_cli("sweep", tmp_path / "bench.toml", *words, "-o", tmp_path / "out")
-    assert answer.code == 4 and "no scheduler answers at this address (TLS" in answer.err
-
-
 @pytest.mark.parametrize("is_begun", [False, True])
 def test_lost_connection_says_how_to_go_on(is_begun):
     """A connection that is lost before the sweep or between two chunks gives an error that says how to go on.
 
     Once a connection that was lost before the first chunk gave the traceback of Dask.
     """
-    import distributed
-
-    with distributed.LocalCluster(
-        1,
-        processes=False,
-        protocol="tcp",
-        host="127.0.0.1",
-        dashboard_address=None,
-        silence_logs="CRITICAL",
-    ) as one:
+    with start_cluster() as one:
         executor = Cluster(one.scheduler.address)
         work = make_work(Path("a.toml"))
         if is_begun:

@@ -6,7 +6,6 @@ import signal
 import subprocess
 import sys
 import time
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -17,11 +16,9 @@ from scene_texts import BENCH, COULOMB, POINT, SHORT
 
 from patchfem.campaigns import (
     Cases,
-    Request,
     SweepScene,
     WorkerData,
     iterate_chunks,
-    read_sweep,
 )
 from patchfem.campaigns.sweeps import executors
 from patchfem.campaigns.sweeps.executors import LocalExecutor
@@ -29,7 +26,6 @@ from patchfem.campaigns.sweeps.executors.cluster import Cluster
 from patchfem.campaigns.sweeps.executors.pool import Pool
 from patchfem.campaigns.sweeps.sweep import ChunkQueue, WorkerDeath
 from patchfem.core import Missing, PatchfemError
-from patchfem.export.sweeps.run import SweepTarget, sweep_into
 from patchfem.runs import FAILED_OUTCOME, CaseResults
 from patchfem.runs.batch.case_results import join_case_results
 from patchfem.scene import read_assignments
@@ -122,45 +118,6 @@ def assert_only_killing_case_fails(tmp_path: Path, once: bool, executor) -> None
         assert results.outcome[number] == FAILED_OUTCOME and "died" in results.messages[number]
 
 
-def test_exact_chunk_size_follows_time_per_case():
-    """The size of a chunk follows the measured time per case."""
-    chunks = ChunkQueue(range(1000), 2)
-    assert len(chunks.take_chunk()) == 1
-    chunks.record_time([0], 0.02)
-    assert len(chunks.take_chunk()) == 50  # chunks of one second
-    chunks.record_time([0], 1e-6)
-    assert len(chunks.take_chunk()) == 238  # a quarter of the remaining cases for two workers
-
-
-def test_exact_batched_cases_are_given_in_full_batches():
-    """Cases that can be marched together are given to a worker in full batches."""
-    few = make_work(RIG, 20)
-    many = make_work(RIG, 300)
-    with_kept_runs = replace(make_work(RIG, 300), keep=print)
-    assert [
-        len(next(iterate_chunks(one, range(len(one.cases)), IdleExecutor()))[0])
-        for one in (few, many, with_kept_runs)
-    ] == [1, 256, 1]
-    chunks = ChunkQueue(range(200), 1, 64)
-    chunks.take_chunk()
-    chunks.record_time(range(64), 640.0)
-    assert (
-        len(chunks.take_chunk()) == 64
-        and len(chunks.take_chunk()) == 64
-        and len(chunks.take_chunk()) == 8
-    )
-
-
-class IdleExecutor:
-    """Executor that takes all chunks and computes nothing."""
-
-    workers = 1
-
-    def run(self, work: WorkerData, take, say=None):
-        while (chunk := take()) is not None:
-            yield chunk, 1.0, (None, [])
-
-
 def test_exact_cases_of_failed_chunk_are_repeated_alone():
     """The cases of a chunk with a failing case are repeated alone, and only the failing one is lost."""
     chunks = ChunkQueue(range(100), 1, 100)
@@ -212,29 +169,6 @@ sweep_into(sweep, cases, SweepTarget(Path(sys.argv[2])), Pool(2), report_progres
 def file_names(folder: Path) -> list:
     """Return the sorted names in a folder."""
     return sorted(one.name for one in folder.iterdir())
-
-
-def test_exact_progress_counts_stored_cases(tmp_path):
-    """The progress of a resumed sweep begins with the number of stored cases."""
-    (tmp_path / "rig.toml").write_text(RIG, encoding="utf-8")
-    progress = []
-
-    def sweep(values: str, resume: bool):
-        scene, cases = read_sweep(tmp_path / "rig.toml", (), Request([f"friction.static={values}"]))
-        target = SweepTarget(tmp_path / "out", resume=resume)
-        progress.clear()
-        sweep_into(
-            scene,
-            cases,
-            target,
-            LocalExecutor(),
-            report_progress=lambda *state: progress.append(state),
-        )
-
-    sweep("0.1,0.2", False)
-    assert progress[0] == (0, 2) and progress[-1] == (2, 2)
-    sweep("0.1,0.2,0.3,0.4,0.5", True)
-    assert progress[0] == (2, 5) and progress[-1] == (5, 5)
 
 
 @pytest.fixture(scope="module")

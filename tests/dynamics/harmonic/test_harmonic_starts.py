@@ -1,11 +1,12 @@
-"""Start values of the harmonic balance that lie close together."""
+"""Coexisting steady motions that lie close together."""
 
 import numpy as np
 import pytest
+from harmonic_motions import find_coexisting_motions
 from modal_bases import make_modal_basis
 
 from patchfem.core import G_N, SineDrive
-from patchfem.dynamics import Spring, find_branches
+from patchfem.dynamics import LawGroup, Spring
 from patchfem.dynamics.harmonic.laws import Jenkins
 
 
@@ -19,5 +20,6 @@ def test_exact_all_three_motions_near_fold_are_found():
     modes = make_modal_basis(w, 0.003, mass=mass)
     laws = [(0, Jenkins([limit / 1e-6], [1e-6])), (modes.output, Spring(0.0, 2e10))]
     for hertz in np.linspace(147.2, 147.6, 5):
-        points = find_branches(modes, SineDrive(6 * G_N, 2 * np.pi * hertz), laws)
+        drive = SineDrive(6 * G_N, 2 * np.pi * hertz)
+        points = find_coexisting_motions(modes, drive, LawGroup(modes, laws))
         assert [p.stable for p in points] == [True, False, True], hertz

@@ -16,10 +16,10 @@ from patchfem.export.surfaces import compare, sentences
 
 # what the first sentence must state for each code of the verdict
 STATED = {
-    "worn": "Worn depth 600.0 nm (596.0 to 604.0), the mean over the common length.",
+    "worn": "Worn depth 600.0 nm (596.0 to 604.0), the mean of the lost material over the common length.",
     "no_wear": "No wear is shown: the mean worn depth over the common length is at most 12 nm.",
     "grown": "40 um^2 stand above the first surface, 0 um^2 are lost",
-    "worn_and_grown": "(596.0 to 604.0), the mean over the common length, and material grew: 35 um^2 lost",
+    "worn_and_grown": "the mean of the lost material over the common length, and material grew: 35 um^2 lost",
     "growth_at_ends": "a scar of 2 um over the rest of the surface, or 2.1 um of material that grew at the ends: both are",
     "scar_or_bow": "Either a scar over all of the surface, up to 2 um deep on average, or a bent datum",
     "scar_or_drift": "Either wear of 20 nm, the mean over the",

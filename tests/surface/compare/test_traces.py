@@ -73,10 +73,9 @@ def test_exact_area_and_ends_of_parabola(depth):
     assert values["common_length"].value == pytest.approx(length, rel=1e-3)
 
 
-def test_exact_floor_of_flat_groove_and_gain():
-    """A flat groove has its depth as floor, whatever the offset, and the gain an interval around 1."""
-    worn = np.zeros(4000)
-    worn[1500:2500] = UM
+def test_exact_floor_of_skew_groove_and_gain():
+    """The fifth of a skew triangle around its tip is .9 times as deep as the tip; the gain has an interval around 1."""
+    worn = UM / 0.9 * np.interp(np.arange(4000), (1500, 2100, 2500), (0, 1, 0))
     before, after = make_pair(worn)
     found = compare_surfaces(before, Profile(after.x, after.z + 3 * UM, "after"))
     floor = found.track.values["depth_floor"]

@@ -18,7 +18,7 @@ from ....dynamics.harmonic.motion import SteadyMotion, find_cycle_energies, make
 from ....dynamics.harmonic.motion import find_regime as balanced_regime
 from ....dynamics.harmonic.stability import add_stability
 from ....dynamics.harmonic.steady import find_steady_motion as periodic_point
-from ....dynamics.harmonic.steady import refine_steady_motion
+from ....dynamics.harmonic.steady import list_coexisting_slides, refine_steady_motion
 from ....formatting import format_length, format_quantity
 from ....response.errors import finer_errors
 from ....response.measures import Values, compute_peak
@@ -260,15 +260,20 @@ class BalanceFinder:
             return StableMotion(motion, stability)
 
         # An unstable motion is not seen in a test, so that all motions under this drive are compared.
-        motions = branches.find_branches(self.modes, drive, self.group, self.tolerance)
-        stable_motions = [branch for branch in motions if branch.stable]
+        motions = []
+        for slides in list_coexisting_slides(motion, drive):
+            try:
+                found = self._solve_balance(drive, slides)
+            except NotConverged:
+                continue
+            motions.append(add_stability(found, self.modes))
+        output = self.modes.output
+        motions.sort(key=lambda each: each.amplitude(output))
+        stable_motions = [each for each in motions if each.stable]
         if not stable_motions:
             return StableMotion(motion, stability)
 
-        motion = self._solve_balance(drive, stable_motions[0])
-
-        output = self.modes.output
-        sizes = ", ".join(format_length(branch.amplitude(output), 3) for branch in motions)
+        sizes = ", ".join(format_length(each.amplitude(output), 3) for each in motions)
         note = (
             f"at this drive {len(motions)} steady motions exist (amplitudes {sizes}), "
             f"{len(stable_motions)} of them stable"
@@ -278,8 +283,7 @@ class BalanceFinder:
                 "; the stable motion of smallest amplitude is shown; accuracy.method = "
                 '"march" gives the motion that is reached from rest'
             )
-
-        return StableMotion(motion, add_stability(motion, self.modes), (note,))
+        return StableMotion(stable_motions[0], stable_motions[0], (note,))
 
     def observe(self, drive, guess=None, *, needs_histories: bool = True) -> ObservedMotion:
         """Compute what sensors see of the steady motion under a drive, without errors.
