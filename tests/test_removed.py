@@ -10,7 +10,7 @@ import pytest
 import surfaces
 from command_line import run_cli
 from lab_files import SI, make_record, write_universal
-from scene_texts import COATED, COULOMB, DRIVE, MODE, NONLOCAL, POINT, TRIANGLE
+from scene_texts import COATED, COULOMB, DRIVE, MODE, POINT
 
 import patchfem as pf
 from patchfem.inputs import read_slide
@@ -20,11 +20,6 @@ from patchfem.structure import universal
 from patchfem.surface import read_surface
 
 RIG = POINT + COULOMB + MODE + DRIVE
-GROOVED = (
-    MODE.join([POINT + 'grooves = {wavelength = "80 um", amplitude = "7.5 um"}\n', DRIVE]) + COULOMB
-)
-WORN = COATED + COULOMB + TRIANGLE + '[wear]\ncoefficient = "1e-15 1/Pa"\ncycles = 100\n'
-BONDS = POINT + NONLOCAL + MODE + DRIVE
 FILES = 'stiffness = "{0}"\nmass = "m.mtx"\nboundary = [1]\nmodes = 1\n'
 MASSES = """[structure]
 masses = ["1 kg", "1 kg"]
@@ -44,9 +39,9 @@ def load(text: str, keys: dict, folder) -> None:
     pf.load(text, **keys)
 
 
-def run_failing_command(words: tuple, folder) -> None:
+def run_failing_command(command: str, folder) -> None:
     """Run a command that fails with exit code 2, and raise its message."""
-    answer = run_cli(*words)
+    answer = run_cli(*command.split())
     assert answer.code == 2
     raise pf.PatchfemError(answer.err)
 
@@ -106,6 +101,32 @@ def import_shapes(folder: Path) -> None:
     pf.import_(write_universal(folder / "shapes.uff", [SI, shape]), folder / "modes.toml")
 
 
+COMMANDS = {  # removed option -> (command that uses it, replacement that the message names)
+    "fit --placebo": (
+        "fit a.toml --placebo friction.static=0.3",
+        "set another value of the key with --set",
+    ),
+    "fit --from-patch": ("fit a.toml --from-patch", "run the scene with its patch"),
+    "fit --amplitudes": ("fit a.toml --amplitudes 1um,2um", "leave it out"),
+    "fit --offset": ("fit a.toml --offset force", "subtract the offset"),
+    "fit --warm-up": ("fit a.toml --warm-up", "hold them out"),
+    "fit --resume": ("fit a.toml --resume", "fewer --starts"),
+    "fit --seed": ("fit a.toml --seed 1", "give more --starts"),
+    "fit --unstable": ("fit a.toml --unstable out", "--hold flag=U"),
+    "sweep --of": ("sweep a.toml --of loop_area", "choose the measure on the page"),
+    "plan --over": (
+        "plan a.toml --over friction.static=0.2,0.3",
+        "give the values of one case with --set",
+    ),
+    "import --segment": ("import a.uff -o b.toml --segment 2s", "fitted to the time record"),
+    "import --window": ("import a.uff -o b.toml --window hann", "fitted to the time record"),
+    "import -o .uff": ("import a.uff -o b.uff", "scipy.signal.csd"),
+    "export --of": ("export out -o a.vtu --of sigma_yy", "choose the field in ParaView"),
+    "compare with four files": (
+        "compare a.csv b.csv c.csv d.csv",
+        "compare each direction by itself",
+    ),
+}
 TRIED = {  # removed feature -> (function that uses it, replacement that the message names)
     "structure.mode.lateral": (
         partial(load, RIG, {"structure.mode.axial.lateral": 0.2}),
@@ -122,66 +143,6 @@ TRIED = {  # removed feature -> (function that uses it, replacement that the mes
     "value with a tolerance": (
         lambda folder: pf.sweep(RIG, {"friction.static": "0.3 +- 5 %"}),
         "write the range as low..high",
-    ),
-    "fit --placebo": (
-        partial(run_failing_command, ("fit", "a.toml", "--placebo", "friction.static=0.3")),
-        "set another value of the key with --set",
-    ),
-    "fit --from-patch": (
-        partial(run_failing_command, ("fit", "a.toml", "--from-patch")),
-        "run the scene with its patch",
-    ),
-    "fit --amplitudes": (
-        partial(run_failing_command, ("fit", "a.toml", "--amplitudes", "1 um,2 um")),
-        "leave it out",
-    ),
-    "fit --offset": (
-        partial(run_failing_command, ("fit", "a.toml", "--offset", "force")),
-        "subtract the offset",
-    ),
-    "fit --warm-up": (
-        partial(run_failing_command, ("fit", "a.toml", "--warm-up")),
-        "hold them out",
-    ),
-    "fit --resume": (
-        partial(run_failing_command, ("fit", "a.toml", "--resume")),
-        "fewer --starts",
-    ),
-    "fit --seed": (
-        partial(run_failing_command, ("fit", "a.toml", "--seed", "1")),
-        "give more --starts",
-    ),
-    "fit --unstable": (
-        partial(run_failing_command, ("fit", "a.toml", "--unstable", "out")),
-        "--hold flag=U",
-    ),
-    "sweep --of": (
-        partial(run_failing_command, ("sweep", "a.toml", "--of", "loop_area")),
-        "choose the measure on the page",
-    ),
-    "plan --over": (
-        partial(run_failing_command, ("plan", "a.toml", "--over", "friction.static=0.2,0.3")),
-        "give the values of one case with --set",
-    ),
-    "import --segment": (
-        partial(run_failing_command, ("import", "a.uff", "-o", "b.toml", "--segment", "2 s")),
-        "fitted to the time record",
-    ),
-    "import --window": (
-        partial(run_failing_command, ("import", "a.uff", "-o", "b.toml", "--window", "hann")),
-        "fitted to the time record",
-    ),
-    "import -o .uff": (
-        partial(run_failing_command, ("import", "a.uff", "-o", "b.uff")),
-        "scipy.signal.csd",
-    ),
-    "export --of": (
-        partial(run_failing_command, ("export", "out", "-o", "a.vtu", "--of", "sigma_yy")),
-        "choose the field in ParaView",
-    ),
-    "compare with four files": (
-        partial(run_failing_command, ("compare", "a.csv", "b.csv", "c.csv", "d.csv")),
-        "compare each direction by itself",
     ),
     "export of a structure as .npz": (export_structure, "exported as .mat"),
     "export of a script for ParaView": (export_script, "write .pvd for older versions"),
@@ -225,6 +186,10 @@ TRIED = {  # removed feature -> (function that uses it, replacement that the mes
     "slide in two directions": (read_two_directions, "leave out the column"),
     ".unv mesh": (partial(read_file, read_pieces, "pair.unv"), "use .med or .msh"),
 }
+TRIED |= {
+    name: (partial(run_failing_command, command), instead)
+    for name, (command, instead) in COMMANDS.items()
+}
 
 
 @pytest.mark.parametrize("name", TRIED)
@@ -238,18 +203,18 @@ def test_refuses_removed_feature(tmp_path, name):
     assert len(sentence.strip().splitlines()) == 1
 
 
-@pytest.mark.parametrize("name", ["offset", "warm_up", "resume", "seed", "unstable"])
-def test_refuses_removed_option_of_fit_in_python(name):
-    """A removed option of a fit is no unknown key in Python: the message says what to use instead."""
-    with pytest.raises(pf.PatchfemError, match=f"^fit: {name} was removed in patchfem 1.10; "):
-        pf.fit(RIG, "loop.csv", free={"friction.static": (0.1, 0.6)}, **{name: 1})
-
-
-@pytest.mark.parametrize("name", ["segment", "window"])
-def test_refuses_removed_option_of_import_in_python(name):
-    """A removed option of an import is refused in Python with what to use instead."""
-    with pytest.raises(pf.PatchfemError, match=f"^import: {name} was removed in patchfem 1.10; "):
-        pf.import_("a.csv", "b.toml", **{name: "2 s"})
+@pytest.mark.parametrize(
+    "verb, name",
+    [("fit", name) for name in ("offset", "warm_up", "resume", "seed", "unstable")]
+    + [("import", name) for name in ("segment", "window")],
+)
+def test_refuses_removed_option_in_python(verb, name):
+    """A removed option of a fit or an import is no unknown key in Python: the message says what to use instead."""
+    with pytest.raises(pf.PatchfemError, match=f"^{verb}: {name} was removed in patchfem 1.10; "):
+        if verb == "fit":
+            pf.fit(RIG, "loop.csv", free={"friction.static": (0.1, 0.6)}, **{name: 1})
+        else:
+            pf.import_("a.csv", "b.toml", **{name: "2 s"})
 
 
 def test_always_all_removed_features_are_tested():

@@ -25,13 +25,6 @@ from patchfem.structure import make_release
 FOLDER = Path(__file__).parent
 POINTS = 20  # points per cycle at which relative displacements are compared
 TRUTH = 204800  # steps per cycle of the reference solution of the patch, a time march
-# names of the problems in `switched`
-KIND = {
-    "decay": "block",
-    "block": "block",
-    "two": "two",
-    "patch": "patch",
-}
 POINT = ("decay", "block", "two")  # problems with point contacts
 ALL = ("decay", "block", "two", "patch")  # all problems
 
@@ -42,7 +35,7 @@ class Problem:
 
     `limit` is the friction limit [N] of one Coulomb interface, `elements` are (stiffness [N/m],
     yield displacement [m]) of elastic-plastic elements. `numbers` describes the same problem for
-    another program, as in `switched`. `size` is the size of a state for absolute tolerances,
+    the rates of `switched`. `size` is the size of a state for absolute tolerances,
     `longest` the largest step in cycles that does not pass over an event. The error is taken over
     the `last` cycles, against the slide `truth` (k,) [m] at `times`.
     """

@@ -11,7 +11,7 @@ from scipy.integrate import solve_ivp
 
 sys.path.insert(0, str(Path(__file__).parent))
 sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
-from engine_problems import ALL, KIND, POINT, POINTS, Problem, hybrid, march
+from engine_problems import ALL, POINT, POINTS, Problem, hybrid, march
 from report_methods import Motion, coulomb, solve_duhamel, solve_euler, solve_newmark
 from switched import PROBLEMS, follow
 
@@ -139,7 +139,7 @@ def slide_and_events(one: Problem, tolerance: float, longest: float) -> tuple:
         Longest step in cycles.
     """
     return follow(
-        PROBLEMS[KIND[one.name]](**one.numbers), advancer(tolerance, one.size), one.times, longest
+        PROBLEMS[one.name](**one.numbers), advancer(tolerance, one.size), one.times, longest
     )
 
 

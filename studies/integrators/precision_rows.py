@@ -1,112 +1,80 @@
 """Measuring every engine on every problem, and comparing their times at equal error."""
 
 import sys
-from importlib.metadata import version
 from pathlib import Path
 from time import process_time
 
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parent))
-sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
-from engine_peers import PEERS
-from engine_problems import ALL, problem
+from engine_problems import ALL, Problem, problem
 from engines import OURS
-from peer import Peer, interpolate_seconds, ratio_text
 
-from patchfem.core import Missing, PatchfemError
+from patchfem.core import PatchfemError
 
 EQUAL = (1e-2, 1e-3, 1e-4, 1e-6)  # errors at which CPU times are compared
 FLOOR = 1e-13  # smaller errors are drawn and compared as this error
 
 
-def run_once(work, one, knob) -> tuple:
-    """Run an engine of this package once; return the slide and the CPU seconds.
-
-    Parameters
-    ----------
-    work : callable
-    one : Problem
-    knob : int or float
-        Steps per cycle or tolerance.
-    """
-    start = process_time()
-    slide = work(one, knob)
-    return slide, process_time() - start
-
-
-def measure(names=ALL, ours=OURS, peers=PEERS, repeats: int = 3) -> tuple:
-    """Measure the error of each engine and the smallest CPU seconds of several runs.
+def measure(names=ALL, ours=OURS, repeats: int = 3) -> list[dict]:
+    """Measure the error of each engine and the smallest CPU seconds of several turns.
 
     Parameters
     ----------
     names : sequence of str
         Problems.
-    ours, peers : dict
-        Engines of this package and other programs.
+    ours : dict
+        Engines, as `OURS`.
     repeats : int
         Number of turns.
 
     Returns
     -------
-    tuple
-        Rows, versions of the peers, and absent peers with the reason.
+    list of dict
+        A row for each problem, engine and setting.
     """
-    children = {}
-    versions = {"scipy": version("scipy")}
-    absent = {}
-    found = {}
-    try:
-        for name, (_, _, _, script, variable, remedy) in peers.items():
-            try:
-                children[name] = Peer(name, script, variable, sys.executable, remedy)
-                versions[name] = children[name].version
-            except Missing as missing:
-                absent[name] = f"skipped: {name} is not installed ({variable}: {remedy})"
-                print(missing, file=sys.stderr)
-        tasks = [
-            (p, name, knob, work, None)
-            for name, (work, knobs, where) in ours.items()
-            for p in names
-            if p in where
-            for knob in knobs
-        ]
-        tasks += [
-            (p, name, knob, peers[name][0], child)
-            for name, child in children.items()
-            for p in names
-            if p in peers[name][2]
-            for knob in peers[name][1]
-        ]
-        for _ in range(repeats):
-            for where, name, knob, work, child in tasks:
-                _turn(found, where, name, knob, work, child)
-    finally:
-        for child in children.values():
-            child.__exit__()
-    return list(found.values()), versions, absent
+    tasks = [
+        (where, name, knob, work)
+        for name, (work, knobs, problems) in ours.items()
+        for where in names
+        if where in problems
+        for knob in knobs
+    ]
+    rows = {}
+    for _ in range(repeats):
+        for where, name, knob, work in tasks:
+            measure_once(rows, problem(where), name, knob, work)
+    return list(rows.values())
 
 
-def _turn(found: dict, where: str, name: str, knob, work, child) -> None:
-    one = problem(where)
+def measure_once(rows: dict, one: Problem, name: str, knob: float, work) -> None:
+    """Run an engine once; add its row, or keep the smaller CPU seconds.
+
+    Parameters
+    ----------
+    rows : dict
+        Rows by problem, engine and setting, which are changed.
+    one : Problem
+    name : str
+        Engine.
+    knob : float
+        Steps per cycle or tolerance.
+    work : callable
+        work(one, knob) returns the slide.
+    """
+    key = one.name, name, knob
+    row = {"problem": one.name, "engine": name, "knob": knob, "error": None, "seconds": None}
+    start = process_time()
     try:
-        slide, seconds = run_once(work, one, knob) if child is None else work(child, one, knob)
+        slide = work(one, knob)
     except (PatchfemError, RuntimeError) as error:
-        found[where, name, knob] = {
-            "problem": where,
-            "engine": name,
-            "knob": knob,
-            "error": None,
-            "seconds": None,
-            "failed": str(error),
-        }
+        rows[key] = row | {"failed": str(error)}
         return
-    error = max(one.error(slide), FLOOR) if np.all(np.isfinite(slide)) else None
-    row = found.setdefault(
-        (where, name, knob),
-        {"problem": where, "engine": name, "knob": knob, "error": error, "seconds": seconds},
-    )
-    row["seconds"] = min(row["seconds"], seconds) if row["seconds"] is not None else seconds
+    row["seconds"] = process_time() - start
+    if np.all(np.isfinite(slide)):
+        row["error"] = max(one.error(slide), FLOOR)
+    first = rows.setdefault(key, row)
+    first["seconds"] = min(first["seconds"], row["seconds"])
 
 
 def curve(rows: list, where: str, name: str) -> tuple:
@@ -161,3 +129,42 @@ def ratios(rows: list, where: str, reference: str) -> dict:
                 theirs, mine, sign if other != "<" else ""
             )
     return out
+
+
+def interpolate_seconds(error: float, errors, seconds) -> tuple:
+    """Interpolate the seconds at which a curve of falling errors reaches `error`, log-log.
+
+    Parameters
+    ----------
+    error : float
+    errors, seconds : sequence of float
+        Points of the curve.
+
+    Returns
+    -------
+    tuple
+        Seconds and a sign: "" inside the curve, "<" if its coarsest point is already better (fewer seconds suffice),
+        ">" if its finest point is worse.
+    """
+    order = np.argsort(errors)
+    e = np.asarray(errors, float)[order]
+    t = np.asarray(seconds, float)[order]
+    sign = ""
+    if error > e[-1]:
+        sign = "<"
+    elif error < e[0]:
+        sign = ">"
+    return float(np.exp(np.interp(np.log(error), np.log(e), np.log(t)))), sign
+
+
+def ratio_text(theirs: float, ours: float, sign: str) -> str:
+    """Format the ratio of two times, or a bound of it if one of them is a bound.
+
+    Parameters
+    ----------
+    theirs, ours : float
+        [s]
+    sign : {"", "<", ">"}
+        From `interpolate_seconds`.
+    """
+    return {"<": "> ", ">": "< ", "": ""}[sign] + f"{theirs / ours:.2g}"

@@ -133,7 +133,7 @@ class TwoMasses:
         return y[:, 1]
 
 
-PROBLEMS = {"block": Block, "two": TwoMasses, "patch": Patch}
+PROBLEMS = {"decay": Block, "block": Block, "two": TwoMasses, "patch": Patch}
 
 
 def follow(problem, advance, times, share: float):

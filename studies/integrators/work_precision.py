@@ -20,7 +20,9 @@ steps with the limit tanh(v/1e-3) end at 2 % of the block, which is the error of
 about sticking by speed and force, with the stick speed limit h/m, is of second order, but of first order where the motion
 reverses without sticking (free decay); there Siconos is of second order.
 
-Run: python studies/integrators/work_precision.py            (the block once, with the peers that are installed)
+The rows of CVODE and Siconos are those of version 1.10, whose `sundials_child.py` and `siconos_child.py` ran them.
+
+Run: python studies/integrators/work_precision.py            (the block once)
      python studies/integrators/work_precision.py --full     (all, three turns; writes the table and the picture)
      python studies/integrators/work_precision.py draw       (the picture again from the measured table)
 """
@@ -34,7 +36,6 @@ from threadpoolctl import threadpool_limits
 sys.path.insert(0, str(Path(__file__).parent))
 sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
 from drawing import BLUE, GREY, ORANGE, drawing
-from engine_peers import PEERS
 from engine_problems import ALL
 from engines import OURS
 from measuring import run
@@ -107,8 +108,6 @@ def report(table: dict) -> None:
                 f"  {row['problem']:6} {row['engine']:24} {row['knob']:8g}  error {row['error']:.1e}  "
                 f"{1e3 * row['seconds']:9.2f} ms"
             )
-    for text in table["absent"].values():
-        print(text)
     for where in dict.fromkeys(r["problem"] for r in table["rows"]):
         reference = {"decay": "newmark, and force"}.get(where, "hybrid")
         print(f"{TITLES[where]}: CPU time over that of '{reference}' at an error of {EQUAL}")
@@ -116,11 +115,16 @@ def report(table: dict) -> None:
             print(f"  {name:24} " + "  ".join(f"{found[error]:>9}" for error in EQUAL))
 
 
-def main(names=ALL, ours=OURS, peers=PEERS, repeats: int = 3, path: Path | None = TABLE) -> dict:
-    """Measure and print all engines, write a picture if `path` is given, and return {rows, versions, absent}."""
+def main(names=ALL, ours=OURS, repeats: int = 3, path: Path | None = TABLE) -> dict:
+    """Measure and print all engines, and write the table if `path` is given; return {rows, versions}.
+
+    The rows of other programs are those of the saved table.
+    """
+    table = json.loads(TABLE.read_text())
     with threadpool_limits(1):
-        rows, versions, absent = measure(names, ours, peers, repeats)
-    table = {"rows": rows, "versions": versions, "absent": absent}
+        rows = measure(names, ours, repeats)
+    others = [row for row in table["rows"] if row["engine"] not in OURS and row["problem"] in names]
+    table["rows"] = rows + others
     if path is not None:
         path.write_text(json.dumps(table, indent=0) + "\n")
     report(table)

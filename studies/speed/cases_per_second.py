@@ -9,9 +9,9 @@ DOP853 1.6. Two cores did much else; with less beside it, an earlier run gave 12
 Random blocks on a spring (m = k = 1, damping ratio .003 to .1, friction .1 to .9 of the push) under 200 cycles of a
 base acceleration at their own frequency, from rest; the amplitude in the last cycle beside that of method "exact".
 The marched cases and method "exact" are timed from the values of the keys to columns of some 20 measures with
-error bars; the loop of thirty lines gives an amplitude alone, and no error; SciPy's DOP853 went from event to event, in
-Python, no step longer than an eighth of a cycle, on the first three of the same cases (this file at be63a014). CPU
-seconds of one thread, all in one run, compiled code made before.
+error bars; the loop of thirty lines (this file of version 1.10) gives an amplitude alone, and no error; SciPy's DOP853 went
+from event to event, in Python, no step longer than an eighth of a cycle, on the first three of the same cases (this file at
+be63a014). CPU seconds of one thread, all in one run, compiled code made before.
 
 Run: python studies/speed/cases_per_second.py            (2000 cases)
      python studies/speed/cases_per_second.py --laws     (whole sweeps of all laws and of patches)
@@ -26,7 +26,6 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
 from measuring import measure_seconds, run
-from numba import njit
 from rig_texts import TEXTS
 
 from patchfem.campaigns import Cases, SweepScene
@@ -36,7 +35,7 @@ from patchfem.campaigns.sweeps.sweep_table import SweepTable
 from patchfem.scene import loads, make_axis
 
 CYCLES = 200  # cycles of a run
-LANES = 64  # cases that the loop integrates together
+N_WARM = 64  # cases that compile and import before the measured ones
 AMPLITUDE = "relative_displacement_amplitude"
 SCENE = f"""[normal]
 load = "1 N"
@@ -64,96 +63,6 @@ def draw_blocks(count: int, seed: int = 1) -> np.ndarray:
     """Return the ratio of friction to force and the damping ratio (count, 2) of random blocks."""
     r = np.random.default_rng(seed)
     return np.stack([r.uniform(0.1, 0.9, count), 10 ** r.uniform(np.log10(0.003), -1, count)], 1)
-
-
-@njit(fastmath=True, error_model="numpy")
-def loop(limit, turn, part, steps, cycles, out):
-    """Integrate n blocks by a loop of thirty lines, LANES cases at a time.
-
-    Parameters
-    ----------
-    limit : (n,) array
-        Friction limit.
-    turn : (4, n) array
-        Map of place and speed over a step without a push.
-    part : (n,) array
-        Cosine part of the motion without friction.
-    steps, cycles : int
-    out : (n,) array
-        Amplitudes.
-    """
-    # one array, so that the compiler knows all strides
-    h = 2 * np.pi / steps
-    n = LANES
-    room = np.zeros(11 * LANES)
-    for first in range(0, len(limit), n):
-        room[:] = 0.0
-        for i in range(n):
-            room[5 * n + i] = limit[first + i]
-            room[6 * n + i] = part[first + i]
-            for m in range(4):
-                room[(7 + m) * n + i] = turn[m, first + i]
-        for k in range(cycles * steps):
-            s0 = np.sin(h * k)
-            c0 = np.cos(h * k)
-            s1 = np.sin(h * (k + 1))
-            c1 = np.cos(h * (k + 1))
-            last = 1.0 if k >= (cycles - 1) * steps else 0.0
-            for i in range(n):
-                y = room[i]
-                u = room[n + i]
-                w = room[2 * n + i]
-                f = room[5 * n + i]
-                p = room[6 * n + i]
-                # deviation from the motion without friction
-                e = y - p * c0 + w * f
-                d = u + p * s0
-                y1 = room[7 * n + i] * e + room[8 * n + i] * d + p * c1 - w * f
-                u1 = room[9 * n + i] * e + room[10 * n + i] * d - p * s1
-                # the time of a stop follows from a linear velocity
-                t = u / (u - u1) if w * u1 < 0.0 else 1.0
-                ys = y + 0.5 * h * t * u if w * u1 < 0.0 else y1
-                rest = (1.0 - t) * h
-                need = -(s0 + t * (s1 - s0)) - ys
-                back = 1.0 if w * u1 < 0.0 and abs(need) > f else 0.0  # reversal without sticking
-                n0 = -s0 - y
-                n1 = -s1 - y
-                goes = 1.0 if w == 0.0 and abs(n1) > f else 0.0
-                share = (abs(n1) - f) / abs(n1 - n0) if goes > 0.0 else 0.0
-                r = h * (share if share < 1.0 else 1.0)
-                jerk = (n1 - n0) / h
-                moved = ys + back * 0.5 * (need + w * f) * rest * rest
-                fast = back * (need + w * f) * rest if w * u1 < 0.0 else u1
-                room[i] = moved if w != 0.0 else y + jerk * r * r * r / 6
-                room[n + i] = fast if w != 0.0 else jerk * r * r / 2
-                side = 1.0 if n1 > 0.0 else -1.0
-                room[2 * n + i] = goes * side if w == 0.0 else -w * back if w * u1 < 0.0 else w
-                top = ys if ys > room[i] else room[i]
-                low = ys if ys < room[i] else room[i]
-                room[3 * n + i] = (
-                    top if top * last > room[3 * n + i] or last == 0.0 else room[3 * n + i]
-                )
-                room[4 * n + i] = (
-                    low if low * last < room[4 * n + i] or last == 0.0 else room[4 * n + i]
-                )
-        for i in range(n):
-            out[first + i] = (room[3 * n + i] - room[4 * n + i]) / 2
-
-
-def by_loop(cases: np.ndarray, steps: int) -> np.ndarray:
-    """Return the amplitudes (n,) of the loop."""
-    whole = np.resize(cases, (-(-len(cases) // LANES) * LANES, 2))
-    limit = whole[:, 0].copy()
-    zeta = whole[:, 1]
-    h = 2 * np.pi / steps
-    out = np.empty(len(whole))
-    w = np.sqrt(1 - zeta**2)
-    decay = np.exp(-zeta * h)
-    c = np.cos(w * h)
-    s = np.sin(w * h) / w
-    turn = decay * np.array([c + zeta * s, s, -s, c - zeta * s])
-    loop(limit, turn, 1 / (2 * zeta), steps, CYCLES, out)
-    return out[: len(cases)]
 
 
 def compute(sweep_scene: SweepScene, cases: Cases) -> SweepTable:
@@ -336,28 +245,20 @@ def families(seed: int = 1, names=tuple(FAMILIES), goes: int = 3, share: float =
     return rows
 
 
-def main(count: int = 2000, steps=(100, 200, 400, 800)) -> list[dict]:
-    """Measure all methods, print them and return the rows."""
+def main(count: int = 2000) -> list[dict]:
+    """Measure both ways, print them and return the rows."""
     cases = draw_blocks(count)
-    warm = cases[:LANES]
-    for way in (by_patchfem, by_exact, lambda some: by_loop(some, 20)):
-        way(warm)
+    for way in (by_patchfem, by_exact):
+        way(cases[:N_WARM])
     found, seconds = measure_seconds(lambda: by_exact(cases))
     exact = found.measures[AMPLITUDE].values.copy()
     rows = [row("exact engine, one by one", "", seconds, exact, exact)]
     found, seconds = measure_seconds(lambda: by_patchfem(cases))
-    rows.append(
-        row("together, with bars", "1e-3", seconds, found.measures[AMPLITUDE].values, exact)
-    )
-    miss = (
-        np.abs(found.measures[AMPLITUDE].values - exact)
-        > found.measures[AMPLITUDE].errors + 1e-12 * exact
-    )
+    amplitude = found.measures[AMPLITUDE]
+    rows.append(row("together, with bars", "1e-3", seconds, amplitude.values, exact))
+    miss = np.abs(amplitude.values - exact) > amplitude.errors + 1e-12 * exact
     rows[-1]["outside"] = int(miss.sum())
     print(f"  outside their bars: {miss.sum()} of {count}")
-    for one in steps:
-        amplitudes, seconds = measure_seconds(lambda one=one: by_loop(cases, one))
-        rows.append(row("loop of thirty lines", str(one), seconds, amplitudes, exact))
     return rows
 
 

@@ -4,9 +4,8 @@ import dataclasses
 
 import numpy as np
 import pytest
-from hybrid_campaign import find_errors
 from hybrid_cases import coulomb, make_modes, make_oscillator
-from hybrid_rigs import draw_spec, make_case
+from random_rigs import RIGS, make_case
 
 from patchfem.core import SineDrive
 from patchfem.hybrid import cases, drives, runs
@@ -53,28 +52,10 @@ def test_histories_are_those_of_the_dense_output():
     assert ledger[0, -1] - ledger[0, 0] == pytest.approx(0.8 * path, rel=1e-5)
 
 
-def test_errors_hold_on_random_rigs():
-    """Errors of the default tolerance against a tolerance of 1e-11: at least 95 % of all values hold."""
-    inside = []
-    for seed in range(200, 240):
-        spec = draw_spec(seed)
-        motion = runs.run_case(make_case(spec))
-        exact = runs.run_case(make_case(spec, rtol=1e-11))
-        errors = find_errors(spec, motion.values)
-        for name, value in exact.values.items():
-            error = errors[name]
-            if name != "energy_balance" and np.isfinite(error):
-                inside.append(
-                    abs(motion.values[name] - value) <= error + 1e-12 * abs(value) + 1e-18
-                )
-    assert len(inside) > 500
-    assert np.mean(inside) > 0.95
-
-
-@pytest.mark.parametrize("seed", [4, 7, 16, 38, 13])
-def test_energy_is_balanced(seed):
+@pytest.mark.parametrize("name", ["4", "7", "16", "38", "13"])
+def test_energy_is_balanced(name):
     """Work of the drive = energy of the modes + friction + dampers, whatever the laws."""
-    motion = runs.run_case(make_case(draw_spec(seed), rtol=1e-11))
+    motion = runs.run_case(make_case(RIGS[name]["spec"], rtol=1e-11))
     assert motion.values["energy_balance"] < 1e-9
 
 

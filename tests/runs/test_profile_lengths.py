@@ -51,7 +51,7 @@ def test_exact_rounded_punch_as_profile_agrees_with_closed_form(tmp_path, tolera
 
 
 # Contact length [m], approach [m], peak [Pa] and stiffness [N/m] of elements of order 5
-# (support/patch_of_order_four.py agrees).
+# (support/patch_of_order_four.py of version 1.10 agrees).
 CROWN_REFERENCE = (2 * 3.7177189e-4, 2.8687086e-7, 1.46972585e7, 3.66814797e10 * 12.7e-3)
 
 

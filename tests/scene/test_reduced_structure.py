@@ -10,7 +10,7 @@ from scipy.io import mmwrite
 import patchfem as pf
 from patchfem.response import ERROR_MEASURES
 
-COUNT = 40
+COUNT = 16
 SCENE = """\
 [structure]
 output_mass = 2
@@ -18,7 +18,7 @@ output_mass = 2
 stiffness = "k.mtx"
 mass = "both.npz"
 damping = "both.npz"
-boundary = [40, 25]
+boundary = [16, 11]
 modes = 4
 [[structure.interface]]
 between = [1, 0]
@@ -34,15 +34,15 @@ cycles = 4
 """
 WHOLE = SCENE[: SCENE.index("[structure.reduced]")].replace(
     "output_mass = 2", 'file = "whole.npz"'
-) + SCENE[SCENE.index("[[structure.interface]]") :].replace("[1, 0]", "[40, 0]")
+) + SCENE[SCENE.index("[[structure.interface]]") :].replace("[1, 0]", "[16, 0]")
 
 ONCE = {"accuracy.max_seconds": 1e-3}  # a run is not repeated with smaller steps
 
 
 @pytest.fixture
 def matrix_folder(tmp_path):
-    """Return a folder with the matrices of a chain of 40 masses that is fixed at one end."""
-    k = 1e7
+    """Return a folder with the matrices of a chain of 16 masses that is fixed at one end."""
+    k = 2e6
     m = 0.02
     K = k * (2 * np.eye(COUNT) - np.eye(COUNT, k=1) - np.eye(COUNT, k=-1))
     K[-1, -1] = k
@@ -52,7 +52,7 @@ def matrix_folder(tmp_path):
     mmwrite(tmp_path / "mm.mtx", sparse.coo_array(K / 1e3), symmetry="symmetric")
     np.savez(tmp_path / "both.npz", M=M, C=C)
     np.savez(tmp_path / "milli.npz", M=M / 1e3, C=C / 1e3)
-    np.savez(tmp_path / "whole.npz", M=M, K=K, C=C, output=np.eye(COUNT)[24])
+    np.savez(tmp_path / "whole.npz", M=M, K=K, C=C, output=np.eye(COUNT)[10])
     np.savez(tmp_path / "small.npz", M=M[:9, :9])
     skew = M.copy()
     skew[0, 3] = 1.0
@@ -88,7 +88,7 @@ def test_always_reduction_errors_cover_full_matrices(matrix_folder, method):
         pairs = [(SCENE, f'method = "{method}"\nmodes = 4'), (WHOLE, "")]
         found = []
         for text, put in pairs:
-            mass = "mass = 1" if text is SCENE else "mass = 40"
+            mass = "mass = 1" if text is SCENE else "mass = 16"
             text = text.replace("modes = 4", put).replace(old or "\0", new)
             text = text.replace(pushed or "\0", f'force = "60 N"\n{mass}')
             found.append(run_scene(matrix_folder, text))
@@ -136,7 +136,7 @@ def test_exact_units_and_node_names_give_same_structure(matrix_folder):
             SCENE.replace("k.mtx", "mm.mtx")
             .replace("both", "milli")
             .replace("modes = 4", 'modes = 4\nunit = "1 mm"'),
-            SCENE.replace("modes = 4", 'modes = 4\nmoved = ["1..20", "21..39:10", "22..40:10"]'),
+            SCENE.replace("modes = 4", 'modes = 4\nmoved = ["1..8", "9..15:4", "10..16:4"]'),
         )
     )
     for other in (milli, named):
@@ -156,17 +156,17 @@ def test_exact_base_moves_mass_of_x_direction_only(matrix_folder):
     text = (
         SCENE.replace("k.mtx", "named.mtx")
         .replace("both.npz", "mass.mtx", 1)
-        .replace("[40, 25]", '["40:y", "25:x"]')
+        .replace("[16, 11]", '["16:y", "11:x"]')
         .replace('damping = "both.npz"', "damping = 0.01")
     )
     (matrix_folder / "mass.mtx").write_text(
         "\n".join(f"{i + 1},{1 + i % 2},{i + 1},{1 + i % 2},0.02" for i in range(COUNT))
     )
-    model = pf.build(pf.load(write_scene(matrix_folder, text.replace("modes = 4", "modes = 38"))))
-    np.testing.assert_allclose((model.rig.modes.base**2).sum(), 20 * 0.02, rtol=1e-9)
-    (matrix_folder / "scene.toml").write_text(text.replace("25:x", "25:z"))
+    model = pf.build(pf.load(write_scene(matrix_folder, text.replace("modes = 4", "modes = 14"))))
+    np.testing.assert_allclose((model.rig.modes.base**2).sum(), 8 * 0.02, rtol=1e-9)
+    (matrix_folder / "scene.toml").write_text(text.replace("11:x", "11:z"))
     answer = run_cli("check", matrix_folder / "scene.toml")
-    assert answer.code == 2 and "the files have no 25:z; node 25 has x" in answer.err
+    assert answer.code == 2 and "the files have no 11:z; node 11 has x" in answer.err
 
 
 def write_scene(matrix_folder, text):
@@ -178,18 +178,18 @@ def write_scene(matrix_folder, text):
 REFUSED = {
     (
         "boundary",
-        "[40, 25]",
-        "[40, 41]",
-    ): "there is no coordinate 41: the matrices have 40, numbered from 1",
-    ("boundary", "[40, 25]", "[40, 40]"): "names 40 twice; name each coordinate once",
-    ("boundary", "[40, 25]", '["40:x", 2]'): "'40:x' names a node, but the files name no nodes",
+        "[16, 11]",
+        "[16, 17]",
+    ): "there is no coordinate 17: the matrices have 16, numbered from 1",
+    ("boundary", "[16, 11]", "[16, 16]"): "names 16 twice; name each coordinate once",
+    ("boundary", "[16, 11]", '["16:x", 2]'): "'16:x' names a node, but the files name no nodes",
     (
         "mass",
         '"both.npz"',
         '"k.mtx"',
     ): "contains the same numbers as the stiffness; give the file of the mass",
     ("stiffness", "k.mtx", "whole.mtx"): "there is no file",
-    ("mass", "both.npz", "small.npz"): "the matrices differ in size: 40 x 40 and 9 x 9",
+    ("mass", "both.npz", "small.npz"): "the matrices differ in size: 16 x 16 and 9 x 9",
     (
         "mass",
         "both.npz",
@@ -205,7 +205,7 @@ REFUSED = {
         "moved",
         "modes = 4",
         'modes = 4\nmoved = ["1..60"]',
-    ): "'1..60' is not a range of rows from 1 to 40",
+    ): "'1..60' is not a range of rows from 1 to 16",
     ("slide", "modes = 4", "modes = 4\nslide = [1, 0]"): "applies only to [friction]",
 }
 

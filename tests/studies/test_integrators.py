@@ -6,8 +6,6 @@ import sys
 import pytest
 from study_module import make_study_fixture
 
-from patchfem.core import Missing
-
 work = make_study_fixture("integrators/work_precision.py")
 
 
@@ -21,12 +19,6 @@ def engines(work):
 def problem(work):
     """Function that makes a test problem from its name."""
     return sys.modules["engine_problems"].problem
-
-
-@pytest.fixture(scope="module")
-def rows(work):
-    """Module that computes the rows of the work-precision table."""
-    return sys.modules["precision_rows"]
 
 
 @pytest.fixture(scope="module")
@@ -105,23 +97,3 @@ def test_exact_saved_table_supports_the_stated_conclusions(work, table):
         found = work.ratios(table["rows"], where, "hybrid")
         for name, ratio in stated.items():
             assert float(found[name][error].strip("<> ")) == pytest.approx(ratio, rel=0.05)
-
-
-@pytest.mark.share(0, 3)
-@pytest.mark.parametrize(
-    "name, knob, error", [("SUNDIALS CVODE", 1e-8, 5e-6), ("Siconos, theta 1/2", 1000, 5e-4)]
-)
-@pytest.mark.parametrize("where", ["decay", "block", "two"])
-def test_exact_peer_programs_agree_with_the_reference_motion(
-    problem, work, rows, name, knob, error, where
-):
-    """SUNDIALS and Siconos agree with the reference motion within the stated error."""
-    ask, _, _, script, variable, remedy = work.PEERS[name]
-    try:
-        peer = rows.Peer(name, script, variable, sys.executable, remedy)
-    except Missing as absent:
-        pytest.skip(str(absent))
-    with peer:
-        case = problem(where)
-        slide, seconds = ask(peer, case, knob)
-    assert case.error(slide) < error and seconds > 0

@@ -32,7 +32,7 @@ UNITS = {"friction.static": "", "friction.bond_length": " m", "friction.stiffnes
 SLIDE = '[slide]\nkind = "sine"\namplitude = "10 um"\nfrequency = "100 Hz"\ncycles = 2\n'
 
 
-def compare_fit(seed: int, folder: Path, earlier: dict | None = None) -> dict:
+def compare_fit(seed: int, folder: Path) -> dict:
     """Compare the intervals of a fit with the true values; see `campaigns`."""
     rng = np.random.default_rng(seed)
     begin = process_time()

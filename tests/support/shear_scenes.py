@@ -177,17 +177,17 @@ def compare_scene(text: str, sets: dict, tolerance: float, names) -> dict:
     return line | {"rows": measure_rows(result.measures, truths, {})}
 
 
-def compare_joint(seed: int, folder: Path, earlier: dict | None = None) -> dict:
+def compare_joint(seed: int, folder: Path) -> dict:
     """Compare the joint of a seed; see `campaigns`."""
     return compare_scene(*draw_joint(seed), JOINT_TOLERANCE, BENCH)
 
 
-def compare_rig(seed: int, folder: Path, earlier: dict | None = None) -> dict:
+def compare_rig(seed: int, folder: Path) -> dict:
     """Compare the rig of a seed; see `campaigns`."""
     return compare_scene(*draw_rig(seed), RIG_TOLERANCE, MOTION)
 
 
-def compare_chain(seed: int, folder: Path, earlier: dict | None = None) -> dict:
+def compare_chain(seed: int, folder: Path) -> dict:
     """Compare the chain of a seed; see `campaigns`."""
     return compare_scene(
         *draw_chain(seed), RIG_TOLERANCE, (*MOTION, *(f"{name}_2" for name in INTERFACE_MEASURES))

@@ -345,7 +345,7 @@ def compare_pair(kind: str, before, after, truths: dict) -> dict:
     return {"rows": rows, "outcome": verdict, "group": kind}
 
 
-def compare_traces(seed: int, folder, earlier) -> dict:
+def compare_traces(seed: int, folder) -> dict:
     """Compare the traces of a seed; see `campaigns`."""
     pair = draw_pair(KINDS[seed % len(KINDS)], seed)
     area = (
@@ -354,7 +354,7 @@ def compare_traces(seed: int, folder, earlier) -> dict:
     return compare_pair(pair.kind, *make_profiles(pair), {"worn_area": area})
 
 
-def compare_scans(seed: int, folder, earlier) -> dict:
+def compare_scans(seed: int, folder) -> dict:
     """Compare the scans of a seed; see `campaigns`."""
     pair = draw_scans(SCAN_KINDS[seed % len(SCAN_KINDS)], seed)
     return compare_pair(pair.kind, pair.before, pair.after, {"worn_volume": pair.worn_volume})
