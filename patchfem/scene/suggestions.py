@@ -168,7 +168,7 @@ def _suggest_name(
             (name for name in fitting if words & set(name.split("_")) or name.startswith(word)),
             lacking if len(lacking) == 1 or not is_set else (),
             _list_similar(key, free),
-            _list_similar(key, written & keys.keys()),
+            _list_similar(key, written & keys.keys() if table_key else keys),
         ),
         "",
     )
