@@ -21,7 +21,7 @@ point at rest is released, is halved up to the last level.
 
 import numpy as np
 
-from ..compiled.flags_kernels import NJIT_CALL, NJIT_INLINE, NJIT_KERNEL
+from ..compiled.flags_kernels import NJIT_CALL, NJIT_KERNEL
 from ..compiled.jit import njit
 from ..contact.set_arrays import REFERENCE_LOAD, REFERENCE_MOMENT
 from ..friction.bonds.point_kernels import MAX_SHORT_PATH
@@ -174,7 +174,7 @@ def sum_triples(first, second, third):
     return total
 
 
-@njit(**NJIT_INLINE)
+@njit(**NJIT_CALL)
 def project(row, state):
     """Return the displacement of a port."""
     total = 0.0
@@ -183,7 +183,7 @@ def project(row, state):
     return total
 
 
-@njit(**NJIT_INLINE)
+@njit(**NJIT_CALL)
 def move_freely(system, level, drive, row, fraction):
     """Write the motion at the end of a step without interface forces, and that of the ports.
 
@@ -235,7 +235,7 @@ def move_freely(system, level, drive, row, fraction):
         values[Port.FREE, p] = free
 
 
-@njit(**NJIT_INLINE)
+@njit(**NJIT_CALL)
 def prepare_points(system, h):
     """Press the trial memory of the points to the loads in the middle of the step."""
     points = system.points
@@ -268,7 +268,7 @@ def prepare_points(system, h):
             prepare(points.numbers, points.trial, j, Step(0.0, h, v, v, 0.0))
 
 
-@njit(**NJIT_INLINE)
+@njit(**NJIT_CALL)
 def write_forces(system, level, h):
     """Write motion of ports and points under the assumed forces, and the mean forces of the laws with their slopes.
 
@@ -342,7 +342,7 @@ def write_forces(system, level, h):
         moves[Port.FORCE, 0] = moves[Port.SUM, 0]
 
 
-@njit(**NJIT_INLINE)
+@njit(**NJIT_CALL)
 def write_bond_forces(system):
     """Write the mean forces of bonds that slide a short way, in loops that vectorise; else return False."""
     points = system.points
@@ -374,7 +374,7 @@ def advance_plain_bonds(system):
     return True
 
 
-@njit(**NJIT_INLINE)
+@njit(**NJIT_CALL)
 def write_point_forces(system, level, h):
     """Write the mean forces of the points of any law, and their slopes.
 
@@ -415,7 +415,7 @@ def write_point_forces(system, level, h):
         values[Point.BY_VELOCITY, j] = mean.by_velocity
 
 
-@njit(**NJIT_INLINE)
+@njit(**NJIT_CALL)
 def write_residual(system, level, h):
     """Write the residuals of port forces and shear coordinates; return the largest one relative to its tolerance.
 
@@ -492,7 +492,7 @@ def write_residual(system, level, h):
     return largest
 
 
-@njit(**NJIT_INLINE)
+@njit(**NJIT_CALL)
 def write_matrix(system, level):
     """Write the Jacobian of the residuals.
 
@@ -551,7 +551,7 @@ def write_matrix(system, level):
             matrix[p, p] -= system.options.redundant
 
 
-@njit(**NJIT_INLINE)
+@njit(**NJIT_CALL)
 def find_descent(system, level):
     """Return the slope of the potential along the present step, which subtracts `ports.step` from the unknowns."""
     ports = system.ports
@@ -569,7 +569,7 @@ def find_descent(system, level):
     return slope
 
 
-@njit(**NJIT_INLINE)
+@njit(**NJIT_CALL)
 def find_step(system, level):
     """Write Newton's step; return the slope of the potential along it, which is below 0, or 0 if there is no step.
 
@@ -597,7 +597,7 @@ def find_step(system, level):
     return 0.0
 
 
-@njit(**NJIT_INLINE)
+@njit(**NJIT_CALL)
 def take_step(system, level, h, fraction):
     """Subtract a fraction of the step from the unknowns at its start; return the relative residual.
 
@@ -623,7 +623,7 @@ def take_step(system, level, h, fraction):
     return write_residual(system, level, h)
 
 
-@njit(**NJIT_INLINE)
+@njit(**NJIT_CALL)
 def solve_forces(system, level, h):
     """Solve the port forces and shear increments by Newton's method; return whether it converged.
 
@@ -789,7 +789,7 @@ def find_loads(system, row, fraction, is_solved):
     return 0.0 if loads.size and heave < 0 else change / total
 
 
-@njit(**NJIT_INLINE)
+@njit(**NJIT_CALL)
 def write_trial(system, level):
     """Write the state at the end of the step under the port forces."""
     response = system.structure.responses[level]
@@ -921,7 +921,7 @@ def find_event(system, drive, is_shortest):
     return not is_shortest
 
 
-@njit(**NJIT_INLINE)
+@njit(**NJIT_CALL)
 def commit(system, h):
     """Advance memories, shear coordinates and loads after an accepted step; bring held ports to rest."""
     ports = system.ports
@@ -1067,7 +1067,7 @@ def relax_pieces(system):
         shear[Shear.VALUE, k] += shear[Shear.TRIAL, k]
 
 
-@njit(**NJIT_INLINE)
+@njit(**NJIT_CALL)
 def commit_list(system, j, h):
     """Advance the list of a point; without shear of the pieces it moves at the velocities of its port.
 
@@ -1096,7 +1096,7 @@ def commit_list(system, j, h):
         system.totals[Total.IS_FULL] = 1.0
 
 
-@njit(**NJIT_INLINE)
+@njit(**NJIT_CALL)
 def read_point(system, j):
     """Return force, energy and stretch of a point under its load at the end of the last step."""
     points = system.points
@@ -1187,7 +1187,7 @@ def rest_ports(system):
                 state[first + i] -= change
 
 
-@njit(**NJIT_INLINE)
+@njit(**NJIT_CALL)
 def try_step(system, level, row, begin, end, drive):
     """Advance by a step of a level; return False if it contains an event; without a contact set SLOT becomes -1.
 
@@ -1273,7 +1273,7 @@ def try_step(system, level, row, begin, end, drive):
     return True
 
 
-@njit(**NJIT_INLINE)
+@njit(**NJIT_CALL)
 def add_energies(system, level, drive):
     """Add the work of the drive and the viscous loss of a step, whose state at the start is in `state[1]`.
 
@@ -1324,7 +1324,7 @@ def add_energies(system, level, drive):
     totals[Total.STORED] = max(totals[Total.STORED], 0.5 * mass * stored)
 
 
-@njit(**NJIT_INLINE)
+@njit(**NJIT_CALL)
 def write_sample(system, row, sample):
     """Write a sample of forces and energies at the present state.
 
@@ -1491,7 +1491,7 @@ def march(system, steps, samples):
     return steps, DONE
 
 
-@njit(**NJIT_INLINE)
+@njit(**NJIT_CALL)
 def add_work(system, sample, first_column, part):
     """Add the mean forces of a part of a step to a sample; return the friction work of this part [J].
 

@@ -22,10 +22,10 @@ GROWTH = {"ratio": 0.6, "rest_growth": 0.3, "slip_growth": 0.4, "rest_speed": 1e
 # ---- direct lists
 
 
-@pytest.mark.parametrize("order", [0.0, 2.0])
+@pytest.mark.parametrize("order, tolerance", [(0.0, 1e-12), (2.0, 1e-12), (3.7, 1e-8)])
 @pytest.mark.parametrize("initial", [0.0, 1.0])
-def test_exact_direct_printed_law_equals_hand_sum(order, initial):
-    """The direct list of the printed law has the forces of a sum over the bonds by hand within 1e-12, also at rest."""
+def test_exact_direct_printed_law_equals_hand_sum(order, tolerance, initial):
+    """The direct list of the printed law has the forces of a sum over the bonds by hand, also at rest."""
     law = Bonds(1.0, 1.0, order, "report", initial=initial)
     path = np.concatenate(
         [random_walk(3, 40, 0.7), random_walk(3, 40, 0.7)[-1] + np.array([0, 0.2, 0.4, 30, 30])]
@@ -33,8 +33,8 @@ def test_exact_direct_printed_law_equals_hand_sum(order, initial):
     compiled = march_list(law, path)
     for k in (3, 20, 40, 43, 45):
         expected = reference_traction(law, path[: k + 1], UNIT_PRESSURE)[0]
-        assert compiled.after[k - 1] == pytest.approx(expected, abs=1e-12)
-    assert compiled.ahead == pytest.approx(compiled.after, abs=1e-12)
+        assert compiled.after[k - 1] == pytest.approx(expected, abs=tolerance)
+    assert compiled.ahead == pytest.approx(compiled.after, abs=tolerance)
 
 
 @pytest.mark.share(0, 3, 6, 8, 11)
