@@ -175,6 +175,20 @@ def sum_triples(first, second, third):
 
 
 @njit(**NJIT_CALL)
+def copy_memory(source, target):
+    """Copy the memory (l, m) of all points."""
+    for k in range(source.shape[0]):
+        for j in range(source.shape[1]):
+            target[k, j] = source[k, j]
+
+
+@njit(**NJIT_CALL)
+def rests(points, memory, j):
+    """Return whether point j is rigid and at rest in a memory of the points."""
+    return find_rest_limit(points.numbers, memory, j, 1.0) < np.inf
+
+
+@njit(**NJIT_CALL)
 def project(row, state):
     """Return the displacement of a port."""
     total = 0.0
@@ -217,12 +231,13 @@ def move_freely(system, level, drive, row, fraction):
         values[Port.FREE, 0] = slope / (1 << level)
         values[Port.VELOCITY, 0] = values[Port.FREE_VELOCITY, 0] = slope / system.options.step
         return
+    inputs = system.structure.inputs
     for i in range(size):
-        total = response[i, size] * drive[0] + response[i, size + 1] * drive[1]
-        total += response[i, size + 2] * drive[2]
-        for k in range(size):
-            total += response[i, k] * state[0, k]
-        state[1, i] = total
+        inputs[i] = state[0, i]
+    for i in range(3):
+        inputs[size + i] = drive[i]
+    for i in range(size):
+        state[1, i] = sum_products(response[i], inputs[: size + 3])
 
     rows = system.ports.rows
     for p in range(rows.shape[0]):
@@ -245,9 +260,7 @@ def prepare_points(system, h):
 
     # Trials since the last accepted step may have changed the memory.
     if options.has_loads or system.totals[Total.IS_DIRTY] > 0:
-        for k in range(points.memory.shape[0]):
-            for j in range(count):
-                points.trial[k, j] = points.memory[k, j]
+        copy_memory(points.memory, points.trial)
         system.totals[Total.IS_DIRTY] = 0.0
 
     if options.has_loads:
@@ -397,7 +410,7 @@ def write_point_forces(system, level, h):
             continue
 
         # The force of a rigid point at rest is unknown until its port is solved.
-        if find_rest_limit(points.numbers, points.trial, j, 1.0) < np.inf:
+        if rests(points, points.trial, j):
             values[Point.FORCE, j] = values[Point.BY_SLIDE, j] = values[Point.BY_VELOCITY, j] = 0.0
             continue
 
@@ -462,7 +475,7 @@ def write_residual(system, level, h):
     # Rigid points hold: the residual is the force that is left at their port, scaled by the velocity compliance.
     if system.options.is_rigid:
         for j in range(points.port.size):
-            if find_rest_limit(points.numbers, points.trial, j, 1.0) < np.inf:
+            if rests(points, points.trial, j):
                 p = points.port[j]
                 vector[p] = moves[Port.END_VELOCITY, p] / ports.compliance[level, 1, p, p]
                 vector[p] -= system.options.redundant * moves[Port.FORCE, p]
@@ -543,7 +556,7 @@ def write_matrix(system, level):
     if not system.options.is_rigid:
         return
     for j in range(n_points):
-        if find_rest_limit(points.numbers, points.trial, j, 1.0) < np.inf:
+        if rests(points, points.trial, j):
             p = points.port[j]
             matrix[p, :] = 0.0
             for k in range(n_ports):
@@ -791,21 +804,19 @@ def find_loads(system, row, fraction, is_solved):
 
 @njit(**NJIT_CALL)
 def write_trial(system, level):
-    """Write the state at the end of the step under the port forces."""
+    """Write the state at the end of the step under the port forces, which complete the inputs of the step."""
     response = system.structure.responses[level]
+    inputs = system.structure.inputs
     state = system.state
     ports = system.ports
     size = state.shape[1]
-    n = size // 2
-    for i in range(size):
-        state[2, i] = state[1, i]
-    for k in range(n):
+    for k in range(size // 2):
         force = 0.0
         for p in range(ports.rows.shape[0]):
             force -= ports.rows[p, k] * ports.values[Port.FORCE, p]
-        force /= system.options.mass
-        for i in range(size):
-            state[2, i] += response[i, size + 3 + k] * force
+        inputs[size + 3 + k] = force / system.options.mass
+    for i in range(size):
+        state[2, i] = state[1, i] + sum_products(response[i, size + 3 :], inputs[size + 3 :])
 
 
 @njit(**NJIT_CALL)
@@ -830,13 +841,10 @@ def find_holds(system, state, drive):
 
     # Ports whose points do not hold carry the friction force of their points.
     for p in range(n_ports):
-        values[Port.HOLD, p] = 0.0
-        ports.vector[p] = 1.0
+        ports.vector[p] = 0.0
     for j in range(points.port.size):
-        if find_rest_limit(points.numbers, points.memory, j, 1.0) < np.inf:
-            ports.vector[points.port[j]] = 0.0
-        else:
-            values[Port.HOLD, points.port[j]] += read_point(system, j).force
+        if not rests(points, points.memory, j):
+            ports.vector[points.port[j]] += read_point(system, j).force
 
     heave = int(ports.contact[0])
     if heave >= 0:
@@ -844,31 +852,42 @@ def find_holds(system, state, drive):
         h = project(ports.rows[heave], state[:n])
         t = project(ports.rows[pitch], state[:n])
         energy = normal.compute_energy(system.sets, int(system.totals[Total.SLOT]), h, t)
-        values[Port.HOLD, heave] += energy[1]
-        values[Port.HOLD, pitch] += energy[2]
+        ports.vector[heave] += energy[1]
+        ports.vector[pitch] += energy[2]
 
     # Ports at rest have no acceleration: grip . hold = acceleration without their forces.
-    for p in range(n_ports):
-        is_free = ports.vector[p] > 0
-        ports.matrix[p, :] = 0.0
-        ports.matrix[p, p] = 1.0
-        if is_free:
-            ports.vector[p] = values[Port.HOLD, p]
+    for j in range(points.port.size):
+        if not rests(points, points.memory, j):
             continue
+        p = points.port[j]
         total = 0.0
         for i in range(n):
             acceleration = -structure.modes[1, i] * drive - structure.modes[0, i] * state[i]
-            for k in range(n):
-                acceleration -= structure.damping[i, k] * state[n + k]
+            acceleration -= sum_products(structure.damping[i], state[n:])
             total += ports.rows[p, i] * acceleration
         ports.vector[p] = total
-        for k in range(n_ports):
-            ports.matrix[p, k] = ports.grip[p, k]
-        ports.matrix[p, p] *= 1 + system.options.redundant
 
-    solve_linear(ports.matrix, ports.vector, n_ports)
+    solve_held(system)
     for p in range(n_ports):
         values[Port.HOLD, p] = ports.vector[p]
+
+
+@njit(**NJIT_CALL)
+def solve_held(system):
+    """Solve grip . x = vector for the ports at rest; the entries of the other ports are given values of x."""
+    ports = system.ports
+    points = system.points
+    n_ports = ports.values.shape[1]
+    for p in range(n_ports):
+        ports.matrix[p, :] = 0.0
+        ports.matrix[p, p] = 1.0
+    for j in range(points.port.size):
+        if rests(points, points.memory, j):
+            p = points.port[j]
+            for k in range(n_ports):
+                ports.matrix[p, k] = ports.grip[p, k]
+            ports.matrix[p, p] *= 1 + system.options.redundant
+    solve_linear(ports.matrix, ports.vector, n_ports)
 
 
 @njit(**NJIT_CALL)
@@ -969,9 +988,7 @@ def commit(system, h):
                 ports.values[Port.FREE, p] = ports.values[Port.INCREMENT, p] if was_held else 0.0
                 values[Point.TOTAL, j] -= ports.values[Port.FREE, p]
 
-    for k in range(points.memory.shape[0]):
-        for j in range(count):
-            points.memory[k, j] = points.trial[k, j]
+    copy_memory(points.trial, points.memory)
     system.totals[Total.IS_DIRTY] = 0.0
 
     # The rates of the last three steps extrapolate those of the next one.
@@ -1060,9 +1077,7 @@ def relax_pieces(system):
         step = Step(slide, 0.0, 0.0, 0.0, 0.0)
         advance(points.numbers, points.trial, j, values[Point.END_LOAD, j], step)
 
-    for k in range(points.memory.shape[0]):
-        for j in range(count):
-            points.memory[k, j] = points.trial[k, j]
+    copy_memory(points.trial, points.memory)
     for k in range(r):
         shear[Shear.VALUE, k] += shear[Shear.TRIAL, k]
 
@@ -1126,15 +1141,23 @@ def read_points(system, forces, stretch):
 
 
 @njit(**NJIT_CALL)
+def find_modal_energy(system):
+    """Return the energy of the modes [J]."""
+    state = system.state[0]
+    n = state.size // 2
+    energy = 0.0
+    for i in range(n):
+        energy += state[n + i] ** 2 + system.structure.modes[0, i] * state[i] ** 2
+    return 0.5 * system.options.mass * energy
+
+
+@njit(**NJIT_CALL)
 def find_motion_energy(system):
     """Return the energy of the modes and of the normal contact [J], and find the present contact set."""
     state = system.state[0]
     ports = system.ports
     n = state.size // 2
-    energy = 0.0
-    for i in range(n):
-        energy += state[n + i] ** 2 + system.structure.modes[0, i] * state[i] ** 2
-    energy *= 0.5 * system.options.mass
+    energy = find_modal_energy(system)
     heave = int(ports.contact[0])
     if heave >= 0:
         up = project(ports.rows[heave], state[:n])
@@ -1158,29 +1181,18 @@ def rest_ports(system):
     n = state.size // 2
     n_ports = ports.rows.shape[0]
 
-    is_held = False
-    for j in range(points.port.size):
-        is_held = is_held or find_rest_limit(points.numbers, points.memory, j, 1.0) < np.inf
-    if not is_held:
-        return
-
     # Places and then velocities: grip . change = the deviation of the ports that hold.
     for first in (0, n):
         for p in range(n_ports):
-            ports.matrix[p, :] = 0.0
-            ports.matrix[p, p] = 1.0
             ports.vector[p] = 0.0
         for j in range(points.port.size):
-            if find_rest_limit(points.numbers, points.memory, j, 1.0) < np.inf:
+            if rests(points, points.memory, j):
                 p = points.port[j]
                 ports.vector[p] = ports.values[Port.FREE, p]
                 if first > 0:
                     ports.vector[p] = project(ports.rows[p], state[n:])
-                for k in range(n_ports):
-                    ports.matrix[p, k] = ports.grip[p, k]
-                ports.matrix[p, p] *= 1 + system.options.redundant
 
-        solve_linear(ports.matrix, ports.vector, n_ports)
+        solve_held(system)
         for p in range(n_ports):
             for i in range(n):
                 change = ports.rows[p, i] * ports.vector[p] / system.options.mass
@@ -1266,16 +1278,14 @@ def try_step(system, level, row, begin, end, drive):
             return False
         totals[Total.UNSOLVED] += 1
 
-    for i in range(system.state.shape[1]):
-        system.state[1, i] = system.state[0, i]
     commit(system, h)
-    add_energies(system, level, drive)
+    add_energies(system, level)
     return True
 
 
 @njit(**NJIT_CALL)
-def add_energies(system, level, drive):
-    """Add the work of the drive and the viscous loss of a step, whose state at the start is in `state[1]`.
+def add_energies(system, level):
+    """Add the work of the drive and the viscous loss of a step.
 
     Parameters
     ----------
@@ -1283,37 +1293,16 @@ def add_energies(system, level, drive):
         Arrays of the march, changed in place.
     level : int
         Level of the step, which lasts a whole step over 2^level.
-    drive : tuple of float
-        Value, slope and second derivative of the drive at the start of the step [m s-2], per second and per second
-        squared.
     """
     structure = system.structure
     totals = system.totals
-    ports = system.ports
     inputs = structure.inputs
-    after = system.state[0]
-    size = after.size
-    n = size // 2
-    mass = system.options.mass
-
-    # The step's inputs: state at the start, parabola of the drive and modal forces per mass.
-    stored = 0.0
-    for i in range(size):
-        inputs[i] = system.state[1, i]
-    for i in range(n):
-        stored += after[n + i] * after[n + i] + structure.modes[0, i] * after[i] * after[i]
-        force = 0.0
-        for p in range(ports.rows.shape[0]):
-            force -= ports.rows[p, i] * ports.values[Port.FORCE, p]
-        inputs[size + 3 + i] = force / mass
-    inputs[size] = drive[0]
-    inputs[size + 1] = drive[1]
-    inputs[size + 2] = drive[2]
+    size = system.state.shape[1]
 
     # Work is bilinear in drive and inputs, loss quadratic in the inputs.
     work = 0.0
     for i in range(3):
-        work += drive[i] * sum_products(structure.work[level, i], inputs)
+        work += inputs[size + i] * sum_products(structure.work[level, i], inputs)
     loss = 0.0
     for i in range(inputs.size):
         loss += inputs[i] * sum_products(structure.loss[level, i], inputs)
@@ -1321,7 +1310,7 @@ def add_energies(system, level, drive):
     totals[Total.WORK_IN] += work
     totals[Total.POWER] += abs(work)
     totals[Total.VISCOUS] += loss
-    totals[Total.STORED] = max(totals[Total.STORED], 0.5 * mass * stored)
+    totals[Total.STORED] = max(totals[Total.STORED], find_modal_energy(system))
 
 
 @njit(**NJIT_CALL)
@@ -1375,7 +1364,7 @@ def write_sample(system, row, sample):
             sample[first + N_PORT_COLUMNS * p] += force
             continue
         energy += state.energy
-        if find_rest_limit(points.numbers, points.memory, j, 1.0) < np.inf:
+        if rests(points, points.memory, j):
             limit = find_rest_limit(points.numbers, points.memory, j, load)
             force = min(max(ports.values[Port.HOLD, p], -limit), limit)
         # The slip is a mean over the points, weighted by their friction limits.

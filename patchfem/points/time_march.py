@@ -6,7 +6,6 @@ from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
-from numpy.lib.stride_tricks import sliding_window_view
 from numpy.polynomial.legendre import leggauss
 
 from .. import compiled
@@ -599,22 +598,16 @@ class March:
     def advance(self, count: int) -> np.ndarray:
         """March over a number of steps; return the samples (steps done + 1, w) of their starts and of the end.
 
-        A part of the march whose lists of bonds are full is repeated with larger lists.
-
         Raises
         ------
         Missing
             If the lists become too long.
         """
         self._set_drive(count)
-        saved = copy_system(self.system) if self.system.options.has_lists else None
-        while True:
-            samples = np.zeros((count + 1, self.width))
-            n_done, status = self.kernels.march(self.system, count, samples)
-            if status != LISTS_FULL:
-                break
-            saved = enlarge_lists(saved, f"at step {self.done + n_done}")
-            self.system = copy_system(saved)
+        samples = np.zeros((count + 1, self.width))
+        self.system, n_done, status = march_with_room(
+            self.kernels, self.system, samples, f"after step {self.done}"
+        )
         samples = samples[: n_done + 1]
         self.done += n_done
         self._judge(status)
@@ -713,6 +706,41 @@ class March:
         statuses = self.system.lists.statuses
         sums = statuses[:, [STATUS.created, STATUS.dissipated, STATUS.n_extra]].sum(axis=0)
         return np.append(sums, statuses[:, STATUS.max_strips].max(initial=0.0))
+
+
+def march_with_room(kernels, system: System, samples, place: str) -> tuple[System, int, int]:
+    """March over steps, again with longer lists of bonds if those are full.
+
+    Parameters
+    ----------
+    kernels : module
+        Compiled march.
+    system : march_rows.System
+        Arrays of the march; changed.
+    samples : (steps + 1, w) array
+        Samples before each step and at the end; output.
+    place : str
+        Where the steps begin, for a message.
+
+    Returns
+    -------
+    system : march_rows.System
+        Arrays at the end.
+    n_done, status : int
+        Number of steps done, and status of the march.
+
+    Raises
+    ------
+    Missing
+        If the lists become too long.
+    """
+    saved = copy_system(system) if system.options.has_lists else None
+    while True:
+        n_done, status = kernels.march(system, len(samples) - 1, samples)
+        if status != LISTS_FULL:
+            return system, n_done, status
+        saved = enlarge_lists(saved, place)
+        system = copy_system(saved)
 
 
 def enlarge_lists(system: System, place: str) -> System:
@@ -887,7 +915,8 @@ def march(
             and record.before is not None
             and record.before.size == now.size
         ):
-            scale = np.concatenate([record.find_largest_state(), np.abs(memory)])
+            largest = np.abs(record.last[1][:, : state.size]).max(axis=0)
+            scale = np.concatenate([largest, np.abs(memory)])
             if (np.abs(now - record.before) <= SAME_CYCLE * scale).all():
                 record.repeat(count)
                 run.done += count * size
@@ -993,23 +1022,16 @@ class Record:
         self.totals = sums[:, -1].copy()
         self.snapshots = list(snapshots)
 
-        # Extremes and phasor of each cycle; a march that ends early has a part of a cycle.
+        # Extremes and phasor of each cycle; the first and the last one may be a part of a cycle.
         output = samples[:, : n // 2] @ run.modes.output
         speed = samples[:, n // 2 : n] @ run.modes.output
-        steps = run.steps
-        n_whole = count // steps
-        ends = [n_whole * steps] if n_whole else []
-        ends += [count] if count > n_whole * steps or not n_whole else []
-        begin = 0
-        for end in ends:
-            size = steps if end == n_whole * steps and n_whole else end - begin
-            cycles = sliding_window_view(output[begin : end + 1], size + 1)[:: max(size, 1)]
-            speeds = sliding_window_view(speed[begin : end + 1], size + 1)[:: max(size, 1)]
-            self.extremes += find_extremes(cycles, speeds, run.step)
-            angle = 2 * np.pi * ((first + begin + np.arange(size)) % steps) / steps
-            parts = cycles[:, :-1] @ np.stack([np.cos(angle), -np.sin(angle)], axis=1)
-            self.phasors += list(2 / max(size, 1) * (parts[:, 0] + 1j * parts[:, 1]))
-            begin = end
+        for begin in range(0, max(count, 1), run.steps):
+            end = min(begin + run.steps, count)
+            cycle = slice(begin, end + 1)
+            self.extremes.append(find_extremes(output[cycle], speed[cycle], run.step))
+            phase = (first + np.arange(begin, end)) % run.steps / run.steps
+            phasor = output[begin:end] @ np.exp(-2j * np.pi * phase)
+            self.phasors.append(2 / max(end - begin, 1) * phasor)
 
     def _keep(self, part: tuple[int, np.ndarray, np.ndarray]) -> None:
         """Keep all samples of the parts within a window of the last one, and of older parts those at equal distances."""
@@ -1022,11 +1044,6 @@ class Record:
                 self.numbers.append(first + picked)
                 self.rows.append(samples[picked])
                 self.sums.append(sums[:, picked])
-
-    def find_largest_state(self) -> np.ndarray:
-        """Return the largest magnitudes (2 n,) of the modal coordinates and velocities in the last part."""
-        n = 2 * self.run.modes.omega.size
-        return np.abs(self.last[1][:, :n]).max(axis=0)
 
     def repeat(self, count: int) -> None:
         """Repeat the last part of the march."""
@@ -1086,39 +1103,31 @@ class Record:
         )
 
 
-def find_extremes(q, v, step: float) -> list[tuple[float, float]]:
-    """Return the smallest and largest of samples q (c, k) of each cycle, those of the cubics between them included.
-
-    `v` (c, k) are the velocities, `step` [s] the distance of the samples.
+def find_extremes(q, v, step: float) -> tuple[float, float]:
+    """Return the smallest and largest of samples (k,) of a displacement, those of the cubics between them included.
 
     Parameters
     ----------
-    q : (c, k) array
-        Samples of each cycle [m].
-    v : (c, k) array
-        Velocities [m/s].
+    q, v : (k,) array
+        Displacement [m] and velocity [m/s].
     step : float
         Distance of the samples [s].
     """
-    low = q.min(axis=1)
-    high = q.max(axis=1)
     # A change of sign within round-off, as at a stop, is no reversal: the cubic would overshoot there.
-    limit = -1e-12 * (v**2).max(axis=1, keepdims=True)
-    row, turn = np.nonzero(v[:, :-1] * v[:, 1:] < limit)
+    turn = np.flatnonzero(v[:-1] * v[1:] < -1e-12 * (v**2).max())
     # The velocity is the parabola with the mean of the increment.
-    first = v[row, turn]
-    last = v[row, turn + 1]
-    mean = (q[row, turn + 1] - q[row, turn]) / step
+    first = v[turn]
+    last = v[turn + 1]
+    mean = (q[turn + 1] - q[turn]) / step
     square = 3 * (first + last) - 6 * mean
     linear = 6 * mean - 4 * first - 2 * last
     root = np.sqrt(np.maximum(linear**2 - 4 * square * first, 0.0))
     # A displacement that jumps, as at a stop within round-off, has its extreme at a sample: the quotient is infinite.
     with np.errstate(divide="ignore"):
         x = np.clip(2 * first / (-linear + np.copysign(root, first - last)), 0.0, 1.0)
-    peaks = q[row, turn] + step * x * (first + x * (linear / 2 + x * square / 3))
-    np.minimum.at(low, row, peaks)
-    np.maximum.at(high, row, peaks)
-    return list(zip(low.tolist(), high.tolist()))
+    peaks = q[turn] + step * x * (first + x * (linear / 2 + x * square / 3))
+    values = np.append(q, peaks)
+    return float(values.min()), float(values.max())
 
 
 def make_histories(run: March, rows, numbers, energies) -> Response:

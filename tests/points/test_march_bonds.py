@@ -352,7 +352,7 @@ def test_refuses_list_longer_than_limit(monkeypatch):
     """A list that exceeds the largest number of entries is refused with a message that names the key to change."""
     monkeypatch.setattr(engine, "MAX_STRIPS", 100)
     with pytest.raises(
-        Missing, match=r"grew beyond 100 entries \(0 MB\) at step \d+; raise accuracy.tail"
+        Missing, match=r"grew beyond 100 entries \(0 MB\) after step \d+; raise accuracy.tail"
     ):
         march_list(GROWING_LISTS["stretch"], 40, monkeypatch)
 
