@@ -14,7 +14,6 @@ Motion in time is computed by `hybrid` and `points`.
 # Names that other folders use, by module.
 PUBLIC = {
     "curve_points": ("sample_adaptively",),
-    "exponentials": ("find_exponentials",),
     "harmonic.backbone": (
         "find_free_motions",
         "make_free_balance",

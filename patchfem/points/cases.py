@@ -6,7 +6,6 @@ import numpy as np
 
 from .. import compiled
 from ..core import ModalBasis, SineDrive
-from ..dynamics.exponentials import find_exponentials
 from ..friction import path_work
 from .case_kernels import LEVELS, TICKS
 from .case_rows import Cases, Now, Number, Seen
@@ -71,30 +70,6 @@ def list_parameters(
     )
 
 
-def make_responses(parameters, steps: int) -> np.ndarray:
-    """Return the responses (c, LEVELS + 1, 2, 5) of slide and velocity in a step and its halves.
-
-    The columns belong to slide and velocity at the start, and to accelerations 1, t and t^2/2.
-
-    Parameters
-    ----------
-    parameters : (c, 12) array
-        Numbers of the cases, by `Number`.
-    steps : int
-        Whole steps per cycle.
-    """
-    # Exponents of slide, velocity and the derivatives of the acceleration, in units of the step.
-    columns = parameters.T[..., None]
-    h = 2 * np.pi / columns[Number.OMEGA] / steps / 2.0 ** np.arange(LEVELS + 1)
-    exponents = np.zeros((*h.shape, 5, 5))
-    exponents[..., np.arange(4), np.arange(1, 5)] = 1.0
-    exponents[..., 1, 0] = -columns[Number.STIFFNESS] * h**2
-    exponents[..., 1, 1] = -columns[Number.DAMPING] * h
-    responses = find_exponentials(exponents.reshape(-1, 5, 5)).reshape(exponents.shape)
-    powers = np.arange(5) - np.arange(2)[:, None]
-    return responses[..., :2, :] * h[..., None, None] ** powers
-
-
 def march_cases(cases: Cases, steps: int, *, has_samples: bool = False) -> CaseMarch:
     """Run cases with a number of steps per cycle, and compute their measures.
 
@@ -120,8 +95,7 @@ def march_cases(cases: Cases, steps: int, *, has_samples: bool = False) -> CaseM
     samples = np.full((n, n_samples, 5), np.nan)
     compiled.load("points.case_kernels").march_cases(
         steps, np.array([np.sin(phase), np.cos(phase)]), cases.parameters, cases.numbers,
-        cases.memory.copy(), now, seen, history, samples,
-        make_responses(cases.parameters, steps),
+        cases.memory.copy(), now, seen, history, samples, np.zeros((LEVELS + 1, 2, 5)),
     )  # fmt: skip
 
     output = columns[Number.OUTPUT][:, None]

@@ -524,8 +524,7 @@ class March:
     - system: arrays of the engine
     - done: number of steps since the start
     - outcome, message: how the march ended, None and "" as long as it goes on
-    - work_sums: friction work from samples, sum of the magnitudes of the friction works of the steps, and created energy
-      [J]
+    - work_sums: friction work from samples, and sum of the magnitudes of the friction works of the steps [J]
     """
 
     def __init__(
@@ -540,7 +539,7 @@ class March:
         self.done = 0
         self.outcome = None
         self.message = ""
-        self.work_sums = np.zeros(3)
+        self.work_sums = np.zeros(2)
         n_columns = len(contact.point_sets) + (2 if contact.sets is not None else 0)
         self.width = 2 * modes.omega.size + Sample.PORTS + N_PORT_COLUMNS * n_columns
         self.kernels = load_kernels(contact)
@@ -642,10 +641,9 @@ class March:
             )
 
     def _add_works(self, samples) -> None:
-        """Add the friction work of samples: by the forces at the samples, its magnitude, and created energy."""
+        """Add the friction work of samples: by the forces at the samples, and its magnitude."""
         n = 2 * self.modes.omega.size
         works = samples[:-1, n + Sample.WORK]
-        created = -np.minimum(split_losses(samples, n, self.system.options.scale), 0.0)
         sampled = np.zeros(works.size)
         rests = np.ones(works.size, bool)
         still = SAME_PLACE * np.abs(samples[:, : n // 2]).max(initial=0.0)
@@ -661,7 +659,7 @@ class March:
         # What a port at rest does within a step and takes back is no work of the friction.
         sampled[rests] = works[rests]
         passed = np.abs(works[~rests]).sum()
-        self.work_sums += float(sampled.sum()), float(passed), float(created.sum())
+        self.work_sums += float(sampled.sum()), float(passed)
 
     def take_snapshot(self, sample) -> Snapshot:
         """Return the state of the interface at the end of the last step, whose sample is given."""
@@ -680,7 +678,7 @@ class March:
         n = 2 * self.modes.omega.size
         totals = self.system.totals
         friction = float(totals[Total.FRICTION])
-        sampled, passed, _ = self.work_sums
+        sampled, passed = self.work_sums
 
         # Friction dissipates its work less the change of the energy stored in the interface.
         ledger = {
@@ -948,13 +946,13 @@ def advance_with_frames(run: March, size: int, frames: int) -> tuple[int, np.nda
         Number of snapshots.
     """
     first = run.done
-    if not frames:
-        return first, run.advance(size), []
     parts = []
     snapshots = []
-    for begin, end in pairwise(np.linspace(0, size, min(frames, size) + 1).round().astype(int)):
+    n_parts = min(max(frames, 1), size)
+    for begin, end in pairwise(np.linspace(0, size, n_parts + 1).round().astype(int)):
         parts.append(run.advance(int(end - begin)))
-        snapshots.append(run.take_snapshot(parts[-1][-1]))
+        if frames:
+            snapshots.append(run.take_snapshot(parts[-1][-1]))
         if run.outcome is not None:
             break
     rows = [part[:-1] for part in parts[:-1]]
