@@ -184,7 +184,17 @@ def copy_memory(source, target):
 
 @njit(**NJIT_CALL)
 def rests(points, memory, j):
-    """Return whether point j is rigid and at rest in a memory of the points."""
+    """Return whether point j is rigid and at rest in a memory of the points.
+
+    Parameters
+    ----------
+    points : march_rows.Points
+        Points with their laws.
+    memory : (l, m) array
+        Memory of the laws of m points, a column for each.
+    j : int
+        Number of the point.
+    """
     return find_rest_limit(points.numbers, memory, j, 1.0) < np.inf
 
 

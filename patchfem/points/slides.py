@@ -98,7 +98,7 @@ def follow(contact: Contact, time, slide, frames=(), say=None, report=None) -> S
         system = system._replace(structure=structure, options=options)
         samples = np.zeros((size + 1, width))
         place = f"after sample {begin} of the prescribed slide"
-        system = march_with_room(kernels, system, samples, place)[0]
+        system = march_with_room(kernels, system, samples, place).system
         rows[begin : end + 1] = samples
         if end in frames:
             force, slip = samples[-1, Sample.PORTS : Sample.PORTS + 2]

@@ -706,7 +706,15 @@ class March:
         return np.append(sums, statuses[:, STATUS.max_strips].max(initial=0.0))
 
 
-def march_with_room(kernels, system: System, samples, place: str) -> tuple[System, int, int]:
+class MarchedSteps(NamedTuple):
+    """Arrays of a march at its end, number of steps done, and status (`march_rows`)."""
+
+    system: System
+    n_done: int
+    status: int
+
+
+def march_with_room(kernels, system: System, samples, place: str) -> MarchedSteps:
     """March over steps, again with longer lists of bonds if those are full.
 
     Parameters
@@ -722,10 +730,7 @@ def march_with_room(kernels, system: System, samples, place: str) -> tuple[Syste
 
     Returns
     -------
-    system : march_rows.System
-        Arrays at the end.
-    n_done, status : int
-        Number of steps done, and status of the march.
+    MarchedSteps
 
     Raises
     ------
@@ -736,7 +741,7 @@ def march_with_room(kernels, system: System, samples, place: str) -> tuple[Syste
     while True:
         n_done, status = kernels.march(system, len(samples) - 1, samples)
         if status != LISTS_FULL:
-            return system, n_done, status
+            return MarchedSteps(system, n_done, status)
         saved = enlarge_lists(saved, place)
         system = copy_system(saved)
 
