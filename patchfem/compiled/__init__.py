@@ -43,7 +43,6 @@ PUBLIC = {
     "flags_kernels": (
         "FASTMATH_FLAGS",
         "NJIT_CALL",
-        "NJIT_INLINE",
         "NJIT_KERNEL",
     ),
     "jit": (

@@ -6,15 +6,12 @@ FASTMATH_FLAGS = {"reassoc", "contract", "arcp"}
 
 # Compiler options of a kernel that allocates nothing and divides by zero as NumPy does
 NJIT_KERNEL = {"error_model": "numpy", "fastmath": FASTMATH_FLAGS, **NJIT_NO_REFCOUNT}
-# The same options for a kernel that is inlined into its callers, so that loops over cases vectorize
-NJIT_INLINE = NJIT_KERNEL | {"forceinline": True}
 # The same options for a kernel that stays a call in callers that are inlined themselves
 NJIT_CALL = NJIT_KERNEL | {"forceinline": False}
 
 __all__ = [
     "FASTMATH_FLAGS",
     "NJIT_CALL",
-    "NJIT_INLINE",
     "NJIT_KERNEL",
     "NJIT_NO_REFCOUNT",
 ]

@@ -134,48 +134,34 @@ def find_relay_cycles(
 
 
 class _ForcedFlow(NamedTuple):
-    """Motion of n modes under a constant force, as a sum of exponentials exp(rate t) of its 2 n eigenvectors.
+    """Motion y' = A (y - e) of n modes under a constant force, as a sum of exponentials of 2 n eigenvectors.
 
-    - modes: modes
     - row: (n,) slide per coordinate
-    - rates: (2 n,) eigenvalues [1/s]
-    - vectors: (2 n, 2 n) eigenvectors of the states (z, z'), in columns
-    - rest: (2 n,) state of rest under the force
+    - matrix: (2 n, 2 n) matrix A of the states (z, z')
+    - rates: (2 n,) its eigenvalues [1/s]
+    - vectors: (2 n, 2 n) its eigenvectors, in columns
+    - rest: (2 n,) parts of the state of rest e in the eigenvectors
     """
 
-    modes: ModalBasis
     row: np.ndarray
+    matrix: np.ndarray
     rates: np.ndarray
     vectors: np.ndarray
     rest: np.ndarray
 
     def find_reversals(self, half_periods) -> np.ndarray:
-        """Return the states (2 n, k) from which the motion goes to their opposites in half periods (k,) [s].
+        """Return the parts (2 n, k) of states from which the motion goes to their opposites in half periods (k,) [s].
 
         With E = exp(A T/2) and the state of rest e, E (y - e) + e = -y, so that y = tanh(A T/4) e.
         """
-        parts = np.linalg.solve(self.vectors, self.rest)[:, None]
-        ratios = np.tanh(np.outer(self.rates, half_periods) / 2)
-        return (self.vectors @ (ratios * parts)).real
+        return np.tanh(np.outer(self.rates, half_periods) / 2) * self.rest[:, None]
 
     def find_reversal_speeds(self, half_periods) -> np.ndarray:
         """Return the velocities (k,) of the slide at these states, times the half period and divided by the slide [1]."""
         n = self.row.size
-        states = self.find_reversals(half_periods)
+        states = (self.vectors @ self.find_reversals(half_periods)).real
         slides = np.abs(self.row) @ np.abs(states[:n])
         return self.row @ states[n:] * half_periods / np.maximum(slides, 1e-300)
-
-    def make_steps(self, times) -> np.ndarray:
-        """Return the matrices (k, 2 n, 2 n) that advance a state without the force over times (k,) [s]."""
-        growth = np.exp(np.outer(times, self.rates))
-        return ((self.vectors * growth[:, None]) @ np.linalg.inv(self.vectors)).real
-
-    def find_rates(self, state) -> np.ndarray:
-        """Return the rates (2 n,) of a state (2 n,) without the force."""
-        modes = self.modes
-        n = self.row.size
-        accelerations = -(modes.omega**2) * state[:n] - modes.damping_matrix @ state[n:]
-        return np.concatenate([state[n:], accelerations])
 
 
 def _make_flow(modes: ModalBasis, row, force: float) -> _ForcedFlow:
@@ -191,7 +177,8 @@ def _make_flow(modes: ModalBasis, row, force: float) -> _ForcedFlow:
         scaled = vectors * np.concatenate([modes.omega, np.ones(n)])[:, None]
         if np.linalg.cond(scaled) <= MAX_CONDITION:
             break
-    return _ForcedFlow(modes, np.asarray(row, float), rates, vectors, rest)
+    parts = np.linalg.solve(vectors, rest)
+    return _ForcedFlow(np.asarray(row, float), matrix, rates, vectors, parts)
 
 
 def _find_mode_relay_cycles(
@@ -213,7 +200,7 @@ def _find_mode_relay_cycles(
         half_period = brentq(find_speed, *half_periods[k : k + 2], xtol=1e-16, rtol=1e-14)
         # Where an undamped mode is in resonance, the interface does not stop at the reversal.
         if abs(find_speed(half_period)) < REST_TOL:
-            cycles.append(_make_relay_cycle(flow, forces[1], half_period))
+            cycles.append(_make_relay_cycle(modes, flow, forces[1], half_period))
     return [cycle for cycle in cycles if cycle is not None]
 
 
@@ -280,38 +267,34 @@ def trace_relay_backbone(
 
 
 def _make_relay_cycle(
-    flow: _ForcedFlow, stick_force: float, half_period: float
+    modes: ModalBasis, flow: _ForcedFlow, stick_force: float, half_period: float
 ) -> LimitCycle | None:
     """Return the limit cycle that has a given half period [s].
 
     The result is None if the interface reverses within the half period, or if the static friction [N] holds it.
     """
-    modes, row = flow.modes, flow.row
+    row = flow.row
     n = row.size
-    state = flow.find_reversals([half_period])[:, 0]
     times = np.linspace(0, half_period, N_SAMPLES // 2 + 1)
-    steps = flow.make_steps(times)
-    path = flow.rest + steps @ (state - flow.rest)
+    away = flow.find_reversals([half_period])[:, 0] - flow.rest
+    path = ((away * np.exp(np.outer(times, flow.rates)) + flow.rest) @ flow.vectors.T).real
 
     # The slide is falling, and at its start the interface needs a force -m a to stay at rest.
     speeds = path[:, n:] @ row
-    slide = float(np.abs(row) @ np.abs(state[:n]))
-    hold = -modes.mass * flow.find_rates(state)[n:] @ row / (row @ row)
+    slide = float(np.abs(row) @ np.abs(path[0, :n]))
+    hold = -modes.mass * (flow.matrix @ path[0])[n:] @ row / (row @ row)
     if speeds[1:-1].max() > 1e-9 * slide / half_period or hold <= stick_force:
         return None
-    motion = path[:, :n] @ modes.output, path[:, n:] @ modes.output
-    amplitude, coarse = [
-        _find_largest(times[::stride], motion[0][::stride], motion[1][::stride])
-        for stride in (1, 2)
-    ]
-    error = abs(amplitude - coarse) + AMPLITUDE_TOL * amplitude
+    amplitude = _find_largest(times, path[:, :n] @ modes.output, path[:, n:] @ modes.output)
 
     # A time shift of the reversal absorbs part of a perturbation, so the map is from reversal to reversal.
-    speed = flow.find_rates(path[-1] - flow.rest)
+    growth = np.exp(half_period * flow.rates)
+    speed = (flow.vectors @ (flow.rates * growth * away)).real
+    step = ((flow.vectors * growth) @ np.linalg.inv(flow.vectors)).real
     face = np.concatenate([np.zeros(n), row])
-    reversal_map = (np.eye(2 * n) - np.outer(speed, face) / (face @ speed)) @ steps[-1]
+    reversal_map = step - np.outer(speed, face @ step) / (face @ speed)
     is_stable = bool(np.abs(np.linalg.eigvals(reversal_map)).max() < 1)
-    return LimitCycle(amplitude, error, np.pi / half_period, is_stable)
+    return LimitCycle(amplitude, AMPLITUDE_TOL * amplitude, np.pi / half_period, is_stable)
 
 
 def _find_largest(times, motion, speeds) -> float:

@@ -21,7 +21,7 @@ point at rest is released, is halved up to the last level.
 
 import numpy as np
 
-from ..compiled.flags_kernels import NJIT_CALL, NJIT_INLINE, NJIT_KERNEL
+from ..compiled.flags_kernels import NJIT_CALL, NJIT_KERNEL
 from ..compiled.jit import njit
 from ..contact.set_arrays import REFERENCE_LOAD, REFERENCE_MOMENT
 from ..friction.bonds.point_kernels import MAX_SHORT_PATH
@@ -174,7 +174,31 @@ def sum_triples(first, second, third):
     return total
 
 
-@njit(**NJIT_INLINE)
+@njit(**NJIT_CALL)
+def copy_memory(source, target):
+    """Copy the memory (l, m) of all points."""
+    for k in range(source.shape[0]):
+        for j in range(source.shape[1]):
+            target[k, j] = source[k, j]
+
+
+@njit(**NJIT_CALL)
+def rests(points, memory, j):
+    """Return whether point j is rigid and at rest in a memory of the points.
+
+    Parameters
+    ----------
+    points : march_rows.Points
+        Points with their laws.
+    memory : (l, m) array
+        Memory of the laws of m points, a column for each.
+    j : int
+        Number of the point.
+    """
+    return find_rest_limit(points.numbers, memory, j, 1.0) < np.inf
+
+
+@njit(**NJIT_CALL)
 def project(row, state):
     """Return the displacement of a port."""
     total = 0.0
@@ -183,7 +207,7 @@ def project(row, state):
     return total
 
 
-@njit(**NJIT_INLINE)
+@njit(**NJIT_CALL)
 def move_freely(system, level, drive, row, fraction):
     """Write the motion at the end of a step without interface forces, and that of the ports.
 
@@ -217,12 +241,13 @@ def move_freely(system, level, drive, row, fraction):
         values[Port.FREE, 0] = slope / (1 << level)
         values[Port.VELOCITY, 0] = values[Port.FREE_VELOCITY, 0] = slope / system.options.step
         return
+    inputs = system.structure.inputs
     for i in range(size):
-        total = response[i, size] * drive[0] + response[i, size + 1] * drive[1]
-        total += response[i, size + 2] * drive[2]
-        for k in range(size):
-            total += response[i, k] * state[0, k]
-        state[1, i] = total
+        inputs[i] = state[0, i]
+    for i in range(3):
+        inputs[size + i] = drive[i]
+    for i in range(size):
+        state[1, i] = sum_products(response[i], inputs[: size + 3])
 
     rows = system.ports.rows
     for p in range(rows.shape[0]):
@@ -235,7 +260,7 @@ def move_freely(system, level, drive, row, fraction):
         values[Port.FREE, p] = free
 
 
-@njit(**NJIT_INLINE)
+@njit(**NJIT_CALL)
 def prepare_points(system, h):
     """Press the trial memory of the points to the loads in the middle of the step."""
     points = system.points
@@ -245,9 +270,7 @@ def prepare_points(system, h):
 
     # Trials since the last accepted step may have changed the memory.
     if options.has_loads or system.totals[Total.IS_DIRTY] > 0:
-        for k in range(points.memory.shape[0]):
-            for j in range(count):
-                points.trial[k, j] = points.memory[k, j]
+        copy_memory(points.memory, points.trial)
         system.totals[Total.IS_DIRTY] = 0.0
 
     if options.has_loads:
@@ -268,7 +291,7 @@ def prepare_points(system, h):
             prepare(points.numbers, points.trial, j, Step(0.0, h, v, v, 0.0))
 
 
-@njit(**NJIT_INLINE)
+@njit(**NJIT_CALL)
 def write_forces(system, level, h):
     """Write motion of ports and points under the assumed forces, and the mean forces of the laws with their slopes.
 
@@ -342,7 +365,7 @@ def write_forces(system, level, h):
         moves[Port.FORCE, 0] = moves[Port.SUM, 0]
 
 
-@njit(**NJIT_INLINE)
+@njit(**NJIT_CALL)
 def write_bond_forces(system):
     """Write the mean forces of bonds that slide a short way, in loops that vectorise; else return False."""
     points = system.points
@@ -374,7 +397,7 @@ def advance_plain_bonds(system):
     return True
 
 
-@njit(**NJIT_INLINE)
+@njit(**NJIT_CALL)
 def write_point_forces(system, level, h):
     """Write the mean forces of the points of any law, and their slopes.
 
@@ -397,7 +420,7 @@ def write_point_forces(system, level, h):
             continue
 
         # The force of a rigid point at rest is unknown until its port is solved.
-        if find_rest_limit(points.numbers, points.trial, j, 1.0) < np.inf:
+        if rests(points, points.trial, j):
             values[Point.FORCE, j] = values[Point.BY_SLIDE, j] = values[Point.BY_VELOCITY, j] = 0.0
             continue
 
@@ -415,7 +438,7 @@ def write_point_forces(system, level, h):
         values[Point.BY_VELOCITY, j] = mean.by_velocity
 
 
-@njit(**NJIT_INLINE)
+@njit(**NJIT_CALL)
 def write_residual(system, level, h):
     """Write the residuals of port forces and shear coordinates; return the largest one relative to its tolerance.
 
@@ -462,7 +485,7 @@ def write_residual(system, level, h):
     # Rigid points hold: the residual is the force that is left at their port, scaled by the velocity compliance.
     if system.options.is_rigid:
         for j in range(points.port.size):
-            if find_rest_limit(points.numbers, points.trial, j, 1.0) < np.inf:
+            if rests(points, points.trial, j):
                 p = points.port[j]
                 vector[p] = moves[Port.END_VELOCITY, p] / ports.compliance[level, 1, p, p]
                 vector[p] -= system.options.redundant * moves[Port.FORCE, p]
@@ -492,7 +515,7 @@ def write_residual(system, level, h):
     return largest
 
 
-@njit(**NJIT_INLINE)
+@njit(**NJIT_CALL)
 def write_matrix(system, level):
     """Write the Jacobian of the residuals.
 
@@ -543,7 +566,7 @@ def write_matrix(system, level):
     if not system.options.is_rigid:
         return
     for j in range(n_points):
-        if find_rest_limit(points.numbers, points.trial, j, 1.0) < np.inf:
+        if rests(points, points.trial, j):
             p = points.port[j]
             matrix[p, :] = 0.0
             for k in range(n_ports):
@@ -551,7 +574,7 @@ def write_matrix(system, level):
             matrix[p, p] -= system.options.redundant
 
 
-@njit(**NJIT_INLINE)
+@njit(**NJIT_CALL)
 def find_descent(system, level):
     """Return the slope of the potential along the present step, which subtracts `ports.step` from the unknowns."""
     ports = system.ports
@@ -569,7 +592,7 @@ def find_descent(system, level):
     return slope
 
 
-@njit(**NJIT_INLINE)
+@njit(**NJIT_CALL)
 def find_step(system, level):
     """Write Newton's step; return the slope of the potential along it, which is below 0, or 0 if there is no step.
 
@@ -597,7 +620,7 @@ def find_step(system, level):
     return 0.0
 
 
-@njit(**NJIT_INLINE)
+@njit(**NJIT_CALL)
 def take_step(system, level, h, fraction):
     """Subtract a fraction of the step from the unknowns at its start; return the relative residual.
 
@@ -623,7 +646,7 @@ def take_step(system, level, h, fraction):
     return write_residual(system, level, h)
 
 
-@njit(**NJIT_INLINE)
+@njit(**NJIT_CALL)
 def solve_forces(system, level, h):
     """Solve the port forces and shear increments by Newton's method; return whether it converged.
 
@@ -789,23 +812,21 @@ def find_loads(system, row, fraction, is_solved):
     return 0.0 if loads.size and heave < 0 else change / total
 
 
-@njit(**NJIT_INLINE)
+@njit(**NJIT_CALL)
 def write_trial(system, level):
-    """Write the state at the end of the step under the port forces."""
+    """Write the state at the end of the step under the port forces, which complete the inputs of the step."""
     response = system.structure.responses[level]
+    inputs = system.structure.inputs
     state = system.state
     ports = system.ports
     size = state.shape[1]
-    n = size // 2
-    for i in range(size):
-        state[2, i] = state[1, i]
-    for k in range(n):
+    for k in range(size // 2):
         force = 0.0
         for p in range(ports.rows.shape[0]):
             force -= ports.rows[p, k] * ports.values[Port.FORCE, p]
-        force /= system.options.mass
-        for i in range(size):
-            state[2, i] += response[i, size + 3 + k] * force
+        inputs[size + 3 + k] = force / system.options.mass
+    for i in range(size):
+        state[2, i] = state[1, i] + sum_products(response[i, size + 3 :], inputs[size + 3 :])
 
 
 @njit(**NJIT_CALL)
@@ -830,13 +851,10 @@ def find_holds(system, state, drive):
 
     # Ports whose points do not hold carry the friction force of their points.
     for p in range(n_ports):
-        values[Port.HOLD, p] = 0.0
-        ports.vector[p] = 1.0
+        ports.vector[p] = 0.0
     for j in range(points.port.size):
-        if find_rest_limit(points.numbers, points.memory, j, 1.0) < np.inf:
-            ports.vector[points.port[j]] = 0.0
-        else:
-            values[Port.HOLD, points.port[j]] += read_point(system, j).force
+        if not rests(points, points.memory, j):
+            ports.vector[points.port[j]] += read_point(system, j).force
 
     heave = int(ports.contact[0])
     if heave >= 0:
@@ -844,31 +862,42 @@ def find_holds(system, state, drive):
         h = project(ports.rows[heave], state[:n])
         t = project(ports.rows[pitch], state[:n])
         energy = normal.compute_energy(system.sets, int(system.totals[Total.SLOT]), h, t)
-        values[Port.HOLD, heave] += energy[1]
-        values[Port.HOLD, pitch] += energy[2]
+        ports.vector[heave] += energy[1]
+        ports.vector[pitch] += energy[2]
 
     # Ports at rest have no acceleration: grip . hold = acceleration without their forces.
-    for p in range(n_ports):
-        is_free = ports.vector[p] > 0
-        ports.matrix[p, :] = 0.0
-        ports.matrix[p, p] = 1.0
-        if is_free:
-            ports.vector[p] = values[Port.HOLD, p]
+    for j in range(points.port.size):
+        if not rests(points, points.memory, j):
             continue
+        p = points.port[j]
         total = 0.0
         for i in range(n):
             acceleration = -structure.modes[1, i] * drive - structure.modes[0, i] * state[i]
-            for k in range(n):
-                acceleration -= structure.damping[i, k] * state[n + k]
+            acceleration -= sum_products(structure.damping[i], state[n:])
             total += ports.rows[p, i] * acceleration
         ports.vector[p] = total
-        for k in range(n_ports):
-            ports.matrix[p, k] = ports.grip[p, k]
-        ports.matrix[p, p] *= 1 + system.options.redundant
 
-    solve_linear(ports.matrix, ports.vector, n_ports)
+    solve_held(system)
     for p in range(n_ports):
         values[Port.HOLD, p] = ports.vector[p]
+
+
+@njit(**NJIT_CALL)
+def solve_held(system):
+    """Solve grip . x = vector for the ports at rest; the entries of the other ports are given values of x."""
+    ports = system.ports
+    points = system.points
+    n_ports = ports.values.shape[1]
+    for p in range(n_ports):
+        ports.matrix[p, :] = 0.0
+        ports.matrix[p, p] = 1.0
+    for j in range(points.port.size):
+        if rests(points, points.memory, j):
+            p = points.port[j]
+            for k in range(n_ports):
+                ports.matrix[p, k] = ports.grip[p, k]
+            ports.matrix[p, p] *= 1 + system.options.redundant
+    solve_linear(ports.matrix, ports.vector, n_ports)
 
 
 @njit(**NJIT_CALL)
@@ -921,7 +950,7 @@ def find_event(system, drive, is_shortest):
     return not is_shortest
 
 
-@njit(**NJIT_INLINE)
+@njit(**NJIT_CALL)
 def commit(system, h):
     """Advance memories, shear coordinates and loads after an accepted step; bring held ports to rest."""
     ports = system.ports
@@ -969,9 +998,7 @@ def commit(system, h):
                 ports.values[Port.FREE, p] = ports.values[Port.INCREMENT, p] if was_held else 0.0
                 values[Point.TOTAL, j] -= ports.values[Port.FREE, p]
 
-    for k in range(points.memory.shape[0]):
-        for j in range(count):
-            points.memory[k, j] = points.trial[k, j]
+    copy_memory(points.trial, points.memory)
     system.totals[Total.IS_DIRTY] = 0.0
 
     # The rates of the last three steps extrapolate those of the next one.
@@ -1060,14 +1087,12 @@ def relax_pieces(system):
         step = Step(slide, 0.0, 0.0, 0.0, 0.0)
         advance(points.numbers, points.trial, j, values[Point.END_LOAD, j], step)
 
-    for k in range(points.memory.shape[0]):
-        for j in range(count):
-            points.memory[k, j] = points.trial[k, j]
+    copy_memory(points.trial, points.memory)
     for k in range(r):
         shear[Shear.VALUE, k] += shear[Shear.TRIAL, k]
 
 
-@njit(**NJIT_INLINE)
+@njit(**NJIT_CALL)
 def commit_list(system, j, h):
     """Advance the list of a point; without shear of the pieces it moves at the velocities of its port.
 
@@ -1096,7 +1121,7 @@ def commit_list(system, j, h):
         system.totals[Total.IS_FULL] = 1.0
 
 
-@njit(**NJIT_INLINE)
+@njit(**NJIT_CALL)
 def read_point(system, j):
     """Return force, energy and stretch of a point under its load at the end of the last step."""
     points = system.points
@@ -1126,15 +1151,23 @@ def read_points(system, forces, stretch):
 
 
 @njit(**NJIT_CALL)
+def find_modal_energy(system):
+    """Return the energy of the modes [J]."""
+    state = system.state[0]
+    n = state.size // 2
+    energy = 0.0
+    for i in range(n):
+        energy += state[n + i] ** 2 + system.structure.modes[0, i] * state[i] ** 2
+    return 0.5 * system.options.mass * energy
+
+
+@njit(**NJIT_CALL)
 def find_motion_energy(system):
     """Return the energy of the modes and of the normal contact [J], and find the present contact set."""
     state = system.state[0]
     ports = system.ports
     n = state.size // 2
-    energy = 0.0
-    for i in range(n):
-        energy += state[n + i] ** 2 + system.structure.modes[0, i] * state[i] ** 2
-    energy *= 0.5 * system.options.mass
+    energy = find_modal_energy(system)
     heave = int(ports.contact[0])
     if heave >= 0:
         up = project(ports.rows[heave], state[:n])
@@ -1158,36 +1191,25 @@ def rest_ports(system):
     n = state.size // 2
     n_ports = ports.rows.shape[0]
 
-    is_held = False
-    for j in range(points.port.size):
-        is_held = is_held or find_rest_limit(points.numbers, points.memory, j, 1.0) < np.inf
-    if not is_held:
-        return
-
     # Places and then velocities: grip . change = the deviation of the ports that hold.
     for first in (0, n):
         for p in range(n_ports):
-            ports.matrix[p, :] = 0.0
-            ports.matrix[p, p] = 1.0
             ports.vector[p] = 0.0
         for j in range(points.port.size):
-            if find_rest_limit(points.numbers, points.memory, j, 1.0) < np.inf:
+            if rests(points, points.memory, j):
                 p = points.port[j]
                 ports.vector[p] = ports.values[Port.FREE, p]
                 if first > 0:
                     ports.vector[p] = project(ports.rows[p], state[n:])
-                for k in range(n_ports):
-                    ports.matrix[p, k] = ports.grip[p, k]
-                ports.matrix[p, p] *= 1 + system.options.redundant
 
-        solve_linear(ports.matrix, ports.vector, n_ports)
+        solve_held(system)
         for p in range(n_ports):
             for i in range(n):
                 change = ports.rows[p, i] * ports.vector[p] / system.options.mass
                 state[first + i] -= change
 
 
-@njit(**NJIT_INLINE)
+@njit(**NJIT_CALL)
 def try_step(system, level, row, begin, end, drive):
     """Advance by a step of a level; return False if it contains an event; without a contact set SLOT becomes -1.
 
@@ -1266,16 +1288,14 @@ def try_step(system, level, row, begin, end, drive):
             return False
         totals[Total.UNSOLVED] += 1
 
-    for i in range(system.state.shape[1]):
-        system.state[1, i] = system.state[0, i]
     commit(system, h)
-    add_energies(system, level, drive)
+    add_energies(system, level)
     return True
 
 
-@njit(**NJIT_INLINE)
-def add_energies(system, level, drive):
-    """Add the work of the drive and the viscous loss of a step, whose state at the start is in `state[1]`.
+@njit(**NJIT_CALL)
+def add_energies(system, level):
+    """Add the work of the drive and the viscous loss of a step.
 
     Parameters
     ----------
@@ -1283,37 +1303,16 @@ def add_energies(system, level, drive):
         Arrays of the march, changed in place.
     level : int
         Level of the step, which lasts a whole step over 2^level.
-    drive : tuple of float
-        Value, slope and second derivative of the drive at the start of the step [m s-2], per second and per second
-        squared.
     """
     structure = system.structure
     totals = system.totals
-    ports = system.ports
     inputs = structure.inputs
-    after = system.state[0]
-    size = after.size
-    n = size // 2
-    mass = system.options.mass
-
-    # The step's inputs: state at the start, parabola of the drive and modal forces per mass.
-    stored = 0.0
-    for i in range(size):
-        inputs[i] = system.state[1, i]
-    for i in range(n):
-        stored += after[n + i] * after[n + i] + structure.modes[0, i] * after[i] * after[i]
-        force = 0.0
-        for p in range(ports.rows.shape[0]):
-            force -= ports.rows[p, i] * ports.values[Port.FORCE, p]
-        inputs[size + 3 + i] = force / mass
-    inputs[size] = drive[0]
-    inputs[size + 1] = drive[1]
-    inputs[size + 2] = drive[2]
+    size = system.state.shape[1]
 
     # Work is bilinear in drive and inputs, loss quadratic in the inputs.
     work = 0.0
     for i in range(3):
-        work += drive[i] * sum_products(structure.work[level, i], inputs)
+        work += inputs[size + i] * sum_products(structure.work[level, i], inputs)
     loss = 0.0
     for i in range(inputs.size):
         loss += inputs[i] * sum_products(structure.loss[level, i], inputs)
@@ -1321,10 +1320,10 @@ def add_energies(system, level, drive):
     totals[Total.WORK_IN] += work
     totals[Total.POWER] += abs(work)
     totals[Total.VISCOUS] += loss
-    totals[Total.STORED] = max(totals[Total.STORED], 0.5 * mass * stored)
+    totals[Total.STORED] = max(totals[Total.STORED], find_modal_energy(system))
 
 
-@njit(**NJIT_INLINE)
+@njit(**NJIT_CALL)
 def write_sample(system, row, sample):
     """Write a sample of forces and energies at the present state.
 
@@ -1375,7 +1374,7 @@ def write_sample(system, row, sample):
             sample[first + N_PORT_COLUMNS * p] += force
             continue
         energy += state.energy
-        if find_rest_limit(points.numbers, points.memory, j, 1.0) < np.inf:
+        if rests(points, points.memory, j):
             limit = find_rest_limit(points.numbers, points.memory, j, load)
             force = min(max(ports.values[Port.HOLD, p], -limit), limit)
         # The slip is a mean over the points, weighted by their friction limits.
@@ -1491,7 +1490,7 @@ def march(system, steps, samples):
     return steps, DONE
 
 
-@njit(**NJIT_INLINE)
+@njit(**NJIT_CALL)
 def add_work(system, sample, first_column, part):
     """Add the mean forces of a part of a step to a sample; return the friction work of this part [J].
 

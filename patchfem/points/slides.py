@@ -7,14 +7,13 @@ import numpy as np
 
 from .. import compiled
 from .contacts import Contact
-from .march_rows import LISTS_FULL, N_PORT_COLUMNS, Sample, Total
+from .march_rows import N_PORT_COLUMNS, Sample, Total
 from .time_march import (
     Snapshot,
-    copy_system,
-    enlarge_lists,
     load_kernels,
     make_snapshot,
     make_system,
+    march_with_room,
     split_losses,
 )
 
@@ -97,17 +96,9 @@ def follow(contact: Contact, time, slide, frames=(), say=None, report=None) -> S
         step = float(time[end] - time[begin]) / size
         options = system.options._replace(step=step if step > 0 else 1.0)
         system = system._replace(structure=structure, options=options)
-        saved = copy_system(system) if options.has_lists else None
-
-        # A march whose lists are full is repeated with longer ones.
-        while True:
-            samples = np.zeros((size + 1, width))
-            _, status = kernels.march(system, size, samples)
-            if status != LISTS_FULL:
-                break
-            saved = enlarge_lists(saved, f"before sample {end} of the prescribed slide")
-            system = copy_system(saved)
-
+        samples = np.zeros((size + 1, width))
+        place = f"after sample {begin} of the prescribed slide"
+        system = march_with_room(kernels, system, samples, place).system
         rows[begin : end + 1] = samples
         if end in frames:
             force, slip = samples[-1, Sample.PORTS : Sample.PORTS + 2]

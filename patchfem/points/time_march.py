@@ -6,7 +6,6 @@ from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
-from numpy.lib.stride_tricks import sliding_window_view
 from numpy.polynomial.legendre import leggauss
 
 from .. import compiled
@@ -525,8 +524,7 @@ class March:
     - system: arrays of the engine
     - done: number of steps since the start
     - outcome, message: how the march ended, None and "" as long as it goes on
-    - work_sums: friction work from samples, sum of the magnitudes of the friction works of the steps, and created energy
-      [J]
+    - work_sums: friction work from samples, and sum of the magnitudes of the friction works of the steps [J]
     """
 
     def __init__(
@@ -541,7 +539,7 @@ class March:
         self.done = 0
         self.outcome = None
         self.message = ""
-        self.work_sums = np.zeros(3)
+        self.work_sums = np.zeros(2)
         n_columns = len(contact.point_sets) + (2 if contact.sets is not None else 0)
         self.width = 2 * modes.omega.size + Sample.PORTS + N_PORT_COLUMNS * n_columns
         self.kernels = load_kernels(contact)
@@ -599,22 +597,16 @@ class March:
     def advance(self, count: int) -> np.ndarray:
         """March over a number of steps; return the samples (steps done + 1, w) of their starts and of the end.
 
-        A part of the march whose lists of bonds are full is repeated with larger lists.
-
         Raises
         ------
         Missing
             If the lists become too long.
         """
         self._set_drive(count)
-        saved = copy_system(self.system) if self.system.options.has_lists else None
-        while True:
-            samples = np.zeros((count + 1, self.width))
-            n_done, status = self.kernels.march(self.system, count, samples)
-            if status != LISTS_FULL:
-                break
-            saved = enlarge_lists(saved, f"at step {self.done + n_done}")
-            self.system = copy_system(saved)
+        samples = np.zeros((count + 1, self.width))
+        self.system, n_done, status = march_with_room(
+            self.kernels, self.system, samples, f"after step {self.done}"
+        )
         samples = samples[: n_done + 1]
         self.done += n_done
         self._judge(status)
@@ -649,10 +641,9 @@ class March:
             )
 
     def _add_works(self, samples) -> None:
-        """Add the friction work of samples: by the forces at the samples, its magnitude, and created energy."""
+        """Add the friction work of samples: by the forces at the samples, and its magnitude."""
         n = 2 * self.modes.omega.size
         works = samples[:-1, n + Sample.WORK]
-        created = -np.minimum(split_losses(samples, n, self.system.options.scale), 0.0)
         sampled = np.zeros(works.size)
         rests = np.ones(works.size, bool)
         still = SAME_PLACE * np.abs(samples[:, : n // 2]).max(initial=0.0)
@@ -668,7 +659,7 @@ class March:
         # What a port at rest does within a step and takes back is no work of the friction.
         sampled[rests] = works[rests]
         passed = np.abs(works[~rests]).sum()
-        self.work_sums += float(sampled.sum()), float(passed), float(created.sum())
+        self.work_sums += float(sampled.sum()), float(passed)
 
     def take_snapshot(self, sample) -> Snapshot:
         """Return the state of the interface at the end of the last step, whose sample is given."""
@@ -687,7 +678,7 @@ class March:
         n = 2 * self.modes.omega.size
         totals = self.system.totals
         friction = float(totals[Total.FRICTION])
-        sampled, passed, _ = self.work_sums
+        sampled, passed = self.work_sums
 
         # Friction dissipates its work less the change of the energy stored in the interface.
         ledger = {
@@ -713,6 +704,46 @@ class March:
         statuses = self.system.lists.statuses
         sums = statuses[:, [STATUS.created, STATUS.dissipated, STATUS.n_extra]].sum(axis=0)
         return np.append(sums, statuses[:, STATUS.max_strips].max(initial=0.0))
+
+
+class MarchedSteps(NamedTuple):
+    """Arrays of a march at its end, number of steps done, and status (`march_rows`)."""
+
+    system: System
+    n_done: int
+    status: int
+
+
+def march_with_room(kernels, system: System, samples, place: str) -> MarchedSteps:
+    """March over steps, again with longer lists of bonds if those are full.
+
+    Parameters
+    ----------
+    kernels : module
+        Compiled march.
+    system : march_rows.System
+        Arrays of the march; changed.
+    samples : (steps + 1, w) array
+        Samples before each step and at the end; output.
+    place : str
+        Where the steps begin, for a message.
+
+    Returns
+    -------
+    MarchedSteps
+
+    Raises
+    ------
+    Missing
+        If the lists become too long.
+    """
+    saved = copy_system(system) if system.options.has_lists else None
+    while True:
+        n_done, status = kernels.march(system, len(samples) - 1, samples)
+        if status != LISTS_FULL:
+            return MarchedSteps(system, n_done, status)
+        saved = enlarge_lists(saved, place)
+        system = copy_system(saved)
 
 
 def enlarge_lists(system: System, place: str) -> System:
@@ -887,7 +918,8 @@ def march(
             and record.before is not None
             and record.before.size == now.size
         ):
-            scale = np.concatenate([record.find_largest_state(), np.abs(memory)])
+            largest = np.abs(record.last[1][:, : state.size]).max(axis=0)
+            scale = np.concatenate([largest, np.abs(memory)])
             if (np.abs(now - record.before) <= SAME_CYCLE * scale).all():
                 record.repeat(count)
                 run.done += count * size
@@ -919,13 +951,13 @@ def advance_with_frames(run: March, size: int, frames: int) -> tuple[int, np.nda
         Number of snapshots.
     """
     first = run.done
-    if not frames:
-        return first, run.advance(size), []
     parts = []
     snapshots = []
-    for begin, end in pairwise(np.linspace(0, size, min(frames, size) + 1).round().astype(int)):
+    n_parts = min(max(frames, 1), size)
+    for begin, end in pairwise(np.linspace(0, size, n_parts + 1).round().astype(int)):
         parts.append(run.advance(int(end - begin)))
-        snapshots.append(run.take_snapshot(parts[-1][-1]))
+        if frames:
+            snapshots.append(run.take_snapshot(parts[-1][-1]))
         if run.outcome is not None:
             break
     rows = [part[:-1] for part in parts[:-1]]
@@ -993,23 +1025,16 @@ class Record:
         self.totals = sums[:, -1].copy()
         self.snapshots = list(snapshots)
 
-        # Extremes and phasor of each cycle; a march that ends early has a part of a cycle.
+        # Extremes and phasor of each cycle; the first and the last one may be a part of a cycle.
         output = samples[:, : n // 2] @ run.modes.output
         speed = samples[:, n // 2 : n] @ run.modes.output
-        steps = run.steps
-        n_whole = count // steps
-        ends = [n_whole * steps] if n_whole else []
-        ends += [count] if count > n_whole * steps or not n_whole else []
-        begin = 0
-        for end in ends:
-            size = steps if end == n_whole * steps and n_whole else end - begin
-            cycles = sliding_window_view(output[begin : end + 1], size + 1)[:: max(size, 1)]
-            speeds = sliding_window_view(speed[begin : end + 1], size + 1)[:: max(size, 1)]
-            self.extremes += find_extremes(cycles, speeds, run.step)
-            angle = 2 * np.pi * ((first + begin + np.arange(size)) % steps) / steps
-            parts = cycles[:, :-1] @ np.stack([np.cos(angle), -np.sin(angle)], axis=1)
-            self.phasors += list(2 / max(size, 1) * (parts[:, 0] + 1j * parts[:, 1]))
-            begin = end
+        for begin in range(0, max(count, 1), run.steps):
+            end = min(begin + run.steps, count)
+            cycle = slice(begin, end + 1)
+            self.extremes.append(find_extremes(output[cycle], speed[cycle], run.step))
+            phase = (first + np.arange(begin, end)) % run.steps / run.steps
+            phasor = output[begin:end] @ np.exp(-2j * np.pi * phase)
+            self.phasors.append(2 / max(end - begin, 1) * phasor)
 
     def _keep(self, part: tuple[int, np.ndarray, np.ndarray]) -> None:
         """Keep all samples of the parts within a window of the last one, and of older parts those at equal distances."""
@@ -1022,11 +1047,6 @@ class Record:
                 self.numbers.append(first + picked)
                 self.rows.append(samples[picked])
                 self.sums.append(sums[:, picked])
-
-    def find_largest_state(self) -> np.ndarray:
-        """Return the largest magnitudes (2 n,) of the modal coordinates and velocities in the last part."""
-        n = 2 * self.run.modes.omega.size
-        return np.abs(self.last[1][:, :n]).max(axis=0)
 
     def repeat(self, count: int) -> None:
         """Repeat the last part of the march."""
@@ -1086,39 +1106,31 @@ class Record:
         )
 
 
-def find_extremes(q, v, step: float) -> list[tuple[float, float]]:
-    """Return the smallest and largest of samples q (c, k) of each cycle, those of the cubics between them included.
-
-    `v` (c, k) are the velocities, `step` [s] the distance of the samples.
+def find_extremes(q, v, step: float) -> tuple[float, float]:
+    """Return the smallest and largest of samples (k,) of a displacement, those of the cubics between them included.
 
     Parameters
     ----------
-    q : (c, k) array
-        Samples of each cycle [m].
-    v : (c, k) array
-        Velocities [m/s].
+    q, v : (k,) array
+        Displacement [m] and velocity [m/s].
     step : float
         Distance of the samples [s].
     """
-    low = q.min(axis=1)
-    high = q.max(axis=1)
     # A change of sign within round-off, as at a stop, is no reversal: the cubic would overshoot there.
-    limit = -1e-12 * (v**2).max(axis=1, keepdims=True)
-    row, turn = np.nonzero(v[:, :-1] * v[:, 1:] < limit)
+    turn = np.flatnonzero(v[:-1] * v[1:] < -1e-12 * (v**2).max())
     # The velocity is the parabola with the mean of the increment.
-    first = v[row, turn]
-    last = v[row, turn + 1]
-    mean = (q[row, turn + 1] - q[row, turn]) / step
+    first = v[turn]
+    last = v[turn + 1]
+    mean = (q[turn + 1] - q[turn]) / step
     square = 3 * (first + last) - 6 * mean
     linear = 6 * mean - 4 * first - 2 * last
     root = np.sqrt(np.maximum(linear**2 - 4 * square * first, 0.0))
     # A displacement that jumps, as at a stop within round-off, has its extreme at a sample: the quotient is infinite.
     with np.errstate(divide="ignore"):
         x = np.clip(2 * first / (-linear + np.copysign(root, first - last)), 0.0, 1.0)
-    peaks = q[row, turn] + step * x * (first + x * (linear / 2 + x * square / 3))
-    np.minimum.at(low, row, peaks)
-    np.maximum.at(high, row, peaks)
-    return list(zip(low.tolist(), high.tolist()))
+    peaks = q[turn] + step * x * (first + x * (linear / 2 + x * square / 3))
+    values = np.append(q, peaks)
+    return float(values.min()), float(values.max())
 
 
 def make_histories(run: March, rows, numbers, energies) -> Response:

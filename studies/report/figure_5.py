@@ -100,7 +100,7 @@ def _by_euler(steps: int, period: float) -> Motion:
     last = slice(-steps - 1, None)
     displacement = motion.z[last] @ rig.modes.output
     velocity = motion.v[last] @ rig.modes.output
-    ((low, high),) = find_extremes(displacement[None], velocity[None], period / steps)
+    low, high = find_extremes(displacement, velocity, period / steps)
     frame = motion.z[last] @ rig.modes.slide - displacement
     return Motion(
         motion.time[last] - 7 * period,

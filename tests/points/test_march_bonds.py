@@ -22,8 +22,6 @@ from patchfem.response import energy_balance
 from patchfem.slip.shear_modes import shear_modes
 from patchfem.structure import drives
 
-from .printed_sums import NodeBonds, solve_displacements
-
 ROW = np.ones(1)
 FORCE = np.array([0.7, 1.3, 2.0, 0.4]) / 0.4  # normal forces of four points [N]
 LAWS = [(reading, order) for reading in ("report", "stretch") for order in (0.0, 0.5, 1.0, 2.0)]
@@ -186,51 +184,6 @@ def test_exact_energy_balance_over_reversals(reading, order, growth):
     losses = found.energies[:, 0]
     created = -np.minimum(losses, 0).sum()
     assert reading == "report" or created < 1e-5 * losses.sum()
-
-
-@pytest.mark.share(1)
-@pytest.mark.parametrize(
-    ("reading", "order", "grows"),
-    [("report", 1.0, False), ("report", 1.0, True), ("report", 0.5, True), ("stretch", 2.0, True)],
-)
-def test_always_points_agree_with_explicit_bond_sums(reading, order, grows):
-    """The force of five points with a full compliance agrees within 3e-4 with a program that keeps every bond."""
-    growth = (
-        {"ratio": 0.8, "rest_growth": 0.1, "slip_growth": 3e-7, "rest_speed": 1e-3} if grows else {}
-    )
-    law = Bonds(0.4, 1e-6, order, reading, initial=0.5, **growth)
-    rng = np.random.default_rng(8)
-    limit = rng.uniform(0.5, 2, 5)
-    root = rng.normal(size=(5, 5))
-    compliance = 2e-8 * (root @ root.T + np.eye(5))
-    values, vectors = np.linalg.eigh(np.sqrt(limit)[:, None] * compliance * np.sqrt(limit))
-    modes = make_shear(vectors / np.sqrt(limit)[:, None], 1 / values)
-    steps = 900
-    path = reversing_path(steps)
-    dt = 0.05 / steps
-    found = follow_path(make_lists(law, limit / 0.4, modes, 40.0, 0.01), path, dt)
-    keys = SimpleNamespace(
-        static=law.static,
-        kinetic=law.static * law.ratio,
-        order=order,
-        reading=reading,
-        bond_length=law.length,
-        rest_growth=law.rest_growth,
-        slip_growth=law.slip_growth,
-        initial_bonds=law.initial,
-    )
-    bonds = NodeBonds(keys, 5, law.rest_speed)
-    slip = np.zeros(5)
-    previous = np.zeros(5)
-    expected = [0.0]
-    for q in path[1:]:
-        next_slip, force = solve_displacements(bonds, limit, compliance, q, dt, 2 * slip - previous)
-        previous = slip
-        slip = next_slip
-        bonds.weight(slip, dt, keep=True)
-        expected.append(force.sum())
-    assert found.n_unsolved == 0
-    assert np.abs(found.forces[:, 0] - expected).mean() < 3e-4 * limit.sum()
 
 
 def test_always_sudden_slip_dissipates_energy():
@@ -399,7 +352,7 @@ def test_refuses_list_longer_than_limit(monkeypatch):
     """A list that exceeds the largest number of entries is refused with a message that names the key to change."""
     monkeypatch.setattr(engine, "MAX_STRIPS", 100)
     with pytest.raises(
-        Missing, match=r"grew beyond 100 entries \(0 MB\) at step \d+; raise accuracy.tail"
+        Missing, match=r"grew beyond 100 entries \(0 MB\) after step \d+; raise accuracy.tail"
     ):
         march_list(GROWING_LISTS["stretch"], 40, monkeypatch)
 

@@ -228,22 +228,6 @@ def make_coulomb_contact(grooves, tolerance, compliance=COMPLIANCE):
     return shear.make_flank_contact(model, LOAD, patch)
 
 
-@pytest.mark.parametrize("tolerance", [1e-2, 1e-4])
-def test_exact_coulomb_points_on_flat_grooves_equal_elements(tolerance):
-    """Coulomb points on flat grooves agree with their exact elements within 0.17 of the tolerance,
-    in partial and in gross slip."""
-    elements = jenkins_set(COMPLIANCE, MU * LOAD * LOAD_FRACTION)
-    slide = np.concatenate(
-        [np.linspace(0, 1, 40), np.linspace(1, -0.8, 60)[1:], np.linspace(-0.8, 3, 90)[1:]]
-    )
-    slide *= elements.yield_displacement.max()
-    expected = follow_slide(
-        make_parallel_contact(elements.stiffness, elements.yield_displacement, BASIS.slide), slide
-    )[0]
-    forces = follow_slide(make_coulomb_contact(Grooves(80e-6, 1e-17), tolerance), slide)[0]
-    assert np.abs(forces[:-1, 0] - expected[:-1, 0]).max() < 0.17 * tolerance * MU * LOAD
-
-
 def solve_coulomb_points(grooves, slide, compliance):
     """Return the force of Coulomb points with a compliance [m/N] along a slide over grooves.
 

@@ -196,23 +196,6 @@ def test_order_with_kinetic_below_static_friction(ratio):
     assert errors[0] < 1e-4 and np.all(errors[1:] < np.maximum(errors[:-1] / 3, EVENT_ERROR))
 
 
-def test_order_for_stops_and_releases_of_several_modes():
-    """Amplitudes of several modes with stops and releases converge."""
-    rng = np.random.default_rng(5)
-    n = int(rng.integers(3, 5))
-    root = rng.normal(size=(n, n))
-    slide = np.append(1.0, rng.uniform(0.3, 1.0, n - 1) * rng.choice([-1, 1], n - 1))
-    modes = make_modal_basis(
-        np.sort(rng.uniform(0.5, 6.0, n)),
-        0.02,
-        slide,
-        rng.uniform(-1, 1, n),
-        damping=0.05 * root @ root.T,
-    )
-    errors = find_errors(modes, SineDrive(1.0, 0.45), 0.1, 0.03, 6, (400, 1600, 6400))
-    assert errors[0] < 1e-4 and np.all(errors[1:] < np.maximum(errors[:-1] / 3, EVENT_ERROR))
-
-
 @pytest.mark.parametrize(
     "seed, n_interfaces, n_modes, coupled", [(3, 2, 3, False), (1, 3, 3, True)]
 )

@@ -62,20 +62,6 @@ def test_exact_release_of_a_coulomb_block():
     assert np.ptp(motion.window.slide[-400:]) == 0
 
 
-def test_exact_stick_under_static_friction():
-    """Below static friction a block at rest moves by no more than round-off."""
-    motion = run(laws.make_coulomb(1.3, 1.0, LIMIT), 100, cycles=20)
-    assert np.abs(motion.extremes).max() < 1e-15 * DRIVE.acceleration / OMEGA**2
-
-
-def test_order_two():
-    """The error of the amplitude of an elastic-plastic block falls by about four for half of the step."""
-    law = laws.make_jenkins(1.0, 1e-5, LIMIT)
-    values = [amplitude(run(law, steps)) for steps in (100, 200, 400, 1600)]
-    errors = np.abs(np.array(values[:3]) - values[3])
-    assert errors[1] <= errors[0] / 2.5 and errors[2] <= errors[1] / 2.5
-
-
 def test_exact_parallel_points_are_one_point():
     """Ten equal points that share the load move as one."""
     one = run(laws.make_jenkins(1.0, 1e-5, LIMIT), 100, cycles=20)

@@ -96,3 +96,17 @@ def test_tangent_is_the_derivative_of_the_mean_force(name):
         change = 1e-11
         slope = (mean(dq + change).force - mean(dq - change).force) / (2 * change)
         assert mean(dq).by_increment == pytest.approx(slope, rel=1e-4)
+
+
+def test_exact_tiny_step_has_accurate_force():
+    """The mean force of a step of 1e-12 of the stretch is exact to rounding, without cancellation."""
+    point = laws.make_jenkins(3.0, 1.0)
+    for stretch in (0.3, -0.7, 0.1):
+        # The memory is the force over mu, and the load that stretches.
+        memory = np.array(point.memory)[:, None]
+        memory[0] = stretch
+        for dq in (1e-12, -1e-13, 1e-300, 0.0):
+            step = maps.Step(dq, 1.0, 0.0, 0.0, 0.0)
+            force, slope = maps.mean_force(point.numbers[:, None], memory, 0, 1.0, step)[:2]
+            assert force == pytest.approx(3 * (stretch + dq / 2), rel=1e-14)
+            assert slope == pytest.approx(1.5, rel=1e-6)

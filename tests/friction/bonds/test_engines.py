@@ -2,13 +2,13 @@
 
 import numpy as np
 import pytest
-from friction_paths import random_walk, reference_traction, triangle_path, upper_pressure
+from friction_paths import reference_traction, triangle_path, upper_pressure
 from march_paths import OMEGA, follow_path, make_one_mode
 from scene_texts import DRIVE, KILOGRAM
 
 from patchfem import build, plan
 from patchfem.core import SineDrive
-from patchfem.friction import Bonds, choose_engine
+from patchfem.friction import Bonds
 from patchfem.points.contacts import BondSum, make_bond_contact
 from patchfem.points.time_march import march
 from patchfem.response import energy_balance
@@ -49,12 +49,6 @@ def load_rig_scene(tmp_path, engine="auto", reading="report", order=1, growth=""
 # ---- choice of the engine
 
 
-def test_exact_recursion_is_chosen_where_exact():
-    """The default law is summed by the recursion, whose stated error is zero."""
-    choice = choose_engine(Bonds(1.0, 1.0), 1e-3, 10.0, 200)
-    assert (choice.engine, choice.error, choice.strips) == ("recursion", 0.0, 0.0)
-
-
 # ---- lists along a prescribed path
 
 
@@ -80,27 +74,6 @@ def test_exact_printed_law_creates_energy_per_cycle():
         created = -losses[losses < 0].sum()
         assert (created > 1e-4) == (reading == "report")
         assert (created < 1e-15) == (reading == "stretch")
-
-
-@pytest.mark.parametrize(
-    "order, initial, size",
-    [
-        (2.0, 0.0, 0.2),
-        (0.0, 1.0, 0.01),
-        (0.5, 1.0, 0.004),
-    ],
-)
-def test_always_stretch_law_creates_negligible_energy(order, initial, size):
-    """The stretch form of the law creates at most 1e-7 of the energy that it dissipates.
-
-    With Simpson's rule or Gauss points for the mean force of a step, the last rows created up to 5
-    % of the work, because the force jumps or has a cusp inside the step.
-    """
-    path = random_walk(8, 400, size)
-    law = Bonds(1.0, 1.0, order, initial=initial)
-    _, energies, n_unsolved, _ = follow_path(make_lists(law), path, 1.0)
-    losses = energies[:-1, 0]
-    assert n_unsolved == 0 and -losses[losses < 0].sum() <= 1e-7 * losses[losses > 0].sum()
 
 
 # ---- marches

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 from friction_paths import (
-    march_bonds,
     random_walk,
     reference_energy,
     reference_traction,
@@ -22,10 +21,10 @@ GROWTH = {"ratio": 0.6, "rest_growth": 0.3, "slip_growth": 0.4, "rest_speed": 1e
 # ---- direct lists
 
 
-@pytest.mark.parametrize("order", [0.0, 2.0])
+@pytest.mark.parametrize("order, tolerance", [(0.0, 1e-12), (2.0, 1e-12), (3.7, 1e-8)])
 @pytest.mark.parametrize("initial", [0.0, 1.0])
-def test_exact_direct_printed_law_equals_hand_sum(order, initial):
-    """The direct list of the printed law has the forces of a sum over the bonds by hand within 1e-12, also at rest."""
+def test_exact_direct_printed_law_equals_hand_sum(order, tolerance, initial):
+    """The direct list of the printed law has the forces of a sum over the bonds by hand, also at rest."""
     law = Bonds(1.0, 1.0, order, "report", initial=initial)
     path = np.concatenate(
         [random_walk(3, 40, 0.7), random_walk(3, 40, 0.7)[-1] + np.array([0, 0.2, 0.4, 30, 30])]
@@ -33,8 +32,8 @@ def test_exact_direct_printed_law_equals_hand_sum(order, initial):
     compiled = march_list(law, path)
     for k in (3, 20, 40, 43, 45):
         expected = reference_traction(law, path[: k + 1], UNIT_PRESSURE)[0]
-        assert compiled.after[k - 1] == pytest.approx(expected, abs=1e-12)
-    assert compiled.ahead == pytest.approx(compiled.after, abs=1e-12)
+        assert compiled.after[k - 1] == pytest.approx(expected, abs=tolerance)
+    assert compiled.ahead == pytest.approx(compiled.after, abs=tolerance)
 
 
 @pytest.mark.share(0, 3, 6, 8, 11)
@@ -55,23 +54,6 @@ def test_exact_direct_stretch_law_equals_hand_sum(order, tolerance, growth):
         expected = reference_traction(law, path[: k + 1] - path[0], UNIT_PRESSURE, 0.4)[0]
         assert compiled.after[k - 1] == pytest.approx(expected, abs=tolerance)
     assert compiled.ahead == pytest.approx(compiled.after, abs=tolerance)
-
-
-@pytest.mark.parametrize("growth", [{}, GROWTH])
-def test_exact_direct_stretch_law_equals_recursion(growth):
-    """The list of every bond has the forces, means and energies of the recursion, which is exact, within 3e-8.
-
-    The error is that of two Gauss points on a strip of a sixteenth of a bond length.
-    """
-    law = Bonds(1.0, 1.0, initial=0.4, **growth)
-    path = np.concatenate(
-        [random_walk(5, 80, 0.5), random_walk(5, 80, 0.5)[-1] + np.array([0, 1e-5, 20.0, 1e3])]
-    )
-    compiled = march_list(law, path, 0.4)
-    recursion = march_bonds(law, path, UNIT_PRESSURE, 0.4)
-    assert compiled.after == pytest.approx(recursion.traction[:, 0], abs=3e-8)
-    assert compiled.mean == pytest.approx(recursion.mean, abs=2e-7)
-    assert compiled.stored == pytest.approx(recursion.stored, abs=5e-8)
 
 
 @pytest.mark.parametrize("order, tolerance", [(-0.5, 1e-4), (1.0, 1e-5)])

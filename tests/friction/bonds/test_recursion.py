@@ -140,15 +140,3 @@ def test_exact_huge_steps_reach_steady_sliding(growth):
         assert run.traction[1] == pytest.approx(-0.3 * length_ratio * sigma, rel=1e-4)
         assert run.mean[1] == pytest.approx(-0.3 * length_ratio * sigma.sum(), rel=1e-4)
         assert run.traction[2] == pytest.approx(run.traction[1], rel=1e-12)  # step of zero length
-
-
-def test_exact_zero_steps_do_not_change_state():
-    """A step of zero length changes neither traction nor energy."""
-    law = Bonds(0.3, 1.0)
-    path = np.array([0, 0.4, 0.4, 0.4, 0.9])
-    for tail in (None, 0.0):
-        run = march_bonds(law, path, make_pressure("upper"), 0.5, tail)
-        shortened = march_bonds(law, path[[0, 1, 4]], make_pressure("upper"), 0.5, tail)
-        assert run.traction[-1] == pytest.approx(shortened.traction[-1], abs=1e-14)
-        assert run.mean[1] == pytest.approx(run.traction[0].sum(), abs=1e-13)
-        assert abs(run.dissipated[1]) <= 1e-15

@@ -110,14 +110,6 @@ def test_exact_long_sliding_reaches_averaged_law(tail, order, direction):
     assert np.abs(expected).max() > 0.4
 
 
-def test_exact_uniform_pressure_is_its_average():
-    """Far from the ends a uniform pressure is its own average, so that the averaged law is Coulomb's law."""
-    nodes = np.linspace(0, 100, 41)
-    for direction in (1.0, -1.0):
-        average = average_pressure(nodes[18:23], nodes, np.full(41, 2.0), direction, 0.5, 1.0)
-        assert average == pytest.approx(2.0, rel=1e-13)
-
-
 @given(st.floats(-30, 30), st.sampled_from([1.0, -1.0]))
 def test_always_average_is_within_pressures(offset, direction):
     """An average is never negative and never above the largest pressure, so that the averaged law creates no energy."""

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 from law_runs import LOAD, run_bench_along_path, shrinking_sine
-from scene_texts import COATED, get_only_mistake, list_mistakes
 
 from patchfem.friction import max_yield_displacement
 from patchfem.friction.laws.iwan import slider_cells
@@ -93,15 +92,3 @@ def test_exact_bench_loop_agrees_with_slider_density():
         and np.diff(ledger[2]).min() >= -1e-18
     )
     assert not ledger[3].any()
-
-
-def test_refuses_lower_shapes_and_varying_load():
-    """Shapes on the lower piece and a varying load are refused for the Iwan law on a bench."""
-    motion = '[slide]\nkind = "sine"\namplitude = "1 um"\nfrequency = "1 Hz"\n'
-    bench = "[friction]\n" + LAW + motion
-    tilt = '[contact.tilt]\nangle = "0.01 mrad"\non = "lower"\n'
-    assert "put the shapes on the upper" in get_only_mistake(COATED + tilt + bench)
-    varying = '[normal]\nload = "100 N"\namplitude = "10 N"\nfrequency = "5 Hz"\n'
-    assert (
-        "normal.amplitude: not supported yet with law 'iwan'" in list_mistakes(varying + bench)[0]
-    )

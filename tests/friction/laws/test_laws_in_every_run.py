@@ -11,7 +11,7 @@ from law_runs import (
     run_two_masses_uncompiled,
     shrinking_sine,
 )
-from scene_texts import COATED, DRIVE, MODE, get_only_mistake, list_mistakes
+from scene_texts import DRIVE, MODE, get_only_mistake
 from scipy.interpolate import CubicSpline
 
 from patchfem import load
@@ -179,20 +179,6 @@ def test_refuses_law_without_required_key(law, keys):
 def test_refuses_law_parameter_out_of_range(law, change, message):
     """A parameter outside the range of its law is refused with the name of the key or the reason."""
     assert message in get_only_mistake(rig_scene(law), f"friction.{change}")
-
-
-@pytest.mark.parametrize("law", [IWAN, POWER, DAHL, TANH])
-def test_refuses_partial_slip_for_hysteretic_laws(law):
-    """The laws without partial slip are refused with `contact.shear`."""
-    scene = COATED + "[contact.shear]\n[friction]\n" + law + MODE + DRIVE
-    assert "with [contact.shear]" in get_only_mistake(scene)
-
-
-@pytest.mark.parametrize("law", [IWAN, POWER, DAMPED])
-def test_refuses_varying_load_for_hysteretic_laws(law):
-    """The laws with memory are refused with a varying load on a rig."""
-    sets = ("normal.amplitude=1 N", "normal.frequency=3 Hz")
-    assert "with normal.amplitude" in list_mistakes(rig_scene(law), *sets)[0]
 
 
 def test_exact_missing_keys_have_defaults():
