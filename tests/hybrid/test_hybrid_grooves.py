@@ -128,18 +128,43 @@ def test_exact_time_of_lift_off_agrees_with_dop853(seed):
 
 
 def test_exact_tanh_law_on_grooves_agrees_with_dop853():
-    """With the friction coefficient mu tanh(sqrt(1 + t^2) v/v_0) slide and speed agree with DOP853 within 1e-6."""
+    """With the friction coefficient mu tanh(sqrt(1 + t^2) v/v_0) slide, speed and loss agree with DOP853 to 1e-6."""
     case = draw_case(3)._replace(lifted=0.4)
     speed = 5e-3
     duration = 3 * 2 * np.pi / case.drive
     motion = run_drawn_case(case, 3, speed=speed, times=[duration])
 
     def differentiate(t, x):
-        friction = case.static * np.tanh(np.hypot(1, flank_slope(case, x[0])[0]) * x[1] / speed)
-        return [x[1], sliding_forces(case, t, x[0], x[1], 1.0, friction)[0]]
+        """Return the rates of slide, speed and friction loss."""
+        stretch = np.hypot(1, flank_slope(case, x[0])[0])
+        friction = case.static * np.tanh(stretch * x[1] / speed)
+        acceleration, normal_force, _ = sliding_forces(case, t, x[0], x[1], 1.0, friction)
+        return [x[1], acceleration, friction * normal_force * stretch * x[1]]
 
     expected = solve_ivp(
-        differentiate, (0, duration), [0.0, 0.0], "DOP853", rtol=1e-11, atol=[1e-16, 1e-13]
+        differentiate, (0, duration), np.zeros(3), "DOP853", rtol=1e-11, atol=[1e-16, 1e-13, 1e-13]
     ).y[:, -1]
-    assert motion.rows[-1, 1:3] == pytest.approx(expected, rel=1e-6)
+    assert motion.rows[-1, 1:3] == pytest.approx(expected[:2], rel=1e-6)
+    assert motion.values["energy_dissipated"] == pytest.approx(expected[2], rel=1e-6)
     assert motion.values["energy_balance"] < 1e-9
+
+
+def test_exact_lift_off_with_tanh_law_agrees_with_dop853():
+    """With a reference speed the run ends where the normal force vanishes in the solution by DOP853, within 2e-5."""
+    case, speed = draw_case(9), 1e-3
+
+    def find_forces(t, x):
+        friction = case.static * np.tanh(np.hypot(1, flank_slope(case, x[0])[0]) * x[1] / speed)
+        return sliding_forces(case, t, x[0], x[1], 1.0, friction)
+
+    def find_normal_force(t, x):
+        return find_forces(t, x)[1]
+
+    find_normal_force.terminal = True
+    expected = solve_ivp(
+        lambda t, x: [x[1], find_forces(t, x)[0]], (0.0, 0.01), [0.0, 0.0], "DOP853", events=find_normal_force,
+        rtol=1e-11, atol=1e-14, max_step=1e-5,
+    )  # fmt: skip
+    motion = run_drawn_case(case, 4, speed=speed)
+    assert motion.status == Status.LEAVES_GROOVES
+    assert motion.time == pytest.approx(expected.t_events[0][0], rel=2e-5)
