@@ -71,12 +71,13 @@ def read_measures(example_folder: Path) -> dict:
 
 
 def test_always_examples_write_html_reports(example_folder):
-    """Runs and sweeps with new measures and a new drive write reports, which describe the drive in words."""
-    for name in ("hold", "rig", "rigs"):
-        assert (example_folder / name / "report.html").stat().st_size > 10_000, name
-    assert "base acceleration of 5 g for one second" in (
-        example_folder / "hold" / "report.html"
-    ).read_text("utf-8")
+    """Runs and sweeps with new measures and a new drive write reports; that of a run names the measures."""
+    pages = {
+        name: (example_folder / name / "report.html").read_text("utf-8")
+        for name in ("hold", "rig", "rigs")
+    }
+    assert all(len(page) > 10_000 for page in pages.values())
+    assert "slide range" in pages["hold"] and "slide range" in pages["rig"]
 
 
 def assert_loop_matches_closed_form(found: dict) -> None:

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from ..exceptions import PatchfemError
 from ..friction.bonds.parameters import Bonds
 from ..friction.grooves import Grooves
 from ..friction.protocol import Element
@@ -149,7 +150,10 @@ def convert_element(element: Element) -> list[PointLaw]:
         if rows[0] == Law.TANH:
             rows[2] = 1 / numbers[2]
         return [PointLaw(rows, memory, 1.0)]
-    raise ValueError(f"law of {element.kernels} has no return map")
+    raise PatchfemError(
+        f"a bench and time steps need the return map of a law, which {element.kernels} lacks; add it to "
+        "points/return_maps_kernels.py, or compute a rig with another method"
+    )
 
 
 def make_contact(elements, rows, springs=(), scale: float = 0.0) -> Contact:
