@@ -175,8 +175,7 @@ def save_checkpoint(path: Path, key: str, run, record) -> None:
     )
     form = np.array(json.dumps(pack(state, arrays)))
     named = {str(number): array for number, array in enumerate(arrays)}
-    n_bytes = sum(array.nbytes for array in arrays)
-    with write_atomically(path, n_bytes) as partial, open(partial, "wb") as file:
+    with write_atomically(path) as partial, open(partial, "wb") as file:
         np.savez(file, key=np.array(key), form=form, **named)
         file.flush()
         os.fsync(file.fileno())
