@@ -108,7 +108,6 @@ class Motion:
     - cycles_done: number of cycles
     - snapshots: states at the ends of equal parts of the last cycle
     - end: the march at its end, from which another one can go on
-    - log, events: None and 0, because a march has no list of events
     """
 
     response: Response
@@ -123,8 +122,6 @@ class Motion:
     cycles_done: float
     snapshots: list[Snapshot]
     end: "March"
-    log: None = None
-    events: int = 0
 
 
 def load_kernels(contact: Contact, say=None):

@@ -1,7 +1,7 @@
 """Computation of the measures of a run: values with names, units and errors.
 
 In: histories of a run, and measures that its engine integrated over the last cycles. Out: measures by name with errors
-from coarse runs, the outcome, and the stick-slip events. Read `rows` first: each row of its table evaluates a
+from coarse runs, and the outcome. Read `rows` first: each row of its table evaluates a
 `LastCycles`. A value that the engine integrated replaces the value from samples. `measures` has the
 functions that evaluate samples.
 """
@@ -16,14 +16,12 @@ PUBLIC = {
     "decay_curve": (
         "DecayCurve",
         "HalfCycles",
-        "MIN_HALF_CYCLE",
         "fit_decay_curve",
         "locate_reversals",
         "make_half_cycles",
         "measure_last_cycle_amplitude",
         "smooth_slopes",
     ),
-    "ends": ("estimate_window_error",),
     "errors": (
         "ERROR_MEASURES",
         "FrictionScale",
@@ -38,16 +36,7 @@ PUBLIC = {
         "merged_cell_errors",
         "total_error",
     ),
-    "events": (
-        "EVENT_KIND_NAMES",
-        "Events",
-        "SEGMENT_BORDER",
-        "classify_changes",
-        "find_segment_borders",
-        "is_all_stuck",
-        "join_events",
-        "sort_events",
-    ),
+    "events": ("is_all_stuck",),
     "levels": (
         "Level",
         "bracket_onset",
@@ -102,10 +91,6 @@ PUBLIC = {
         "find_missing_steady",
         "find_missing_unbounded",
     ),
-    "ringing": (
-        "compute_stuck_vibration",
-        "select_strongest",
-    ),
     "rows": (
         "AMPLITUDE",
         "STEADY_AMPLITUDE",
@@ -120,17 +105,13 @@ PUBLIC = {
         "remove_interface_number",
         "select_names",
         "set_final_floors",
-        "stick_fraction",
     ),
     "settling": (
         "CLASSES",
         "extrapolate_steady_amplitudes",
-        "slip_period",
         "window_amplitude_means",
     ),
     "spectrum": (
-        "friction_harmonic",
-        "motion_harmonic",
         "find_acceleration_harmonics",
         "read_instrument",
         "make_acceleration_measures",

@@ -125,63 +125,6 @@ def test_exact_coulomb_decay_agrees_with_closed_form():
     assert set(data.decay_time.dims) == {"decay_time"} and "decay_frequency_error" in data
 
 
-TWO_MODES = """[normal]
-load = "20 N"
-[friction]
-law = "elastic-plastic"
-static = 0.3
-stiffness = "30 kN/m"
-[structure]
-moving_mass = "1 kg"
-[[structure.mode]]
-name = "first"
-frequency = "40 Hz"
-damping = 0.002
-slide = 1.0
-output = 1.0
-[[structure.mode]]
-name = "second"
-frequency = "131 Hz"
-damping = 0.002
-slide = 0.7
-output = -0.6
-[drive]
-kind = "free"
-displacement = "2 mm"
-cycles = 60
-"""
-
-
-def test_exact_decay_that_ends_stuck_has_stuck_eigenvalue():
-    """A decay that ends stuck has frequency and damping of the eigenvalue of the stuck rig.
-
-    They agree within 1e-9 and 1e-7, although another mode rings too.
-    """
-    done = pf.run(TWO_MODES)
-    omega = 2 * np.pi * np.array([40.0, 131.0])
-    slide = np.array([1.0, 0.7])
-    matrix = np.block(
-        [
-            [np.zeros((2, 2)), np.eye(2)],
-            [-np.diag(omega**2) - 3e4 * np.outer(slide, slide), -0.004 * np.diag(omega)],
-        ]
-    )
-    values = np.linalg.eigvals(matrix)
-    frequency = values.imag / (2 * np.pi)
-    damping = -values.real / np.abs(values)
-    decay = done.extra["decay"]
-    k = np.argmin(np.abs(frequency - decay.frequency[-1]))
-    rings = decay.frequency == decay.frequency[-1]
-    assert str(done.outcome) == "stuck" and rings.sum() > 40 and 3 < np.sum(~rings)
-    assert decay.frequency[-1] == pytest.approx(frequency[k], rel=1e-9)
-    assert decay.damping[-1] == pytest.approx(damping[k], rel=1e-7)
-    assert np.all(decay.frequency_error < decay.frequency / 2) and np.all(
-        decay.damping_error < decay.damping / 2
-    )
-    amplitude = np.ptp(done.window.output) / 2
-    assert decay.amplitude[-1] < 1.2 * amplitude
-
-
 CROWNED = (
     CROWNED_JOINT
     + """\
