@@ -109,6 +109,7 @@ PUBLIC = {
     "settling": (
         "CLASSES",
         "extrapolate_steady_amplitudes",
+        "slip_period",
         "window_amplitude_means",
     ),
     "spectrum": (

@@ -180,7 +180,7 @@ def is_drifting(drift, error, amplitude, tolerance, floor) -> np.ndarray:
 def _midpoint_drift(extremes, window: int) -> float:
     """Return the drift per cycle [m] of the midpoint of the motion between the last windows.
 
-    On a belt, a window may contain complete stick-slip cycles, whereas a cycle of the drive does not. The
+    On a belt, a window contains complete stick-slip cycles, whereas a cycle of the drive does not. The
     result is inf with fewer than two windows.
 
     Parameters

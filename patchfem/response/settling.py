@@ -13,6 +13,8 @@ CLASSES = Outcome.TRANSIENT, Outcome.STEADY, Outcome.GROWS
 STEADY_CLASS = 1  # Index of Outcome.STEADY in CLASSES.
 GROWS_CLASS = 2  # Index of Outcome.GROWS in CLASSES.
 MIN_WINDOWS = 3  # Smallest number of windows for an estimate of the free motion.
+# Largest speed at which an interface counts as stuck, relative to the largest speed in the run.
+SLIP_SPEED_TOL = 1e-3
 # Largest sine of the angle between two phasor differences that count as collinear.
 COLLINEAR_SINE = 0.02
 # Smallest decay of the slowest mode over a third of the run at which a persistent beat counts as periodic.
@@ -317,6 +319,28 @@ def beat_mean_amplitudes(extremes, window: int) -> ArrayPair:
     )
     is_known = (error < np.abs(amplitude[:, -1] - value)) & (value > 0)
     return np.where(is_known, value, np.nan), np.where(is_known, error, np.nan)
+
+
+def slip_period(time, rate) -> float:
+    """Return the longest period [s] between the starts of the last slip intervals.
+
+    The result is 0 if there are fewer than two slip intervals, or if the last one started more than 1.5
+    times this period before the end, so that the interface sticks. The interface slips while its rate
+    exceeds SLIP_SPEED_TOL times the largest rate. A motion without stick has two slip intervals per cycle.
+
+    Parameters
+    ----------
+    time, rate : (k,)
+        Times [s] and rates of the relative displacement [m/s].
+    """
+    rate = np.asarray(rate, float)
+    direction = np.sign(rate) * (np.abs(rate) > SLIP_SPEED_TOL * np.abs(rate).max(initial=0.0))
+    time = np.asarray(time, float)
+    start_steps = np.flatnonzero((direction[1:] != 0) & (direction[1:] != direction[:-1]))
+    # slip starts at the last sample of the preceding stick interval
+    starts = time[start_steps + (direction[start_steps] != 0)]
+    period = float(np.diff(starts[-4:]).max(initial=0.0))
+    return period if starts.size and time[-1] - starts[-1] <= 1.5 * period else 0.0
 
 
 def _increases_steadily(amplitudes) -> np.ndarray:

@@ -175,7 +175,7 @@ def test_exact_rig_at_overshoot_is_transient(cycles):
 
 BELT = """\
 [structure]
-masses = ["1 kg", "1e9 kg"]
+masses = ["1 kg", "1e8 kg"]
 [[structure.spring]]
 between = [1, 0]
 stiffness = "1 N/m"
@@ -193,13 +193,21 @@ kind = "free"
 """
 
 
-@pytest.mark.parametrize("end, outcome", [(20.0, "transient"), (300.0, "steady")])
+@pytest.mark.parametrize("end, outcome", [(20.0, "transient"), (100.0, "steady")])
 def test_exact_block_on_belt_is_not_stuck(end, outcome):
-    """A block on a moving belt is steady with the amplitude sqrt(0.17) m if a window contains its stick-slip cycle."""
+    """A block on a moving belt is steady with the amplitude sqrt(0.17) m.
+
+    It sticks longer than a cycle of the drive.
+    """
     result = run(loads(BELT + f'duration = "{end} s"\n'), estimate=False)
     slipped = result.response.slide[-1] - result.response.slide[0]
     assert abs(slipped) > 0.1 and result.outcome == outcome
     if outcome == "steady":
+        assert result.extra["window"] == 2
         assert result.measures["relative_displacement_amplitude"].value == pytest.approx(
             np.sqrt(0.17), abs=2e-7
         )
+        # the belt loses a little speed
+        assert settling.slip_period(
+            result.response.time, result.response.slide_rate
+        ) == pytest.approx(8 + 2 * (np.pi - np.arctan(4)), rel=2e-5)

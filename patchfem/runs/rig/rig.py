@@ -6,6 +6,7 @@ functions of `postprocessing`.
 """
 
 from dataclasses import replace
+from math import ceil
 
 import numpy as np
 
@@ -14,7 +15,8 @@ from ...response.coarser import CoarserRuns, ComparisonRuns
 from ...response.errors import absolute_change, add_errors
 from ...response.reasons import find_missing_unbounded
 from ...response.rows import AMPLITUDE, set_final_floors
-from ...structure.drive_sizes import find_decay_rate
+from ...response.settling import slip_period
+from ...structure.drive_sizes import find_decay_rate, is_periodic
 from ..results.result import Result, RunInputs
 from . import bond_lists, levels, postprocessing
 from .costs import MAX_MARCH_STEPS, MAX_RUN_STEPS
@@ -125,6 +127,12 @@ def run_refined(inputs: RunInputs, numerics: Numerics) -> CoupledRun:
     solution = runner.solve(numerics)
     inputs.seconds.update({"march": solution.seconds} | (solution.prepare or {}))
 
+    # On a belt, the window must contain a complete stick-slip period, which the first run shows.
+    n_cycles = _count_slip_period_cycles(model, numerics, solution)
+    if n_cycles > numerics.window:
+        numerics = replace(numerics, window=n_cycles)
+        solution = runner.solve(numerics)
+
     if not inputs.estimate or solution.outcome is Outcome.NOT_CONVERGED:
         measures = add_errors(solution.values, size=size) | compute_peak_frequency(solution)
         return CoupledRun(inputs, numerics, solution, measures)
@@ -190,6 +198,20 @@ def _list_joint_runs(inputs: RunInputs, space_runs: ComparisonRuns) -> Compariso
             stiffer = replace(kind.runs[0], coarse_patch=False, stiffer_joint=True)
             joint_runs.append(CoarserRuns((stiffer,), absolute_change, kind.reference, "mesh"))
     return joint_runs
+
+
+def _count_slip_period_cycles(model, numerics, solution) -> int:
+    """Return the number of cycles of a complete stick-slip period on a belt.
+
+    Such a motion has its own period, because the drive is not periodic. The result is 0 if there is
+    no period, or if the run is shorter than two windows.
+    """
+    drive = model.rig.drive.signal
+    if model.friction is None or not drive.segments or is_periodic(drive):
+        return 0
+    response = solution.response
+    n_cycles = ceil(slip_period(response.time, response.slide_rate) / drive.period)
+    return n_cycles if 2 * n_cycles <= numerics.cycles else 0
 
 
 def _find_step_excess(run: CoupledRun) -> float:
