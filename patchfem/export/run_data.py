@@ -16,6 +16,7 @@ from ..core import PatchfemError, SineDrive
 from ..inputs import loops, measured
 from ..model import structure
 from ..response import spectrum
+from ..response.events import EVENT_KIND_NAMES
 from ..response.levels import LEVEL_MEASURES
 from ..response.rows import TABLE
 from ..runs.accuracy_curve import compute_accuracy_curve
@@ -25,7 +26,7 @@ from .answer import Variable, Variables, encode, make_columns
 
 # a measured row belongs to a run if its frequency differs by no more than this [Hz]
 SAME_FREQUENCY = 0.5
-MEANINGS = {"status": ("open", "stick", "slip")}
+MEANINGS = {"status": ("open", "stick", "slip"), "event_kind": tuple(EVENT_KIND_NAMES)}
 STUCK_TEXT = "state of the interface"
 READINGS = {"acceleration": "m s-2", "displacement": "m"}  # quantities of the sensors, and units
 FRICTIONLESS = ("slide", "slide_velocity", "friction_force")  # histories that a linear run has not
@@ -128,6 +129,17 @@ VARIABLES = {
         "normal stress of each strip, compression positive",
         "patch.strips.pressure",
     ),
+    "event_time": Row("event", "s", "time of the event", "extra.events.time"),
+    "event_interface": Row(
+        "event",
+        "1",
+        "number of the interface or strip from 1; 0 for a change of the drive",
+        "extra.events.interface",
+    ),
+    "event_kind": Row(
+        "event", "", "kind of event; `up` means towards positive slip", "extra.events.kind"
+    ),
+    "event_slide": Row("event", "m", "relative displacement at the event", "extra.events.slide"),
     "curve_frequency": Row("curve_point", "Hz", "drive frequency", "extra.curve.frequency"),
     "curve_level": Row(
         "curve_point",

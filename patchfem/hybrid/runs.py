@@ -131,6 +131,13 @@ class Motion:
         first = 1 + self.case.y.size + number * self.case.rig.faces.shape[0]
         return rows[:, first : first + self.case.n_friction]
 
+    def find_directions(self) -> np.ndarray:
+        """Return the directions (e + 1, i) of slip of the friction interfaces at the start and after each event.
+
+        They are 0 while a rigid interface rests, and while all elements of an interface stick.
+        """
+        return self._columns(np.concatenate([self.rows[:1], self.event_rows]), 2)
+
     def list_reversals(self, interface: int) -> np.ndarray:
         """Return times [s] and slides [m] (k, 2) at which the motion of an interface starts and reverses."""
         is_own = (self.event_rows[:, -2] == interface) & (self.event_rows[:, -1] == Margin.MOTION)

@@ -108,6 +108,7 @@ class Motion:
     - cycles_done: number of cycles
     - snapshots: states at the ends of equal parts of the last cycle
     - end: the march at its end, from which another one can go on
+    - log: None, because a march has no list of events
     """
 
     response: Response
@@ -122,6 +123,7 @@ class Motion:
     cycles_done: float
     snapshots: list[Snapshot]
     end: "March"
+    log: None = None
 
 
 def load_kernels(contact: Contact, say=None):

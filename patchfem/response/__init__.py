@@ -1,7 +1,7 @@
 """Computation of the measures of a run: values with names, units and errors.
 
 In: histories of a run, and measures that its engine integrated over the last cycles. Out: measures by name with errors
-from coarse runs, and the outcome. Read `rows` first: each row of its table evaluates a
+from coarse runs, the outcome, and the stick-slip events. Read `rows` first: each row of its table evaluates a
 `LastCycles`. A value that the engine integrated replaces the value from samples. `measures` has the
 functions that evaluate samples.
 """
@@ -36,7 +36,16 @@ PUBLIC = {
         "merged_cell_errors",
         "total_error",
     ),
-    "events": ("is_all_stuck",),
+    "events": (
+        "EVENT_KIND_NAMES",
+        "Events",
+        "SEGMENT_BORDER",
+        "classify_changes",
+        "find_segment_borders",
+        "is_all_stuck",
+        "join_events",
+        "sort_events",
+    ),
     "levels": (
         "Level",
         "bracket_onset",

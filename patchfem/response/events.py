@@ -1,19 +1,90 @@
-"""Whether the interfaces of a run stick.
+"""Stick-slip events of a run that an engine computes from event to event, and whether interfaces stick.
 
-In: the window of a run. Out: slips of its interfaces, and whether all of them stick.
+In: event rows of an engine, or the window of a run. Out: `Events`.
 """
+
+from typing import NamedTuple
 
 import numpy as np
 
-from .measures import slip_round_off
+from .measures import ArrayPair, slip_round_off
+
+# Kinds of events, as indices of EVENT_KIND_NAMES.
+STOP = 0
+RELEASE_UP = 1
+RELEASE_DOWN = 2
+REVERSAL_UP = 3
+REVERSAL_DOWN = 4
+SEGMENT_BORDER = 5
+EVENT_KIND_NAMES = ("stop", "release_up", "release_down", "reversal_up", "reversal_down", "border")
+MAX_EVENTS = 100_000
 
 
-def list_slips(response) -> np.ndarray:
-    """Return the slip (k, i) [m] of each interface."""
+class Events(NamedTuple):
+    """Last events of a run in chronological order, at most MAX_EVENTS.
+
+    - time (k,): time [s].
+    - interface (k,): number of the interface, from 1; 0 for the border between two segments of the
+      drive.
+    - kind (k,): index of EVENT_KIND_NAMES; "up" means towards positive slip.
+    - slide (k,): relative displacement [m].
+    """
+
+    time: np.ndarray
+    interface: np.ndarray
+    kind: np.ndarray
+    slide: np.ndarray
+
+
+def sort_events(rows) -> Events:
+    """Return event rows (time [s], interface, kind, displacement [m]) as Events, sorted by time."""
+    rows = np.array(rows, float).reshape(-1, 4)
+    rows = rows[np.lexsort((rows[:, 1], rows[:, 0]))][-MAX_EVENTS:]
+    time, interface, kind, slide = rows.T.copy()
+    return Events(time, interface.astype(np.int32), kind.astype(np.int8), slide)
+
+
+def classify_changes(before, after) -> np.ndarray:
+    """Return the kind of each change from one stick-slip state to another one.
+
+    Parameters
+    ----------
+    before, after : (k,)
+        States: +1 or -1 for slip in this direction, 0 for stick.
+    """
+    is_reversal = (before != 0) & (after != 0)
+    upwards = np.where(is_reversal, REVERSAL_UP, RELEASE_UP)
+    downwards = np.where(is_reversal, REVERSAL_DOWN, RELEASE_DOWN)
+    return np.where(after == 0, STOP, np.where(after > 0, upwards, downwards))
+
+
+def join_events(parts: list[Events], shifts: list[float]) -> Events:
+    """Join the events of successive runs, with a border between segments of the drive at each start.
+
+    Parameters
+    ----------
+    parts : list of Events
+        Events of each run, in chronological order.
+    shifts : list of float
+        Start times of the runs relative to the first one [s].
+    """
+    rows = [(shift, 0, SEGMENT_BORDER, np.nan) for shift in shifts[1:]]
+    for events, shift in zip(parts, shifts):
+        rows += zip(events.time + shift, *events[1:])
+    return sort_events(rows)
+
+
+def slips_and_displacements(response) -> ArrayPair:
+    """Return the slip and the relative displacement (k, i) [m] of each interface."""
     extra = response.extra
     if "slides" in extra:
-        return extra.get("slips", extra["slides"])
-    return response.slip[:, None]
+        return extra.get("slips", extra["slides"]), extra["slides"]
+    return response.slip[:, None], response.slide[:, None]
+
+
+def find_segment_borders(drive) -> list[float]:
+    """Return the times [s] at which a drive changes from one segment to the next."""
+    return [segment.start for segment in drive.segments[1:]]
 
 
 def is_all_stuck(window, max_stick_slip: float) -> bool:
@@ -21,5 +92,5 @@ def is_all_stuck(window, max_stick_slip: float) -> bool:
 
     The limit applies to half the range of the slip, and is at least its round-off.
     """
-    slips = np.column_stack([window.slip, list_slips(window)])
+    slips = np.column_stack([window.slip, slips_and_displacements(window)[0]])
     return bool(np.ptp(slips, axis=0).max() / 2 <= max(max_stick_slip, slip_round_off(window)))

@@ -79,8 +79,8 @@ def solve(omega: float, ratio: float) -> Row:
         ratio,
         printed,
         float(decay(printed, 1.0, 1 / ratio, omega)),
-        time[x == x[-1]][0],
-        x[-1],
+        float(found.event_time[-1]),
+        float(x[-1]),
         float(np.abs(x - decay(time, 1.0, 1 / ratio, omega)).max()),
     )
 

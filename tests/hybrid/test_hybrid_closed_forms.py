@@ -135,6 +135,21 @@ def test_masing_memory_of_nested_loops():
     assert [by_time[t] for t in time[1:]] == pytest.approx(history, abs=1e-12)
 
 
+def test_directions_of_slip_follow_the_elements():
+    """A turn in the elastic range is no event, but slip that goes on afterwards is: rest, +, rest, +, rest, -."""
+    law = masing.from_elements([2.0, 1.0], [0.2, 0.5])
+    slide = np.array([0.0, 1.0, 0.7, 1.2, 0.5])
+    time = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(slide)))])
+    motion = runs.run_case(make_bench(law, time, slide, samples=[0.0]))
+    directions = motion.find_directions()[:, 0]
+    slides = np.interp([event.time for event in motion.events], time, slide)
+    changes = 1 + np.flatnonzero(np.diff(directions))
+    # The weakest element yields at 0.2, again where the motion turned at 1, and back from 1.2 after 2 x 0.2.
+    assert directions[0] == 0
+    assert directions[changes].tolist() == [1, 0, 1, 0, -1]
+    assert slides[changes - 1] == pytest.approx([0.2, 1.0, 1.0, 1.2, 0.8], abs=1e-9)
+
+
 def test_bonds_heal_at_rest_and_restart():
     """Dwell of bonds (eq. 2.10): their length after a rest, and the force F = mu N z/eps_0 of the restart."""
     for dwell, length in ((0.05, 0.696735), (0.2, 0.932332), (1.0, 0.999977)):

@@ -191,6 +191,7 @@ class RunEvaluator:
         ends = window_end_values(run.extremes, run.phasors, n_cycles)
         fields = {
             "message": run.message,
+            "log": run.log,
             "snapshots": run.snapshots,
             "steady": estimate_steady(drive, *ends),
         }

@@ -20,8 +20,16 @@ from ...core import (
 from ...hybrid import cases
 from ...hybrid import runs as engine
 from ...hybrid.laws import is_rigid
+from ...hybrid.laws.masing import has_stick
 from ...hybrid.records import Margin, Memory, State, Status
 from ...response.errors import ERROR_MEASURES, absolute_change, convergence_error
+from ...response.events import (
+    SEGMENT_BORDER,
+    Events,
+    classify_changes,
+    find_segment_borders,
+    sort_events,
+)
 from ...response.measures import MIN_SLIDE_RANGE, Values
 from ...response.rows import find_definition, select_names
 from ...structure.drive_sizes import (
@@ -103,6 +111,7 @@ class LumpedRun:
     - outcome, message: how the run ended, if it ended early.
     - end: arrays of the engine at the end, from which another run can go on.
     - cycles_done: number of cycles.
+    - log: events of the interfaces, or None.
     - snapshots: states of the elements of a patch in the last cycle.
     - repeats: whether the motion repeats after each cycle.
     """
@@ -117,6 +126,7 @@ class LumpedRun:
     message: str
     end: State
     cycles_done: float
+    log: Events | None = None
     snapshots: list[ElementSnapshot] = field(default_factory=list)
     repeats: bool = False
 
@@ -301,6 +311,7 @@ class LumpedEvaluator(RunEvaluator):
             message="",
             end=motion.final,
             cycles_done=cycles,
+            log=self._list_events(motion, drive),
             snapshots=self._list_snapshots(motion, response, times.snapshots, start),
             repeats=motion.repeats,
         )
@@ -332,6 +343,26 @@ class LumpedEvaluator(RunEvaluator):
         rise = slope * (accelerations @ modes.slide) + bend * response.slide_rate**2
         force = self.joints.laws[0][1].mean + grooves.lifted_mass * rise
         return replace(response, extra=response.extra | {"normal_load": force})
+
+    def _list_events(self, motion, drive) -> Events | None:
+        """Return stops, releases and reversals of the interfaces, and the changes of the drive.
+
+        None for laws that have no such events, because some part of them always slips.
+        """
+        have_elements = self.joints.laws and all(has_stick(law) for law, _ in self.joints.laws)
+        if not (self.is_rigid or have_elements):
+            return None
+        directions = motion.find_directions()
+        rows = motion.event_rows
+        modes = self.model.rig.modes
+        slides = rows[:, 1 : 1 + modes.omega.size] @ modes.interfaces.T
+        borders = [start for start in find_segment_borders(drive) if start < motion.time]
+        events = [(start, 0, SEGMENT_BORDER, np.nan) for start in borders]
+        for k, states in enumerate(directions.T):
+            changed = np.flatnonzero(states[:-1] != states[1:])
+            kinds = classify_changes(states[changed], states[changed + 1])
+            events += zip(rows[changed, 0], [k + 1] * changed.size, kinds, slides[changed, k])
+        return sort_events(events)
 
     def _list_snapshots(self, motion, response: Response, times, start) -> list[ElementSnapshot]:
         """Return the stretches of the elements of patches at given times, from all reversals before.

@@ -10,6 +10,7 @@ from functools import partial
 import numpy as np
 
 from ...core import Measure, SineDrive
+from ...response.events import join_events
 from ...response.levels import Level, bracket_onset, make_no_onset_reason, make_onset_test
 from ...response.rows import TABLE
 from ...structure.drive_sizes import find_drive_omega
@@ -225,6 +226,7 @@ def join_runs(runs: list, duration: float):
         response=_join_histories([run.response for run in runs], shifts),
         window=window,
         ledger=ledger,
+        log=None if last.log is None else join_events([run.log for run in runs], shifts),
         extremes=np.concatenate([run.extremes for run in runs]),
         phasors=np.concatenate([run.phasors for run in runs]),
     )

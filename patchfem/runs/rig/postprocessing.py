@@ -211,6 +211,8 @@ def collect_summary_data(run: CoupledRun, measures: Measures, notes: list[str]) 
     snapshots = solution.snapshots
     if rig.friction.has_partial_slip and snapshots and hasattr(snapshots[0], "faces"):
         extra["shots"] = snapshots
+    if solution.log is not None:
+        extra["events"] = solution.log
 
     # A patch that slips part by part is a set of elements, or of shear modes if its load varies.
     reduced = getattr(solution.contact, "reduction", None)

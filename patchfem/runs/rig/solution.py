@@ -41,6 +41,7 @@ class Solution:
     - message: reason of an early end.
     - levels, run_level: Level of each drive level, and a function that runs another level, see
       `levels.find_onset`.
+    - log: events of an event-driven engine.
     - notes: warnings of the engine.
     - stick_tolerance: largest slip per cycle [m] at which the interface counts as stuck.
     - run_errors: error estimates by measure from the run itself, without coarse runs.
@@ -68,6 +69,7 @@ class Solution:
     message: str = ""
     levels: tuple = ()
     run_level: object = None
+    log: object = None
     notes: tuple[str, ...] = ()
     stick_tolerance: float = 0.0
     run_errors: Values = field(default_factory=dict)
