@@ -22,6 +22,7 @@ PUBLIC = {
         "measure_last_cycle_amplitude",
         "smooth_slopes",
     ),
+    "ends": ("estimate_window_error",),
     "errors": (
         "ERROR_MEASURES",
         "FrictionScale",
