@@ -16,6 +16,7 @@ PUBLIC = {
     "decay_curve": (
         "DecayCurve",
         "HalfCycles",
+        "MIN_HALF_CYCLE",
         "fit_decay_curve",
         "locate_reversals",
         "make_half_cycles",
@@ -100,6 +101,10 @@ PUBLIC = {
         "find_missing_secant",
         "find_missing_steady",
         "find_missing_unbounded",
+    ),
+    "ringing": (
+        "compute_stuck_vibration",
+        "select_strongest",
     ),
     "rows": (
         "AMPLITUDE",

@@ -125,6 +125,91 @@ def test_exact_coulomb_decay_agrees_with_closed_form():
     assert set(data.decay_time.dims) == {"decay_time"} and "decay_frequency_error" in data
 
 
+TWO_MODES = """[normal]
+load = "20 N"
+[friction]
+law = "elastic-plastic"
+static = 0.3
+stiffness = "30 kN/m"
+[structure]
+moving_mass = "1 kg"
+[[structure.mode]]
+name = "first"
+frequency = "40 Hz"
+damping = 0.002
+slide = 1.0
+output = 1.0
+[[structure.mode]]
+name = "second"
+frequency = "131 Hz"
+damping = 0.002
+slide = 0.7
+output = -0.6
+[drive]
+kind = "free"
+displacement = "2 mm"
+cycles = 60
+"""
+
+
+def test_exact_decay_that_ends_stuck_has_stuck_eigenvalue():
+    """A decay that ends stuck has frequency and damping of the eigenvalue of the stuck rig.
+
+    They agree within 1e-9 and 1e-7, although another mode rings too.
+    """
+    done = pf.run(TWO_MODES)
+    omega = 2 * np.pi * np.array([40.0, 131.0])
+    slide = np.array([1.0, 0.7])
+    matrix = np.block(
+        [
+            [np.zeros((2, 2)), np.eye(2)],
+            [-np.diag(omega**2) - 3e4 * np.outer(slide, slide), -0.004 * np.diag(omega)],
+        ]
+    )
+    values = np.linalg.eigvals(matrix)
+    frequency = values.imag / (2 * np.pi)
+    damping = -values.real / np.abs(values)
+    decay = done.extra["decay"]
+    k = np.argmin(np.abs(frequency - decay.frequency[-1]))
+    rings = decay.frequency == decay.frequency[-1]
+    assert str(done.outcome) == "stuck" and rings.sum() > 40 and 3 < np.sum(~rings)
+    assert decay.frequency[-1] == pytest.approx(frequency[k], rel=1e-9)
+    assert decay.damping[-1] == pytest.approx(damping[k], rel=1e-7)
+    assert np.all(decay.frequency_error < decay.frequency / 2) and np.all(
+        decay.damping_error < decay.damping / 2
+    )
+    amplitude = np.ptp(done.window.output) / 2
+    assert decay.amplitude[-1] < 1.2 * amplitude
+
+
+def test_exact_linear_release_has_eigenvalue():
+    """Every row of a release without friction has frequency and damping of the first mode, although another one rings."""
+    text = TWO_MODES[TWO_MODES.index("[structure]") :]
+    decay = pf.run(text).extra["decay"]
+    assert decay.frequency.size > 100
+    assert decay.frequency == pytest.approx(40 * np.sqrt(1 - 0.002**2), rel=1e-9)
+    assert decay.damping == pytest.approx(0.002, rel=1e-7)
+
+
+def test_exact_decay_that_ends_stuck_on_stiffening_spring():
+    """After its last slip a block of 1 kg on a cubic spring has the frequency of the Duffing oscillator."""
+    first = TWO_MODES[: TWO_MODES.index('[[structure.mode]]\nname = "second"')]
+    spring = '1 kg"\nstiffening = {cubic = "2e10 N/m^3"}'
+    text = first.replace('1 kg"', spring) + TWO_MODES[TWO_MODES.index("[drive]") :]
+    run = pf.run(text)
+    decay = run.extra["decay"]
+    late = decay.select(decay.time > run.extra["events"].time[-1] + 0.1)
+    assert late.time.size > 40
+
+    # Energy: T = 4 int_0^(pi/2) d theta / sqrt(w^2 + c a^2 (1 + sin^2 theta) / 2).
+    square = (80 * np.pi) ** 2 + 3e4
+    for amplitude, frequency in zip(late.amplitude[::10], late.frequency[::10]):
+        cubic = 1e10 * amplitude**2
+        angles = np.linspace(0, np.pi / 2, 101)
+        quarter = np.trapezoid((square + cubic * (1 + np.sin(angles) ** 2)) ** -0.5, angles)
+        assert frequency == pytest.approx(0.25 / quarter, rel=1e-4)
+
+
 CROWNED = (
     CROWNED_JOINT
     + """\

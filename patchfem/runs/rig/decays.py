@@ -15,6 +15,7 @@ import numpy as np
 from ...core import NotConverged, PatchfemError
 from ...dynamics.harmonic import forces, quasi_static
 from ...response.decay_curve import (
+    MIN_HALF_CYCLE,
     DecayCurve,
     fit_decay_curve,
     locate_reversals,
@@ -69,10 +70,25 @@ def _add_coarse_run_errors(curve: DecayCurve, solution: Solution) -> DecayCurve:
 
 
 def _measure_decay_curve(run: Solution) -> DecayCurve:
-    """Measure the decay curve of a run from its half cycles while they decrease."""
+    """Measure the decay curve of a run from its half cycles while they decrease.
+
+    After the last slip, the curve is that of the strongest mode of the free vibration, because the
+    reversals of a sum of several modes belong to none of them.
+    """
     motion = run.response
+    mode = run.tail
     reversals = locate_reversals(motion.time, motion.output, motion.output_rate)
-    return fit_decay_curve(make_half_cycles(*reversals))
+    half_cycles = fit_decay_curve(make_half_cycles(*reversals))
+    if mode is None:
+        return half_cycles
+    time = np.arange(mode.begin, mode.end, 0.5 / mode.frequency)
+    rate = 2 * np.pi * mode.frequency * mode.damping / np.sqrt(1 - mode.damping**2)
+    amplitude = mode.displacement * np.exp(-rate * (time - mode.begin))
+    zero = np.zeros(time.size)
+    ringing = DecayCurve(time, amplitude, zero + mode.frequency, zero, zero + mode.damping, zero)
+    ringing = ringing.select(amplitude > MIN_HALF_CYCLE * np.abs(motion.output).max())
+    slipping = half_cycles.select(half_cycles.time < mode.begin)
+    return DecayCurve(*map(np.concatenate, zip(slipping, ringing)))
 
 
 def make_laws_on_mesh(model, patch, meshed: tuple = ()):

@@ -31,6 +31,7 @@ from ...response.events import (
     sort_events,
 )
 from ...response.measures import MIN_SLIDE_RANGE, Values
+from ...response.ringing import compute_stuck_vibration, select_strongest
 from ...response.rows import find_definition, select_names
 from ...structure.drive_sizes import (
     choose_samples_per_cycle,
@@ -458,6 +459,24 @@ class LumpedEvaluator(RunEvaluator):
         # The other measures need samples of equal distances.
         even = window.select(find_numbers(window)[1])
         return {"is_single_interface": True, "loop": loop, "window": even}
+
+    def collect_solution_fields(self, run, drive) -> Fields:
+        """Return the vibration of a release after its last slip, in which the rig is linear."""
+        rig = self.model.rig
+        is_linear = not self.joints.laws
+        springs = np.zeros(len(rig.modes.interfaces)) if is_linear else self.joints.springs
+        if rig.drive.kind != "free" or not np.isfinite(springs).all() or rig.springs.is_nonlinear:
+            return {}
+        motion = run.response
+        if not is_linear:
+            slips = motion.extra.get("slips", motion.slip[:, None])
+            moves = np.abs(np.diff(slips, axis=0)).max(axis=1) > 0
+            last = np.flatnonzero(moves)[-1] + 1 if moves.any() else 0
+            motion = motion.select(motion.time >= motion.time[last])
+        vibration = []
+        if motion.time.size > 1:
+            vibration = compute_stuck_vibration(rig.modes, springs, motion)
+        return {"tail": select_strongest(vibration)} if vibration else {}
 
     def estimate_run_errors(self, run, drive, values: Values) -> Values:
         """Estimate the errors of the samples of a random motion.

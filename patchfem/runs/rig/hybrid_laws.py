@@ -42,6 +42,11 @@ class Joints(NamedTuple):
         """Whether a law has elements that yield at several displacements."""
         return any(has_many_elements(law) for law, _ in self.laws)
 
+    @property
+    def springs(self) -> np.ndarray:
+        """Stiffness (i,) [N/m] of each interface in stick; nan for a law that is no single element."""
+        return np.array([find_spring_stiffness(law) for law, _ in self.laws])
+
 
 def make_joints(model: Model, numerics: Numerics, patch) -> Joints:
     """Return laws and loads of all interfaces of a rig.
@@ -121,6 +126,14 @@ def list_elements(model: Model, numerics: Numerics, patch) -> list[tuple[np.ndar
     """
     listed = joints.list_joints(model, patch, numerics.meshed)
     return [joint.list_elements(model.rig.speed_scale) for joint in listed]
+
+
+def find_spring_stiffness(law) -> float:
+    """Return the stiffness [N/m] of a law that is a single element in stick; nan for other laws."""
+    if law.law != "masing" or law.numbers[1] >= 0 or has_many_elements(law):
+        return np.nan
+    limit, length = law.numbers[2:4]
+    return limit / length
 
 
 def _find_stick_tolerance(listed, laws) -> float:

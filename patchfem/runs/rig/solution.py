@@ -52,6 +52,7 @@ class Solution:
       determined; None if the engine sets the outcome.
     - drive: drive of the largest motion of a response curve or of drive levels; None for a single motion.
     - peak_error: error of the frequency of this drive [Hz]; inf for a curve without a peak, NaN without a curve.
+    - tail: `ringing.VibratingMode` that remains after the last slip of a release, or None.
     - extra: further data of the result.
     """
 
@@ -79,6 +80,7 @@ class Solution:
     extremes: np.ndarray | None = None
     drive: SineDrive | None = None
     peak_error: float = np.nan
+    tail: object = None
     extra: Fields = field(default_factory=dict)
 
 
