@@ -23,7 +23,6 @@ PUBLIC = {
         "measure_last_cycle_amplitude",
         "smooth_slopes",
     ),
-    "ends": ("estimate_window_error",),
     "errors": (
         "ERROR_MEASURES",
         "FrictionScale",

@@ -1,8 +1,10 @@
-"""Stated errors compared with true errors of sequences of known order."""
+"""Stated errors compared with true errors: sequences of known order, and a march with few steps."""
 
 import numpy as np
 import pytest
+from scene_texts import DRIVE, KILOGRAM, POINT, make_friction_table
 
+import patchfem as pf
 from patchfem.response import (
     add_errors,
     convergence_errors,
@@ -77,3 +79,19 @@ def test_exact_error_rules_of_measure_kinds():
     }
     least = add_errors(values, errors)["drift_per_cycle"].error
     assert least == pytest.approx(1e-15 + 1e-13 * 2e-3, rel=1e-9)
+
+
+@pytest.mark.parametrize("law", ["coulomb", "elastic-plastic"])
+@pytest.mark.parametrize("steps, cycles", [(40, 10.31225), (40, 7.51225), (400, 7.511225)])
+def test_always_errors_of_march_that_ends_between_whole_steps(law, steps, cycles):
+    """Measures of a march whose end is half a step beyond a whole step agree with the exact ones within their errors."""
+    text = POINT + make_friction_table(law) + KILOGRAM
+    text += DRIVE.replace("cycles = 30", f"cycles = {cycles}")
+    march = pf.run(text, **{"accuracy.method": "march", "accuracy.steps_per_cycle": steps})
+    exact = pf.run(text, **{"accuracy.method": "exact"})
+    assert march.response.time[-1] == pytest.approx(cycles / 143, rel=1e-12)
+    for name, measure in march.measures.items():
+        truth = exact.measures[name]
+        if measure.error is not None and truth.value is not None:
+            allowed = measure.error + truth.error + measure.floor
+            assert abs(measure.value - truth.value) <= allowed, name

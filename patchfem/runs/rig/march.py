@@ -13,7 +13,6 @@ import numpy as np
 from ...core import IntegratedMeasures, Outcome
 from ...effects import law_has_trait
 from ...points import time_march as engine
-from ...response.ends import estimate_window_error
 from ...response.measures import Values, compute_step_harmonic, peak_sampling_errors
 from ...structure.drive_sizes import estimate_peak_speed, find_drive_omega
 from ..bench.engine import BondListGuard
@@ -30,10 +29,6 @@ from .solution import (
     describe_escape,
     find_travel,
 )
-
-# Safety factor on the first-order error due to a run that does not end exactly at the requested
-# time.
-END_ERROR_FACTOR = 1.5
 
 
 def march_in_time(model, numerics, patch, frames: int = 0, say=None, progress=None) -> Solution:
@@ -109,7 +104,7 @@ class MarchEvaluator(RunEvaluator):
         return {"bond_summation": self.choose_bond_summation()}
 
     def estimate_run_errors(self, run, drive, values: Values) -> Values:
-        """Estimate how far the peaks of a motion exceed its samples, and the errors of an end between two steps.
+        """Estimate how far the peaks of a motion exceed its samples.
 
         Parameters
         ----------
@@ -120,13 +115,7 @@ class MarchEvaluator(RunEvaluator):
         values : dict of float
             Measures by name.
         """
-        errors = peak_sampling_errors(run.window)
-        n_steps = self.numerics.cycles * self.numerics.steps
-        offset = n_steps - round(n_steps)
-        changes = estimate_window_error(run.window, self.model.rig.drive.signal.period, offset)
-        for name, change in changes.items():
-            errors[name] = errors.get(name, 0.0) + END_ERROR_FACTOR * change
-        return errors
+        return peak_sampling_errors(run.window)
 
     def choose_bond_summation(self):
         """Return the bond summation of the run; None for a law without bonds."""
