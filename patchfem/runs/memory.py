@@ -102,6 +102,7 @@ def _list_parts_of_motion(plan: Plan, *, has_steps: bool) -> list[MemoryPart]:
     width = 2.0 * plan.unknowns["modes"] + 12 + 6 * n_interfaces
     turns = min(REVERSALS_PER_CYCLE * drive.cycles, checkpoint.MAX_EARLY_SAMPLES)
     length = "drive.duration" if drive.waveform.is_random else "drive.cycles"
+
     parts = [
         MemoryPart(
             history.sample * width * samples,

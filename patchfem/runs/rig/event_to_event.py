@@ -467,6 +467,8 @@ class LumpedEvaluator(RunEvaluator):
         springs = np.zeros(len(rig.modes.interfaces)) if is_linear else self.joints.springs
         if rig.drive.kind != "free" or not np.isfinite(springs).all() or rig.springs.is_nonlinear:
             return {}
+
+        # The part of the motion in which no interface slips.
         motion = run.response
         if not is_linear:
             slips = motion.extra.get("slips", motion.slip[:, None])
