@@ -30,7 +30,6 @@ __all__ = [
     "InitialState",
     "IntegratedMeasures",
     "Interface",
-    "InterfaceLoop",
     "Measure",
     "MeasureDefinition",
     "Missing",
@@ -495,25 +494,6 @@ class Response:
         return Response(**columns, extra=extra)
 
 
-class InterfaceLoop(NamedTuple):
-    """Integrals over the friction loop of an interface in the last cycles.
-
-    - displacement_harmonic: first harmonic of the relative displacement [m].
-    - force_harmonic: first harmonic of the friction force [N].
-    - work: friction work [J].
-    - slip_range: range of the slip [m].
-    - stuck_time: time without slip [s].
-    - max_force: largest friction force [N].
-    """
-
-    displacement_harmonic: complex
-    force_harmonic: complex
-    work: float
-    slip_range: float
-    stuck_time: float
-    max_force: float
-
-
 @dataclass(frozen=True, eq=False, slots=True)
 class IntegratedMeasures:
     """Quantities of the last cycles that an engine computes without sampling the motion.
@@ -522,11 +502,9 @@ class IntegratedMeasures:
     accurate than those from samples. A quantity that is missing here is computed from samples (`response.rows`).
 
     - values: values of measures by name; None if the run has no value.
-    - loops: InterfaceLoop of each interface.
     - reversals: (relative displacement [m], friction force [N]) of the first interface at the smallest and at the
       largest relative displacement of each cycle.
     """
 
     values: dict[str, float | None] = field(default_factory=dict)
-    loops: tuple[InterfaceLoop, ...] = ()
     reversals: tuple[tuple[tuple[float, float], ...], ...] = ()

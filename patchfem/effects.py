@@ -120,7 +120,7 @@ class Waveform(NamedTuple):
     @property
     def has_steady_motion(self) -> bool:
         """Whether harmonic balance can compute the steady-state motion, or a curve of such motions."""
-        return self.is_sine or self.has_levels or self.is_swept
+        return self.is_sine or self.is_swept
 
 
 # Module with a function of the coordinates x and the scene table for each gap shape.

@@ -419,9 +419,6 @@ def _collect_levels(result: Result) -> Variables:
         "level_drive": ([level.drive for level in levels], unit, drive_text),
         "level_stuck": (np.array([level.stuck for level in levels], np.int8), "", STUCK_TEXT),
     }
-    if any(level.outcome for level in levels):
-        outcomes = [str(level.outcome) for level in levels]
-        columns["level_outcome"] = (outcomes, "", "outcome of the level")
     for name in LEVEL_MEASURES:
         if any(name in level.values for level in levels):
             unit = TABLE[name].unit

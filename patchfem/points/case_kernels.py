@@ -451,7 +451,7 @@ def observe_extremes(h, law, start, now, seen, observes):
         Slide [m], velocity [m/s], force [N] and irreversible slide [m] at the start of the step.
     now : (20,) array
         State of the case, in the rows of `case_rows.Now`; changed in place.
-    seen : (33,) array
+    seen : (32,) array
         What was observed, in the rows of `case_rows.Seen`; changed in place.
     observes : bool
         Whether the cycle is measured.
@@ -541,7 +541,7 @@ def observe_acceleration(waves, h, case, start, now, seen):
         Slide [m], velocity [m/s], force [N] and irreversible slide [m] at the start of the step.
     now : (20,) array
         State of the case, in the rows of `case_rows.Now`; changed in place.
-    seen : (33,) array
+    seen : (32,) array
         What was observed, in the rows of `case_rows.Seen`; changed in place.
     """
     q = now[Now.SLIDE]
@@ -580,7 +580,7 @@ def observe_harmonics(time, h, omega, start, now, seen):
         Slide [m], velocity [m/s], force [N] and irreversible slide [m] at the start of the step.
     now : (20,) array
         State of the case, in the rows of `case_rows.Now`; changed in place.
-    seen : (33,) array
+    seen : (32,) array
         What was observed, in the rows of `case_rows.Seen`; changed in place.
     """
     q = now[Now.SLIDE]
@@ -625,7 +625,7 @@ def observe_stick(time, h, omega, is_rigid, start, now, seen):
         Slide [m], velocity [m/s], force [N] and irreversible slide [m] at the start of the step.
     now : (20,) array
         State of the case, in the rows of `case_rows.Now`; changed in place.
-    seen : (33,) array
+    seen : (32,) array
         What was observed, in the rows of `case_rows.Seen`; changed in place.
     """
     # Irreversible fraction of the path in the step, less one half.
@@ -772,7 +772,7 @@ def observe_forces(h, start, now, numbers, memory, j, load, seen):
         Number of the point.
     load : float
         Normal load [N].
-    seen : (33,) array
+    seen : (32,) array
         What was observed, in the rows of `case_rows.Seen`; changed in place.
     """
     dq = now[Now.SLIDE] - start[0]
@@ -803,7 +803,7 @@ def end_cycle(now, seen, history):
     ----------
     now : (20,) array
         State of the case, in the rows of `case_rows.Now`; changed in place.
-    seen : (33,) array
+    seen : (32,) array
         What was observed, in the rows of `case_rows.Seen`; changed in place.
     history : (4,) array
         Smallest and largest slide [m] and the integrals for its phasor; output.
@@ -876,37 +876,7 @@ def rotate_cosine(waves, k, part):
 
 
 @njit(**NJIT_KERNEL)
-def store_sample(sine, case, now, seen, samples):
-    """Store the state and the acceleration at the output at the end of a step, if there is room for it.
-
-    Parameters
-    ----------
-    sine : float
-        Sine of the drive at this instant.
-    case : (12,) array
-        Numbers of the case, in the rows of `case_rows.Number`.
-    now : (20,) array
-        State of the case, in the rows of `case_rows.Now`; changed in place.
-    seen : (33,) array
-        What was observed, in the rows of `case_rows.Seen`; changed in place.
-    samples : (S, 5) array
-        Samples of the case; output.
-    """
-    row = int(seen[Seen.N_SAMPLES])
-    if row >= samples.shape[0]:
-        return
-    q = now[Now.SLIDE]
-    v = now[Now.VELOCITY]
-    samples[row, 0] = q
-    samples[row, 1] = v
-    samples[row, 2] = now[Now.SLIP]
-    samples[row, 3] = now[Now.FORCE]
-    samples[row, 4] = find_acceleration(sine, q, v, now[Now.FORCE], case)
-    seen[Seen.N_SAMPLES] += 1
-
-
-@njit(**NJIT_KERNEL)
-def march_cycle(steps, table, waves, observes, case, now, numbers, memory, j, seen, samples):
+def march_cycle(steps, table, waves, observes, case, now, numbers, memory, j, seen):
     """March a case over a cycle; `waves` are those of `march_cases`.
 
     Parameters
@@ -929,10 +899,8 @@ def march_cycle(steps, table, waves, observes, case, now, numbers, memory, j, se
         Memory of the laws of m points, a column for each.
     j : int
         Number of the point.
-    seen : (33,) array
+    seen : (32,) array
         What was observed, in the rows of `case_rows.Seen`; changed in place.
-    samples : (S, 5) array
-        Samples of the case; output.
     """
     omega = case[Number.OMEGA]
     step = 2 * np.pi / omega / steps
@@ -986,8 +954,6 @@ def march_cycle(steps, table, waves, observes, case, now, numbers, memory, j, se
             excess = seen[Seen.EXCESS]
             observe_stick(time, h, omega, is_rigid, start, now, seen)
             change = 0.0 if is_rigid else abs(seen[Seen.EXCESS] - excess)
-            if (tick + size) % TICKS == 0:
-                store_sample(drive[2], case, now, seen, samples)
         tick += size
         if change > 2 * max_change and level < LEVELS:
             level += 1
@@ -996,7 +962,7 @@ def march_cycle(steps, table, waves, observes, case, now, numbers, memory, j, se
 
 
 @njit(cache=True, **NJIT_KERNEL)
-def march_cases(steps, waves, parameters, numbers, memory, nows, seens, histories, samples, table):
+def march_cases(steps, waves, parameters, numbers, memory, nows, seens, histories, table):
     """March cases over their cycles.
 
     Parameters
@@ -1013,13 +979,10 @@ def march_cases(steps, waves, parameters, numbers, memory, nows, seens, historie
         Memory of the laws; changed in place.
     nows : (c, 20) array
         States of the cases, in the rows of `case_rows.Now`; output.
-    seens : (c, 33) array
+    seens : (c, 32) array
         What was observed, in the rows of `case_rows.Seen`; output.
     histories : (c, n, 4) array
         Extremes and phasor of every cycle; output.
-    samples : (c, S, 5) array
-        Slide, velocity, irreversible slide, force and acceleration at the ends of the first S whole steps of the window;
-        output.
     table : (LEVELS + 1, 2, 5) array
         Workspace.
     """
@@ -1053,9 +1016,7 @@ def march_cases(steps, waves, parameters, numbers, memory, nows, seens, historie
             if observes:
                 seen[Seen.LAST_MEAN] = 0.0
                 seen[Seen.MIDDLE] -= 2 * np.pi / omega if seen[Seen.N_CYCLES] > 0 else 0.0
-            march_cycle(
-                steps, table, waves, observes, case, now, numbers, memory, j, seen, samples[j]
-            )
+            march_cycle(steps, table, waves, observes, case, now, numbers, memory, j, seen)
 
             end_cycle(now, seen, histories[j, cycle])
             is_same = repeats(omega, now)

@@ -70,7 +70,7 @@ class Seen(IntEnum):
     and of the longest stick; integrals of slide and force times harmonic 1; friction work by mean forces, by the
     trapezoidal rule, and its magnitude; integral of the slide in the first and in the last cycle; sums of range and
     secant, number of secants; forces at the extremes of the cycle; slide and velocity at the start; duration; number of
-    cycles; integrals of the force times harmonic 3; number of samples.
+    cycles; integrals of the force times harmonic 3.
     """
 
     MAX_ACCELERATION = 0
@@ -105,7 +105,6 @@ class Seen(IntEnum):
     N_CYCLES = 29
     FORCE_COS_3 = 30
     FORCE_SIN_3 = 31
-    N_SAMPLES = 32
 
 
 class Cases(NamedTuple):

@@ -22,8 +22,6 @@ class CaseMarch(NamedTuple):
     - extremes (c, n, 2), phasors (c, n): of the output in every cycle [m]
     - repeats (c,): whether the motion has become periodic
     - longest_stick (c,): duration of the longest stick in the measured cycles [s]
-    - samples (c, S, 5): slide [m], velocity [m/s], irreversible slide [m], force [N] and acceleration at the output [m s-2]
-      at the ends of the steps of the window; NaN after its last step
     """
 
     values: dict[str, np.ndarray]
@@ -31,7 +29,6 @@ class CaseMarch(NamedTuple):
     phasors: np.ndarray
     repeats: np.ndarray
     longest_stick: np.ndarray
-    samples: np.ndarray
 
 
 def list_parameters(
@@ -70,7 +67,7 @@ def list_parameters(
     )
 
 
-def march_cases(cases: Cases, steps: int, *, has_samples: bool = False) -> CaseMarch:
+def march_cases(cases: Cases, steps: int) -> CaseMarch:
     """Run cases with a number of steps per cycle, and compute their measures.
 
     Parameters
@@ -79,8 +76,6 @@ def march_cases(cases: Cases, steps: int, *, has_samples: bool = False) -> CaseM
         With the same number of cycles.
     steps : int
         Whole steps per cycle; steps with an event are halved.
-    has_samples : bool
-        Whether the motion in the window is stored.
     """
     # Half steps of the whole cycle, and of the finest level for the halving of steps.
     n = len(cases.parameters)
@@ -91,11 +86,9 @@ def march_cases(cases: Cases, steps: int, *, has_samples: bool = False) -> CaseM
     now = np.zeros((n, len(Now)))
     seen = np.zeros((n, len(Seen)))
     history = np.zeros((n, int(columns[Number.CYCLES].max(initial=0)), 4))
-    n_samples = steps * int(columns[Number.WINDOW].max(initial=0)) if has_samples else 0
-    samples = np.full((n, n_samples, 5), np.nan)
     compiled.load("points.case_kernels").march_cases(
         steps, np.array([np.sin(phase), np.cos(phase)]), cases.parameters, cases.numbers,
-        cases.memory.copy(), now, seen, history, samples, np.zeros((LEVELS + 1, 2, 5)),
+        cases.memory.copy(), now, seen, history, np.zeros((LEVELS + 1, 2, 5)),
     )  # fmt: skip
 
     output = columns[Number.OUTPUT][:, None]
@@ -107,7 +100,6 @@ def march_cases(cases: Cases, steps: int, *, has_samples: bool = False) -> CaseM
             phasors * output,
             seen[:, Seen.N_CYCLES] < columns[Number.WINDOW],
             seen[:, Seen.LONGEST_STICK],
-            samples,
         )
 
 
@@ -120,7 +112,7 @@ def compute_measures(cases: Cases, now, seen, history) -> dict[str, np.ndarray]:
         The cases that were run.
     now : (c, 20) array
         States at the end, in the rows of `case_rows.Now`.
-    seen : (c, 33) array
+    seen : (c, 32) array
         What was observed, in the rows of `case_rows.Seen`.
     history : (c, n, 4) array
         Extremes and phasor of every cycle.

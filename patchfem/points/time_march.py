@@ -3,6 +3,7 @@
 from copy import copy
 from dataclasses import dataclass
 from itertools import pairwise
+from math import ceil
 from typing import NamedTuple
 
 import numpy as np
@@ -62,6 +63,7 @@ SAME_CYCLE = 1e-11
 TAYLOR_DEGREE = 18  # degree whose remainder is below round-off for matrices of norm 1
 SAME_PLACE = 1e-12  # change of a slide relative to the largest displacement that counts as rest
 MAX_EARLY_SAMPLES_PER_CYCLE = 128  # samples per cycle of the histories before the window
+WHOLE_CYCLE_TOL = 1e-6  # fraction of a cycle that is round-off of the number of cycles
 EDGE = 1e-9  # distance of the samples of a drive from the ends of a step, in steps
 # Sums that a repeated cycle continues
 REPEATED = [Total.WORK_IN, Total.POWER, Total.VISCOUS, Total.FRICTION]
@@ -107,7 +109,7 @@ class Motion:
     - cycles_done: number of cycles
     - snapshots: states at the ends of equal parts of the last cycle
     - end: the march at its end, from which another one can go on
-    - log, events: None and 0, because a march has no list of events
+    - log: None, because a march has no list of events
     """
 
     response: Response
@@ -123,7 +125,6 @@ class Motion:
     snapshots: list[Snapshot]
     end: "March"
     log: None = None
-    events: int = 0
 
 
 def load_kernels(contact: Contact, say=None):
@@ -501,8 +502,8 @@ def sample_drive(drive, step: float, first: int, count: int) -> np.ndarray:
         Acceleration or force over mass as a function of time.
     step : float
         Duration of a step [s].
-    first : int
-        Number of the first step.
+    first : float
+        Start of the first step, in steps.
     count : int
         Number of steps.
     """
@@ -523,6 +524,8 @@ class March:
     - modes, drive, contact, steps, step: rig, drive, contact points, steps per cycle and their duration [s]
     - system: arrays of the engine
     - done: number of steps since the start
+    - shift: time of step number 0 of the present step size, in steps; below 0 after a first part with shorter steps
+    - n_first, first_step: number and duration [s] of the steps of the first part
     - outcome, message: how the march ended, None and "" as long as it goes on
     - work_sums: friction work from samples, and sum of the magnitudes of the friction works of the steps [J]
     """
@@ -537,6 +540,9 @@ class March:
         self.step = drive.period / steps
         self.system = make_system(contact, self.step, modes, travel, start)
         self.done = 0
+        self.shift = 0.0
+        self.n_first = 0
+        self.first_step = self.step
         self.outcome = None
         self.message = ""
         self.work_sums = np.zeros(2)
@@ -554,6 +560,28 @@ class March:
             other.drive = drive
         return other
 
+    def set_step(self, step: float) -> None:
+        """Go on with steps of another duration [s]."""
+        time = (self.done + self.shift) * self.step
+        fresh = make_system(self.contact, step, self.modes)
+        system = self.system
+        self.system = system._replace(
+            structure=system.structure._replace(
+                responses=fresh.structure.responses,
+                loss=fresh.structure.loss,
+                work=fresh.structure.work,
+            ),
+            ports=system.ports._replace(compliance=fresh.ports.compliance),
+            options=system.options._replace(step=float(step)),
+        )
+        self.step = step
+        self.shift = time / step - self.done
+
+    def find_times(self, numbers) -> np.ndarray:
+        """Return the times (k,) [s] of the steps with given numbers (k,)."""
+        times = (numbers + self.shift) * self.step
+        return np.where(numbers < self.n_first, numbers * self.first_step, times)
+
     @property
     def state(self) -> np.ndarray:
         """Modal coordinates [m] and velocities [m/s], (2, n)."""
@@ -568,6 +596,7 @@ class March:
         totals[Total.IS_DIRTY] = 1.0
         self.work_sums[:] = 0.0
         self.done = 0
+        self.shift = 0.0
         sample = np.zeros((1, self.width))
         self._set_drive(1)
         self.kernels.march(self.system, 0, sample)
@@ -587,10 +616,10 @@ class March:
     def _set_drive(self, count: int) -> None:
         """Write the drive, and a prescribed load, of the next steps."""
         structure = self.system.structure._replace(
-            drive=sample_drive(self.drive, self.step, self.done, count + 1)
+            drive=sample_drive(self.drive, self.step, self.done + self.shift, count + 1)
         )
         if self.contact.load is not None:
-            times = self.step * (self.done + np.arange(count + 1.0))
+            times = self.step * (self.done + self.shift + np.arange(count + 1.0))
             structure = structure._replace(loads=np.asarray(self.contact.load(times), float))
         self.system = self.system._replace(structure=structure)
 
@@ -620,7 +649,7 @@ class March:
             self.outcome = Outcome.EXCEEDS_TRAVEL
         elif status == LEAVES_GROOVES:
             self.outcome = Outcome.LEAVES_GROOVES
-            self.message = self.contact.grooves.describe_lift(self.done * self.step)
+            self.message = self.contact.grooves.describe_lift((self.done + self.shift) * self.step)
         elif status == NO_CONTACT_SET:
             self.outcome = Outcome.NOT_CONVERGED
             self.message = f"at step {self.done} the method could not determine which points are in contact; {advice}"
@@ -668,7 +697,7 @@ class March:
         rest = sample[2 * n :]
         motion = float(row @ sample[:n]), float(row @ sample[n : 2 * n])
         ports = rest[Sample.PORTS :]
-        place = self.done * self.step, *motion, ports[0], ports[1]
+        place = (self.done + self.shift) * self.step, *motion, ports[0], ports[1]
         return make_snapshot(
             self.kernels, self.system, (*place, rest[Sample.HEAVE], rest[Sample.PITCH])
         )
@@ -840,8 +869,8 @@ def march(
 ) -> Motion:  # fmt: skip
     """March a rig over the cycles of its drive.
 
-    The march begins with the fraction of a cycle, so that the window has complete cycles. Cycles of a periodic motion
-    under a sine are not computed again.
+    The march begins with the fraction of a cycle, so that the window has complete cycles. The steps of this part are
+    shorter, so that they end with the part. Cycles of a periodic motion under a sine are not computed again.
 
     Parameters
     ----------
@@ -882,7 +911,14 @@ def march(
     else:
         run = March(modes, drive, contact, steps_per_cycle, travel, start)
 
-    n_steps = round(cycles * steps_per_cycle)
+    # The fraction of a cycle has the next larger number of steps, all of the same duration.
+    part = cycles * steps_per_cycle % steps_per_cycle
+    run.n_first = max(ceil(part - WHOLE_CYCLE_TOL * steps_per_cycle), 0)
+    n_steps = run.n_first + round(cycles - part / steps_per_cycle) * steps_per_cycle
+    whole_step = run.first_step = drive.period / steps_per_cycle
+    if run.n_first and abs(run.n_first - part) > WHOLE_CYCLE_TOL:
+        run.first_step = whole_step * part / run.n_first
+        run.set_step(run.first_step)
     record = Record(run, n_steps, min(window * steps_per_cycle, n_steps), keeps_samples)
     saved = checkpoint.open_checkpoint(run, record, (n_steps, steps_per_cycle, window, frames))
     can_repeat = (
@@ -894,12 +930,16 @@ def march(
 
     # Whole cycles at a time, except for the fraction at the start.
     while run.done < n_steps and run.outcome is None:
+        if run.done == run.n_first and run.step != whole_step:
+            run.set_step(whole_step)
         n_left = n_steps - run.done
         n_early = n_left - record.n_window
         size = n_left % steps_per_cycle or steps_per_cycle
         if size == steps_per_cycle and n_early > steps_per_cycle:
             most = min(MAX_CYCLES_AT_ONCE, MAX_STEPS_AT_ONCE // steps_per_cycle)
             size *= max(1, min(most, n_early // steps_per_cycle))
+        if run.done < run.n_first:
+            size = run.n_first
 
         totals = run.system.totals.copy()
         works = run.work_sums.copy()
@@ -1100,7 +1140,7 @@ class Record:
             run.find_ledger(last[0]),
             run.outcome,
             run.message,
-            run.done / steps,
+            (run.done + run.shift) / steps,
             self.snapshots,
             run,
         )
@@ -1153,7 +1193,7 @@ def make_histories(run: March, rows, numbers, energies) -> Response:
     """
     modes = run.modes
     contact = run.contact
-    time = numbers * run.step
+    time = run.find_times(numbers)
     n = modes.omega.size
 
     z = rows[:, :n]

@@ -23,7 +23,6 @@ PUBLIC = {
         "measure_last_cycle_amplitude",
         "smooth_slopes",
     ),
-    "ends": ("estimate_window_error",),
     "errors": (
         "ERROR_MEASURES",
         "FrictionScale",
@@ -120,7 +119,6 @@ PUBLIC = {
         "remove_interface_number",
         "select_names",
         "set_final_floors",
-        "stick_fraction",
     ),
     "settling": (
         "CLASSES",
@@ -129,8 +127,6 @@ PUBLIC = {
         "window_amplitude_means",
     ),
     "spectrum": (
-        "friction_harmonic",
-        "motion_harmonic",
         "find_acceleration_harmonics",
         "read_instrument",
         "make_acceleration_measures",

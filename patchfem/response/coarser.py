@@ -25,8 +25,8 @@ class CoarserRuns(NamedTuple):
     - rule: function (values of the reference run, *values of the coarse runs) that returns errors by
       measure name.
     - reference: settings of the reference run to which they are compared; None: the fine run.
-    - source: source of the error, i.e. what is coarser: "steps", "mesh", "modes", "bonds" or "cells";
-      "own" if no key of a scene sets it.
+    - source: source of the error, i.e. what is coarser: "steps", "mesh", "modes", "bonds", "cells" or
+      "samples"; "own" if no key of a scene sets it.
     """
 
     runs: tuple[Hashable, ...]

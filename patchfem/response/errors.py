@@ -327,9 +327,7 @@ def split_errors(values: Values, errors, step_values=()) -> dict[str, ErrorCause
     return causes
 
 
-def add_run_error_estimates(
-    measures: Measures, error_estimates: Values, end_errors: Values
-) -> Measures:
+def add_run_error_estimates(measures: Measures, error_estimates: Values) -> Measures:
     """Add the error estimates of a run itself to the errors of its measures.
 
     Parameters
@@ -338,9 +336,6 @@ def add_run_error_estimates(
         Measure by name; a measure without an error is not changed.
     error_estimates : dict
         Errors by name, in the unit of each measure.
-    end_errors : dict
-        Further errors by name, because the last sample does not lie at the requested end time. They
-        are stated as the cause "end".
 
     Returns
     -------
@@ -349,12 +344,9 @@ def add_run_error_estimates(
     """
     updated = dict(measures)
     for name, measure in measures.items():
-        causes = measure.causes
-        if causes is not None and end_errors:
-            causes = causes._replace(parts=causes.parts | {"end": end_errors.get(name, 0.0)})
         if measure.error is not None:
-            error = measure.error + error_estimates.get(name, 0.0) + end_errors.get(name, 0.0)
-            updated[name] = replace(measure, error=error, causes=causes)
+            error = measure.error + error_estimates.get(name, 0.0)
+            updated[name] = replace(measure, error=error)
     return updated
 
 

@@ -7,7 +7,6 @@ onset of slip.
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from ..core import Outcome
 from ..formatting import format_length
 from .measures import Values
 from .rows import AMPLITUDE, select_names
@@ -26,7 +25,6 @@ class Level:
     - stuck: whether no interface slips.
     - values, errors: known measures and their errors by name.
     - unit: unit of `drive`.
-    - outcome: outcome of the motion at this level; "" if it was not computed.
     """
 
     drive: float
@@ -34,13 +32,10 @@ class Level:
     values: Values
     errors: Values
     unit: str = "m s-2"
-    outcome: str = ""
 
 
 def make_onset_test(kind: str, length: float | None = None) -> Callable[[Level], bool]:
     """Return a function that decides whether a drive level lies above the onset of slip.
-
-    A motion that grows without bound counts as slip.
 
     Parameters
     ----------
@@ -50,11 +45,10 @@ def make_onset_test(kind: str, length: float | None = None) -> Callable[[Level],
     length : float, optional
         Limit of the amplitude for "gauge" [m].
     """
-    exceeds_onset = {
+    return {
         "slip": lambda level: not level.stuck,
         "gauge": lambda level: level.values[AMPLITUDE] > length,
     }.get(kind, lambda level: level.values.get("acceleration_distortion", 0.0) > MIN_DISTORTION)
-    return lambda level: level.outcome == Outcome.GROWS or exceeds_onset(level)
 
 
 def make_no_onset_reason(kind: str, length: float | None = None) -> str:

@@ -51,8 +51,7 @@ def judge_outcome(
     - Periodic drive, or last level of a drive in levels: the outcome follows from the amplitudes of
       successive windows (`classify_periodic`) and the remaining free motion (`remaining_free_motion`). If a
       steady motion will still change by more than ESTIMATE_TOL times the tolerance, the steady estimate is
-      returned. If a bounded motion is known to exist (`solution.bounded`), an increasing amplitude is
-      TRANSIENT, not GROWS.
+      returned.
     - Release or step: STEADY if the amplitude is below its floor, i.e. at rest; otherwise as above,
       but a release grows only if a mode gains energy.
     - Sweep or recorded signal: TRANSIENT without a steady estimate, unless the interface sticks.
@@ -136,7 +135,6 @@ def judge_outcome(
             window,
             [np.array([np.nan if one is None else one]) for one in solution.steady],
             (tolerance, floor, max(min_decay_rate, 0.0) * window * drive.period),
-            solution.bounded,
         )
     )
 
@@ -226,9 +224,7 @@ def remove_errors(measures: Measures) -> Measures:
     return {name: replace(measure, error=None) for name, measure in measures.items()}
 
 
-def classify_periodic(
-    amplitudes, extremes, window: int, steady, limits: tuple, bounded=False
-) -> tuple:
+def classify_periodic(amplitudes, extremes, window: int, steady, limits: tuple) -> tuple:
     """Classify n motions under periodic drives, and estimate their steady amplitudes.
 
     A motion is steady only if both the difference from its steady estimate and the remaining free motion are
@@ -247,8 +243,6 @@ def classify_periodic(
         Values and errors (n,) [m] of `settling.extrapolate_steady_amplitudes`; NaN for none.
     limits : tuple
         Tolerance, floor [m], and logarithmic decay of the slowest mode over a window [1]; numbers or (n,).
-    bounded : bool or (n,)
-        Whether a bounded motion is known to exist.
 
     Returns
     -------
@@ -260,7 +254,6 @@ def classify_periodic(
     last = amplitudes[:, -1]
     allowed = tolerance * last + floor
     classes = classify_motions(amplitudes, tolerance, floor)
-    classes = np.where((classes == GROWS_CLASS) & bounded, 0, classes)
     change = np.abs(np.where(np.isnan(value), last, value) - last)
     classes = np.where((classes == STEADY_CLASS) & (change > allowed), 0, classes)
     if extremes is not None:

@@ -49,7 +49,7 @@ class LastCycles:
     - is_sine: whether the drive is sinusoidal at the end of the run.
     - integrated: measures that the engine integrated.
     - loop: first harmonics of relative displacement [m] and friction force [N], and work per cycle
-      [J], if they are not in `integrated`; None if the window contains no complete cycle.
+      [J]; None if the window contains no complete cycle.
     - ledger (4, k): friction work and energies [J], or None.
     - reversal_rule: rule for the friction force at a reversal of the displacement (see
       `loops.find_reversals`).
@@ -86,12 +86,6 @@ class LastCycles:
         """Slip amplitude [m], stick fraction [1] and phase of slip onset [rad] as a dict."""
         if self.load is None:
             return {}
-        if self.integrated.loops:
-            loop = self.integrated.loops[0]
-            return {
-                "slip_amplitude": loop.slip_range / 2,
-                "stick_fraction": stick_fraction(loop.stuck_time, self.span),
-            }
         window = self.window
         steps = max(1, round((window.time.size - 1) * self.drive.period / self.span))
         values = compute_slip_measures(window, self.drive, steps)
@@ -110,37 +104,20 @@ class LastCycles:
         )
 
     @cached_property
-    def loop_harmonics(self) -> tuple | None:
-        """First harmonics of relative displacement and friction force, and work per cycle [J].
-
-        None without a complete cycle.
-        """
-        if self.loop is not None or not self.integrated.loops or not self.has_full_cycle:
-            return self.loop
-        first = self.integrated.loops[0]
-        return (
-            first.displacement_harmonic,
-            first.force_harmonic,
-            first.work * self.drive.period / self.span,
-        )
-
-    @cached_property
     def loop_measures(self) -> Values:
         """Measures of the friction loop as a dict; empty without friction or a complete cycle.
 
         loop_area [J]; under sinusoidal drive also equivalent_stiffness and secant_stiffness [N/m]
         and equivalent_damping [1].
         """
-        if self.loop_harmonics is None or self.load is None:
+        if self.loop is None or self.load is None:
             return {}
         is_moving = self.is_sine and np.ptp(self.window.slide) > max(
             2 * self.slide_round_off, MIN_SLIDE_RANGE
         )
         if not is_moving:
-            return interface_loop(0.0, *self.loop_harmonics, self.stiffness)
-        measures = interface_loop(
-            mean_half_range(self.reversals), *self.loop_harmonics, self.stiffness
-        )
+            return interface_loop(0.0, *self.loop, self.stiffness)
+        measures = interface_loop(mean_half_range(self.reversals), *self.loop, self.stiffness)
         return measures | {"secant_stiffness": secant_stiffness(self.reversals)}
 
     @cached_property
@@ -285,13 +262,7 @@ ROWS = (
         "N",
         1e-6,
         "largest friction force on the whole interface, of a bench during the whole run",
-        lambda s: (
-            None
-            if s.load is None
-            else s.integrated.loops[0].max_force
-            if s.integrated.loops
-            else compute_peak(s.window.force)
-        ),
+        lambda s: None if s.load is None else compute_peak(s.window.force),
         group="friction",
         flags="interface level loop",
         friction_scale=lambda scale: scale.limit,
@@ -637,14 +608,6 @@ def compute_measures(last_cycles: LastCycles) -> Values:
         for name in INTERFACE_MEASURES:
             values[add_interface_number(name, number)] = TABLE[name].function(interface)
     return {name: value for name, value in (values | known).items() if value is not None}
-
-
-def stick_fraction(stick_time, span):
-    """Return the ratio of the stick time to the duration of a window.
-
-    A fraction that differs from 1 only by round-off is set to 1.
-    """
-    return np.where(stick_time >= span * (1 - 1e-12), 1.0, stick_time / span)[()]
 
 
 def remove_interface_number(name: str) -> str:

@@ -162,37 +162,6 @@ def make_acceleration_measures(first_harmonic: float, third_harmonic: float) -> 
     }
 
 
-def friction_harmonic(window, modes, drive) -> complex:
-    """Return the Fourier coefficient [N] of the friction force from the equations of motion.
-
-    With equation 3.4, F1 = m sum_i s_i r_i / sum_i s_i^2, where r = -base a1 - (z'')1 - D (z')1 -
-    omega^2 z1 and s_i is the participation factor of mode i for the relative displacement. The
-    result includes impulses within a step, e.g. at the end of slip.
-
-    Parameters
-    ----------
-    window : Response
-        Complete cycles of a drive that ends as a sinusoid, without forces other than drive and friction.
-    modes
-        Modal basis with one interface.
-    drive
-        Its last segment is the sinusoid.
-    """
-    segment = _find_last_segment(window, drive)
-    time = window.time
-    omega = segment.omega
-    z = motion_harmonic(time, window.modal, window.modal_rate, omega)
-    velocity = differentiate_harmonic(z, window.modal, time, omega)
-    acceleration = differentiate_harmonic(velocity, window.modal_rate, time, omega)
-    residual = (
-        -modes.base * _drive_harmonic(segment)
-        - acceleration
-        - modes.damping_matrix @ velocity
-        - modes.omega**2 * z
-    )
-    return complex(modes.mass * (modes.slide @ residual) / (modes.slide @ modes.slide))
-
-
 def read_instrument(
     window, drive, peak: float, kind: str = "peak", cutoff: float | None = None
 ) -> float:

@@ -7,11 +7,10 @@ the allowed one therefore needs a resolution that is finer by the factor `excess
 """
 
 from collections.abc import Callable, Mapping
-from math import ceil, floor, log2, log10, pi
+from math import ceil, floor, log2, log10
 from types import MappingProxyType
 from typing import NamedTuple
 
-from ..effects import law_has_trait
 from ..formatting import format_number
 from ..model.gap import longest_loaded_cell
 from ..model.model import Model
@@ -262,7 +261,7 @@ def _advise_on_motion(missed: Missed) -> Advice:
     harmonics = missed.extra.get("harmonics")
     if harmonics is None or name.startswith(SAMPLED_MEASURES):
         return NO_ADVICE
-    return notes.advise_harmonics(harmonics, _count_friction_harmonics(missed))
+    return notes.advise_harmonics(harmonics)
 
 
 def _count_steps(missed: Missed) -> int | None:
@@ -277,77 +276,39 @@ def _advise_steps(missed: Missed) -> Advice | None:
     if steps is None:
         return None
     model = missed.model
-    accuracy = model.accuracy
     name = missed.worst
     parts, order = missed.measures[name].causes
-    fixed = [key for key in ("method", "steps_per_cycle") if key in accuracy.model_fields_set]
 
-    # The hybrid engine needs no steps, so that leaving out the keys may be the better advice.
-    exact = None
-    if (
-        model.kind == "rig"
-        and (accuracy.method == "march" or accuracy.steps_per_cycle is not None)
-        and not engines.HYBRID.find_unsupported_feature(model)
-    ):
-        left_out = " and ".join(f"accuracy.{key}" for key in fixed)
-        text = f"leave out {left_out}; the steps then follow from the tolerance"
-        exact = Advice(text, left_out)
+    # A rig doubles its steps while this reduces the errors, or needs none, unless the scene fixes them.
+    fixed = [key for key in ("method", "steps_per_cycle") if key in model.accuracy.model_fields_set]
+    can_choose = model.kind == "rig" and (
+        model.accuracy.steps_per_cycle is not None
+        or (fixed and not engines.HYBRID.find_unsupported_feature(model))
+    )
 
+    clause = ""
     if order is None:
         clause = (
             f"the results with {steps // 4}, {steps // 2} and {steps} steps per cycle show no order of convergence of "
-            f"{name}"
+            f"{name}; "
         )
-        if exact:
-            return exact._replace(text=f"{clause}; {exact.text}")
-        return _advise_without_order(model, steps, clause)
+    else:
+        # The steps may have what the other causes leave of the allowed error.
+        total = sum(parts.values())
+        allowed = total / missed.excess[name]
+        target = max(allowed - (total - parts["steps"]), MIN_STEP_ERROR_FRACTION * allowed)
+        halvings = max(1, ceil(log2(parts["steps"] / target) / order))
+        if halvings <= MAX_HALVINGS or not can_choose:
+            proposed = steps * 2 ** min(halvings, notes.MAX_PROPOSED_HALVINGS)
+            return Advice.set_key(STEPS_KEY, proposed)
 
-    # The steps may have what the other causes leave of the allowed error.
-    total = sum(parts.values())
-    allowed = total / missed.excess[name]
-    target = max(allowed - (total - parts["steps"]), MIN_STEP_ERROR_FRACTION * allowed)
-    halvings = max(1, ceil(log2(parts["steps"] / target) / order))
-    if exact and halvings > MAX_HALVINGS:
-        return exact
-    proposed = steps * 2 ** min(halvings, notes.MAX_PROPOSED_HALVINGS)
-    return Advice.set_key(STEPS_KEY, proposed)
-
-
-def _advise_without_order(model: Model, steps: int, clause: str) -> Advice:
-    """Return the advice for a run whose measures show no order of convergence with the steps, as the clause says.
-
-    If the scene does not prescribe the steps, they are doubled until the measures meet the tolerance.
-    """
+    if can_choose:
+        keys = " and ".join(f"accuracy.{key}" for key in fixed)
+        return Advice(f"{clause}leave out {keys}; the steps then follow from the tolerance", keys)
     if 2 * steps > costs.MAX_MARCH_STEPS:
-        return Advice(f"{clause}, so more steps may not help; {USE_ERROR_ADVICE}")
-    if model.kind == "rig" and model.accuracy.steps_per_cycle is not None:
-        text = (
-            f"{clause}; leave out {STEPS_KEY}, so that patchfem doubles the number of steps "
-            "while this reduces the errors"
-        )
-        return Advice(text, STEPS_KEY)
-    text = (
-        f"{clause}, so the effect of more steps is not known; try {STEPS_KEY} = {2 * steps}, or "
-        f"{USE_ERROR_ADVICE}"
-    )
+        return Advice(clause + USE_ERROR_ADVICE)
+    text = f"{clause}try {STEPS_KEY} = {2 * steps}, or {USE_ERROR_ADVICE}"
     return Advice(text, STEPS_KEY, 2 * steps)
-
-
-def _advise_end(missed: Missed) -> Advice:
-    """Return the advice on steps per cycle with which the run ends exactly at a sample.
-
-    At most twice as many steps are proposed, in multiples of four, so that coarser runs with half
-    and a quarter of them exist.
-    """
-    steps = _count_steps(missed)
-    cycles = missed.extra["cycles"]
-    counts = range(4 * ceil(steps / 4), 2 * steps + 4, 4)
-    best = min(counts, key=lambda count: abs(cycles * count - round(cycles * count)))
-    text = (
-        f"the run ends between two samples; set {STEPS_KEY} = {best}, so that a sample lies closer to "
-        "the end of the run"
-    )
-    return Advice(text, STEPS_KEY, best)
 
 
 def _advise_motion_mesh(missed: Missed) -> Advice | None:
@@ -391,21 +352,8 @@ def _advise_bond_sum(missed: Missed) -> Advice:
 # Advice on a measure of a motion by the axis with the largest share of its error; None: the axis is at its limit.
 ADVICE_BY_AXIS: dict[str, Callable[[Missed], Advice | None]] = {
     "steps": _advise_steps,
-    "end": _advise_end,
     "mesh": _advise_motion_mesh,
     "reduced": _advise_reduced_modes,
     "modes": _advise_shear_modes,
     "bonds": _advise_bond_sum,
 }
-
-
-def _count_friction_harmonics(missed: Missed) -> float:
-    """Return the number of harmonics that a velocity-dependent friction force needs.
-
-    It is the largest slip velocity divided by the reference speed of the law; 0 for other laws.
-    """
-    law = missed.model.friction
-    slip = missed.measures.get("slip_amplitude")
-    if law is None or slip is None or not law_has_trait(law.law, "creeps"):
-        return 0.0
-    return 2 * pi / missed.extra["period"] * slip.value / law.reference_speed

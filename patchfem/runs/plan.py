@@ -15,7 +15,6 @@ from ..inputs import measured
 from ..model.model import Model, build
 from ..model.source import locate_errors
 from ..response import rows
-from ..structure import drive_sizes
 from . import joint
 from .bench import engine as of_bench
 from .patch import plan as patch_plan
@@ -23,15 +22,6 @@ from .results.patch_rows import Values
 from .rig import engines
 from .rig import plan as of_rig
 
-SKIPPING_ENGINES = (
-    "march",
-    "hybrid",
-)  # Engines that skip cycles once the motion is periodic.
-# Smallest number of cycles at which a plan mentions that cycles may be skipped.
-MIN_SKIPPED_CYCLES = 100
-SKIPPING_NOTE = (
-    "as soon as the motion repeats itself, the remaining cycles are not computed one by one"
-)
 GROUPS = {  # Definition and SI unit of each group.
     "D": (
         "D: friction limit (static, if there are two) divided by the largest force of the drive, both on the first mode",
@@ -210,15 +200,13 @@ def _make_plan(model: Model) -> Plan:
     if rig is not None:
         engine = engines.choose_engine(model).name
         unknowns |= of_rig.count_unknowns(model)
-        law_sentences += of_rig.describe_method(model)
+        law_sentences += of_rig.describe_printed_law(model)
     if model.kind == "bench":
         engine, counts, samples = of_bench.count_bench_sizes(model)
         unknowns |= counts
         groups = of_bench.compute_dimensionless_groups(model) | groups
 
     # Laws, and what the numbers of the plan say of the motion.
-    if model.wear is not None and model.patch is not None:
-        law_sentences.append(_describe_wear(model))
     if model.friction is not None:
         chain |= _interface_stiffnesses(model)
         groups |= _compute_law_groups(model)
@@ -226,22 +214,9 @@ def _make_plan(model: Model) -> Plan:
     if rig is not None:
         motion_sentences += of_rig.describe_stick(rig, groups, chain)
 
-    if (
-        engine in SKIPPING_ENGINES
-        and drive_sizes.is_sinusoidal(rig.drive.signal)
-        and rig.drive.cycles >= MIN_SKIPPED_CYCLES
-    ):
-        law_sentences.append(SKIPPING_NOTE)
-
     sentences = [*motion_sentences, *patch_sentences, *law_sentences]
     if "slip_length" in groups:
         sentences.append(patch_plan.describe_shear(model.patch, groups["slip_length"]))
-    if model.kind == "rig" and model.partial_slip and rig.friction.load_varies:
-        sentences.append(
-            f"the normal load changes with the motion, so {model.partial_slip} is computed with the tangential modes of "
-            "all nodes; the numerical error is estimated from a second run with half as many modes"
-        )
-
     return Plan(
         model,
         engine,
@@ -251,23 +226,6 @@ def _make_plan(model: Model) -> Plan:
         groups,
         tuple(sentences),
     )
-
-
-def _describe_wear(model: Model) -> str:
-    """Describe the jumps over the cycles of wear and the motion between them in a sentence."""
-    changes_motion = (
-        bool(model.partial_slip)
-        or model.side == "lower"
-        or model.grooves is not None
-        or model.wear.friction is not None
-    )
-    jumps = (
-        f"{model.wear.jumps} jumps" if model.wear.jumps else "jumps whose number the run chooses"
-    )
-    repetition = "the motion is computed only once, because wear does not change it"
-    if changes_motion:
-        repetition = "the motion is computed again after each jump"
-    return f"wear: {model.wear.cycles:.6g} cycles in {jumps}; {repetition}"
 
 
 def _interface_stiffnesses(model: Model) -> dict:

@@ -33,7 +33,7 @@ from patchfem.points import checkpoint, time_march
 from patchfem.runs import refine
 
 MARCH = '[accuracy]\nmethod = "march"\nsteps_per_cycle = 60\n'
-SHORT_DRIVE = DRIVE.replace("cycles = 30", "cycles = 16.3")
+SHORT_DRIVE = DRIVE.replace("cycles = 30", "cycles = 16.3071")
 RIGS = {
     "one slide": POINT + PLASTIC + MODE + SECOND + SHORT_DRIVE + MARCH,
     "a list of bonds": POINT + NONLOCAL + "order = 0.5\n" + MODE + SHORT_DRIVE + MARCH,
@@ -225,7 +225,7 @@ def test_exact_run_ended_by_signal_can_be_resumed(tmp_path, number):
     SIGKILL it prints nothing, and after the other signals one line."""
     scene = tmp_path / "scene.toml"
     out = tmp_path / "out"
-    scene.write_text(RIGS["one slide"].replace("cycles = 16.3", "cycles = 4000"), "utf-8")
+    scene.write_text(RIGS["one slide"].replace("cycles = 16.3071", "cycles = 4000"), "utf-8")
     code = (
         "from patchfem.points import checkpoint as c; c.MIN_WRITE_INTERVAL = 0.05; c.MAX_WRITE_FRACTION = 1.0; "
         "from patchfem.points import time_march; time_march.SAME_CYCLE = -1.0; "

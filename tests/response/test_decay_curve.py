@@ -182,6 +182,34 @@ def test_exact_decay_that_ends_stuck_has_stuck_eigenvalue():
     assert decay.amplitude[-1] < 1.2 * amplitude
 
 
+def test_exact_linear_release_has_eigenvalue():
+    """Every row of a release without friction has frequency and damping of the first mode, although another one rings."""
+    text = TWO_MODES[TWO_MODES.index("[structure]") :]
+    decay = pf.run(text).extra["decay"]
+    assert decay.frequency.size > 100
+    assert decay.frequency == pytest.approx(40 * np.sqrt(1 - 0.002**2), rel=1e-9)
+    assert decay.damping == pytest.approx(0.002, rel=1e-7)
+
+
+def test_exact_decay_that_ends_stuck_on_stiffening_spring():
+    """After its last slip a block of 1 kg on a cubic spring has the frequency of the Duffing oscillator."""
+    first = TWO_MODES[: TWO_MODES.index('[[structure.mode]]\nname = "second"')]
+    spring = '1 kg"\nstiffening = {cubic = "2e10 N/m^3"}'
+    text = first.replace('1 kg"', spring) + TWO_MODES[TWO_MODES.index("[drive]") :]
+    run = pf.run(text)
+    decay = run.extra["decay"]
+    late = decay.select(decay.time > run.extra["events"].time[-1] + 0.1)
+    assert late.time.size > 40
+
+    # Energy: T = 4 int_0^(pi/2) d theta / sqrt(w^2 + c a^2 (1 + sin^2 theta) / 2).
+    square = (80 * np.pi) ** 2 + 3e4
+    for amplitude, frequency in zip(late.amplitude[::10], late.frequency[::10]):
+        cubic = 1e10 * amplitude**2
+        angles = np.linspace(0, np.pi / 2, 101)
+        quarter = np.trapezoid((square + cubic * (1 + np.sin(angles) ** 2)) ** -0.5, angles)
+        assert frequency == pytest.approx(0.25 / quarter, rel=1e-4)
+
+
 CROWNED = (
     CROWNED_JOINT
     + """\

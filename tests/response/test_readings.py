@@ -51,14 +51,6 @@ def test_exact_readings_of_known_harmonics(moving):
         )
 
 
-def test_always_high_cutoff_gives_peak():
-    """A low-pass reading with a high cutoff agrees with the peak within 1e-3."""
-    drive = SineDrive(30.0, OMEGA)
-    window, _ = make_motion(drive)
-    peak = float(np.abs(window.acceleration).max())
-    assert read_instrument(window, drive, peak, "lowpass", 1e6) == pytest.approx(peak, rel=1e-3)
-
-
 def test_refuses_unknown_reading():
     """An unknown reading is refused with the list of readings."""
     drive = SineDrive(30.0, OMEGA)

@@ -88,13 +88,6 @@ def test_exact_output_at_rest_has_no_distortion(force, there):
     assert ratio.reason == ("" if there else OUTPUT_AT_REST_REASON)
 
 
-@pytest.mark.parametrize(("start", "cycles"), [("20 um", 15)])
-def test_always_free_motion_has_no_drift(start, cycles):
-    """A free motion has no drift per cycle, since no drive defines a period."""
-    found = run(RELEASED.format(start=start, cycles=cycles)).measures["drift_per_cycle"]
-    assert found.value is None and found.error is None and found.reason == APERIODIC_REASON
-
-
 STICK_SLIP = """[normal]
 load = "100 N"
 [friction]

@@ -5,11 +5,8 @@ from math import pi
 import numpy as np
 import pytest
 
-from patchfem import build
 from patchfem.core import Response, SineDrive
 from patchfem.response import spectrum
-from patchfem.runs import choose_numerics
-from patchfem.runs.rig.solve import solve_rig
 
 OMEGA, PERIOD = 2.0, pi
 
@@ -69,48 +66,3 @@ def test_exact_distortion_includes_base_acceleration(moving):
         "acceleration_distortion": third / first,
     }
     assert spectrum.make_acceleration_measures(1e-16, 1e-17)["acceleration_distortion"] is None
-
-
-SCENE = """\
-[normal]
-load = "0.8 N"
-[friction]
-law = "coulomb"
-static = 1.0
-kinetic = {kinetic}
-[structure]
-moving_mass = "1 kg"
-[[structure.mode]]
-name = "a"
-frequency = "0.15915494309189535 Hz"
-damping = 0.02
-slide = 1.0
-[[structure.mode]]
-name = "b"
-frequency = "0.55 Hz"
-damping = 0.02
-slide = 0.4
-base = 0.0
-output = 0.2
-[drive]
-kind = "{kind}"
-frequency = "0.08 Hz"
-{size}
-cycles = 12
-"""
-
-
-@pytest.mark.parametrize(
-    "kind, size", [("force", 'force = "1 N"'), ("base", 'acceleration = "1 m/s^2"')]
-)
-@pytest.mark.parametrize("kinetic", [0.7])
-def test_exact_friction_harmonic_from_motion_and_force_agree(kind, size, kinetic):
-    """The equivalent stiffness from the motion alone agrees with that from the friction force within 1e-8."""
-    text = SCENE.format(kinetic=kinetic, kind=kind, size=size)
-    model = build(text)
-    found = solve_rig(model, choose_numerics(model), None)
-    w = found.window
-    drive = model.rig.drive.signal
-    slide = spectrum.motion_harmonic(w.time, w.slide, w.slide_rate, drive.omega)
-    stiffness = (spectrum.friction_harmonic(w, model.rig.modes, drive) / slide).real
-    assert stiffness == pytest.approx(found.values["equivalent_stiffness"], abs=1e-8)

@@ -1,5 +1,6 @@
 """Memory of a run: its parts, the limits, and refusals before large arrays are allocated."""
 
+import os
 import tracemalloc
 
 import pytest
@@ -59,13 +60,14 @@ def test_refuses_large_run_before_allocation_with_key(text, sets, key, monkeypat
 
 
 def test_exact_free_memory_of_control_group(tmp_path):
-    """The free memory of a control group is its limit minus the used memory plus the inactive cached files."""
-    groups, root = tmp_path / "cgroup", tmp_path / "fs"
-    for place, limit, used, inactive in (("a", 9000, 5000, 600), ("a/b", "max", 4000, 0)):
-        (root / place).mkdir(parents=True)
-        (root / place / "memory.max").write_text(f"{limit}\n")
-        (root / place / "memory.current").write_text(f"{used}\n")
-        (root / place / "memory.stat").write_text(f"anon 1\ninactive_file {inactive}\n")
-    groups.write_text("0::/a/b\n")
-    assert memory.free_in_control_group(50.0, groups, root) == 9000 - 5000 + 600 + 50
-    assert memory.free_in_control_group(50.0, tmp_path / "none", root) == float("inf")
+    """The free memory is that of the system, at most the limit of the control group less what others use of it."""
+    page = os.sysconf("SC_PAGE_SIZE")
+    (tmp_path / "self").mkdir()
+    files = {"meminfo": "MemTotal: 90 kB\nMemAvailable: 20 kB", "self/statm": "70 3 1", "memory.max": "9000",
+             "memory.current": "5000", "memory.stat": "anon 1\ninactive_file 600"}  # fmt: skip
+    for name, text in files.items():
+        (tmp_path / name).write_text(text)
+    assert memory.free_bytes(tmp_path, tmp_path) == 9000 - 5000 + 600 + 3 * page
+    (tmp_path / "memory.max").write_text("max")
+    assert memory.free_bytes(tmp_path, tmp_path) == 20 * 1024 + 3 * page
+    assert memory.free_bytes(tmp_path / "none", tmp_path) == float("inf")

@@ -1,5 +1,4 @@
-"""Frequency response curves and drive levels by the engine `harmonic`: values and errors at every
-point."""
+"""Frequency response curves by the engine `harmonic`: values and errors at every point."""
 
 import numpy as np
 import pytest
@@ -12,7 +11,6 @@ from patchfem.runs.rig.steady.curves import COLUMN_MEASURES
 
 STEADY = {"accuracy.method": "harmonic"}
 STRONG_SWEEP = SWEEP.replace('"3 g"', '"6 g"').replace('"120 Hz"', '"138 Hz"')
-LEVELS = '[drive]\nkind = "base"\nwaveform = "levels"\nfrequency = "143 Hz"\nlevels = [{}]\ncycles = {}\n'
 G, LIMIT = 9.80665, 0.3 * 26 * 4.4482216152605
 SOFT_ELEMENT = PLASTIC.replace("1 um", "20 um")
 
@@ -81,29 +79,6 @@ def test_exact_point_of_curve_agrees_with_sine_run(law):
             )
 
 
-def test_exact_onset_of_slip_agrees_with_closed_form():
-    """An element slips when its spring reaches the friction limit, |q| = limit/k, in the motion of
-    the stuck rig; the onset counts from a slip of 1e-3 bond lengths."""
-    text = POINT + SOFT_ELEMENT + MODE + LEVELS.format('"0.2 g", "6 g"', 12) + 'onset = "slip"\n'
-    onset = pf.run(text, **STEADY).measures["onset_level"]
-    omega = 2 * np.pi * 143
-    w = 2 * np.pi * 143
-    stiffness = LIMIT / 20e-6
-    receptance = 1 / abs(omega**2 + stiffness / 0.884 - w**2 + 2j * 0.003 * omega * w)
-    expected = 20e-6 / receptance
-    assert expected - onset.error <= onset.value <= 1.002 * expected + onset.error
-    assert onset.error < 1e-3 * expected
-
-
-def test_exact_level_with_unbounded_motion_grows():
-    """Without damping, friction bounds the motion at resonance only up to a drive force of 4/pi
-    times mu N; levels above it have the outcome grows."""
-    text = POINT + COULOMB + MODE.replace("0.003", "0") + LEVELS.format('"3 g", "4.5 g", "6 g"', 12)
-    run = pf.run(text, **STEADY)
-    assert [level.outcome for level in run.extra["levels"]] == ["stuck", "steady", "grows"]
-    assert run.outcome == "steady" and np.isnan(run.extra["curve"]["amplitude"][2])
-
-
 INTERLOCK = (
     POINT
     + '[friction]\nlaw = "elastic-plastic"\nstatic = 0.05\nbond_length = "20 um"\n'
@@ -119,13 +94,6 @@ def test_always_unstable_steady_state_is_not_converged():
     result = pf.run(INTERLOCK + SINE.format(200, 10), **STEADY)
     assert result.outcome == "not_converged" and "unstable" in result.extra["regime"]
     assert any("is unstable" in warning and "march" in warning for warning in result.warnings)
-    levels = pf.run(
-        INTERLOCK + LEVELS.format('"2 g", "5 g"', 12).replace("143 Hz", "200 Hz"), **STEADY
-    )
-    assert [level.outcome for level in levels.extra["levels"]] == ["stuck", "not_converged"]
-    assert levels.outcome == "stuck" and any(
-        "1 of 2 drive levels" in warning for warning in levels.warnings
-    )
 
 
 def test_exact_number_of_steady_motions_is_stated():

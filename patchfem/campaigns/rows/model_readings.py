@@ -96,7 +96,7 @@ class ModelReadings:
     def _read_accelerometer(self, motion, drive) -> float:
         """Return the accelerometer reading of a motion before its gain is applied [m s-2]."""
         if self.reading[0] == "fundamental" and motion.fundamental is not None:
-            return abs(motion.fundamental)
+            return motion.fundamental
         return read_instrument(motion.window, drive, motion.acceleration, *self.reading)
 
     def _solve_contact(self, model: Model) -> tuple[Model, object]:

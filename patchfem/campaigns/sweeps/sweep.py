@@ -159,7 +159,7 @@ def _find_min_chunk_size(work: WorkerData) -> int:
         model, Model
     ):  # The run of the case reports its error.
         return 1
-    return batches.MIN_CHUNK_CASES if batches.find_group(model, len(work.cases)).key else 1
+    return batches.MIN_CHUNK_CASES if batches.find_group(model, len(work.cases)) else 1
 
 
 class ChunkQueue:

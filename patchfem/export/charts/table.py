@@ -682,7 +682,7 @@ RUN_TABLES = (
         "level",
         "drive = level_drive, amplitude = level_relative_displacement_amplitude, "
         "peak acceleration = level_absolute_acceleration_peak, distortion = level_acceleration_distortion, "
-        "outcome = level_outcome, interface = level_stuck",
+        "interface = level_stuck",
     ),
 )
 PAIR_COLUMNS = "worn_depth_mean, worn_volume, track_width, track_depth, amplitude_ratio"

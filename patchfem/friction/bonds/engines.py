@@ -61,17 +61,6 @@ class EngineChoice:
         """Return the age [bond lengths] beyond which bonds are dropped, or inf if none are dropped."""
         return cutoff_age(order, self.tail) if self.tail > 0 else inf
 
-    def describe(self) -> str:
-        """Describe engine, list length, settings and error bound in one line of text."""
-        if self.engine == "recursion":
-            return "recursion, exact"
-        parts = [f"{self.engine}: about {self.strips:.0f} list entries"]
-        if self.tail > 0:
-            parts.append(f"tail {self.tail:.1g}")
-        if self.merge > 0:
-            parts.append(f"merge width {self.merge:.2g} bond lengths")
-        return ", ".join([*parts, f"error of the sum {self.error:.1g} of the friction limit"])
-
 
 # The recursion is exact and keeps no strips.
 RECURSION = EngineChoice("recursion", 0.0, 0.0, 0.0, 0.0, cost_model.RECURSION_STEP_SECONDS)

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Sequence
 from functools import partial
-from typing import NamedTuple
 
 from ...core import PatchfemError
 from ...model.model import Model
@@ -19,39 +18,16 @@ from .case_results import CaseResults
 # Smallest number of cases of a study of which lumped cases are computed together, and of a chunk of such a study.
 MIN_CASES = 32
 MIN_CHUNK_CASES = 256
-# Beginning of the note on cases that could not be computed together.
-FAILURE_NOTE = (
-    "this case was run by itself, because computing it together with other cases failed with an "
-    "internal fault; its results are not affected, but please report it"
-)
 
 
-class Group(NamedTuple):
-    """Models that are computed together, or one by one.
-
-    - key: hashable key of models that are computed together; None for single runs.
-    - failure: description of the error, if the key could not be found; else "".
-    """
-
-    key: Hashable = None
-    failure: str = ""
-
-
-def find_group(model: Model, n_study_cases: int) -> Group:
-    """Return the group of a model in a study with a number of cases."""
+def find_group(model: Model, n_study_cases: int) -> Hashable | None:
+    """Return the key of the models that are computed together with a model; None if it is computed by a single run."""
     if n_study_cases < MIN_CASES or model.kind != "rig":
-        return Group()
+        return None
     try:
-        return Group() if lumped.refusal_reason(model) else Group(lumped.group_key(model))
+        return None if lumped.refusal_reason(model) else lumped.group_key(model)
     except one_by_one.CASE_ERRORS:  # a single run of the case reports its error
-        return Group()
-    except Exception as error:
-        return Group(failure=_describe(error))
-
-
-def _describe(error: Exception) -> str:
-    """Return the text of an error."""
-    return f"{type(error).__name__}: {error}"
+        return None
 
 
 def solve_models(
@@ -63,8 +39,8 @@ def solve_models(
 ) -> CaseResults:
     """Compute the case results of a sequence of models.
 
-    If cases cannot be computed together because of a fault, they are computed one by one, and a note of each names the
-    error. Errors of single cases (`one_by_one.CASE_ERRORS`) cause no note.
+    If cases cannot be computed together because of a fault, they are computed one by one, and a message names the
+    error. Errors of single cases (`one_by_one.CASE_ERRORS`) cause no message.
 
     Parameters
     ----------
@@ -82,12 +58,12 @@ def solve_models(
     """
     results = CaseResults.blank(len(models))
     n_study_cases = n_study_cases or len(models)
-    groups: dict[Group, Sequence[int]] = {}
+    groups: dict[Hashable, Sequence[int]] = {}
     cases = range(len(models))
     if isinstance(models, SimilarModels) and on_result is None:
         # No rule depends on the numbers in which these models differ.
         group = find_group(models.first, n_study_cases)
-        if group.key is not None:
+        if group is not None:
             groups[group] = cases
             cases = range(0)
 
@@ -97,7 +73,7 @@ def solve_models(
         if isinstance(model, PatchfemError):
             results.fail(case, str(model))
             continue
-        group = find_group(model, n_study_cases) if on_result is None else Group()
+        group = find_group(model, n_study_cases) if on_result is None else None
         groups.setdefault(group, []).append(case)
 
     # Each group falls back to single runs if its common computation fails.
@@ -117,27 +93,21 @@ def _forward_result(on_result: Callable, case_indices: Sequence[int], index: int
 
 
 def _solve_group(
-    group: Group,
+    group: Hashable | None,
     models: Sequence[Model],
     solve_one_by_one: Callable,
     report: Callable | None,
 ) -> CaseResults:
-    """Compute the results of a group together, or by single runs if this fails."""
-    failure = group.failure
-    if group.key is not None:
+    """Compute the results of a group together, or by single runs if it is None or if this fails."""
+    if group is not None:
         try:
             return lumped.solve(models, report)
         except one_by_one.CASE_ERRORS:  # a single run of the case reports its error
             pass
         except Exception as error:
-            failure = _describe(error)
-    if failure and report is not None:
-        report(
-            f"{len(models)} cases are run one by one, because running them together failed: {failure}"
-        )
-    results = solve_one_by_one(models)
-    if failure:
-        for case in range(len(models)):
-            notes = results.notes.get(case, ())
-            results.notes[case] = [*notes, f"{FAILURE_NOTE} ({failure})"]
-    return results
+            if report is not None:
+                report(
+                    f"{len(models)} cases are run one by one, because running them together failed with an internal "
+                    f"fault, please report it: {type(error).__name__}: {error}"
+                )
+    return solve_one_by_one(models)

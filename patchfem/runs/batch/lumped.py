@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...core import Outcome, Response, SineDrive
+from ...core import Outcome, SineDrive
 from ...effects import law_has_trait, needs_bond_list
 from ...model.model import Model
 from ...model.similar_models import SimilarModels, collect_columns
@@ -26,11 +26,9 @@ from ...response.errors import convergence_errors, total_error
 from ...response.outcome import (
     AMPLITUDE_ROUND_OFF,
     classify_periodic,
-    describe_ringing,
     is_drifting,
     is_ringing_visible,
     is_still_changing,
-    is_still_loading,
     remaining_ringing,
     steady_estimate_error,
 )
@@ -193,8 +191,7 @@ def _solve_cases(models: Sequence[Model], report: Callable | None) -> CaseResult
     refined = refine(cases, scales)
     results = make_results(models, cases, scales, refined)
     _insert_texts(models, results)
-    is_alone = needs_single_run(scales, refined, results)
-    mark_loading_cases(models, cases, scales, refined, results, is_alone)
+    is_alone = needs_single_run(cases, scales, refined, results)
     results.seconds[:] = (perf_counter() - begin) / len(models)
     one_by_one.replace_by_single_runs(results, models, is_alone, report)
     return results
@@ -341,20 +338,6 @@ def make_results(
     ]
     results.outcome[:] = list(map(str, outcomes))
 
-    # An interface that sticks while the rig still vibrates freely has not settled.
-    decay = scales.decay * 2 * np.pi / cases.parameters[:, Number.OMEGA]
-    ringing = remaining_ringing(refined.march.extremes, window, decay)
-    sizes = (values[AMPLITUDE], errors[AMPLITUDE], find_floor(AMPLITUDE, values, scales))
-    is_ringing = is_stuck & is_ringing_visible(ringing, *sizes, scales.tolerance)
-
-    # The warning states the remaining amplitude relative to the motion.
-    results.outcome[is_ringing] = str(Outcome.TRANSIENT)
-    for case in np.flatnonzero(is_ringing).tolist():
-        ratio = float(ringing[case] / values[AMPLITUDE][case])
-        limits = float(scales.tolerance[case]), float(decay[case])
-        count = int(cases.parameters[case, Number.CYCLES])
-        results.warnings[case] = [describe_ringing(ratio, limits, count)]
-
     # The steady amplitude is a measure if the motion still changes.
     is_transient = results.outcome == str(Outcome.TRANSIENT)
     with np.errstate(invalid="ignore"):
@@ -460,68 +443,29 @@ def _judge_motions(cases: Cases, scales: Scales, refined: Refined) -> tuple:
     return np.where(is_steady & drifts, 0, classes), *steady
 
 
-def needs_single_run(scales: Scales, refined: Refined, results: CaseResults) -> np.ndarray:
+def needs_single_run(
+    cases: Cases, scales: Scales, refined: Refined, results: CaseResults
+) -> np.ndarray:
     """Return a mask (n,) of the cases that only a single run can compute."""
-    values = refined.march.values
+    march = refined.march
+    values = march.values
     is_alone = ~refined.is_met | (results.outcome == str(Outcome.GROWS))
     is_alone |= scales.may_create > 0
     is_alone |= ~(scales.limit > 0) | (scales.acceleration == 0)
+
+    # A sticking interface may still vibrate freely, or carry a force that increases with its mean stretch.
+    window = int(cases.parameters[0, Number.WINDOW])
+    decay = scales.decay * 2 * np.pi / cases.parameters[:, Number.OMEGA]
+    ringing = remaining_ringing(march.extremes, window, decay)
+    sizes = (values[AMPLITUDE], refined.errors[AMPLITUDE], find_floor(AMPLITUDE, values, scales))
+    is_unsettled = is_ringing_visible(ringing, *sizes, scales.tolerance)
+    loading = np.abs(values["drift_per_cycle"]) * (window - 1) * scales.stick_stiffness
+    is_unsettled |= loading > scales.tolerance * values["friction_force_peak"]
+    is_alone |= (results.outcome == str(Outcome.STUCK)) & is_unsettled
+
     with np.errstate(invalid="ignore"):
         is_alone |= ~(values["work_check"] <= MAX_WORK_CHECK)
     return is_alone
-
-
-def mark_loading_cases(
-    models: Sequence[Model],
-    cases: Cases,
-    scales: Scales,
-    refined: Refined,
-    results: CaseResults,
-    is_done: np.ndarray,
-) -> None:
-    """Set the outcome of sticking cases whose friction force still increases to transient.
-
-    Their forces are those of another march, which keeps its samples.
-
-    Parameters
-    ----------
-    models : sequence of Model
-        Models of one group.
-    cases, scales, refined
-        Numbers of their motions, their scales, and their marches.
-    results : CaseResults
-        Outcomes and reasons are changed in place.
-    is_done : (n,) of bool
-        Cases that are left out.
-    """
-    march = refined.march
-    may_load = (results.outcome == str(Outcome.STUCK)) & (scales.stick_stiffness > 0) & ~is_done
-    may_load &= ~(march.repeats & (march.values["stick_fraction"] == 1))
-    is_loading = np.zeros(len(models), bool)
-    for count in np.unique(refined.steps[may_load]).astype(int).tolist():
-        part = np.flatnonzero(may_load & (refined.steps == count))
-        samples = march_cases(cases.select(part), count, has_samples=True).samples
-        for row, case in enumerate(part.tolist()):
-            rig = models[case].rig
-            drive = rig.drive.signal
-            window = _make_window(rig.modes, drive, samples[row], count)
-            is_loading[case] = is_still_loading(window, drive.period, scales.tolerance[case])
-
-    results.outcome[is_loading] = str(Outcome.TRANSIENT)
-    _put_reason(results, STEADY_AMPLITUDE, np.flatnonzero(is_loading), CHANGE_NOT_RESOLVED_REASON)
-
-
-def _make_window(modes, drive, samples, steps: int) -> Response:
-    """Return the histories of the last cycles from samples of a march with a number of steps per cycle."""
-    slide, speed, slip, force, acceleration = samples[~np.isnan(samples[:, 0])].T
-    # The samples begin after the first step.
-    time = np.arange(1, slide.size + 1) * drive.period / steps
-    ratio = modes.slide[0]
-    base = np.zeros(slide.size)
-    return Response(
-        time, slide[:, None] / ratio, speed[:, None] / ratio, slide, speed, slide, speed, acceleration,
-        base, force, slip,
-    )  # fmt: skip
 
 
 def _insert_texts(models: Sequence[Model], results: CaseResults) -> None:

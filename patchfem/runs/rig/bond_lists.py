@@ -173,23 +173,6 @@ def is_bond_list_too_long(model: Model, numerics: Numerics, counters: dict) -> b
     return strips > MAX_STRIPS_PER_STEP * numerics.cycles * numerics.steps
 
 
-def has_doubling_failed(counters: dict, errors: list[float]) -> bool:
-    """Return whether two doublings of the steps have not reduced the error of a bond list.
-
-    The list of a released block that reverses in almost every step depends on the step size: errors
-    of 71, 509, 139, 39 and 97 times the tolerance were observed in successive doublings. Further
-    doublings would cost four and eight times as much.
-
-    Parameters
-    ----------
-    counters : dict
-        Counters of the run, including "strips".
-    errors : list
-        Error of the displacement [m] after each doubling.
-    """
-    return counters.get("strips", 0.0) > 0 and len(errors) > 2 and errors[-1] >= errors[-3]
-
-
 def estimate_bond_list_length(model: Model, numerics: Numerics) -> int:
     """Return the expected number of strips of a bond list; a list that grows in every step contains all strips."""
     steps = numerics.cycles * numerics.steps

@@ -234,28 +234,23 @@ def estimate_march_seconds(model: Model) -> float:
     )
 
 
-def explain_time_steps(model: Model) -> str:
-    """Return why a time integration is chosen over the engine `hybrid`, or "" if it is not.
+def prefers_time_steps(model: Model) -> bool:
+    """Return whether a time integration is chosen over the engine `hybrid`.
 
-    The reason is a setting of the time integration in the scene, or that the steps of `hybrid` cost more CPU time than
-    those of the time integration and than its smaller errors are worth.
+    The scene has a setting of the time integration, or the steps of `hybrid` cost more CPU time than those of the time
+    integration and than its smaller errors are worth.
     """
     accuracy = model.accuracy
-    is_rigid = all(
+    is_rigid = not model.partial_slip and all(
         law_has_trait(law.numbers.law, "set-valued") and not law.partial_slip
         for law in model.rig.friction.interfaces
     )
-    if not (is_rigid and not model.partial_slip):
-        for key in MARCH_SETTINGS:
-            if getattr(accuracy, key) is not None:
-                return f"accuracy.{key} is set"
-        if accuracy.quadrature not in ("auto", "recursion"):
-            return "accuracy.quadrature is set"
+    has_setting = any(getattr(accuracy, key) is not None for key in MARCH_SETTINGS)
+    if not is_rigid and (has_setting or accuracy.quadrature not in ("auto", "recursion")):
+        return True
     is_resolved = required_steps_per_cycle(model) <= MAX_MARCH_STEPS
     seconds = MAX_HYBRID_SECONDS if is_resolved else MAX_UNRESOLVED_SECONDS
-    if estimate_hybrid_seconds(model) <= max(seconds, estimate_march_seconds(model)):
-        return ""
-    return "time steps are faster than steps from event to event"
+    return estimate_hybrid_seconds(model) > max(seconds, estimate_march_seconds(model))
 
 
 def refuse_long_hybrid_run(model: Model) -> None:

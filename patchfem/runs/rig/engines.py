@@ -23,7 +23,7 @@ from ...scene.rules import methods
 from ...scene.rules.accuracy import has_effect, list_fixed_settings
 from ...slip import shear_modes
 from ..patch import faces
-from .costs import explain_time_steps
+from .costs import prefers_time_steps
 
 # Ratio of the width within which bonds are merged in the comparison run to that in the run itself.
 MERGE_WIDTH_FACTOR = 0.5
@@ -101,22 +101,20 @@ def collect_motion_features(model: Model, *, steady: bool = False) -> methods.Mo
 
 
 class SteadyMethod(NamedTuple):
-    """Method that computes steady motions, with its description for a plan.
+    """Method that computes steady motions.
 
-    - words: description for a plan.
     - engine: name of the engine whose code and numerical settings it uses.
     """
 
     name: str
-    words: str
     engine: str
 
 
 STEADY_METHODS = {
     finder.name: finder
     for finder in (
-        SteadyMethod("shooting", "Newton's method on the map of a period", "hybrid"),
-        SteadyMethod("balance", "harmonic balance", "harmonic"),
+        SteadyMethod("shooting", "hybrid"),
+        SteadyMethod("balance", "harmonic"),
     )
 }
 
@@ -298,7 +296,7 @@ def _list_hybrid_space_runs(model: Model, numerics, patch, coarse, solution) -> 
     strips_slide_apart = model.rig.friction.strips_slide_apart
     coarser_runs = []
     if strips_slide_apart:
-        coarser_runs.append(CoarserRuns((), estimate_sampling_errors))
+        coarser_runs.append(CoarserRuns((), estimate_sampling_errors, source="samples"))
     if coarse is not None and (model.partial_slip or strips_slide_apart or averaged):
         meshes = [replace(numerics, coarse_patch=True), *meshes]
     rule = (
@@ -368,7 +366,7 @@ def choose_engine(model: Model) -> Engine:
     if HYBRID.find_unsupported_feature(model):
         return MARCH
     is_only_engine = model.grooves is not None
-    return HYBRID if is_only_engine or not explain_time_steps(model) else MARCH
+    return HYBRID if is_only_engine or not prefers_time_steps(model) else MARCH
 
 
 def describe_unused_settings(model: Model, engine: str) -> list[str]:

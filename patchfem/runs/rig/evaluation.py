@@ -235,14 +235,20 @@ class RunEvaluator:
         return Level(level, self.is_stuck(run), values, errors)
 
 
+def find_numbers(window) -> tuple[np.ndarray, np.ndarray]:
+    """Return the numbers (k,) of the samples of a window, and whether they are of equal distances and not of events (k,)."""
+    position = (window.time - window.time[0]) / np.diff(window.time).max()
+    number = np.round(position).astype(int)
+    return number, np.abs(position - number) <= 1e-6
+
+
 def thin_samples(window):
     """Remove every second sample of a uniformly sampled window.
 
     The last sample and the samples of events in between remain.
     """
-    position = (window.time - window.time[0]) / np.diff(window.time).max()
-    number = np.round(position).astype(int)
-    is_retained = (np.abs(position - number) > 1e-6) | (number % 2 == 0)
+    number, is_even = find_numbers(window)
+    is_retained = ~is_even | (number % 2 == 0)
     is_retained[-1] = True
     return window.select(is_retained)
 

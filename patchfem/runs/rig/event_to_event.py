@@ -13,13 +13,11 @@ import numpy as np
 from ... import compiled
 from ...core import (
     IntegratedMeasures,
-    InterfaceLoop,
     NotConverged,
     Outcome,
     Response,
-    SineDrive,
 )
-from ...hybrid import cases, periodic
+from ...hybrid import cases
 from ...hybrid import runs as engine
 from ...hybrid.laws import is_rigid
 from ...hybrid.laws.masing import has_stick
@@ -32,35 +30,38 @@ from ...response.events import (
     find_segment_borders,
     sort_events,
 )
-from ...response.measures import MIN_SLIDE_RANGE, Values, compute_harmonic
-from ...response.ringing import VibratingMode, compute_stuck_vibration, select_strongest
-from ...response.rows import AMPLITUDE, find_definition, select_names
+from ...response.measures import MIN_SLIDE_RANGE, Values
+from ...response.ringing import compute_stuck_vibration, select_strongest
+from ...response.rows import find_definition, select_names
 from ...structure.drive_sizes import (
     choose_samples_per_cycle,
-    find_drive_omega,
-    find_min_decay_rate,
-    is_periodic,
     is_sinusoidal,
 )
 from ...structure.histories import find_accelerations
 from . import strips
-from .evaluation import RunEvaluator, compute_sampled_work, compute_work_check, thin_samples
+from .evaluation import (
+    RunEvaluator,
+    compute_sampled_work,
+    compute_work_check,
+    find_numbers,
+    thin_samples,
+)
 from .hybrid_laws import Joints, make_joints
 from .levels import remove_incomplete_cycle, run_levels
-from .solution import Fields, Solution, describe_escape, find_travel, first_mode_stiffness
+from .solution import (
+    Fields,
+    Solution,
+    compute_sampled_loop,
+    describe_escape,
+    find_travel,
+    first_mode_stiffness,
+)
 
 LATE_SAMPLES_PER_CYCLE = 400  # samples of each of the last cycles
 MIN_WINDOW_SAMPLES = 101  # samples of the last cycles of a run shorter than a cycle
 MAX_EARLY_SAMPLES = 8_000  # samples of equal distances before the last cycles
 EARLY_SAMPLES_PER_CYCLE = 40
 SAME_TIME_TOL = 1e-9  # distance of samples that are one, in cycles
-MAX_CHANGE_RATIO = 1e-2  # largest ratio of the change of a steady motion to the tolerance
-N_CHANGE_WINDOWS = (
-    3  # windows at the end of a run from which the change of the motion is determined
-)
-# Smallest relative decay of a free motion over the last windows that is assumed; less damping counts as this decay.
-MIN_RELATIVE_DECAY = 1e-6
-STEADY_RTOL = 1e-10  # step tolerance of the steady motion that follows a run
 MIN_SAMPLED_CYCLES = 2.0  # cycles at the end that have as many samples as the window
 # Measures of the motion, of the whole run and of its balance are those of the engine also for strips.
 STRIP_GROUPS = ("curve", "run", "error")
@@ -111,7 +112,6 @@ class LumpedRun:
     - outcome, message: how the run ended, if it ended early.
     - end: arrays of the engine at the end, from which another run can go on.
     - cycles_done: number of cycles.
-    - events: number of stored events.
     - log: events of the interfaces, or None.
     - snapshots: states of the elements of a patch in the last cycle.
     - repeats: whether the motion repeats after each cycle.
@@ -127,7 +127,6 @@ class LumpedRun:
     message: str
     end: State
     cycles_done: float
-    events: int
     log: Events | None = None
     snapshots: list[ElementSnapshot] = field(default_factory=list)
     repeats: bool = False
@@ -179,11 +178,9 @@ def run_from_event_to_event(
     fields = {}
     begin = perf_counter()
     if rig.drive.levels.amplitudes:
-        run, fields = run_levels(evaluator, integrate, None, lambda run: run, progress)
+        run, fields = run_levels(evaluator, integrate, progress)
     else:
         run = integrate(rig.drive.signal, None, progress, True, numerics.cycles)
-        steady = evaluator.find_steady_amplitude(run)
-        fields |= {} if steady is None else {"steady": steady}
         run = remove_incomplete_cycle(run)
     fields["prepare"] = {"reduce": reduced}
     return evaluator.make_solution(run, perf_counter() - begin, **fields)
@@ -248,30 +245,6 @@ class LumpedEvaluator(RunEvaluator):
             n_steps=numerics.steps,
         )
         return engine.run_case(case, start=state, fills_histories=numerics.whole)
-
-    def find_steady_amplitude(self, run: LumpedRun) -> tuple | None:
-        """Return amplitude [m] and error of the steady motion of elements that a run under a sine approaches.
-
-        The result is None if the motion changes no more, or if it approaches none that is stable.
-        """
-        drive = self.model.rig.drive.signal
-        laws = [law.law for law, _ in self.joints.laws]
-        if run.outcome is not None or not laws or set(laws) != {"masing"} or self.is_stuck(run):
-            return None
-        decay = find_min_decay_rate(self.model.rig.modes) * drive.period
-        tolerance = self.model.accuracy.tolerance
-        if (
-            not isinstance(drive, SineDrive)
-            or run.cycles_done % 1
-            or not may_still_change(run.extremes, self.numerics.window, tolerance, decay)
-        ):
-            return None
-        schedule = cases.Schedule(1.0, 1, np.zeros(0), np.inf)
-        case = cases.make_rig_case(self.model.rig, self.joints.laws, schedule, rtol=STEADY_RTOL)
-        motion = periodic.find_periodic_motion(
-            case, start=run.end, n_first=0, has_kinks=self.joints.has_kinks
-        )
-        return find_stable_amplitude(motion)
 
     def _choose_times(self, drive, cycles: float, frames: int) -> SampleTimes:
         """Choose the times of the samples and of `frames` snapshots."""
@@ -339,7 +312,6 @@ class LumpedEvaluator(RunEvaluator):
             message="",
             end=motion.final,
             cycles_done=cycles,
-            events=len(motion.event_rows),
             log=self._list_events(motion, drive),
             snapshots=self._list_snapshots(motion, response, times.snapshots, start),
             repeats=motion.repeats,
@@ -426,8 +398,7 @@ class LumpedEvaluator(RunEvaluator):
     def compute_integrated_measures(self, run, drive, *, stuck: bool = False) -> IntegratedMeasures:
         """Return the measures of the engine.
 
-        Strips that slide independently have a single loop of their mean displacement, which is computed from
-        samples.
+        Strips that slide independently have a single loop of their mean displacement, which is that of samples.
 
         Parameters
         ----------
@@ -452,8 +423,7 @@ class LumpedEvaluator(RunEvaluator):
             names = ["slip_start_phase", "energy_stored"]
             for group in STRIP_GROUPS:
                 names += select_names(group)
-            loop = _compute_strips_loop(run, drive)
-            return IntegratedMeasures({name: values.get(name) for name in names}, loops=(loop,))
+            return IntegratedMeasures({name: values.get(name) for name in names})
         values.pop("energy_stored", None)
         return IntegratedMeasures(values)
 
@@ -468,7 +438,7 @@ class LumpedEvaluator(RunEvaluator):
         return missing
 
     def collect_cycle_data(self, run, drive, *, stuck: bool) -> Fields:
-        """Return whether the interfaces are strips of a single one.
+        """Return the loop of strips that slide independently, which are parts of a single interface.
 
         Parameters
         ----------
@@ -479,29 +449,35 @@ class LumpedEvaluator(RunEvaluator):
         stuck : bool
             Whether the interface is stuck during the last cycles.
         """
-        return {"is_single_interface": self.strips_slide_apart}
-
-    def _find_stuck_vibration(self, motion: Response, drive) -> list[VibratingMode]:
-        """Return the free vibration of the modes in a part of the motion in which no interface slips; [] if one does."""
-        springs = self.joints.springs
-        if not springs.size or motion.time.size < 2 or is_periodic(drive) or not drive.segments:
-            return []
-        slips = motion.extra.get("slips", motion.slip[:, None])
-        if np.ptp(slips, axis=0).max() > 0:
-            return []
-        return compute_stuck_vibration(self.model.rig.modes, springs, motion)
+        if not self.strips_slide_apart:
+            return {}
+        # The yaw does work in addition to that of the mean displacement.
+        window = run.window
+        work = np.ptp(window.extra["ledger"][0, [0, -1]])
+        cycles = (window.time[-1] - window.time[0]) / drive.period
+        loop = compute_sampled_loop(window, drive, float(work / cycles))
+        # The other measures need samples of equal distances.
+        even = window.select(find_numbers(window)[1])
+        return {"is_single_interface": True, "loop": loop, "window": even}
 
     def collect_solution_fields(self, run, drive) -> Fields:
-        """Return the vibration that remains after the last slip of a release."""
-        if self.model.rig.drive.kind != "free" or not self.joints.springs.size:
+        """Return the vibration of a release after its last slip, in which the rig is linear."""
+        rig = self.model.rig
+        is_linear = not self.joints.laws
+        springs = np.zeros(len(rig.modes.interfaces)) if is_linear else self.joints.springs
+        if rig.drive.kind != "free" or not np.isfinite(springs).all() or rig.springs.is_nonlinear:
             return {}
-        response = run.response
-        slips = response.extra.get("slips", response.slip[:, None])
-        moves = np.flatnonzero(np.abs(np.diff(slips, axis=0)).max(axis=1) > 0)
-        if not moves.size:
-            return {}
-        after = response.select(response.time >= response.time[moves[-1] + 1])
-        vibration = self._find_stuck_vibration(after, drive)
+
+        # The part of the motion in which no interface slips.
+        motion = run.response
+        if not is_linear:
+            slips = motion.extra.get("slips", motion.slip[:, None])
+            moves = np.abs(np.diff(slips, axis=0)).max(axis=1) > 0
+            last = np.flatnonzero(moves)[-1] + 1 if moves.any() else 0
+            motion = motion.select(motion.time >= motion.time[last])
+        vibration = []
+        if motion.time.size > 1:
+            vibration = compute_stuck_vibration(rig.modes, springs, motion)
         return {"tail": select_strongest(vibration)} if vibration else {}
 
     def estimate_run_errors(self, run, drive, values: Values) -> Values:
@@ -528,40 +504,6 @@ class LumpedEvaluator(RunEvaluator):
                 error = convergence_error(change, order=row.order)
                 errors[name] = error + row.sample_error / self.steps
         return errors
-
-
-def find_stable_amplitude(motion: periodic.PeriodicMotion) -> tuple[float, float] | None:
-    """Return the amplitude [m] of a periodic motion and its error; None if it is not known or not stable."""
-    if motion.grows or not motion.change <= motion.tolerance or not motion.is_stable:
-        return None
-    amplitude = float(motion.batch.windows[0][AMPLITUDE][0])
-    return amplitude, amplitude * (10 * motion.error + 1e2 * STEADY_RTOL)
-
-
-def may_still_change(extremes, window: int, tolerance: float, decay: float) -> bool:
-    """Return whether a motion may still change by more than a fraction of the tolerance.
-
-    This is the case if the run is too short. Otherwise, the change of the extremes in the last
-    N_CHANGE_WINDOWS windows is divided by the fraction by which the slowest free motion decays in
-    this time, because the extremes of a slow beat hardly change near its maximum.
-
-    Parameters
-    ----------
-    extremes : (c, 2)
-        Minimum and maximum output of each cycle [m].
-    window : int
-        Number of cycles in a window.
-    tolerance : float
-        Relative tolerance of the scene.
-    decay : float
-        Exponent of the decay of the slowest free motion per cycle [1].
-    """
-    last = np.asarray(extremes, float)[-N_CHANGE_WINDOWS * window :]
-    if len(last) < N_CHANGE_WINDOWS * window:
-        return True
-    decayed = max(-np.expm1(-decay * len(last)), MIN_RELATIVE_DECAY)
-    limit = MAX_CHANGE_RATIO * tolerance * decayed * np.ptp(last[-window:]) / 2
-    return np.ptp(last, axis=0).max() > limit
 
 
 def _divide(begin: float, end: float, period: float, minimum: int) -> np.ndarray:
@@ -602,25 +544,3 @@ def _find_stretches(reversals, points, limit) -> list[np.ndarray]:
             k += 1
         found.append(np.clip(stretch + slide - last, -limit, limit))
     return found
-
-
-def _compute_strips_loop(run, drive) -> InterfaceLoop:
-    """Compute the friction loop of a patch from the samples of its independent strips.
-
-    Each event has a sample. The yaw does work in addition to that of the mean displacement.
-    """
-    window = run.window
-    omega = find_drive_omega(drive)
-    gaps = np.diff(window.time)
-    weight = np.concatenate([[0.0], gaps / 2]) + np.concatenate([gaps / 2, [0.0]])
-    is_stuck = ~window.extra["slide_rates"].any(axis=1)
-    power = (window.extra["forces"] * window.extra["slide_rates"]).sum(axis=1)
-    slide = window.slide - weight @ window.slide / weight.sum()
-    return InterfaceLoop(
-        displacement_harmonic=complex(compute_harmonic(window.time, weight, slide, omega)),
-        force_harmonic=complex(compute_harmonic(window.time, weight, window.force, omega)),
-        work=float(weight @ power),
-        slip_range=float(np.ptp(window.slip)),
-        stuck_time=float(weight[is_stuck].sum()),
-        max_force=float(np.abs(window.force).max()),
-    )

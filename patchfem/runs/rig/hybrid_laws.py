@@ -26,7 +26,8 @@ class Joints(NamedTuple):
     """Interfaces of a rig.
 
     - laws: (LawNumbers, Load) of each interface.
-    - elements: stiffness [N/m] and yield displacement [m] (e,) of the elements of each interface; () for other laws.
+    - elements: stiffness [N/m] and yield displacement [m] (e,) of the elements of each interface; () without partial
+      slip.
     - contact: joints.Joint of the only patch, if it slips part by part, or None.
     - stick_tolerance: largest slip per cycle [m] at which the interfaces count as stuck.
     """
@@ -43,10 +44,8 @@ class Joints(NamedTuple):
 
     @property
     def springs(self) -> np.ndarray:
-        """Stiffness (i,) [N/m] of each interface that is a single element; empty if one is not."""
-        if not self.elements or any(np.size(stiffness) != 1 for stiffness, _ in self.elements):
-            return np.zeros(0)
-        return np.array([float(stiffness[0]) for stiffness, _ in self.elements])
+        """Stiffness (i,) [N/m] of each interface in stick; nan for a law that is no single element."""
+        return np.array([find_spring_stiffness(law) for law, _ in self.laws])
 
 
 def make_joints(model: Model, numerics: Numerics, patch) -> Joints:
@@ -82,9 +81,7 @@ def make_joints(model: Model, numerics: Numerics, patch) -> Joints:
             laws.append((law, Load(float(joint.load))))
     return Joints(
         tuple(laws),
-        tuple(joint.list_elements(speed) for joint in listed)
-        if is_soft
-        else _list_single_elements(laws),
+        tuple(joint.list_elements(speed) for joint in listed) if is_soft else (),
         listed[0] if is_soft and len(listed) == 1 else None,
         _find_stick_tolerance(listed, [law for law, _ in laws]),
     )
@@ -131,15 +128,12 @@ def list_elements(model: Model, numerics: Numerics, patch) -> list[tuple[np.ndar
     return [joint.list_elements(model.rig.speed_scale) for joint in listed]
 
 
-def _list_single_elements(laws) -> tuple:
-    """Return stiffness and yield displacement of laws that are single elements, () if one is not."""
-    elements = []
-    for law, _ in laws:
-        if law.law != "masing" or law.numbers[1] >= 0:
-            return ()
-        limit, length = law.numbers[2:4]
-        elements.append((np.array([limit / length]), np.array([length])))
-    return tuple(elements)
+def find_spring_stiffness(law) -> float:
+    """Return the stiffness [N/m] of a law that is a single element in stick; nan for other laws."""
+    if law.law != "masing" or law.numbers[1] >= 0 or has_many_elements(law):
+        return np.nan
+    limit, length = law.numbers[2:4]
+    return limit / length
 
 
 def _find_stick_tolerance(listed, laws) -> float:

@@ -150,7 +150,7 @@ def _find_level_factor(rig) -> float:
     return rig.modes.mass if rig.drive.kind == "force" else 1.0
 
 
-def run_levels(evaluator, integrate, state, find_end_state, progress=None) -> tuple:
+def run_levels(evaluator, integrate, progress=None) -> tuple:
     """Run the levels of a drive in order, each from the final state of the previous one.
 
     Parameters
@@ -158,11 +158,7 @@ def run_levels(evaluator, integrate, state, find_end_state, progress=None) -> tu
     evaluator : RunEvaluator
         Evaluates each level; its model has the levels of the drive.
     integrate : callable
-        Function (sine, state, watch, is_last) that returns a run.
-    state
-        Initial state.
-    find_end_state : callable
-        Function of a run that returns its final state.
+        Function (sine, run, watch, is_last) that returns the run from the end of another one, None for the start.
     progress : callable, optional
         Callback for the completed fraction of all levels.
 
@@ -175,17 +171,16 @@ def run_levels(evaluator, integrate, state, find_end_state, progress=None) -> tu
     omega = find_drive_omega(rig.drive.signal)
     moving = rig.drive.signal.moving
 
-    # Level k starts from states[k], and a further level after it from states[k + 1].
-    states = [state]
     runs = []
     level_results = []
 
     def run_level(number: int, level: float) -> Level:
         """Run a level from the final state of level `number`, or from rest if it is -1."""
         sine = SineDrive(level, omega, moving)
-        run = integrate(sine, states[number + 1], None, False)
+        run = integrate(sine, runs[number] if number >= 0 else None, None, False)
         return evaluator.evaluate_level(level, run, sine, EXACT_RELATIVE_ERROR)
 
+    # Each level goes on from the end of the one before; a run that ends early is the last one.
     amplitudes = rig.drive.levels.amplitudes
     n_levels = len(amplitudes)
     for k, amplitude in enumerate(amplitudes):
@@ -193,10 +188,9 @@ def run_levels(evaluator, integrate, state, find_end_state, progress=None) -> tu
         if progress is not None:
             report = partial(_report_fraction, progress, k, n_levels)
         sine = SineDrive(amplitude, omega, moving)
-        run = integrate(sine, states[-1], report, k + 1 == n_levels)
+        run = integrate(sine, runs[-1] if runs else None, report, k + 1 == n_levels)
         runs.append(run)
         level_results.append(evaluator.evaluate_level(amplitude, run, sine, EXACT_RELATIVE_ERROR))
-        states.append(find_end_state(run))
         if run.outcome is not None:
             break
 
@@ -235,7 +229,6 @@ def join_runs(runs: list, duration: float):
         log=None if last.log is None else join_events([run.log for run in runs], shifts),
         extremes=np.concatenate([run.extremes for run in runs]),
         phasors=np.concatenate([run.phasors for run in runs]),
-        events=sum(run.events for run in runs),
     )
 
 

@@ -6,7 +6,6 @@ work of the energy balance and the harmonics of the loop.
 
 from dataclasses import replace
 from functools import partial
-from operator import attrgetter
 from time import perf_counter
 
 import numpy as np
@@ -14,15 +13,8 @@ import numpy as np
 from ...core import IntegratedMeasures, Outcome
 from ...effects import law_has_trait
 from ...points import time_march as engine
-from ...response.ends import estimate_window_error
 from ...response.measures import Values, compute_step_harmonic, peak_sampling_errors
-from ...response.spectrum import friction_harmonic, motion_harmonic
-from ...structure.drive_sizes import (
-    estimate_peak_speed,
-    find_drive_omega,
-    has_full_cycle,
-    is_sinusoidal,
-)
+from ...structure.drive_sizes import estimate_peak_speed, find_drive_omega
 from ..bench.engine import BondListGuard
 from . import levels as rig_levels
 from . import strips
@@ -37,10 +29,6 @@ from .solution import (
     describe_escape,
     find_travel,
 )
-
-# Safety factor on the first-order error due to a run that does not end exactly at the requested
-# time.
-END_ERROR_FACTOR = 1.5
 
 
 def march_in_time(model, numerics, patch, frames: int = 0, say=None, progress=None) -> Solution:
@@ -81,7 +69,7 @@ def march_in_time(model, numerics, patch, frames: int = 0, say=None, progress=No
             numerics.steps,
             window=numerics.window,
             travel=travel,
-            start=rig.start if before is None else before,
+            start=rig.start if before is None else before.end,
             frames=0 if slide_apart or not is_last else frames,
             keeps_samples=numerics.whole,
             progress=watch,
@@ -95,9 +83,7 @@ def march_in_time(model, numerics, patch, frames: int = 0, say=None, progress=No
         run = integrate(rig.drive.signal, None, progress, True)
         return evaluator.make_solution(run, perf_counter() - begin, prepare=prepare)
     cycles = rig.drive.levels.cycles
-    run, fields = rig_levels.run_levels(
-        evaluator, partial(integrate, cycles=cycles), None, attrgetter("end"), progress
-    )
+    run, fields = rig_levels.run_levels(evaluator, partial(integrate, cycles=cycles), progress)
     return evaluator.make_solution(run, perf_counter() - begin, prepare=prepare, **fields)
 
 
@@ -114,14 +100,8 @@ class MarchEvaluator(RunEvaluator):
         super().__init__(model, numerics, patch, contact, stick_tolerance)
 
     def collect_solution_fields(self, run, drive) -> Fields:
-        """Return drive levels, bond summation and errors due to an end between two steps."""
-        late = {}
-        n_steps = self.numerics.cycles * self.numerics.steps
-        if n_steps != round(n_steps):
-            period = self.model.rig.drive.signal.period
-            changes = estimate_window_error(run.window, period, n_steps - round(n_steps))
-            late = {name: END_ERROR_FACTOR * change for name, change in changes.items()}
-        return {"bond_summation": self.choose_bond_summation(), "extra": {"late": late}}
+        """Return the bond summation of the run."""
+        return {"bond_summation": self.choose_bond_summation()}
 
     def estimate_run_errors(self, run, drive, values: Values) -> Values:
         """Estimate how far the peaks of a motion exceed its samples.
@@ -198,36 +178,19 @@ class MarchEvaluator(RunEvaluator):
         }
 
     def _compute_loop(self, run, drive) -> CycleLoop | None:
-        """Compute the first harmonics of displacement and friction force, and the work per cycle.
-
-        If only the drive and friction act, the harmonic of the force follows from the motion
-        (`friction_harmonic`).
-        """
+        """Compute the first harmonics of displacement and friction force, and the work per cycle."""
         window = run.window
-        omega = find_drive_omega(drive)
-        rig = self.model.rig
-
         work = run.window_work
         # The friction of strips that yaw does more work than follows from the mean displacement.
-        together = self.contact.set_valued and not rig.friction.strips_slide_apart
+        slides_apart = self.model.rig.friction.strips_slide_apart
+        together = self.contact.set_valued and not slides_apart
         # The friction work of this interface excludes other interfaces and impacts at stops.
-        if len(rig.friction.names) > 1 or together:
+        if len(self.model.rig.friction.names) > 1 or together:
             work = float(run.step_force @ np.diff(window.slide))
 
         span = window.time[-1] - window.time[0]
-        work *= drive.period / span if span > 0 else 0.0
-
-        # The equation of motion gives the force from the motion only if no other force acts.
-        alone = len(rig.modes.interfaces) == 1 and not (
-            (rig.friction.load_varies and not self.model.load_varies)
-            or rig.friction.strips_slide_apart
-            or rig.springs.is_nonlinear
-        )
-        if alone and is_sinusoidal(drive) and has_full_cycle(span, drive):
-            slide = motion_harmonic(window.time, window.slide, window.slide_rate, omega)
-            return CycleLoop(slide, friction_harmonic(window, rig.modes, drive), work)
-
-        force = 0j
-        if span > 0:
-            force = compute_step_harmonic(window.time, run.step_force, omega)
-        return compute_sampled_loop(window, drive, work, force)
+        if not span > 0:
+            return None
+        # The mean force of a step includes the impulses in it, e.g. at the end of slip.
+        force = compute_step_harmonic(window.time, run.step_force, find_drive_omega(drive))
+        return compute_sampled_loop(window, drive, work * drive.period / span, force)

@@ -7,7 +7,7 @@ import numpy as np
 
 from ...core import Outcome
 from ...effects import law_has_trait
-from ...formatting import format_length, format_number, format_quantity
+from ...formatting import format_length, format_number
 from ...response.outcome import describe_ringing, find_ringing, note_on_changing_drive
 from ...response.rows import AMPLITUDE
 from ...structure.drive_sizes import find_min_decay_rate
@@ -20,14 +20,10 @@ from ..results.notes import (
     warn_of_work_check,
 )
 from ..results.travel import warn_of_large_slide
-from .costs import explain_time_steps
 from .engines import ENGINES, find_obstacle_of_map
 from .hybrid_laws import list_elements
 from .solution import first_interface_load
 
-# The motion after a release counts as still decaying if its largest amplitude in the window exceeds
-# that of the last cycle by more than this fraction.
-MIN_DECAY_EXCESS = 1e-3
 EQUAL_FREQUENCY_TOL = 1e-9  # Largest relative difference at which two frequencies count as equal.
 SINGLE_POINT_WARNING = (
     "the shape of the patch does not affect the motion: with pieces that are rigid in shear, a constant "
@@ -138,8 +134,8 @@ def collect_notes(run) -> list[str]:
         *note_on_groove_slope(model, run.patch),
     ]
     f = model.friction
-    if len(rig.friction.interfaces):
-        notes += _note_on_elements(run)
+    if ENGINES[run.numerics.engine].finds_periodic_motion:
+        notes += _note_on_elements_without_slip(run)
     if solution.levels and rig.drive.levels.onset[0] == "slip" and solution.stick_tolerance > 0:
         notes.append(
             f"onset_level: slip counts only if its amplitude is above {format_length(solution.stick_tolerance)}, "
@@ -149,27 +145,7 @@ def collect_notes(run) -> list[str]:
         *rig.structure.reduction_notes,
         *notes,
         *note_on_creep(f),
-        *_note_on_release(run),
         *end_notes,
-    ]
-
-
-def _note_on_release(run) -> list[str]:
-    """Return a list with a note on the time interval of the measures of a release."""
-    rig = run.model.rig
-    window = run.solution.window
-    main = run.measures["relative_displacement_amplitude"]
-    if (
-        rig.drive.kind != "free"
-        or main.value is None
-        or np.ptp(window.output) / 2 <= main.value * (1 + MIN_DECAY_EXCESS) + main.floor
-    ):
-        return []
-    span = format_quantity(float(window.time[-1] - window.time[0]), "s", 3)
-    begin = format_quantity(float(window.time[0]), "s", 3)
-    return [
-        f"relative_displacement_amplitude is that of the last whole cycle; peaks of acceleration and force, slip and "
-        f"stick cover the last {span}, from {begin} on, in which the motion still decays"
     ]
 
 
@@ -220,32 +196,10 @@ def _note_on_bond_growth(model, patch, solution) -> list[str]:
     return note_on_growth(model, peak)
 
 
-def _note_on_elements(run) -> list[str]:
-    """Return a list with a note on the method that computes the motion of friction elements."""
-    if find_obstacle_of_map("piecewise", run.model):
-        return []
-    if run.numerics.engine == "march":
-        return _note_on_marched_elements(run)
-    if ENGINES[run.numerics.engine].finds_periodic_motion:
-        return _note_on_elements_without_slip(run)
-    return []
-
-
-def _note_on_marched_elements(run) -> list[str]:
-    """Return a list with a note if friction elements are integrated in time steps to save CPU time."""
-    model = run.model
-    if model.accuracy.method != "auto" or "steps_per_cycle" in run.numerics.pinned:
-        return []
-    pinned = run.patch is not None and not model.patch.mesh.is_automatic
-    return [
-        f"time stepping is used, because {explain_time_steps(model)}; "
-        f'{"on a coarser mesh, or " * pinned}with accuracy.method = "exact" the motion is computed exactly'
-    ]
-
-
 def _note_on_elements_without_slip(run) -> list[str]:
     """Return a list with a note on a steady motion in which some elements never slip."""
-    if run.solution.outcome not in (Outcome.STEADY, Outcome.STUCK):
+    is_steady = run.solution.outcome in (Outcome.STEADY, Outcome.STUCK)
+    if not (is_steady and run.has_friction) or find_obstacle_of_map("piecewise", run.model):
         return []
     window = run.solution.window
     slides = window.extra.get("slides", window.slide[:, None])

@@ -123,31 +123,14 @@ def choose_numerics(model: Model) -> Numerics:
         local = cases.EXACT_RTOL if is_exact else choose_step_tolerance(accuracy.tolerance)
         return replace(numerics, local=local, steps=cases.MIN_STEPS)
     if engine is MARCH and accuracy.steps_per_cycle is None:
-        # The steps are short enough for a unique solution, and the last one ends where the run
-        # ends.
-        steps = round_steps_to_run_end(max(steps, min_unique_steps(model)), cycles)
-        return replace(numerics, steps=steps)
+        # The steps are short enough for a unique solution; comparison runs have half and a quarter of them.
+        return replace(numerics, steps=4 * ceil(max(steps, min_unique_steps(model)) / 4))
     return numerics
 
 
 def choose_step_tolerance(tolerance: float) -> float:
     """Return the largest relative error per step of the engine `hybrid`."""
     return float(np.clip(1e-5 * tolerance, 1e-12, 1e-8))
-
-
-def round_steps_to_run_end(steps: int, cycles: float) -> int:
-    """Round the steps per cycle up so that a sample lies close to the requested end of a run.
-
-    The number of steps is a multiple of 4, because comparison runs have half and a quarter of them.
-    If the number of cycles is not an integer, an end that is wrong by half a step causes an error
-    of first order in all measures of the last cycles. Up to an eighth more steps are tried.
-    """
-    least = ceil(steps / 4)
-    if cycles == round(cycles):
-        return 4 * least
-    return 4 * min(
-        range(least, least + max(8, least // 8)), key=lambda k: abs(cycles * k - round(cycles * k))
-    )
 
 
 def min_unique_steps(model: Model) -> int:

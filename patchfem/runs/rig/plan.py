@@ -14,8 +14,7 @@ from ...response.rows import add_interface_number, remove_interface_number
 from ...slip import shear_modes
 from ...structure.drive_sizes import find_drive_omega, find_max_acceleration
 from . import bond_lists
-from .costs import estimate_element_count_and_stiffness, find_interface_load
-from .engines import ENGINES, choose_steady_method, find_obstacle_of_map
+from .costs import find_interface_load
 from .numerics import choose_numerics
 
 # Largest relative difference between the frequencies of drive and mode at which the mode counts as
@@ -113,16 +112,6 @@ def count_unknowns(model: Model) -> dict:
     if model.partial_slip and is_changed:
         counts["shear_modes"] = numerics.shear_modes or shear_modes.N_SHEAR_MODES
     return counts
-
-
-def describe_method(model: Model) -> list[str]:
-    """Describe in sentences for a plan how the friction force or the steady motion is found."""
-    if model.friction is None:
-        return []
-    numerics = choose_numerics(model)
-    if ENGINES[numerics.engine].finds_periodic_motion:
-        return [f"the steady motion is found by {choose_steady_method(model).words}"]
-    return describe_bond_summation(model, numerics)
 
 
 def compute_dimensionless_groups(model: Model) -> dict:
@@ -258,19 +247,14 @@ def _describe_sliding(friction_ratio: float) -> str:
     return f"D = {friction_ratio:.3g} is below pi/4: at resonance friction alone does not limit the amplitude"
 
 
-def describe_bond_summation(model: Model, numerics) -> list[str]:
-    """Describe the bond summation or the number of friction elements in sentences for a plan."""
-    if not law_has_trait(model.friction.law, "bonds"):
-        if find_obstacle_of_map("piecewise", model):
-            return []
-        count = estimate_element_count_and_stiffness(model)[0]
-        return [f"{count} friction element{'s' * (count > 1)} by engine {numerics.engine}"]
-    choice = bond_lists.choose_bond_summation(model, numerics)
-    sentences = ["method of the sum over bonds: " + choice.describe()]
-    if not model.partial_slip and bond_lists.is_stuck_by_printed_law(model):
-        sentences.append(
-            "with the law as printed in the report the block hardly slides or does not slide at all: it reverses its "
-            "motion in almost every time step, and each reversal makes the list of bonds longer; set "
-            'friction.reading = "stretch" to give the block a finite stiffness'
-        )
-    return sentences
+def describe_printed_law(model: Model) -> list[str]:
+    """Describe in sentences for a plan that the law as printed in the report holds the block at rest."""
+    if model.friction is None or model.partial_slip:
+        return []
+    if not bond_lists.is_stuck_by_printed_law(model):
+        return []
+    return [
+        "with the law as printed in the report the block hardly slides or does not slide at all: it reverses its "
+        "motion in almost every time step, and each reversal makes the list of bonds longer; set "
+        'friction.reading = "stretch" to give the block a finite stiffness'
+    ]

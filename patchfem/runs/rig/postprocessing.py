@@ -87,9 +87,9 @@ def add_onset_level(run: CoupledRun) -> CoupledRun:
 def add_outcome_and_errors(run: CoupledRun) -> CoupledRun:
     """Return the run with its outcome, and with all error estimates of its measures.
 
-    The errors that the run itself shows (`Solution.run_errors`) and those of an end between two samples
-    are added to the errors from coarse runs. A motion that grows has no errors. The outcome is
-    NOT_CONVERGED if the error of the energy balance is too large.
+    The errors that the run itself shows (`Solution.run_errors`) are added to the errors from coarse
+    runs. A motion that grows has no errors. The outcome is NOT_CONVERGED if the error of the energy
+    balance is too large.
     """
     solution = run.solution
     if text := describe_balance_error(ENGINES[run.numerics.engine], run.measures):
@@ -98,8 +98,7 @@ def add_outcome_and_errors(run: CoupledRun) -> CoupledRun:
         run = replace(run, solution=solution)
 
     rig = run.model.rig
-    end_errors = solution.extra.get("late", {})
-    measures = add_run_error_estimates(run.measures, solution.run_errors, end_errors)
+    measures = add_run_error_estimates(run.measures, solution.run_errors)
     if not run.has_errors:
         measures = remove_errors(measures)
 

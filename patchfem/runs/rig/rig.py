@@ -32,8 +32,7 @@ from .solve import refuse_long_run
 # Outcomes of runs that ended early; more steps do not change them.
 EARLY_OUTCOMES = (Outcome.EXCEEDS_TRAVEL, Outcome.LEAVES_GROOVES)
 MIN_STEP_ERROR = 1e-12  # Smallest relative error per step; below it round-off dominates.
-# Fraction of the error due to the steps of `hybrid` below which smaller steps are no use.
-MIN_OWN_FRACTION = 0.1
+MIN_STEP_SHARE = 0.5  # Smallest share of the steps in an error that smaller steps reduce.
 # Largest number of steps times nodes of a run that is repeated with twice the steps although its displacement meets the
 # tolerance; it takes some 10 s of CPU time. The entries of a list of bonds count as nodes.
 MAX_REFINED_WORK = 1e8
@@ -145,8 +144,7 @@ def run_refined(inputs: RunInputs, numerics: Numerics) -> CoupledRun:
     space_runs += _list_joint_runs(inputs, space_runs)
     space_errors = runner.estimate_errors(space_runs, solution)
 
-    displacement_errors = []  # Error of the displacement [m] of each run, from coarse to fine.
-    excesses = []  # Largest ratio of an error to the allowed error, where the displacement meets it.
+    excesses = []  # Largest ratio of an error due to the steps to the allowed error, of each run.
     while True:
         time_runs = engine.coarser_in_time(model, numerics)
         errors = [*runner.estimate_errors(time_runs, solution), *space_errors]
@@ -163,9 +161,13 @@ def run_refined(inputs: RunInputs, numerics: Numerics) -> CoupledRun:
         if solution.levels or model.rig.drive.kind == "free":
             solution = _add_level_errors(solution, coarser_runs, runner.solutions)
 
-        displacement_errors.append(measures[AMPLITUDE].error or 0.0)
         run = CoupledRun(inputs, numerics, solution, measures)
-        if not time_runs or _is_finest(run, displacement_errors) or _meets_tolerance(run, excesses):
+        if not time_runs or _is_finest(run):
+            break
+        # The run ends where two runs with smaller steps have not reduced the largest error, as those of some lists of
+        # bonds, which depend on the steps.
+        excesses.append(_find_step_excess(run))
+        if excesses[-1] <= 1 or (len(excesses) > 2 and excesses[-1] >= excesses[-3]):
             break
 
         # A run with twice the steps is compared with this one.
@@ -213,81 +215,41 @@ def _count_slip_period_cycles(model, numerics, solution) -> int:
 
 
 def _find_step_excess(run: CoupledRun) -> float:
-    """Return the largest ratio of error to allowed error of the measures that need more steps.
+    """Return the largest ratio of error to allowed error of the measures whose error is mainly that of the steps.
 
-    The errors are those of the completed run. A measure needs more steps if it misses the tolerance,
-    but would meet it without the error of the steps. The result is 0 if there is none.
+    The errors are those of the completed run. If the run takes too much time (MAX_REFINED_WORK), the displacement alone
+    counts. The result is 0 if no measure needs smaller steps.
     """
-    # The engine `hybrid` estimates the error of its steps itself.
-    kind = "own" if run.numerics.local else "steps"
-    run = postprocessing.add_missing_value_reasons(postprocessing.add_outcome_and_errors(run))
-    tolerance = run.model.accuracy.tolerance
-    largest = 0.0
-    for measure in set_final_floors(run.measures, tolerance).values():
-        ratio = measure.error_ratio(tolerance)
-        if ratio > 1 and measure.causes is not None:
-            part = measure.causes.parts.get(kind, 0.0)
-            step_ratio = ratio * part / measure.error
-            if ratio - step_ratio <= 1:
-                largest = max(largest, ratio)
-    return largest
-
-
-def _meets_tolerance(run: CoupledRun, excesses: list[float]) -> bool:
-    """Return whether the measures meet the tolerance as far as more steps can help.
-
-    The displacement must meet it. Other measures are refined while the work of the run is at most
-    MAX_REFINED_WORK, and while two doublings of the steps reduce the largest excess.
-
-    Parameters
-    ----------
-    run : CoupledRun
-        Run with the errors from its coarse runs.
-    excesses : list
-        Result of `_find_step_excess` of the coarser runs; that of the run is added.
-    """
-    displacement = run.measures[AMPLITUDE]
-    if run.numerics.local and displacement.causes is not None:
-        # Smaller steps do not reduce the errors of meshes and samples.
-        own = displacement.causes.parts.get("own", 0.0)
-        if own <= MIN_OWN_FRACTION * (displacement.error or 0.0):
-            return True
-    if displacement.error_ratio(run.model.accuracy.tolerance) > 1:
-        return False
-    if run.numerics.local and hasattr(run.model.rig.drive.signal, "band"):
-        # The errors of a random motion are those of its samples.
-        return True
-    excesses.append(_find_step_excess(run))
-    if excesses[-1] <= 1 or (len(excesses) > 2 and excesses[-1] >= excesses[-3]):
-        return True
     nodes = max(1 if run.patch is None else run.patch.x.size, run.solution.book.get("strips", 0.0))
     work = run.numerics.steps * run.numerics.cycles * nodes
     if run.model.rig.friction.load_varies and run.patch is not None:
         work *= PRESSING_WORK
-    return work > MAX_REFINED_WORK
+
+    # The engine `hybrid` estimates the error of its steps itself.
+    axis = "own" if run.numerics.local else "steps"
+    run = postprocessing.add_missing_value_reasons(postprocessing.add_outcome_and_errors(run))
+    tolerance = run.model.accuracy.tolerance
+    ratios = [0.0]
+    for name, measure in set_final_floors(run.measures, tolerance).items():
+        counts = name == AMPLITUDE or work <= MAX_REFINED_WORK
+        if counts and measure.causes is not None and measure.error:
+            share = measure.causes.parts.get(axis, 0.0) / measure.error
+            if share > MIN_STEP_SHARE:
+                ratios.append(measure.error_ratio(tolerance))
+    return max(ratios)
 
 
-def _is_finest(run: CoupledRun, displacement_errors: list[float]) -> bool:
-    """Return whether no finer run is possible.
-
-    Parameters
-    ----------
-    run : CoupledRun
-        Run with its numerical settings.
-    displacement_errors : list
-        Errors of the displacement [m] of all runs up to this one.
-    """
+def _is_finest(run: CoupledRun) -> bool:
+    """Return whether no run with smaller steps is possible."""
     numerics = run.numerics
     if numerics.local:
         return 0.01 * numerics.local < MIN_STEP_ERROR
     steps = numerics.steps * 2
-    book = run.solution.book
     return (
         "steps_per_cycle" in numerics.pinned
         or steps > MAX_MARCH_STEPS
         or steps * numerics.cycles > MAX_RUN_STEPS
-        or bond_lists.is_bond_list_too_long(run.model, numerics, book)
-        or bond_lists.has_doubling_failed(book, displacement_errors)
+        or bond_lists.is_bond_list_too_long(run.model, numerics, run.solution.book)
         or run.solution.outcome in EARLY_OUTCOMES
     )
 

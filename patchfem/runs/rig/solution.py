@@ -50,7 +50,6 @@ class Solution:
     - coarser: pairs of a coarse run and its reference run (None for this run).
     - extremes (c, 2): minimum and maximum output of every cycle [m], from which the outcome is
       determined; None if the engine sets the outcome.
-    - bounded: whether a bounded steady motion is known to exist.
     - drive: drive of the largest motion of a response curve or of drive levels; None for a single motion.
     - peak_error: error of the frequency of this drive [Hz]; inf for a curve without a peak, NaN without a curve.
     - tail: `ringing.VibratingMode` that remains after the last slip of a release, or None.
@@ -79,7 +78,6 @@ class Solution:
     bond_summation: object = None
     coarser: tuple = ()
     extremes: np.ndarray | None = None
-    bounded: bool = False
     drive: SineDrive | None = None
     peak_error: float = np.nan
     tail: object = None
@@ -196,12 +194,12 @@ def first_mode_stiffness(model, window) -> float:
 def compute_sampled_loop(
     window, drive, work: float, force: complex | None = None
 ) -> CycleLoop | None:
-    """Compute the friction loop from equally spaced samples by the trapezoidal rule.
+    """Compute the friction loop from samples by the trapezoidal rule.
 
     Parameters
     ----------
     window : Response
-        Equally spaced samples of the last cycles.
+        Samples of the last cycles.
     drive
         Drive, whose frequency is that of the harmonics.
     work : float
@@ -216,10 +214,11 @@ def compute_sampled_loop(
     """
     if not has_full_cycle(window.time[-1] - window.time[0], drive):
         return None
-    weight = np.full(window.time.size, 1.0)
+    step = np.diff(window.time)
+    weight = np.append(step, 0.0) + np.append(0.0, step)
     omega = find_drive_omega(drive)
-    weight[[0, -1]] = 0.5
-    slide = compute_harmonic(window.time, weight, window.slide - window.slide.mean(), omega)
+    mean = np.average(window.slide, weights=weight)
+    slide = compute_harmonic(window.time, weight, window.slide - mean, omega)
     if force is None:
         force = compute_harmonic(window.time, weight, window.force, omega)
     return CycleLoop(slide, force, work)

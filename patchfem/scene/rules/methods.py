@@ -102,12 +102,12 @@ VARYING_LAWS = ("coulomb", "tanh", "elastic-plastic")
 # are the maps of a period by which a steady motion is found.
 ENGINE_SUPPORT = {
     "hybrid": EngineSupport("events", "no-law yaw faces levels parts spring load grooves"),
-    "exact": EngineSupport("exact", "no-law yaw faces levels"),
-    "piecewise": EngineSupport("pieces", "parts faces levels"),
+    "exact": EngineSupport("exact", "no-law yaw faces"),
+    "piecewise": EngineSupport("pieces", "parts faces"),
     "march": EngineSupport(
         "march", "no-law load yaw yaw-levels parts grooves spring faces levels pressed"
     ),
-    "harmonic": EngineSupport("", "no-law parts grooves spring faces levels"),
+    "harmonic": EngineSupport("", "no-law parts grooves spring faces"),
 }
 METHOD_KEY = "accuracy.method"
 
@@ -312,8 +312,8 @@ def _find_harmonic_obstacle(motion: MotionFeatures, limits: dict[str, str]) -> s
     drive = TableView(motion.drive)
     if drive.kind == "free" or (wave.name and not wave.has_steady_motion):
         return (
-            "'harmonic' finds only steady motion: under a sine, over the frequencies of a sweep, or over the "
-            "levels of waveform 'levels'; use 'march' or leave `method` out"
+            "'harmonic' finds only steady motion: under a sine, or over the frequencies of a sweep; use 'march' or leave "
+            "`method` out"
         )
     if wave.is_swept and drive.kind == "base" and drive.table.displacement is not None:
         return (

@@ -219,7 +219,7 @@ FEATURES = {
         "drive.waveform = '{scene.drive.waveform}'",
     ),
     "levels or sweep in time": Feature(
-        lambda j: j.scene.accuracy.method != "harmonic" and (j.wave.is_swept or j.wave.has_levels),
+        lambda j: j.wave.has_levels or (j.wave.is_swept and j.scene.accuracy.method != "harmonic"),
         "drive.waveform",
         "drive.waveform = '{scene.drive.waveform}'",
     ),

@@ -141,8 +141,6 @@ class BalanceFinder:
     If several motions exist, the iteration starts from a given point of the response curve.
     """
 
-    peak_tolerances = (1e-2, 0.1)
-
     def __init__(self, model, numerics, patch, frames: int = 0, say=None):
         rig = model.rig
         parts = []
@@ -160,7 +158,7 @@ class BalanceFinder:
         self.group = LawGroup(rig.modes, parts)
         self.tolerance = model.accuracy.tolerance
 
-    def compute_steady_motion(self, drive, guess=None) -> tuple[Solution, SteadyMotion]:
+    def compute_steady_motion(self, drive, guess=None) -> Solution:
         """Compute the steady motion under sinusoidal drive, with error estimates.
 
         The errors are estimated with twice as many harmonics and twice as many samples.
@@ -219,7 +217,7 @@ class BalanceFinder:
             errors=errors,
             extra=extra,
             notes=notes,
-        ), motion
+        )
 
     def _solve_balance(self, drive, guess) -> SteadyMotion:
         """Solve the harmonic balance under a drive from an initial guess; None for none."""
@@ -307,11 +305,6 @@ class BalanceFinder:
         """Participation (n,) of the point whose displacement is measured."""
         return self.modes.output if self.modes.gauge is None else self.modes.gauge
 
-    def compute_curve_point(self, drive, guess=None) -> CurvePoint:
-        """Compute one point of a response curve, without error estimates."""
-        motion = self._solve_balance(drive, guess)
-        return self._make_curve_point(add_stability(motion, self.modes))
-
     def _make_curve_point(self, motion) -> CurvePoint:
         """Convert a steady motion with known stability to a point of a response curve."""
         kind = balanced_regime(motion)
@@ -324,7 +317,6 @@ class BalanceFinder:
             kind if stable else f"{kind}, unstable",
             float(np.abs(motion.multipliers).max(initial=0.0)),
             stable,
-            Outcome.STUCK if kind == "stuck" else Outcome.STEADY,
             motion,
         )
 

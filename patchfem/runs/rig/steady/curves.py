@@ -1,7 +1,6 @@
-"""Response curves of steady motions over frequency, and drives in levels.
+"""Response curves of steady motions over frequency.
 
-In: curve points from a finder. Out: columns of a response curve, and the Solution of a drive in
-levels.
+In: curve points from a finder. Out: columns of a response curve.
 """
 
 from dataclasses import replace
@@ -9,12 +8,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ....core import NotConverged, Outcome, Response, SineDrive
+from ....core import Response, SineDrive
 from ....dynamics.curve_points import sample_adaptively
-from ....response.levels import LEVEL_MEASURES, Level
 from ....response.measures import Values
 from ....response.rows import AMPLITUDE
-from ..solution import replace_output_by_gauge
 
 # Name of the measure in each column of a response curve.
 COLUMN_MEASURES = {
@@ -40,7 +37,6 @@ class CurvePoint(NamedTuple):
     - regime: name of the motion, such as "stick-slip".
     - multiplier: largest magnitude of the Floquet multipliers.
     - stable: whether the motion is stable.
-    - outcome: Outcome of the motion.
     - guess: initial guess for the motion at a neighbouring drive.
     """
 
@@ -50,24 +46,7 @@ class CurvePoint(NamedTuple):
     regime: str
     multiplier: float
     stable: bool
-    outcome: Outcome
     guess: Any = None
-
-    @property
-    def drive_level(self) -> Level:
-        """Level record of the point; its amplitude is NaN if the motion is unbounded."""
-        values = {COLUMN_MEASURES["amplitude"]: np.nan}
-        if self.values:
-            values = {name: self.values.get(name) for name in LEVEL_MEASURES}
-            values = {name: value for name, value in values.items() if value is not None}
-        errors = {name: self.errors[name] for name in values if name in self.errors}
-        return Level(
-            self.drive.acceleration,
-            self.outcome is Outcome.STUCK,
-            values,
-            errors,
-            outcome=str(self.outcome),
-        )
 
 
 class ObservedMotion(NamedTuple):
@@ -77,15 +56,15 @@ class ObservedMotion(NamedTuple):
     - acceleration: peak absolute acceleration [m s-2], as in the measures of a run.
     - displacement: displacement amplitude [m], as in the measures of a run.
     - initial_guess: initial guess for the motion under a similar drive, or None.
-    - fundamental: first harmonic of the absolute acceleration [m s-2]; None if it must be computed
-      from the window.
+    - fundamental: magnitude of the first harmonic of the absolute acceleration [m s-2]; None if it
+      must be computed from the window.
     """
 
     window: Response | None
     acceleration: float
     displacement: float
     initial_guess: Any = None
-    fundamental: complex | None = None
+    fundamental: float | None = None
 
 
 class ResponseCurve(NamedTuple):
@@ -120,44 +99,8 @@ def describe_instability(multipliers) -> str:
     )
 
 
-def make_curve_point(drive, solution, guess=None) -> CurvePoint:
-    """Convert the Solution of a steady motion to a point of a response curve.
-
-    Parameters
-    ----------
-    drive : SineDrive
-        Drive of the motion.
-    solution : Solution
-        Its `extra` has the regime and the Floquet multipliers.
-    guess : optional
-        Initial guess for the motion at a neighbouring drive.
-    """
-    size = float(np.abs(np.asarray(solution.extra["multipliers"])).max(initial=0.0))
-    bounded = solution.outcome not in (Outcome.GROWS, Outcome.LEAVES_GROOVES, Outcome.NOT_CONVERGED)
-    return CurvePoint(
-        drive,
-        solution.values if bounded else {},
-        solution.errors if bounded else {},
-        solution.extra["regime"],
-        size,
-        "unstable" not in solution.extra["regime"] and bounded,
-        solution.outcome,
-        guess,
-    )
-
-
-def make_missing_curve_point(drive) -> CurvePoint:
-    """Return the curve point of a drive at which no steady motion was found."""
-    return CurvePoint(drive, {}, {}, "not found", np.nan, False, Outcome.NOT_CONVERGED)
-
-
 class TracedCurve:
-    """Base class of finders whose response curve has no folds; subclasses compute its points.
-
-    `peak_tolerances` are tolerances, see `peak.refine_peak`.
-    """
-
-    peak_tolerances = 1e-2, 0.1
+    """Base class of finders whose response curve has no folds; subclasses compute its points."""
 
     def measure_curve_distance(self, first: CurvePoint, second: CurvePoint) -> float:
         """Return the distance [rad/s] between two points of a response curve."""
@@ -253,56 +196,3 @@ def tabulate_curve(points, folds=()) -> dict:
         "multiplier": np.array([point.multiplier for point in points]),
         "folds": np.array(folds),
     }
-
-
-def solve_drive_levels(finder, drive):
-    """Compute the steady motions at all drive levels; return the one with the largest amplitude.
-
-    Each level starts from the motion at the previous one, as in a test with increasing level. The
-    Solution has the curve of all levels, the Level of each, and a function that computes another
-    level (`levels.find_onset`). A level without steady motion is stored as not converged, with a
-    note.
-
-    Raises
-    ------
-    NotConverged
-        If no level has a steady motion.
-    """
-    points = []
-    failures = []
-    best = None
-    for part in drive.segments:
-        sine = SineDrive(part.amplitude, part.omega, drive.moving)
-        guess = points[-1].guess if points and points[-1].stable else None
-        try:
-            solution, guess = finder.compute_steady_motion(sine, guess)
-        except NotConverged as failure:
-            points.append(make_missing_curve_point(sine))
-            failures.append(failure)
-            continue
-        points.append(
-            make_curve_point(sine, replace_output_by_gauge(finder.model, solution), guess)
-        )
-        if best is None or find_largest_point(points) == len(points) - 1:
-            best = solution, sine
-        failures += [solution.message] if solution.message else []
-    if best is None:
-        raise failures[0]  # No drive level has a steady motion.
-
-    def run_level(number: int, level: float) -> Level:
-        """Compute the steady motion at another level [m s-2], starting from that of level `number`."""
-        sine = SineDrive(level, drive.segments[0].omega, drive.moving)
-        return finder.compute_curve_point(
-            sine, points[number].guess if number >= 0 else None
-        ).drive_level
-
-    message = f"no steady motion was found at {len(failures)} of {len(points)} drive levels; at the first of them: "
-    notes = tuple(f"{message}{one}" for one in failures[:1])
-    return replace(
-        best[0],
-        extra=best[0].extra | {"curve": tabulate_curve(points)},
-        drive=best[1],
-        run_level=run_level,
-        levels=tuple(point.drive_level for point in points),
-        notes=(*best[0].notes, *notes),
-    )

@@ -1,34 +1,38 @@
-"""Peak of a response curve, which is refined until its neighbours bound it closely.
+"""Peak of a response curve, located by Brent's method.
 
 In: points of a response curve and a finder. Out: the Solution of the largest motion, with the
 errors of its amplitude and frequency.
 
-Where a curve is concave, it lies below the extrapolated chords of the neighbouring intervals, so
-these bound its maximum. A new point is added where the bound is largest. The bound is sharp at a
-kink; at a smooth peak it converges with the square of the spacing.
+The points of the curve bracket each of its highest maxima. Brent's method finds the maximum of a bracket by points that
+it adds (Brent, Algorithms for Minimization without Derivatives, 1973, ch. 5). It also converges to a kink, and to the
+last stable motion, because an unstable one counts as 0.
 """
 
+from bisect import bisect
 from dataclasses import replace
 from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
+from scipy.optimize import minimize_scalar
 
 from ....core import NotConverged
 from ....response.errors import absolute_change
 from ....response.measures import Values
 from ....response.rows import AMPLITUDE
 from ..solution import Solution, replace_output_by_gauge
-from .curves import CurvePoint, ResponseCurve, find_largest_point, tabulate_curve
+from .curves import (
+    INTERPOLATION_TOL,
+    CurvePoint,
+    ResponseCurve,
+    find_largest_point,
+    tabulate_curve,
+)
 
 MAX_ADDED_POINTS = 40  # Largest number of points that are added to refine a peak.
-# Smallest fraction of the peak at which a resonance curve is assumed concave; that of a single mode
-# is concave above 0.816.
-MIN_CONCAVE_FRACTION = 0.8
-# Error of the position of a peak due to round-off, relative to its width.
-POSITION_TOL = 3e-4
-# Largest distance, relative to the length of the curve, at which two points count as identical.
-IDENTICAL_POINT_TOL = 1e-9
+# Tolerance of the position of a peak, relative to its width: a part of the tolerance of the scene, at least round-off.
+POSITION_TOL = 0.1
+MIN_POSITION_TOL = 3e-4
 WIDTH_HEIGHT_FRACTION = 0.9  # Fraction of the height of a peak at which its width is measured.
 # Ratio of the shift of a peak to its width times the relative error of its height. The width is
 # measured a tenth below the peak, so that an error of a tenth shifts it by its width.
@@ -57,87 +61,75 @@ def refine_peak(points: list[CurvePoint], finder, tolerance: float) -> RefinedPe
     points : list of CurvePoint
         Points of the curve in order.
     finder
-        Has the methods measure_curve_distance(a, b) and compute_point_between(a, b, fraction) of CurvePoints, and
-        `peak_tolerances`, the ratios of the remaining errors of the peak to the tolerance: that of the
-        amplitude, and that of the position relative to the width.
+        Has the methods measure_curve_distance(a, b) and compute_point_between(a, b, fraction) of CurvePoints.
     tolerance : float
         Relative tolerance of the scene.
 
     Returns
     -------
     RefinedPeak
-        Refined curve with at most MAX_ADDED_POINTS added points.
+        Refined curve with at most MAX_ADDED_POINTS added points at each of its highest maxima.
     """
-    points = list(points)
-    for remaining in range(MAX_ADDED_POINTS, -1, -1):
-        s = np.cumsum([0.0, *(finder.measure_curve_distance(a, b) for a, b in pairwise(points))])
-        y = _collect_amplitudes(points)
-        is_stable = np.array([point.stable for point in points])
+    curve = CurveInProgress(list(points), finder)
+    heights = curve.find_heights()
+    # The curve between the points may be higher than they are by the tolerance of its interpolation.
+    high = np.flatnonzero(heights >= (1 - INTERPOLATION_TOL) * max(heights.max(), 1e-300))
+    is_maximum = [heights[k] == heights[max(k - 1, 0) : k + 2].max() for k in high]
+    for place in np.array(curve.positions)[high[is_maximum]].tolist():
+        curve.refine_maximum(place, max(POSITION_TOL * tolerance, MIN_POSITION_TOL))
 
-        best = find_largest_point(points)
-        bounds, fractions = bound_concave_curve(s, y)
-        if not y[best] > 0 or not bounds.size:
-            return RefinedPeak(points, best, 0.0)
-        if is_stable.any():
-            bounds[~(is_stable[:-1] | is_stable[1:])] = 0.0
-            fractions[is_stable[:-1] != is_stable[1:]] = (
-                0.5  # The limit of stability between two points is found by bisection.
-            )
-        if not np.isfinite(y[max(best - 1, 0) : best + 2]).all():
-            return RefinedPeak(points, best, np.inf)
+    # The curve falls from the peak to its neighbours by at least as much as it rises to a peak between them. The largest
+    # motion of a curve that rises up to its end is at this end.
+    best = find_largest_point(curve.points)
+    near = _collect_amplitudes(curve.points[max(best - 1, 0) : best + 2])
+    is_at_rest = not curve.points[best].values.get(AMPLITUDE, 0.0) > 0
+    if np.isnan(near).any() and not is_at_rest:
+        return RefinedPeak(curve.points, best, np.inf)
+    is_inside = near.size == 3 and not is_at_rest
+    return RefinedPeak(curve.points, best, float(np.ptp(near)) if is_inside else 0.0)
 
-        above = max(float(bounds.max()) - y[best], 0.0)
-        bounds[np.diff(s) <= IDENTICAL_POINT_TOL * s[-1]] = 0.0
-        interval = int(np.argmax(bounds))
-        if bounds[interval] <= y[best] * (1 + finder.peak_tolerances[0] * tolerance):
-            share = max(finder.peak_tolerances[1] * tolerance, POSITION_TOL)
-            added = _choose_added_point(s, y, best, share)
-            interval = -1
-            if added is not None:
-                interval, fractions[interval] = added
 
-        if not remaining or interval < 0:
-            return RefinedPeak(points, best, above)
+class CurveInProgress:
+    """Response curve to which points are added, with their positions along it."""
+
+    def __init__(self, points: list[CurvePoint], finder):
+        self.points = points
+        self.finder = finder
+        distances = [finder.measure_curve_distance(a, b) for a, b in pairwise(points)]
+        self.positions = np.cumsum([0.0, *distances]).tolist()
+        self.has_stable = any(point.stable for point in points)
+
+    def find_heights(self) -> np.ndarray:
+        """Return the amplitudes (n,) [m]; 0 for unbounded motions, and for unstable ones beside stable ones."""
+        counts = [point.stable or not self.has_stable for point in self.points]
+        return np.where(counts, np.nan_to_num(_collect_amplitudes(self.points)), 0.0)
+
+    def refine_maximum(self, place: float, tolerance: float) -> None:
+        """Add points until the maximum next to a position is known within a fraction of its width."""
+        heights = self.find_heights()
+        at = np.array(self.positions)
+        k = self.positions.index(place)
+        width = min(
+            _measure_peak_width(heights[k:], at[k:] - place),
+            _measure_peak_width(heights[k::-1], place - at[k::-1]),
+        ) or np.ptp(at)
+        bounds = at[max(k - 1, 0)], at[min(k + 1, at.size - 1)]
+        options = {"xatol": tolerance * width, "maxiter": MAX_ADDED_POINTS}
         try:
-            points.insert(
-                interval + 1,
-                finder.compute_point_between(
-                    points[interval],
-                    points[interval + 1],
-                    float(np.clip(fractions[interval], 0.05, 0.95)),
-                ),
-            )
+            minimize_scalar(self._compute_depth, bounds=bounds, method="bounded", options=options)
         except NotConverged:
-            return RefinedPeak(points, best, above)
+            # The points that have been added remain.
+            return
 
-
-def _choose_added_point(s, y, best: int, min_fraction: float) -> tuple | None:
-    """Choose the position of a new point next to the largest point of a curve.
-
-    The new point is the vertex of the parabola through the largest point and its neighbours, or a
-    tenth of the way to the farther neighbour if the vertex is close to the largest point. The
-    result is the index of the interval and the fraction of it. It is None if both neighbours are
-    closer than `min_fraction` times the width of the peak, or if the largest point is at an end.
-
-    The arguments s and y (n,) are the positions along the curve and its values.
-    """
-    if not 0 < best < len(s) - 1:
-        return None
-    max_distance = min_fraction * min(
-        _measure_peak_width(y[best:], s[best:] - s[best]),
-        _measure_peak_width(y[best::-1], s[best] - s[best::-1]),
-    )
-    before = s[best] - s[best - 1]
-    after = s[best + 1] - s[best]
-    if max(before, after) <= max_distance:
-        return None
-    slopes = (y[best] - y[best - 1]) / before, (y[best + 1] - y[best]) / after
-    gap = slopes[0] - slopes[1]
-    off = (slopes[0] * after + slopes[1] * before) / (2 * gap) if gap > 0 else 0.0
-    if abs(off) <= 0.1 * (after if off > 0 else before):
-        size = max(0.1 * max(before, after), min(0.8 * max_distance, before, after), 2 * abs(off))
-        off = size if after > before else -size
-    return (best, off / after) if off > 0 else (best - 1, 1 + off / before)
+    def _compute_depth(self, position: float) -> float:
+        """Add the point at a position to the curve; return its negative height [m]."""
+        k = min(max(bisect(self.positions, position), 1), len(self.points) - 1)
+        begin, end = self.positions[k - 1 : k + 1]
+        fraction = (position - begin) / (end - begin)
+        point = self.finder.compute_point_between(self.points[k - 1], self.points[k], fraction)
+        self.points.insert(k, point)
+        self.positions.insert(k, position)
+        return -self.find_heights()[k]
 
 
 def _measure_peak_width(y, distances) -> float:
@@ -154,49 +146,6 @@ def _collect_amplitudes(points) -> np.ndarray:
     return np.array([point.values.get(AMPLITUDE, np.nan) for point in points])
 
 
-def bound_concave_curve(s, y) -> tuple:
-    """Return upper bounds of a concave curve between its points, by extrapolated chords.
-
-    A chord with a point below MIN_CONCAVE_FRACTION of the larger end of the interval is not used,
-    because the curve may be convex there. Without any chord, the bound is the larger end divided by
-    MIN_CONCAVE_FRACTION.
-
-    Parameters
-    ----------
-    s : (n,)
-        Positions along the curve.
-    y : (n,)
-        Values of the curve; an interval with NaN at an end has the bound 0.
-
-    Returns
-    -------
-    tuple
-        Bounds (n - 1,), and their positions (n - 1,) as fractions of the intervals.
-    """
-    h = np.diff(s)
-    ends = np.maximum(y[:-1], y[1:])
-    with np.errstate(all="ignore"):
-        slope = np.diff(y) / h
-        # Slopes of the chords to the left and to the right of each interval.
-        rise, fall = np.full((2, h.size), np.nan)
-        rise[1:] = np.where(y[:-2] >= MIN_CONCAVE_FRACTION * ends[1:], slope[:-1], np.nan)
-        fall[:-1] = np.where(y[2:] >= MIN_CONCAVE_FRACTION * ends[:-1], slope[1:], np.nan)
-        left = y[:-1] + rise * h
-        right = y[1:] - fall * h
-        # Both extrapolated chords intersect at this fraction of the interval.
-        intersection = (right - y[:-1]) / (rise - fall) / h
-        inside = (intersection > 0) & (intersection < 1)
-        bounds = np.where(inside, y[:-1] + rise * intersection * h, ends)
-        alone = np.isnan(rise) != np.isnan(fall)
-        bounds = np.where(
-            alone,
-            np.fmax(left, right),
-            np.where(np.isnan(rise) & np.isnan(fall), ends / MIN_CONCAVE_FRACTION, bounds),
-        )
-        bounds = np.where(np.isnan(ends), 0.0, np.fmax(bounds, ends))
-    return bounds, np.where(inside, intersection, 0.5)
-
-
 def solve_peak(curve: ResponseCurve, finder) -> Solution:
     """Compute the steady motion at the peak of a response curve, with its error estimates.
 
@@ -211,7 +160,7 @@ def solve_peak(curve: ResponseCurve, finder) -> Solution:
     """
     points, best, above = refine_peak(curve.points, finder, finder.model.accuracy.tolerance)
     peak_point = points[best]
-    solution = finder.compute_steady_motion(peak_point.drive, peak_point.guess)[0]
+    solution = finder.compute_steady_motion(peak_point.drive, peak_point.guess)
     errors = dict(solution.errors or {})
     solution = replace(
         solution,
@@ -262,7 +211,7 @@ def solve_peak(curve: ResponseCurve, finder) -> Solution:
 def _compute_neighbour_differences(finder, neighbour, solution: Solution) -> Values:
     """Return the differences of all measures between a curve point and a Solution."""
     try:
-        other = finder.compute_steady_motion(neighbour.drive, neighbour.guess)[0]
+        other = finder.compute_steady_motion(neighbour.drive, neighbour.guess)
     except NotConverged:
         return {}
     return absolute_change(solution.values, other.values)

@@ -15,7 +15,7 @@ from ....core import NotConverged, Outcome, PatchfemError
 from ....hybrid import cases, periodic
 from ....hybrid import runs as hybrid_runs
 from ....hybrid.laws import is_rigid
-from ....hybrid.records import Clock, Status, Whole, Window
+from ....hybrid.records import Clock, Status, Window
 from ....response.measures import Values
 from ....response.spectrum import make_acceleration_measures
 from ....structure.response import compute_receptance
@@ -37,7 +37,7 @@ from .curves import (
 N_CYCLES_IN_GROOVES = 30
 RTOL = 1e-11  # tolerance of a step, so that the change over a period is far below the motion
 STEPS_ERROR = 100.0  # error of a periodic motion that is due to its steps, relative to RTOL
-SENSED_COLUMNS = ("amplitude", "acceleration_peak")  # columns of a curve that sensors measure
+SENSED_COLUMNS = ("amplitude", "acceleration_peak", "acceleration_fundamental")  # what sensors see
 N_CYCLES = 2.0  # computed cycles of a periodic motion, so that each stick is complete
 MIN_STOP = 1e-9  # shortest stop that is counted, in periods
 N_NEAR_CYCLES = 1  # cycles before the first correction of a motion that starts from a similar one
@@ -94,21 +94,21 @@ class ShootingFinder(TracedCurve):
             )
         return motion
 
-    def compute_steady_motion(self, drive, guess=None) -> tuple:
-        """Compute the steady motion under sinusoidal drive, and the guess for a neighbouring drive.
+    def compute_steady_motion(self, drive, guess=None) -> Solution:
+        """Compute the steady motion under sinusoidal drive, from rest or from a similar motion.
 
         If the lifted mass leaves its grooves, there is no steady motion. The Solution is then that of the motion that
-        leaves them, and the guess is None.
+        leaves them.
         """
         begin = perf_counter()
         run = self._leave_grooves(drive)
         if run is not None:
-            return self._make_solution(run, drive, begin, "leaves its grooves"), None
+            return self._make_solution(run, drive, begin, "leaves its grooves")
         motion = self.find_periodic_motion(drive, guess)
         state = None if motion.grows else motion.batch.states
         cycles = periodic.N_GROWTH_CYCLES if motion.grows else N_CYCLES
         run = self.evaluator.integrate(drive, cycles, state, self.frames)
-        return self._make_periodic_solution(run, motion, drive, begin), state
+        return self._make_periodic_solution(run, motion, drive, begin)
 
     def _leave_grooves(self, drive):
         """Return the run from rest that leaves the grooves, or None if there is none."""
@@ -207,7 +207,7 @@ class ShootingFinder(TracedCurve):
             return point
         if self._leave_grooves(drive) is not None:
             regime = "leaves its grooves"
-            return CurvePoint(drive, {}, {}, regime, np.nan, False, Outcome.LEAVES_GROOVES)
+            return CurvePoint(drive, {}, {}, regime, np.nan, False)
 
         # A neighbour beyond a jump of the curve may be too far away as a start.
         try:
@@ -217,7 +217,7 @@ class ShootingFinder(TracedCurve):
                 raise
             motion = self.find_periodic_motion(drive)
         if motion.grows:
-            return CurvePoint(drive, {}, {}, "unbounded", 1.0, False, Outcome.GROWS)
+            return CurvePoint(drive, {}, {}, "unbounded", 1.0, False)
 
         windows = motion.batch.windows[0]
         values = {name: float(windows[name][0]) for name in COLUMN_MEASURES.values()}
@@ -233,7 +233,6 @@ class ShootingFinder(TracedCurve):
             regime=regime if is_stable else f"{regime}, unstable",
             multiplier=float(np.abs(motion.multipliers).max(initial=0.0)),
             stable=is_stable,
-            outcome=Outcome.STUCK if is_stuck else Outcome.STEADY,
             guess=motion.batch.states,
         )
 
@@ -256,23 +255,18 @@ class ShootingFinder(TracedCurve):
         needs_histories : bool
             Whether the histories of a cycle are needed.
         """
-        if not (needs_histories or self.joints.laws):
-            point = self._compute_linear_point(drive)
-            if point is not None:
-                amplitude, peak = (point.values[COLUMN_MEASURES[name]] for name in SENSED_COLUMNS)
-                return ObservedMotion(None, peak, amplitude, fundamental=peak)
-        motion = self.find_periodic_motion(drive, guess)
-        if motion.grows or self._leave_grooves(drive) is not None:
+        point = self.compute_curve_point(drive, guess)
+        if not point.values:
             return None
-        state = motion.batch.states
         window = None
         if needs_histories:
+            # The closed form of a linear rig has no state from which a cycle starts.
+            laws = self.joints.laws
+            state = point.guess if laws else self.find_periodic_motion(drive).batch.states
             window = self.evaluator.integrate(drive, N_CYCLES, state, 0).window
-        values = motion.batch.windows[0]
-        amplitude, peak = (float(values[COLUMN_MEASURES[name]][0]) for name in SENSED_COLUMNS)
-        whole = motion.batch.records.whole[0, 0]
-        fundamental = 2 / whole[Whole.SPAN] * complex(whole[Whole.COS_1], -whole[Whole.SIN_1])
-        return ObservedMotion(window, peak, amplitude, state, fundamental)
+        sensed = [point.values.get(COLUMN_MEASURES[name]) for name in SENSED_COLUMNS]
+        amplitude, peak, fundamental = sensed
+        return ObservedMotion(window, peak, amplitude, point.guess, fundamental)
 
     def _compute_linear_point(self, drive) -> CurvePoint | None:
         """Return the point of a response curve of a linear rig in closed form, or None at an undamped resonance."""
@@ -292,7 +286,7 @@ class ShootingFinder(TracedCurve):
         values = {name: value for name, value in values.items() if value is not None}
         multiplier = float(np.exp(self._max_growth_rate * drive.period))
         errors = estimate_exact_errors(values, 0.0)
-        return CurvePoint(drive, values, errors, "sliding", multiplier, True, Outcome.STEADY)
+        return CurvePoint(drive, values, errors, "sliding", multiplier, True)
 
     @cached_property
     def _max_growth_rate(self) -> float:

@@ -1,4 +1,4 @@
-"""Steady motion of a rig under a sine, and the largest one over a sweep or drive levels.
+"""Steady motion of a rig under a sine, and the largest one over a sweep.
 
 In: a Model, its Numerics and its Patch. Out: the Solution of the periodic motion with its regime,
 Floquet multipliers and stability. Coulomb interfaces, elastic-plastic elements and grooves are solved by shooting with
@@ -9,7 +9,6 @@ from ....core import SineDrive
 from ..engines import choose_steady_method
 from ..solution import Solution
 from .balance import BalanceFinder
-from .curves import solve_drive_levels
 from .peak import solve_peak
 from .shooting import ShootingFinder
 
@@ -19,7 +18,7 @@ FINDERS = {"shooting": ShootingFinder, "balance": BalanceFinder}
 def solve_steady_motion(
     model, numerics, patch, frames: int = 0, say=None, progress=None
 ) -> Solution:
-    """Compute the steady motion under a sine, or the largest one over a sweep or drive levels.
+    """Compute the steady motion under a sine, or the largest one over a sweep.
 
     The drive of the largest motion is `Solution.drive`.
 
@@ -41,14 +40,8 @@ def solve_steady_motion(
     Solution
     """
     finder_class = FINDERS[choose_steady_method(model).name]
-    return _solve_drive(finder_class(model, numerics, patch, frames, say), model)
-
-
-def _solve_drive(finder, model) -> Solution:
-    """Compute the steady motion, response curve or drive levels that the drive of a model requests."""
+    finder = finder_class(model, numerics, patch, frames, say)
     drive = model.rig.drive.signal
     if isinstance(drive, SineDrive):
-        return finder.compute_steady_motion(drive)[0]
-    if model.rig.drive.levels.amplitudes:
-        return solve_drive_levels(finder, drive)
+        return finder.compute_steady_motion(drive)
     return solve_peak(finder.trace_curve(drive), finder)
