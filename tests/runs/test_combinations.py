@@ -83,7 +83,7 @@ METHODS_OF_ENGINES = {"exact": "hybrid", "march": "march", "harmonic": "harmonic
 ACCEPTED = {
     "bench of a point": (14, 7, 7, 22, 7, 4, 4, 4),
     "bench of a patch": (36, 16, 16, 84, 12, 12, 12, 12),
-    "rig of a point": (102, 53, 53, 165, 44, 46, 46, 46),
+    "rig of a point": (100, 52, 52, 164, 43, 45, 45, 45),
     "rig of a patch": (58, 21, 43, 160, 8, 15, 15, 15),
     "one interface": (14, 8, 8, 22, 7, 8, 8, 8),
     "interfaces": (14, 6, 6, 12, 0, 6, 6, 6),
