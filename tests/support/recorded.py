@@ -49,6 +49,8 @@ MIN_ERROR = 1e-12
 MIN_CHECK = 1e-7
 # Difference that passes of the shares of a variance, which are sums of terms of order 1.
 MIN_SHARE = 1e-9
+# Difference that passes of stiffnesses [N/m], which are zero but for round-off for a rigid law.
+MIN_STIFFNESS = 1e-3
 # Printed numbers up to this size are round-off errors; percentages of prose up to this size are errors, which the JSON files
 # state as well.
 MIN_PRINTED = 1e-20
@@ -356,6 +358,8 @@ def is_equal(key: str, recorded: dict, found: dict) -> bool:
     smallest = MIN_CHECK if is_check else MIN_ERROR if is_error else 0.0
     if ".ranking." in key:
         smallest = MIN_SHARE
+    elif "stiffness" in key:
+        smallest = MIN_STIFFNESS
     if isinstance(old, list) and isinstance(new, list):
         margin = relative * max(map(abs, old[2:]), default=0.0) + smallest
         return len(old) == len(new) and np.allclose(old, new, rtol=relative, atol=margin)
