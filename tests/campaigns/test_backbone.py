@@ -367,19 +367,6 @@ def test_always_errors_of_micro_slip_include_the_mesh():
     assert coarse.exponents.micro is None
 
 
-def test_stuck_frequency_follows_from_tangential_stiffness():
-    """The stuck frequency agrees with the tangential stiffness of a run within their errors."""
-    backbone = compute_backbone(pf.build(CROWNED), "", [1e-6], ("quasi-static",))
-    stiffness = pf.run(
-        CROWNED[: CROWNED.index("[structure]")] + '[slide]\nkind = "sine"\namplitude = "1 um"\n'
-        'frequency = "1 Hz"\n'
-    ).measures["tangential_stiffness"]
-    stuck = np.sqrt(OMEGA**2 + stiffness.value / 0.5) / (2 * np.pi)
-    error = backbone.frequencies.stuck_error + stuck * stiffness.error / stiffness.value / 2
-    assert abs(backbone.frequencies.stuck - stuck) <= error < 1e-3 * stuck
-    assert backbone.exponents.micro is None
-
-
 @pytest.mark.parametrize("slide", [1.0, 0.01])
 def test_default_amplitudes_end_where_mode_is_nearly_free(slide):
     """The default amplitudes end where the frequency is within 5 % of the free one.

@@ -85,21 +85,6 @@ def test_band_is_errors_and_difference_of_methods(both_curves):
         assert backbone[f"band_{name}_high"].values == pytest.approx(ends[1], rel=1e-12)
 
 
-def test_band_of_one_method_is_its_error():
-    """The band of a single curve is its numerical error."""
-    backbone = pf.backbone(LAW + SLIDE, modes=MODES, amplitudes=AMPLITUDES[::6], method="balance")
-    assert "it is widest at" in backbone.attrs["advice"]
-    width = backbone.band_damping_high.values - backbone.band_damping_low.values
-    assert width == pytest.approx(2 * backbone.balance_damping_error.values, rel=1e-6, abs=1e-15)
-
-
-@pytest.mark.parametrize("method", ["decay", "all"])
-def test_refuses_removed_method(method):
-    """A method that was removed is refused with what to use instead."""
-    with pytest.raises(pf.PatchfemError, match=f"'{method}' was removed in patchfem 1.3; "):
-        pf.backbone(LAW + SLIDE, modes=MODES, method=method)
-
-
 def test_new_joint_scene_has_a_backbone(tmp_path, monkeypatch, capsys):
     """The scene of `new joint` with two given modes has a backbone with a band and advice."""
     monkeypatch.chdir(tmp_path)

@@ -16,7 +16,6 @@ from patchfem.campaigns import (
     describe_best_setting,
     numerical_settings,
 )
-from patchfem.campaigns.cost import find_best_run
 from patchfem.core import Measure, NotConverged
 from patchfem.export.costs import make_answer
 from patchfem.runs.run import run
@@ -92,23 +91,6 @@ def test_exact_error_at_setting_of_scene_agrees_with_run(keys, own, monkeypatch)
         assert row.measures[name].error == pytest.approx(measure.error, rel=1e-9)
 
 
-def test_exact_automatic_mesh_averages_profile_as_run(tmp_path):
-    """Under a trace on pieces of unequal length, the row of the automatic mesh averages it as the run does.
-
-    Once it resolved the finest waves, which cannot be solved apart there.
-    """
-    heights = "".join(f"{1e-5 * k},{1e-7 * (k % 3)}\n" for k in range(1271))
-    (tmp_path / "trace.csv").write_text(f"x [m],height [m]\n{heights}", "utf-8")
-    scene = tmp_path / "scene.toml"
-    tables = '[contact.profile]\nfile = "trace.csv"\n[contact.lower]\nlength = "20 mm"\n'
-    scene.write_text(PIECE + 'load = "26 lbf"\nsubstrate = "steel"\n' + tables, "utf-8")
-    model = build(scene)
-    *_, uniform, automatic = numerical_settings.make_setting_values(model, "element_size")
-    assert automatic.value is None and automatic.model.patch.gap.average is None
-    assert automatic.model.patch.gap.limit == model.patch.gap.limit == LENGTH / 200
-    assert uniform.model.patch.gap.limit == uniform.model.patch.gap.average == uniform.value
-
-
 def test_exact_table_contains_values_and_errors(tmp_path):
     """The table contains the errors of each run."""
     scene = tmp_path / "a.toml"
@@ -152,23 +134,6 @@ def test_exact_summary_states_coarsest_sufficient_run_or_worst_measure():
     assert describe_best_setting(automatic, 1e-2) == within
     automatic[-1] = make_cost("auto", 3, 1e-3, value=None)
     assert describe_best_setting(automatic, 1e-3).startswith("a knob at auto: 3 CPU s per run")
-
-
-def test_exact_unknown_error_is_not_within_tolerance():
-    """A run with an unknown error is not within the tolerance, and unknown errors are stated.
-
-    Once a run with 4 modes whose work had no error estimate was called the fastest "with every measure within the
-    tolerance".
-    """
-    runs = [make_cost("4", 0.1, 1e-4), make_cost("8", 1, 1e-5), make_cost("16", 2, 1e-5)]
-    forget_errors(runs[0], "b")
-    assert find_best_run(runs, 1e-2).label == "8"
-    assert find_best_run(runs, 1e-6).label == "8"
-    for run_cost in runs:
-        forget_errors(run_cost, "a", "b")
-    assert describe_best_setting(runs, 1e-2) == (
-        "no setting is known to meet the tolerance 0.01: no run has an error estimate of every measure"
-    )
 
 
 def test_exact_notes_are_those_of_the_named_run():

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pyuff
+from friction_loops import elastic_plastic_force
 
 LOAD, MU, BOND = 115.0, 0.31, 2.3e-6
 SCENE = f"""\
@@ -74,7 +75,4 @@ def elastic_plastic_loop(count=80, cycles=2) -> tuple:
     """
     time = np.arange(count * cycles + 1) / count / 100
     slide = 10e-6 * np.sin(2 * np.pi * 100 * time)
-    out = [0.0]
-    for step in np.diff(slide):
-        out.append(min(max(out[-1] + MU * LOAD * step / BOND, -MU * LOAD), MU * LOAD))
-    return time, slide, np.array(out)
+    return time, slide, elastic_plastic_force(slide, MU * LOAD, BOND)

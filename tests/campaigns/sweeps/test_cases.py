@@ -70,18 +70,6 @@ def test_exact_case_name_depends_on_values_only():
     )
 
 
-def test_exact_cases_with_same_pieces_are_neighbours():
-    """Cases with the same pieces are computed one after another."""
-    cases = make_cases("contact.load=1 N,2 N,3 N", "contact.height=1 mm,2 mm")
-    assert cases.sort_by_pieces(range(6)) == [0, 2, 4, 1, 3, 5]
-    assert make_cases(*THREE).sort_by_pieces([3, 1, 2]) == [3, 1, 2]
-    cases = make_cases(
-        "drive.acceleration=1 g,2 g", "contact.load=1 N,2 N", "contact.height=1 mm,2 mm"
-    )
-    # Cases with the same patch are adjacent.
-    assert cases.sort_by_pieces(range(8)) == [0, 4, 2, 6, 1, 5, 3, 7]
-
-
 def test_exact_cases_with_shared_mesh_are_named_by_sweep():
     """If all cases share an automatically chosen mesh, their names depend on the other cases of the sweep."""
     pinned = SweepScene(Path("a.toml"), SMALL_PATCH)
