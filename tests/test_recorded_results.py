@@ -8,10 +8,19 @@ change run `python tests/support/recorded.py`, read the differences that it prin
 import pytest
 from recorded import GROUPS, SCENES, compare_with_recorded, find_differences, run_recorded
 
+# Of the numbered scenes every third is compared in a normal run, and no group of costly commands.
+NUMBERED = [name for name in SCENES if name[0].isdigit()]
+DEAR = {"costly", *NUMBERED[1::3], *NUMBERED[2::3]}
 PROSE = "The peak pressure of the patch is 2.33 MPa at contact.load."
 
 
-@pytest.mark.parametrize("name", [*GROUPS, *SCENES])
+@pytest.mark.parametrize(
+    "name",
+    [
+        pytest.param(name, marks=pytest.mark.slow) if name in DEAR else name
+        for name in [*GROUPS, *SCENES]
+    ],
+)
 def test_exact_results_equal_recorded_ones(name, tmp_path):
     """Values agree to 1e-6 and to a thousandth of their errors, prose in its numbers, units, keys and quoted words."""
     differences = compare_with_recorded(name, run_recorded(name, tmp_path.resolve()))

@@ -47,6 +47,8 @@ RELATIVE_OF_ERRORS = 0.02
 # Difference that passes of all errors, and of checks that are zero but for round-off.
 MIN_ERROR = 1e-12
 MIN_CHECK = 1e-7
+# Difference that passes of two printed numbers: an energy of a motion without friction is zero but for round-off.
+MIN_PRINTED = 1e-20
 # Difference that passes of the shares of a variance, which are sums of terms of order 1.
 MIN_SHARE = 1e-9
 NUMBER = re.compile(r"(?<![\w.])[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
@@ -54,8 +56,8 @@ NUMBER = re.compile(r"(?<![\w.])[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
 MIN_WORDS = 4
 WORD = re.compile(r"[A-Za-z]{2,}")
 QUANTITY = re.compile(rf"({NUMBER.pattern})" + r"(?: ?([^\s,;:)]+))?")
-# Keys of scenes and names of measures have a dot or an underscore; names of laws and files are quoted.
-KEY = re.compile(r"[A-Za-z]\w*(?:\.[A-Za-z]\w*)+|[A-Za-z]+(?:_\w+)+|\"[^\"\n]*\"|'[^'\n]*'")
+# Keys of scenes and names of measures have a dot or an underscore; names of laws and files are quoted, as are quantities.
+KEY = re.compile(r"[A-Za-z]\w*(?:\.[A-Za-z]\w*)+|[A-Za-z]+(?:_\w+)+|\"(?![-\d])[^\"\n]*\"|'[^'\n]*'")
 UNITS = {unit for units in UNIT_FACTORS.values() for unit in units} | {"%"} - {"in"}
 UNSTABLE_KEYS = re.compile(
     r"seconds|versions|\bpatchfem$|version|sha256|\bdate\b|\bcreated\b|\.motions$"
@@ -396,7 +398,7 @@ def are_equal_numbers(old: str, new: str) -> bool:
     """Return whether two printed numbers differ by a unit of their last place at most."""
     mantissa, _, exponent = old.partition("e")
     unit = 10.0 ** (int(exponent or 0) - len(mantissa.partition(".")[2]))
-    margin = max(1.01 * unit * ("." in mantissa), RELATIVE * abs(float(old)))
+    margin = max(1.01 * unit * ("." in mantissa), RELATIVE * abs(float(old)), MIN_PRINTED)
     return abs(float(old) - float(new)) <= margin
 
 
