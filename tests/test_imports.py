@@ -65,7 +65,7 @@ FOLDERS = {  # kind of scene -> text, folders that `patchfem run` loads for the 
 }
 
 
-@pytest.mark.share(3, 7, 8)
+@pytest.mark.share(7, 8)
 @pytest.mark.parametrize("kind", FOLDERS)
 def test_exact_run_loads_folders_of_its_scene(write_scene, tmp_path, kind):
     """`patchfem run` in a new process loads the physics folders listed for its kind of scene and no others."""
@@ -116,7 +116,7 @@ def modules_of_run(text: str) -> set:
         return modules_after(FROM_PYTHON, path)
 
 
-@pytest.mark.share(0, 6)
+@pytest.mark.share(0)
 @pytest.mark.parametrize("name", MODULES_OF_SCENES)
 def test_exact_run_loads_modules_of_its_keys(name):
     """A run from Python loads the modules of the keys in its scene, and not those of absent keys."""
@@ -186,7 +186,7 @@ COMMANDS = {  # command -> scene, arguments, modules of patchfem and packages th
 }
 
 
-@pytest.mark.share(0, 3, 6, 10, 11, 12, 13)
+@pytest.mark.share(3, 6, 10, 11, 13)
 @pytest.mark.parametrize("name", COMMANDS)
 def test_exact_command_loads_only_needed_packages(write_scene, tmp_path, name):
     """A command does not load the modules and packages listed as unnecessary for it."""

@@ -10,7 +10,9 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 from numba import njit
+from scene_texts import PLASTIC, POINT, STRUCTURE
 
+import patchfem as pf
 from patchfem.compiled import jit, machine
 
 
@@ -229,16 +231,12 @@ def test_always_argument_kinds_distinguish_types():
     ) == words.convert(7)
 
 
-MOTIONS = """
+MEASURES = ("slip_amplitude", "friction_work")
+MOTIONS = f"""
 import json, sys
 import patchfem as pf
-rig = '[normal]\\nload = "40 N"\\n[friction]\\nlaw = "LAW"\\nstatic = 0.3\\nMORE\\n' \\
-    '[structure]\\nmoving_mass = "1 kg"\\n' \\
-    '[[structure.mode]]\\nname = "a"\\nfrequency = "100 Hz"\\ndamping = 0.01\\nslide = 1.0\\n' \\
-    '[drive]\\nkind = "base"\\nfrequency = "90 Hz"\\nacceleration = "5 g"\\ncycles = 1\\n'
-found = pf.run(rig.replace("LAW", "elastic-plastic").replace("MORE", 'bond_length = "2 um"'))
-out = [found.measures[name].value for name in ("slip_amplitude", "friction_work")]
-print(json.dumps([out, "numba" in sys.modules]))
+found = pf.run(sys.argv[1], **{{"drive.cycles": 1}})
+print(json.dumps([found.measures[name].value for name in {MEASURES}]))
 """
 
 
@@ -247,16 +245,15 @@ def test_exact_motions_agree_without_compilation(monkeypatch):
 
     Round-off changes the lengths of the steps, whose tolerance is larger.
     """
-    answers = []
-    for switch in "0", "1":
-        monkeypatch.setenv("NUMBA_DISABLE_JIT", switch)
-        done = subprocess.run(
-            [sys.executable, "-c", MOTIONS], capture_output=True, text=True, timeout=300, check=True
-        )
-        answers.append(json.loads(done.stdout))
-    (compiled, _), (interpreted, numba) = answers
-    assert numba and all(np.ravel(compiled))
-    np.testing.assert_allclose(interpreted, compiled, rtol=1e-8)
+    scene = POINT + PLASTIC + STRUCTURE
+    measures = pf.run(scene, **{"drive.cycles": 1}).measures
+    compiled = [measures[name].value for name in MEASURES]
+    monkeypatch.setenv("NUMBA_DISABLE_JIT", "1")
+    done = subprocess.run(
+        [sys.executable, "-c", MOTIONS, scene], capture_output=True, text=True, check=True
+    )
+    assert all(compiled)
+    np.testing.assert_allclose(json.loads(done.stdout), compiled, rtol=1e-8)
 
 
 def sum_with_enum_indices(table):
