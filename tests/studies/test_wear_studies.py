@@ -1,7 +1,5 @@
 """The wear studies: their stated figures, from inexpensive cases."""
 
-import re
-
 import numpy as np
 import pytest
 from study_module import make_study_fixture
@@ -24,18 +22,6 @@ def check_bands(bands, rows, within):
     assert [six.seen, twelve.seen] == pytest.approx([0.18, 0.45], abs=5 * within)
     # these inequalities support the stated conclusion
     assert six.interval[1] > 1 and twelve.interval[1] > 1 and six.after_interval[0][1] < 1
-
-
-def test_always_few_bands_give_stated_ratios(bands, tmp_path, capsys):
-    """Two surfaces give the stated amplitude ratios within 0.03."""
-    rows = bands.main(strokes=(2, 4), seeds=2, bite=0.03e-6, path=tmp_path / "x.svg")
-    check_bands(bands, rows, 0.03)
-    text = (tmp_path / "x.svg").read_text()
-    assert all(
-        each in text
-        for each in ("along x (sliding)", "6 um worn off each: whole area", "strokes of Table 1")
-    )
-    assert len(re.findall("one trace each way", capsys.readouterr().out)) == 5
 
 
 @pytest.mark.slow
