@@ -154,16 +154,8 @@ COMMANDS = {  # command -> scene, arguments, modules of patchfem and packages th
         "pyvista vtkmodules numba meshio skfem scipy matplotlib pandas xarray",
     ),
     "check": (rig_without_files(), ("check", "SCENE"), "", HEAVY),
-    "check of a bench": (
-        BENCH,
-        ("check", "SCENE"),
-        "campaigns export.sweeps scene.assignments runs.batch",
-        "email socket",
-    ),
     "check of measured rows": ("", ("check", str(RIG)), "", HEAVY),
     "help": ("", ("--help",), "", HEAVY),
-    "help of a verb": ("", ("check", "--help"), "", HEAVY),
-    "version": ("", ("--version",), "", HEAVY),
     "sweep": (
         BENCH,
         ("sweep", "SCENE", "--over", "friction.static=0.1,0.2", "-o", "OUT", "-q"),
@@ -176,17 +168,11 @@ COMMANDS = {  # command -> scene, arguments, modules of patchfem and packages th
         "runs.bench.bench runs.wear",
         "numpy.random cyclopts.completion numba email socket",
     ),
-    "profile": (
-        TRACE,
-        ("profile", "SCENE", "--cutoff", "80 um"),
-        "",
-        SLOW_SCIPY + " scipy.optimize",
-    ),
     "compare": (TRACE, ("compare", "SCENE", "SCENE"), "", SLOW_SCIPY),
 }
 
 
-@pytest.mark.share(3, 6, 10, 11, 13)
+@pytest.mark.share(3, 5, 7, 8, 9)
 @pytest.mark.parametrize("name", COMMANDS)
 def test_exact_command_loads_only_needed_packages(write_scene, tmp_path, name):
     """A command does not load the modules and packages listed as unnecessary for it."""

@@ -115,40 +115,6 @@ def test_exact_stored_code_gives_same_bits(stored_sum):
     assert result[1] == pytest.approx(weighted_sum(-1, other, 2.0, out)[1][0], rel=1e-13)
 
 
-def test_exact_tuples_are_passed_by_address(stored_sum, tmp_path):
-    """Tuples are passed by address, to inner functions too, and the sums agree with numba's within 1e-14.
-
-    The tuples contain numbers, arrays of any layout and nested tuples.
-    """
-    _, (first, outer, step, _), answer, _, numba_sum = stored_sum
-    inner = jit.njit(error_model="numpy", _nrt=False)(weighted_sum)
-
-    @jit.njit(error_model="numpy", _nrt=False)
-    def call_inlined(first, outer, step, out):
-        """Return the result of the inlined function."""
-        return inner(first, outer, step, out)
-
-    for function in (inner, call_inlined):
-        code = machine.compile_and_store(
-            tmp_path / "a.code", function, (first, outer, step, np.zeros(5)), jit.compile_optimised
-        )
-        result = np.zeros(5)
-        assert code(pack_arguments(first, outer, step, result)) == (8, (result[-1], 7))
-        assert result[-1] == pytest.approx(answer[1][0], rel=1e-14)
-        other = outer._replace(
-            first=2 * outer.first, count=2, inner=Inner(-outer.inner.places, 1.5)
-        )
-        expected = np.zeros(5)
-        assert (
-            code(pack_arguments(-1, other, 2.0, result))[0]
-            == numba_sum(-1, other, 2.0, expected)[0]
-            == 1
-        )
-        assert result[:2] == pytest.approx(expected[:2], rel=1e-14)
-    [compiled] = inner.overloads.values()  # compiled inside `call_inlined`
-    assert compiled.signature.args[1].tuple_type.fields == Outer._fields
-
-
 @pytest.mark.parametrize(
     "damage",
     [

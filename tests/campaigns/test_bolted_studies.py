@@ -12,8 +12,7 @@ import pytest
 
 import patchfem as pf
 from patchfem.core import PatchfemError
-from patchfem.model import build
-from patchfem.scene import BaseScene, loads, remember_written
+from patchfem.scene import loads, remember_written
 
 MASS = 1.3  # modal mass [kg]
 SLIDE = 0.0169  # motion of the contact per motion of the output
@@ -72,31 +71,6 @@ def stuck_frequency(joint_stiffness: float, bolted_stiffness: float) -> float:
     """Return the frequency [Hz] of the mode with a sticking joint, after another joint was subtracted."""
     square = (2 * np.pi * 212.0) ** 2 + (joint_stiffness - bolted_stiffness) * SLIDE**2 / MASS
     return float(np.sqrt(square) / (2 * np.pi))
-
-
-def write_free_scene(contact: str, joint_stiffness: float) -> str:
-    """Return the same rig with the frequency and damping of the mode without the joint."""
-    frequency = free_frequency(joint_stiffness)
-    damping = 0.002 * 212.0 / frequency
-    free = MODE.replace('measured = "stuck"\n', "").replace("212 Hz", f"{frequency!r} Hz")
-    return contact + free.replace("0.002", repr(damping)) + DRIVE
-
-
-def test_exact_sweep_over_load_of_patch_equals_single_runs():
-    """A case of a sweep of a patch equals, to round-off, the run of a model with the same joint subtracted,
-    and its measures are those of the structure given by its free modes within their errors."""
-    others = (LOADS[0], LOADS[2])
-    swept = pf.sweep(ROUGH + MODE + DRIVE, {"contact.load": list(others)})
-    scene = loads(ROUGH + MODE + DRIVE, "rough.toml")
-    base = BaseScene(remember_written(scene))
-    bolted = pf.run(ROUGH + MODE + DRIVE).measures["tangential_stiffness"].value
-    case = pf.run(build(base.override([f"contact.load={others[1]}"])))
-    single = pf.run(write_free_scene(ROUGH, bolted), **{"contact.load": others[1]})
-    for name in ("relative_displacement_amplitude", "friction_force_peak", "loop_area"):
-        assert swept[name].values[1] == pytest.approx(case.measures[name].value, rel=1e-9)
-        error = case.measures[name].error + single.measures[name].error
-        assert abs(single.measures[name].value - case.measures[name].value) <= error
-    assert any("the scene as written" in note for note in case.notes)
 
 
 @pytest.mark.parametrize("contact, key", [(POINT, "normal.load"), (ROUGH, "contact.load")])

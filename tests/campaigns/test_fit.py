@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 from command_line import run_cli
 from friction_loops import dahl_force, elastic_plastic_force, write_loop
-from scipy.integrate import solve_ivp
 
 from patchfem import SceneError, build
 from patchfem.campaigns.fits.loop import fit_hysteresis_loop
@@ -36,19 +35,11 @@ TRUTH = {
     "springs": {"friction.static": 0.31, "friction.stiffness": 1.3e7},
     "tanh": {"friction.static": 0.31, "friction.reference_speed": 1.7e-3},
     "bonds": {"friction.static": 0.31, "friction.bond_length": 2.3e-6},
-    "growth": {
-        "friction.static": 0.31,
-        "friction.kinetic": 0.22,
-        "friction.bond_length": 2.3e-6,
-        "friction.rest_growth": 7.0,
-        "friction.slip_growth": 1.1e-6,
-    },
 }
 FREE = {
-    "friction.static": "0.1..0.7", "friction.kinetic": "0.1..0.3", "friction.bond_length": "0.3 um..20 um",
+    "friction.static": "0.1..0.7", "friction.bond_length": "0.3 um..20 um",
     "friction.stiffness": "2e6 N/m..1e8 N/m",
-    "friction.reference_speed": "0.1 mm/s..100 mm/s", "friction.rest_growth": "1 m/s^2..50 m/s^2",
-    "friction.slip_growth": "0.2 um..10 um", "normal.load": "50 N..200 N",
+    "friction.reference_speed": "0.1 mm/s..100 mm/s",
 }  # fmt: skip
 
 
@@ -56,34 +47,6 @@ def sine_path(count=80, cycles=2):
     """Return time [s] and relative displacement [m] of a sine of 10 um at 100 Hz, (n,) each."""
     time = np.arange(count * cycles + 1) / count / 100
     return time, 10e-6 * np.sin(2 * np.pi * 100 * time)
-
-
-def growing_bond_force(time, slide, mu, kinetic, eps0, rest, slip, floor=1e-5):
-    """Return the friction force (n,) [N] of bonds that grow at rest, along a piecewise linear path.
-
-    It integrates z' = v - |v| z/eps and equation 2.10 by a Runge-Kutta method of order 8.
-    """
-    out = [0.0]
-    eps = eps0
-    z = 0.0
-    m = 1.0
-    for dt, dq in zip(np.diff(time), np.diff(slide)):
-        v = dq / dt
-
-        def rate(_, y, v=v):
-            z, m, eps = y
-            w = abs(v)
-            return [
-                v * m - w * z / eps,
-                w * (1 - m) / eps,
-                rest / max(w, floor) * (eps0 - eps) + w / slip * (kinetic / mu * eps0 - eps),
-            ]
-
-        z, m, eps = solve_ivp(
-            rate, (0, dt), [z, m, eps], method="DOP853", rtol=1e-12, atol=1e-20
-        ).y[:, -1]
-        out.append(mu * LOAD / eps0 * z)
-    return np.array(out)
 
 
 def reference_force(law, time, slide, truth):
@@ -95,8 +58,6 @@ def reference_force(law, time, slide, truth):
         return elastic_plastic_force(slide, values[0] * LOAD, values[0] * LOAD / values[1])
     if law == "bonds":
         return dahl_force(slide, values[0] * LOAD, values[1])
-    if law == "growth":
-        return growing_bond_force(time, slide, *values)
     speed = np.diff(slide) / np.diff(time)
     side = np.sign(speed) if law == "coulomb" else np.tanh(speed / values[1])
     # The force at a row is the mean of those of the two adjacent segments.
@@ -133,40 +94,6 @@ def test_exact_parameters_of_each_law_are_recovered(tmp_path, law):
         result.keys.fit.intervals.ends[:, 0] <= result.keys.fit.values
     ).all() and result.keys.warnings == []
     assert np.ptp(result.keys.fit.intervals.ends, axis=1) == pytest.approx(0, abs=1e-6)
-
-
-def test_order_of_bond_growth_fit_is_two(tmp_path):
-    """The residual of a fit with growing bonds falls with the second power of the time step.
-
-    The steps are halved until the loop changes by less than a tenth of the tolerance, and this
-    change bounds the residual against the integrated reference loop.
-    """
-    time, slide = sine_path(24, 1)
-    loop = write_loop(
-        tmp_path / "loop.csv", time, slide, reference_force("growth", time, slide, TRUTH["growth"])
-    )
-    sets = [
-        f"{name}={value!r}"
-        + {"m": " m", "r": " m/s^2"}.get(
-            "m" if "length" in name or "slip" in name else "r" if "rest" in name else "", ""
-        )
-        for name, value in TRUTH["growth"].items()
-        if name != "friction.static"
-    ]
-    results = []
-    for tolerance, pieces in ((1e-1, 1), (1e-3, None)):
-        scene = load_scene(tmp_path, "growth", *sets, f"accuracy.tolerance={tolerance}")
-        result = fit_hysteresis_loop(scene, loop, free_ranges("friction.static"))
-        assert result.step_error <= 0.1 * tolerance * 31
-        assert result.rms < 1.4 * result.step_error
-        assert pieces is None or result.steps_per_row == pieces
-        results.append((result.steps_per_row, result.rms))
-    (few_pieces, coarse_rms), (many_pieces, fine_rms) = results
-    assert (
-        np.log(coarse_rms / fine_rms) / np.log(many_pieces / few_pieces)
-        == pytest.approx(2, abs=0.1)
-        and fine_rms < 3e-4
-    )
 
 
 def test_exact_ratio_column_and_patch_give_same_parameters(tmp_path):

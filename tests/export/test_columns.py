@@ -1,31 +1,12 @@
 """Units and rows of CSV files, and the JSON form of details."""
 
 import csv
-import json
-from dataclasses import dataclass
-from typing import NamedTuple
 
-import numpy as np
 import pytest
 
 from patchfem.export import answer, columns
 
 G_N = 9.80665
-
-
-class Point(NamedTuple):
-    """Point with a number that may be missing."""
-
-    x: float
-    y: float
-
-
-@dataclass
-class Record:
-    """Record with a point."""
-
-    name: str
-    point: Point
 
 
 def test_exact_csv_of_fit_has_units_of_its_headings():
@@ -80,23 +61,3 @@ def test_exact_csv_of_curves_names_the_value_of_a_key():
         ["1 N", "balance", "2e-06", "", "0.2"],
         ["2 N", "quasi-static", "5e-06", "", ""],
     ]
-
-
-def test_exact_details_are_plain_json():
-    """Records, arrays and numbers that are not finite in the details become objects, lists and null."""
-    content = {
-        "records": (Record("a", Point(1.0, np.nan)),),
-        "array": np.array([[1.0, np.inf], [2.0, 3.0]]),
-        "count": np.int64(3),
-        "flag": np.array([True, False]),
-        "objects": np.array([None, True], object),
-    }
-    plain = {
-        "records": [{"name": "a", "point": {"x": 1.0, "y": None}}],
-        "array": [[1.0, None], [2.0, 3.0]],
-        "count": 3,
-        "flag": [True, False],
-        "objects": [None, True],
-    }
-    assert answer.to_plain(content) == plain
-    assert json.loads(json.dumps(answer.Answer("fit", "", (), details=content).details)) == plain

@@ -186,25 +186,3 @@ def test_exact_plot_is_a_picture(folders, tmp_path, ending, names):
         assert path.read_bytes().startswith(starts[ending])
     with pytest.raises(PatchfemError, match=r"\.png, \.svg, \.pdf"):
         axes.write_plot(store.read(folders / "cost"), tmp_path / "a.jpg")
-
-
-def test_exact_signed_maps_have_same_colours_in_page_and_picture():
-    """The largest value of a map with both signs is red, and the smallest is blue, on the page and in a picture."""
-    from base64 import b64decode
-    from gzip import decompress
-
-    from patchfem.export import page
-    from patchfem.export.charts import axes, panel, plotly
-
-    curve = panel.Curve("", np.arange(2.0), np.array([[-1.0, 0.5]]), rows=np.zeros(1))
-    chart = panel.Panel("map", "map", panel.Axis("x"), panel.Axis("y"), [curve])
-    (mesh,) = axes.make_figure([chart]).axes[0].collections
-    drawn = [mesh.cmap(mesh.norm(value))[:3] for value in (-1.0, 1.0)]
-
-    (trace,) = plotly.draw(chart)["data"]
-    library = decompress(b64decode(page.read_library())).decode()
-    scale = re.search(rf"{trace['colorscale']}:(\[\[.*?\]\])", library)[1]
-    colours = re.findall(r"rgb\((\d+),(\d+),(\d+)\)", scale)
-    shown = [tuple(map(int, colours[place])) for place in (0, -1)]
-    for low, high in (drawn, shown):
-        assert low[2] > low[0] and high[0] > high[2]

@@ -24,7 +24,7 @@ from scene_texts import (
 )
 
 from patchfem.effects import EFFECTS, import_effect
-from patchfem.model import build, gap
+from patchfem.model import build
 from patchfem.runs import find_drive_and_knee
 from patchfem.runs.plan import plan
 from patchfem.runs.run import run
@@ -222,10 +222,3 @@ def test_exact_only_base_sine_at_resonance_of_single_mode_has_knee(text, sets, h
     """Only a sine of the base at resonance of a single mode has a drive that friction can bound."""
     model = build(loads(POINT + COULOMB + text, sets=sets))
     assert set(find_drive_and_knee(model)) == ({"drive", "knee"} if has_knee else set())
-
-
-@pytest.mark.parametrize("loaded, length", [((), 3), ((0,), 1), ((1,), 2)])
-def test_exact_longest_loaded_cell(loaded, length):
-    """Only cells next to a node with pressure count; without such nodes all cells count."""
-    x = np.array([0.0, 1.0, 3.0, 6.0])
-    assert gap.longest_loaded_cell(x, np.isin(range(4), loaded)) == length

@@ -22,7 +22,6 @@ from patchfem.campaigns import (
 )
 from patchfem.campaigns.sweeps import executors
 from patchfem.campaigns.sweeps.executors import LocalExecutor
-from patchfem.campaigns.sweeps.executors.cluster import Cluster
 from patchfem.campaigns.sweeps.executors.pool import Pool
 from patchfem.campaigns.sweeps.sweep import WorkerDeath
 from patchfem.core import Missing, PatchfemError
@@ -116,15 +115,6 @@ def assert_only_killing_case_fails(tmp_path: Path, once: bool, executor) -> None
         assert len((tmp_path / str(number)).read_text()) == (1 if once else 2)
     for number in lost:
         assert results.outcome[number] == FAILED_OUTCOME and "died" in results.messages[number]
-
-
-@pytest.mark.slow
-def test_exact_cluster_equals_local_executor():
-    """A Dask cluster gives the same results as a single process."""
-    pytest.importorskip("distributed")
-    results, _ = run_all_cases(make_work(), Cluster("", 1))
-    expected, _ = run_all_cases(make_work(), LocalExecutor())
-    assert_same_results(results, expected, range(8))
 
 
 def test_refuses_unknown_executors(monkeypatch):

@@ -3,14 +3,12 @@
 import csv
 import json
 import re
-from pathlib import Path
 
 import numpy as np
 import pytest
 from comparisons import FINDINGS, VERDICTS, compare_pair, compare_traces
 
 from patchfem.export import netcdf, page, quantities, store
-from patchfem.export import surface_definitions as definitions
 from patchfem.export.answer import Quantity
 from patchfem.export.surfaces import compare, sentences
 
@@ -56,27 +54,6 @@ def test_exact_headline_of_each_verdict(code):
     assert 1 <= len(answer.verdict) <= 4
     assert all(re.match(r"[A-Z0-9].*[.?]$", text) for text in answer.verdict)
     assert answer.details["code"] == code
-
-
-def test_exact_each_code_of_a_sentence_is_given_by_some_module():
-    """Each verdict, finding and reason with a sentence stands in the text of a module other than that of the sentences."""
-    package = Path(sentences.__file__).parents[2]
-    texts = [
-        path.read_text("utf-8")
-        for folder in ("surface", "campaigns", "export/surfaces")
-        for path in (package / folder).rglob("*.py")
-        if path != Path(sentences.__file__)
-    ]
-    tables = (
-        sentences.VERDICTS,
-        sentences.ADVICE,
-        sentences.IN_VERDICT,
-        sentences.WARNINGS,
-        sentences.NOTES,
-        sentences.REASONS,
-    )
-    codes = {code for table in tables for code in table}
-    assert not [code for code in codes if not any(f'"{code}"' in text for text in texts)]
 
 
 @pytest.mark.parametrize("code", FINDINGS)
@@ -169,13 +146,3 @@ def test_exact_page_is_made_again_and_shows_the_files(written):
         name = tile["label"].replace(" ", "_")
         assert quantities.format_quantity(name, parse(summary["measures"][name])) == tile["text"]
         assert f"<b>{tile['text']}</b>" in text and tile["meaning"]
-
-
-def test_always_every_quantity_has_a_definition():
-    """All numbers of comparisons have a unit and a meaning, and the unit is that of the number."""
-    for comparison in map(compare_pair, (False, True)):
-        for name, quantity in compare.make_answer(comparison).quantities.items():
-            found = quantities.find_definition(name, "compare")
-            assert found is not None and found.unit == quantity.unit, name
-            assert len(quantities.describe(name, "compare").split()) > 2
-    assert definitions.find("no_such_quantity") is None

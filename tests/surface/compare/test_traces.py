@@ -174,15 +174,6 @@ def test_exact_deep_track_at_another_place_is_measured_below_its_flanks():
     assert found.values["shift"].value is None
 
 
-@pytest.mark.parametrize("gain", [0.9, 1.03])
-def test_always_gain_is_found_beside_wear(gain):
-    """A gain of the instrument does not change the worn area."""
-    found = compare_surfaces(NEW, Profile(WORN.x, gain * WORN.z, "after"))
-    gains = [finding.numbers["gain"] for finding in found.findings if finding.code == "other_gain"]
-    assert gains == [pytest.approx(gain, rel=0.01)]
-    assert found.values["worn_area"].value == pytest.approx(2 / 3 * UM * 1000 * UM, rel=0.02)
-
-
 def test_exact_known_shift_is_used():
     """A known shift places traces that no search could place."""
     worn = make_parabola(0.2 * UM, 1500, 2500)
@@ -276,20 +267,6 @@ def test_exact_spikes_and_dropouts_are_left_out():
     assert found.verdict.code == "worn"
     assert found.evidence.removed[1] >= 9
     assert found.values["worn_area"].value == pytest.approx(2 / 3 * UM * 1000 * UM, rel=0.02)
-
-
-def test_exact_roughness_inside_and_outside_of_a_polished_track():
-    """Ra inside of a track whose floor is smooth falls, and that outside stays."""
-    surface = draw_surface(9)
-    start = round(SHIFT / UM)
-    worn = np.zeros(4000)
-    inside = slice(1000, 3000)
-    worn[inside] = surface[start : start + 4000][inside] + 3 * UM
-    found = compare_surfaces(*make_pair(worn, 9, surface=surface))
-    regions = found.evidence.roughness
-    assert regions["inside"]["after"]["Ra"].value < 0.2 * regions["inside"]["before"]["Ra"].value
-    ratio = regions["outside"]["after"]["Ra"].value / regions["outside"]["before"]["Ra"].value
-    assert ratio == pytest.approx(1.0, abs=0.05)
 
 
 def make_cosine(depth: float, first: int, last: int, count: int = 4000) -> np.ndarray:
