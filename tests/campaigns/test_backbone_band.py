@@ -80,19 +80,6 @@ def test_band_is_errors_and_difference_of_methods(both_curves):
         assert backbone[f"band_{name}_high"].values == pytest.approx(ends[1], rel=1e-12)
 
 
-def test_exact_drive_of_scene_is_ignored():
-    """A scene whose [drive] is incomplete, or absent, gives the curve of the same scene with a drive."""
-    text, _, drive = (LAW + STRUCTURE).partition("[drive]")
-    curves = [
-        pf.backbone(text + tail, amplitudes=[2e-5], method="quasi-static")
-        for tail in ("[drive]" + drive, '[drive]\nkind = "free"\n', "")
-    ]
-    for name in ("quasi_static_frequency", "quasi_static_damping"):
-        assert len({curve[name].item() for curve in curves}) == 1
-    for curve, is_noted in zip(curves, (True, True, False)):
-        assert any("[drive] is ignored" in note for note in curve.attrs["notes"]) == is_noted
-
-
 @pytest.mark.parametrize(
     "scene, modes, message",
     [

@@ -207,18 +207,6 @@ def test_preloads_on_one_page_agree_with_closed_form(tmp_path, capsys, monkeypat
     assert (tmp_path / "curves.png").stat().st_size > 1000
 
 
-def test_over_in_python_has_the_dimension_case():
-    """`pf.backbone` with `over` returns variables over case and amplitude; single backbones agree within 1e-9."""
-    given = {"amplitudes": [2e-4, 5e-4], "method": "balance"}
-    both = pf.backbone(JOINT, over={"friction.static": [0.2, 0.3]}, **given)
-    assert both.balance_frequency.dims == ("case", "balance_amplitude")
-    for case, static in enumerate((0.2, 0.3)):
-        alone = pf.backbone(JOINT, **given, **{"friction.static": static})
-        for name in ("frequency", "damping", "force"):
-            found = both[f"balance_{name}"].values[case]
-            assert found == pytest.approx(alone[f"balance_{name}"].values, rel=1e-9)
-
-
 @pytest.mark.parametrize(
     "options, message",
     [

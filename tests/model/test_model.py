@@ -23,7 +23,6 @@ from scene_texts import (
     TRIANGLE,
 )
 
-from patchfem.effects import EFFECTS, import_effect
 from patchfem.model import build
 from patchfem.runs import find_drive_and_knee
 from patchfem.runs.plan import plan
@@ -183,12 +182,6 @@ def test_exact_replaced_part_equals_changed_scene_key(text, sets, change):
 
 
 # ---- effects and derived properties
-
-
-def test_always_every_effect_names_a_module_that_exists():
-    """The module of every effect that has code of its own can be imported."""
-    for name, effect in EFFECTS.items():
-        assert not effect.module or import_effect(name).__name__ == effect.module, name
 
 
 def test_exact_run_in_of_one_stroke_has_steps_of_cycles():
