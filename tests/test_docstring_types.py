@@ -5,6 +5,7 @@ import builtins
 import re
 from pathlib import Path
 
+import pytest
 from import_graph import read_sources, syntax_nodes
 
 ROOT = Path(__file__).parents[1]
@@ -70,6 +71,7 @@ def find_unknown_quoted(modules: dict) -> list:
     ]
 
 
+@pytest.mark.slow
 def test_always_docstrings_quote_names_that_exist():
     """Every name in backquotes in a docstring of the package occurs in its code."""
     assert find_unknown_quoted(parse_modules()) == []

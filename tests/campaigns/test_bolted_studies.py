@@ -107,6 +107,7 @@ def test_exact_modes_given_beside_the_scene_keep_their_slide():
     assert free[1] == pytest.approx(free[0], rel=1e-12)
 
 
+@pytest.mark.slow
 def test_exact_fit_of_the_bolted_joint_finds_its_stiffness(tmp_path: Path):
     """A fit of a joint that was bolted in the modal test finds the bond length of synthetic data with
     measured_joint = "case"; with the joint of the scene as written it warns."""

@@ -48,6 +48,7 @@ def write_decay(path, text: str, noise: float = 0.0, seed: int = 0, amplitudes=A
     return path
 
 
+@pytest.mark.slow
 def test_band_of_the_fitted_curve_contains_the_truth_beyond_the_data(tmp_path):
     """The 95 % band of a curve that is fitted to noisy data contains the true curve at three times the amplitudes."""
     path = write_decay(tmp_path / "decay.csv", IWAN, 0.03, 5, np.geomspace(2e-7, 1e-5, 6))

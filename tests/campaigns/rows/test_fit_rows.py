@@ -296,7 +296,7 @@ def test_refuses_unsuitable_rows_options(tmp_path, words, message):
 
 
 def test_exact_fit_uses_reading_and_gains_of_scene(tmp_path):
-    """A fit uses the reading (rms) and the gains of the scene, and the seed determines its starts."""
+    """A fit uses the reading (rms) and the gains of the scene."""
     path = write_rows(tmp_path, make_linear_rows(scale=1.3 / np.sqrt(2), seen=0.8))
     scene = write_and_load(
         tmp_path,
@@ -306,9 +306,5 @@ def test_exact_fit_uses_reading_and_gains_of_scene(tmp_path):
         "measured.reading=rms",
         "measured.displacement_gain=0.8",
     )
-    one, two = (
-        fit_to_rows(scene, path, read_free_keys(*LINEAR_FREE), starts=1, seed=seed)
-        for seed in (0, 1)
-    )
-    assert one.keys.fit.values == pytest.approx([141.0, 0.03], rel=1e-4)
-    assert one.keys.fit.descent_rms != two.keys.fit.descent_rms
+    fit = fit_to_rows(scene, path, read_free_keys(*LINEAR_FREE), starts=1)
+    assert fit.keys.fit.values == pytest.approx([141.0, 0.03], rel=1e-4)

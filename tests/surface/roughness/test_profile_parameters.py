@@ -68,6 +68,7 @@ def test_exact_report_splits_waves_at_cutoff():
     assert report["Pq"].low is None and report["Pq"].reason == ""
 
 
+@pytest.mark.slow
 def test_always_intervals_hold_the_mean_of_a_rough_surface():
     """The 90 % interval of Rq from the sections of one trace contains its mean in at least 24 of 30 traces."""
     found = []
