@@ -148,27 +148,6 @@ def test_exact_units_and_node_names_give_same_structure(matrix_folder):
             np.testing.assert_allclose(*products, rtol=1e-8, atol=1e-12)
 
 
-def test_exact_base_moves_mass_of_x_direction_only(matrix_folder):
-    """With rows named by node and direction, the base moves only the mass along x.
-
-    A direction that a node lacks is refused.
-    """
-    text = (
-        SCENE.replace("k.mtx", "named.mtx")
-        .replace("both.npz", "mass.mtx", 1)
-        .replace("[16, 11]", '["16:y", "11:x"]')
-        .replace('damping = "both.npz"', "damping = 0.01")
-    )
-    (matrix_folder / "mass.mtx").write_text(
-        "\n".join(f"{i + 1},{1 + i % 2},{i + 1},{1 + i % 2},0.02" for i in range(COUNT))
-    )
-    model = pf.build(pf.load(write_scene(matrix_folder, text.replace("modes = 4", "modes = 14"))))
-    np.testing.assert_allclose((model.rig.modes.base**2).sum(), 8 * 0.02, rtol=1e-9)
-    (matrix_folder / "scene.toml").write_text(text.replace("11:x", "11:z"))
-    answer = run_cli("check", matrix_folder / "scene.toml")
-    assert answer.code == 2 and "the files have no 11:z; node 11 has x" in answer.err
-
-
 def write_scene(matrix_folder, text):
     """Write a scene into the folder and return its path."""
     (matrix_folder / "scene.toml").write_text(text)

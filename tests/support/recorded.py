@@ -61,8 +61,10 @@ MIN_WORDS = 4
 WORD = re.compile(r"[A-Za-z]{2,}")
 ERROR = re.compile(rf"± ?{NUMBER.pattern}")
 QUANTITY = re.compile(rf"({NUMBER.pattern})" + r"(?: ?([^\s,;:)]+))?")
-# Keys of scenes and names of measures have a dot or an underscore; names of laws and files are quoted.
-KEY = re.compile(r"[A-Za-z]\w*(?:\.[A-Za-z]\w*)+|[A-Za-z]+(?:_\w+)+|\"[^\"\n]*\"|'[^'\n]*'")
+# Keys of scenes and names of measures have a dot or an underscore; names of laws and files are quoted, as are quantities.
+KEY = re.compile(
+    r"[A-Za-z]\w*(?:\.[A-Za-z]\w*)+|[A-Za-z]+(?:_\w+)+|\"(?![-\d])[^\"\n]*\"|'[^'\n]*'"
+)
 UNITS = {unit for units in UNIT_FACTORS.values() for unit in units} | {"%"} - {"in"}
 UNSTABLE_KEYS = re.compile(
     r"seconds|versions|\bpatchfem$|version|sha256|\bdate\b|\bcreated\b|\.motions$|\.evaluations$"

@@ -1,17 +1,14 @@
 """The torture driver detects planted faults, so that a passing campaign means something."""
 
 import faulthandler
-import json
 import os
 import signal
 import sys
 import time
 
-import h5py
 import numpy as np
 import pytest
-from torture import driver, results
-from torture.trial import Trial, TrialFailure, capture, run_in_fork
+from torture.trial import Trial, capture, run_in_fork
 
 pytestmark = pytest.mark.skipif(not hasattr(os, "fork"), reason="a trial is a forked process")
 
@@ -104,57 +101,3 @@ def test_always_stdout_and_stderr_are_captured(tmp_path):
         return 3
 
     assert capture(command, []) == (3, "from Python\n", "from C\n")
-
-
-def write_summary(folder, **changes):
-    """Write the summary.json of a run with some changed entries and return the folder."""
-    folder.mkdir(exist_ok=True)
-    content = {
-        "outcome": "steady",
-        "warnings": [],
-        "measures": {"energy_balance": {"value": 1e-12}},
-    } | changes
-    (folder / "summary.json").write_text(json.dumps(content))
-    return folder
-
-
-@pytest.mark.parametrize(
-    "changes, expected",
-    [
-        ({"measures": {"energy_balance": {"value": 1e-3}}}, "steady with an energy balance"),
-        ({"measures": {"loop_area": {"value": float("nan")}}}, "NaN in JSON"),
-        ({"measures": {"loop_area": {"value": None}}}, "without a reason"),
-        ({"outcome": "not_converged"}, "without a warning"),
-    ],
-)
-def test_refuses_inconsistent_summary(tmp_path, changes, expected):
-    """A summary that contradicts itself or contains NaN is refused with a message that says why."""
-    assert results.check_results(write_summary(tmp_path / "good"))["outcome"] == "steady"
-    with pytest.raises(TrialFailure, match=expected):
-        results.check_results(write_summary(tmp_path / "bad", **changes))
-
-
-def test_refuses_nan_in_result_file(tmp_path):
-    """A result file with NaN is refused, and the message names the variable."""
-    for name, values in (("good", [1.0, 2.0]), ("bad", [1.0, np.nan])):
-        with h5py.File(write_summary(tmp_path / name) / "result.nc", "w") as file:
-            file.create_group("deep")["x"] = values
-    results.check_results(tmp_path / "good")
-    with pytest.raises(TrialFailure, match="deep/x holds 1 of 2 values"):
-        results.check_results(tmp_path / "bad")
-
-
-def test_refuses_leftover_files(tmp_path):
-    """A partial results folder that remains after a run is refused."""
-    (tmp_path / "out.partial").mkdir()
-    with pytest.raises(TrialFailure, match=r"out\.partial"):
-        results.check_no_remnants(tmp_path)
-
-
-def test_always_random_numbers_of_trial_are_reproducible():
-    """The random numbers of a trial depend only on its campaign, seed and index, not on earlier
-    trials."""
-    trials = [("grammar", 5, 0), ("grammar", 5, 1), ("grammar", 6, 0), ("scenes", 5, 0)]
-    first = [driver.make_generator(*trial).random() for trial in trials]
-    assert len(set(first)) == 4
-    assert [driver.make_generator(*trial).random() for trial in reversed(trials)] == first[::-1]

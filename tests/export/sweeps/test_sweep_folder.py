@@ -12,7 +12,6 @@ from computed_cases import ComputedCases
 from scene_texts import COULOMB, POINT, SHORT
 
 from patchfem.export import store
-from patchfem.export.charts.sweeps import list_measures
 
 RIG = POINT + COULOMB + SHORT
 OVER = ("--over", "drive.acceleration=1 g..5 g:10", "--over", "normal.load=10 N..200 N:10,-1 N")
@@ -135,22 +134,3 @@ def test_exact_files_of_cases_follow_keep(scene_file, tmp_path):
         assert summary.case == {"friction.static": "0.1"}
         message = store.read_summary(folder / "cases" / failed["case"]).message
         assert message == failed["message"] and "friction.static" in message
-
-
-def test_pages_name_cases_by_keys_and_begin_with_the_headline(scene_file, tmp_path):
-    """A page of several cases names them by their keys; the menu of a sweep begins with the measure of its headline.
-
-    The second key is needed, because the page of one key draws all main measures at once.
-    """
-    over = ("--over", "friction.static=0.1,0.2", "--over", "drive.acceleration=4 g,5 g")
-    folder = tmp_path / "swept"
-    run_cli("sweep", scene_file, *over, "-o", folder, "--keep", "results")
-    page = tmp_path / "both.html"
-    cases = [folder / "cases" / row["case"] for row in read_rows(folder)[:2]]
-    assert run_cli("report", *cases, "-o", page).code == 0
-    text = page.read_text("utf-8")
-    assert "static 0.1, acceleration 4 g" in text and "static 0.1, acceleration 5 g" in text
-
-    answer = store.read(folder)
-    first = list_measures({"": answer})[0]
-    assert answer.verdict[0].lower().startswith(first.replace("_", " "))

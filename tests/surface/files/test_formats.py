@@ -4,8 +4,6 @@ import gzip
 import re
 import sys
 import types
-import zipfile
-from importlib.util import find_spec
 
 import numpy as np
 import pytest
@@ -145,17 +143,6 @@ def test_refuses_faulty_file(tmp_path, data, name, units, message):
     """A faulty file is refused with a message that states the fault."""
     with pytest.raises(PatchfemError, match=message):
         read_bytes(tmp_path, data, name, units)
-
-
-@pytest.mark.skipif(
-    find_spec("SurfaceTopography") is not None, reason="the extra `profiles` is installed"
-)
-def test_refuses_zip_file_without_extra(tmp_path):
-    """A text in a zip file is refused with the advice to unpack it, and an X3P file with the extra to install."""
-    with zipfile.ZipFile(tmp_path / "a.zip", "w") as archive:
-        archive.writestr("a.csv", "x [um],z [um]\n0,1\n5,2\n")
-    with pytest.raises(PatchfemError, match=r"unpack it if it contains a text; X3P .*\[profiles\]"):
-        read_surface(tmp_path / "a.zip")
 
 
 @pytest.mark.parametrize(
