@@ -12,6 +12,7 @@ import xarray as xr
 from command_line import run_cli
 from scene_runs import assert_agree, find_sentences
 from scipy.io import loadmat
+from yielding_points import solve_after_each_yield
 
 import patchfem as pf
 from patchfem.runs.patch import faces
@@ -112,57 +113,23 @@ def chain_result():
     return pf.run(CHAIN)
 
 
-def compute_yield_sequence(giving, limit) -> tuple:
-    """Return the stiffness and the yield displacement of each slip event under a rising
-    displacement.
-
-    `giving` is the compliance (m, m) [m/N] of the nodes and `limit` their friction limits (m,) [N].
-    Stuck nodes carry forces t with giving t = q minus the displacement by slipping nodes; the nodes
-    slip one after the other.
-    """
-    sticks = np.ones(limit.size, bool)
-    displacements = [0.0]
-    forces = [0.0]
-    while sticks.any():
-        coefficients = np.linalg.solve(
-            giving[np.ix_(sticks, sticks)],
-            np.stack(
-                [np.ones(sticks.sum()), giving[np.ix_(sticks, ~sticks)] @ limit[~sticks]], axis=1
-            ),
-        )
-        # Displacement at which each stuck node reaches its friction limit.
-        yield_displacements = (limit[sticks] + coefficients[:, 1]) / coefficients[:, 0]
-        displacements.append(yield_displacements.min())
-        forces.append(
-            float(
-                (coefficients[:, 0] * yield_displacements.min() - coefficients[:, 1]).sum()
-                + limit[~sticks].sum()
-            )
-        )
-        sticks[
-            np.flatnonzero(sticks)[yield_displacements <= yield_displacements.min() * (1 + 1e-9)]
-        ] = False
-    slope = np.diff(forces) / np.diff(displacements)
-    return slope - np.append(slope[1:], 0.0), np.array(displacements[1:])
-
-
 def integrate_chain(model, cycles: int, steps: int) -> tuple:
     """Return the displacement of mass 1 [m] and the friction work [J] after some cycles of CHAIN,
     by leapfrog steps.
 
     The patches are nodes that slip one after the other.
     """
-    yield_sequences = []
+    # Stiffness and yield displacement of the parallel elements of each patch
+    elements = []
     for interface in model.rig.friction.interfaces:
         patch = faces.solve_contact_on_meshes(interface, model.accuracy.tolerance)[0]
         in_contact = patch.active
         load = patch.pressure.sigma_n * patch.pieces.interface.weight
-        yield_sequences.append(
-            compute_yield_sequence(
-                patch.slip_compliance[np.ix_(in_contact, in_contact)],
-                interface.numbers.static * load[in_contact],
-            )
+        slides, rates = solve_after_each_yield(
+            patch.slip_compliance[np.ix_(in_contact, in_contact)],
+            interface.numbers.static * load[in_contact],
         )
+        elements.append((-np.diff(rates.sum(axis=1), append=0.0), slides))
     rows = np.array([[1.0, 0.0], [-1.0, 1.0]])
     omega = 2 * np.pi * 240
     peak = 8 * 9.80665
@@ -170,7 +137,7 @@ def integrate_chain(model, cycles: int, steps: int) -> tuple:
     displacement = np.zeros(2)
     velocity = np.zeros(2)
     work = 0.0
-    element_forces = [np.zeros(k.size) for k, _ in yield_sequences]
+    element_forces = [np.zeros(k.size) for k, _ in elements]
     total = np.zeros(2)
     for n in range(cycles * steps):
         previous = total
@@ -190,7 +157,7 @@ def integrate_chain(model, cycles: int, steps: int) -> tuple:
         displacement = displacement + h * velocity
         increments = rows @ velocity * h
         total = np.zeros(2)
-        for k, (stiffness, limits) in enumerate(yield_sequences):
+        for k, (stiffness, limits) in enumerate(elements):
             element_forces[k] = np.clip(element_forces[k] + increments[k], -limits, limits)
             total[k] = stiffness @ element_forces[k]
         work += float((previous + total) / 2 @ increments)

@@ -14,18 +14,15 @@ import numpy as np
 import pytest
 import xarray as xr
 from command_line import run_cli
-from scene_runs import assert_agree, find_sentences, run_scene
 from scene_texts import (
     BENCH,
     COULOMB,
-    MODE,
     NONLOCAL,
     POINT,
     SHEAR,
     SLIDE,
     SMALL_PATCH,
     STRUCTURE,
-    SWEEP,
 )
 from vtkmodules.util.numpy_support import vtk_to_numpy
 from vtkmodules.vtkCommonDataModel import vtkCompositeDataSet
@@ -224,21 +221,6 @@ def test_exact_every_row_of_elements_carries_the_load(run_case, name):
             )
 
 
-# Results of two different ways that must agree.
-
-
-def test_exact_rigid_patch_agrees_with_point_contact():
-    """A rigid patch under constant load has the motion of a point contact, and a warning says so."""
-    patch, point = (
-        run_scene(text + NONLOCAL + STRUCTURE + STEPS, estimate=False)
-        for text in (SMALL_PATCH, POINT)
-    )
-    assert find_sentences(patch.warnings, "the shape of the patch does not affect")
-    assert_agree(
-        patch.measures, point.measures, "loop_area slip_amplitude friction_force_peak", 1e-10
-    )
-
-
 @pytest.mark.parametrize(
     "path", sorted(STUDIES.rglob("*.toml")), ids=lambda p: str(p.relative_to(STUDIES))
 )
@@ -266,20 +248,3 @@ def test_refuses_run_beyond_memory_limit_in_one_line(tmp_path):
     )
     assert process.returncode == 4 and process.stderr.count("\n") == 1, process.stderr
     assert "GB are free; free some memory" in process.stderr or "out of memory" in process.stderr
-
-
-# Progress.
-
-
-def test_always_long_run_reports_progress():
-    """A long sweep reports its progress on the way, in increasing fractions up to 1."""
-    fractions = []
-    changes = "accuracy.method=march; accuracy.steps_per_cycle=400"
-    run_scene(
-        POINT + NONLOCAL + MODE + SWEEP.replace('"120 Hz"', '"160 Hz"'),
-        changes,
-        progress=fractions.append,
-        estimate=False,
-    )
-    assert sum(0.2 < fraction < 0.9 for fraction in fractions) >= 1
-    assert fractions == sorted(fractions) and fractions[-1] <= 1.0
