@@ -6,14 +6,14 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from bond_moments import advance_bonds
-from friction_paths import LowerPressure, random_walk, reference_with_lift_off
+from friction_paths import random_walk
 from march_paths import OMEGA, follow_path, make_one_mode
 from modal_bases import make_modal_basis
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 from scipy.special import gammainc
 
-from patchfem.core import InitialState, Missing, Outcome, SineDrive
+from patchfem.core import InitialState, Missing, SineDrive
 from patchfem.friction import Bonds
 from patchfem.points import time_march as engine
 from patchfem.points.contacts import BondSum, make_bond_contact, make_pressed_contact
@@ -119,21 +119,6 @@ def test_exact_shear_modes_agree_with_nodal_deflections(step):
     assert last.bend == pytest.approx(compliance @ last.forces, abs=1e-9)
 
 
-@pytest.mark.share(1, 4, 7)
-@pytest.mark.parametrize(("reading", "order"), LAWS)
-def test_exact_points_on_rigid_bodies_equal_single_list(reading, order):
-    """Points on rigid bodies give the force of a single list of bonds within 2e-5 of the friction limit."""
-    law = Bonds(0.4, 1e-6, order, reading)
-    path = reversing_path(80)
-    expected = follow_path(make_lists(law, FORCE.sum()), path, 1e-3)
-    found = follow_path(make_lists(law, FORCE), path, 1e-3)
-    # Away from the position of the first bonds, which have a width where there are several lists.
-    compared = np.abs(path) > 1e-8
-    assert found.n_unsolved == 0
-    change = found.forces[compared, 0] - expected.forces[compared, 0]
-    assert np.abs(change).max() < 2e-5 * 0.4 * FORCE.sum()
-
-
 @pytest.mark.parametrize(
     ("order", "curve", "tolerance"),
     [
@@ -196,30 +181,6 @@ def test_always_sudden_slip_dissipates_energy():
     check_balance(found, path)
 
 
-@pytest.mark.parametrize("law", [Bonds(0.4, 2e-6), Bonds(0.4, 2e-6, 1.0, "report")])
-def test_exact_moving_pressure_agrees_with_sum_over_bonds(law):
-    """The forces under a pressure that is fixed to the lower piece agree with an explicit sum over the bonds.
-
-    For the recursion within 1e-9; for the reading "report" within the error of merging.
-    """
-    x = np.linspace(-30e-6, 30e-6, 61)
-    sigma = 1e6 * np.maximum(0.0, 0.3 + np.sin(x / 4e-6))
-    area = np.full(61, 1e-4 / 61)
-    bond_sum = BondSum(law, 40.0, 0.01) if law.reading == "report" else None
-    contact = make_bond_contact(law, area * 1e6, ROW, None, bond_sum, np.stack([x, sigma / 1e6]))
-    path = 6e-6 * np.sin(np.linspace(0, 7.0, 301))
-    found = follow_path(contact, path, 1e-3)
-    assert found.n_unsolved == 0
-    check_balance(found, path, 1e-9)
-    pressure = LowerPressure(x, sigma)
-    tolerance = 1e-9 if bond_sum is None else 1e-4
-    for k in (60, 151, 300):
-        tractions = reference_with_lift_off(law, path[: k + 1], pressure, 1e-3)
-        assert (tractions == 0).any()
-        force = 0.4 * area @ tractions
-        assert found.forces[k, 0] == pytest.approx(force, abs=tolerance * 0.4 * area @ sigma)
-
-
 # ---- motion
 
 
@@ -274,21 +235,6 @@ def test_order_two_against_integrated_rate_equations(growth):
     assert (reference.y[3].min() < 0.701 * length) == bool(growth)
     assert errors[0] > errors[1] > errors[2] and errors[2] < 1e-4
     assert np.log2(errors[0] / errors[2]) / 6 == pytest.approx(2, abs=0.15)
-
-
-def test_always_unresolved_pressure_waves_are_reported():
-    """Steps longer than the waves of the pressure end as NOT_CONVERGED or agree with short steps; short steps converge."""
-    x = np.linspace(-30e-6, 30e-6, 1201)
-    sigma = 1e6 * np.maximum(0.0, 0.3 + np.sin(x / 1e-6))
-    area = np.full(1201, 1e-4 / 1201)
-    contact = make_bond_contact(Bonds(0.4, 2e-6), area * 1e6, ROW, lower=np.stack([x, sigma / 1e6]))
-    drive = SineDrive(1.5 * 0.4 * area @ sigma, OMEGA)
-    coarse, fine = (
-        march(make_one_mode(OMEGA, 0.01, 1.0), drive, contact, 2, steps, window=2)
-        for steps in (12, 100)
-    )
-    assert coarse.outcome in (None, Outcome.NOT_CONVERGED)
-    assert fine.outcome is None and fine.message == ""
 
 
 @pytest.mark.parametrize("has_shear", [True, False])

@@ -2,14 +2,20 @@
 
 import numpy as np
 import pytest
-from friction_paths import reference_traction, triangle_path, upper_pressure
+from friction_paths import (
+    make_bond_sum,
+    make_points,
+    reference_traction,
+    triangle_path,
+    upper_pressure,
+)
 from march_paths import OMEGA, follow_path, make_one_mode
 from scene_texts import DRIVE, KILOGRAM
 
 from patchfem import build
 from patchfem.core import SineDrive
 from patchfem.friction import Bonds
-from patchfem.points.contacts import BondSum, make_bond_contact
+from patchfem.points.contacts import make_bond_contact
 from patchfem.points.time_march import march
 from patchfem.response import energy_balance
 from patchfem.runs import choose_numerics as settings_of
@@ -46,15 +52,7 @@ def load_rig_scene(tmp_path, engine="auto", reading="report", order=1, growth=""
     return scene.load(file)
 
 
-# ---- choice of the engine
-
-
 # ---- lists along a prescribed path
-
-
-def make_lists(law, force=1.0, reach=np.inf, merge=0.0):
-    """Return a point whose bonds are summed over a list."""
-    return make_bond_contact(law, force, np.ones(1), bond_sum=BondSum(law, reach, merge))
 
 
 def test_exact_printed_law_creates_energy_per_cycle():
@@ -66,7 +64,9 @@ def test_exact_printed_law_creates_energy_per_cycle():
     assert path[0] == path[-1] == 0
     for reading, expected in (("report", -3.9761e-4), ("stretch", 2.1858e-5)):
         law = Bonds(1.0, 1.0, 1.0, reading, initial=0.0)
-        forces, energies, n_unsolved, _ = follow_path(make_lists(law), path, 1.0)
+        forces, energies, n_unsolved, _ = follow_path(
+            make_points(law, upper_pressure([1.0]), 0.0), path, 1.0
+        )
         work = forces[:-1, 1] @ np.diff(path)
         assert n_unsolved == 0 and work / (4 * 0.01 * 20) == pytest.approx(expected, rel=1e-3)
         losses = energies[:-1, 0]
@@ -87,7 +87,7 @@ def test_exact_marched_list_agrees_with_hand_sum(reading, order):
     marched = march(
         make_one_mode(OMEGA, 0.01, 1.0),
         SineDrive(5 * 9.80665, OMEGA),
-        make_lists(law, 98.0665),
+        make_bond_contact(law, 98.0665, np.ones(1), bond_sum=make_bond_sum(law, 0.0)),
         2,
         100,
         window=2,

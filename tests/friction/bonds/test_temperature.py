@@ -18,7 +18,6 @@ rest_activation = "2500 K"
 slip_activation = "1500 K"
 """
 CONSTANT_SPEED = '[slide]\nkind = "constant"\nspeed = "5 mm/s"\ndistance = "60 um"\n'
-SUBSTRATE = 'substrate = "Ti-8Al-1Mo-1V"'
 
 
 @pytest.mark.parametrize(
