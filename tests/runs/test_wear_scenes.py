@@ -31,7 +31,7 @@ SOFT_RIG = (
     + SHEAR
     + NONLOCAL
     + MODE
-    + '[drive]\nkind = "base"\nfrequency = "143 Hz"\nacceleration = "5 g"\ncycles = 100\n'
+    + '[drive]\nkind = "base"\nfrequency = "143 Hz"\nacceleration = "5 g"\ncycles = 12\n'
 )
 LONG_WEAR = WEAR.replace("135723", "1e9").replace("1e-14", "1e-13")
 WORN_THROUGH_SCENE = (
@@ -60,18 +60,17 @@ def test_exact_worn_volume_is_coefficient_times_load_times_path():
 
 
 def test_static_measures_after_wear_are_those_of_the_worn_patch():
-    """After wear the pressure peak is that of the worn field within 1 %, with pieces that are rigid and elastic in shear.
+    """After wear the pressure peak is that of the worn field within 1 %, with pieces that are elastic in shear.
 
     With [contact.shear] a bench stated the peak of the unworn patch, which is 2.7 times as high.
     """
     free = TILTED.replace('element_size = "0.5 mm"\n', "")
-    for scene in (free, free + SHEAR):
-        result = run_text(scene + COULOMB + SINE + WEAR + LARGE_TOLERANCE)
-        largest = result.fields["normal_stress"][-1].max()
-        assert result.measures["pressure_peak"].value == pytest.approx(largest, rel=1e-2)
-        x = result.patch.x
-        loaded = np.ptp(x[result.fields["normal_stress"][-1] > 0]) / np.ptp(x)
-        assert result.measures["contact_fraction"].value == pytest.approx(loaded, rel=5e-2)
+    result = run_text(free + SHEAR + COULOMB + SINE + WEAR + "jumps = 6\n" + LARGE_TOLERANCE)
+    largest = result.fields["normal_stress"][-1].max()
+    assert result.measures["pressure_peak"].value == pytest.approx(largest, rel=1e-2)
+    x = result.patch.x
+    loaded = np.ptp(x[result.fields["normal_stress"][-1] > 0]) / np.ptp(x)
+    assert result.measures["contact_fraction"].value == pytest.approx(loaded, rel=5e-2)
 
 
 @pytest.mark.parametrize("motion", [SINE, STRUCTURE], ids=["bench", "rig"])
@@ -85,7 +84,7 @@ def test_exact_point_contact_wear_agrees_with_archard(motion):
     assert "worn_depth_max" not in result.measures
 
 
-@pytest.mark.share(0, 3)
+@pytest.mark.share(2, 3)
 @pytest.mark.parametrize(
     "table",
     [
@@ -138,7 +137,7 @@ def test_exact_non_periodic_slide_counts_as_one_wear_cycle(slide, path):
         SOFT_RIG + WEAR + "jumps = 2\n" + LARGE_TOLERANCE,
         TILTED + COULOMB + SINE + WEAR,
         SOFT_RIG + WEAR + LARGE_TOLERANCE,
-        WORN_THROUGH_SCENE + "jumps = 40\n",
+        WORN_THROUGH_SCENE + "jumps = 12\n",
     ],
     ids=["bench_jumps", "rig_jumps", "bench", "rig", "worn_through"],
 )
@@ -177,7 +176,7 @@ def test_exact_resumed_wear_run_writes_identical_files(tmp_path, monkeypatch, te
 
 def test_exact_worn_through_coating_ends_run():
     """A run ends when the coating of the piece that wears more is worn through: the volume is that of the cycles so far."""
-    result = run_text(WORN_THROUGH_SCENE + "upper_share = 0.2\njumps = 40\n")
+    result = run_text(WORN_THROUGH_SCENE + "upper_share = 0.2\njumps = 12\n")
     cycle, volume, depth = (
         result.measures[name].value
         for name in ("worn_through_cycle", "worn_volume", "worn_depth_max")
@@ -191,7 +190,7 @@ def test_exact_worn_through_coating_ends_run():
     error = result.measures["worn_through_cycle"].error
     for offset in (-error, error):
         text = WORN_THROUGH_SCENE.replace("1e9", repr(cycle + offset))
-        outcome = run_text(text + "upper_share = 0.2\njumps = 40\n").outcome
+        outcome = run_text(text + "upper_share = 0.2\njumps = 12\n").outcome
         assert (outcome == "worn_through") == (offset > 0)
 
 
@@ -199,7 +198,7 @@ def test_refuses_to_resume_run_of_other_scene(tmp_path, monkeypatch):
     """An interrupted wear run is resumed only by the same scene."""
     scene = tmp_path / "worn.toml"
     save = evolve.save_wear_state
-    scene.write_text(TILTED + COULOMB + SINE + WEAR)
+    scene.write_text(TILTED + COULOMB + SINE + WEAR + "jumps = 2\n")
 
     def save_and_interrupt(*arguments):
         save(*arguments)
