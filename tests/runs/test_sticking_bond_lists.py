@@ -106,6 +106,8 @@ def test_refuses_stuck_block_with_too_long_bond_list(monkeypatch):
     """A run whose list of bonds would take too long is stopped early, with an estimate of its time and the key to lower."""
     scene = load(RIG.format(reading="report", push=5.739).replace("cycles = 6", "cycles = 60"))
     monkeypatch.setattr(engine, "MAX_LIST_SECONDS", 0.6)
-    pattern = r"computing time of about (\d+) s, more than the limit of 1 s; lower the number of cycles"
+    pattern = (
+        r"computing time of about (\d+) s, more than the limit of 1 s; lower the number of cycles"
+    )
     with pytest.raises(Missing, match=pattern):
         run(scene, estimate=False)
