@@ -64,7 +64,7 @@ def read_outcome(path: Path) -> str:
 def count_outcomes(name: str, count: int) -> Counter:
     """Return the numbers of outcomes of randomly damaged copies of one file."""
     file, seed, make_file = SEEDS[name]
-    trial = Trial(np.random.default_rng([81, len(seed)]), None, None, None)
+    trial = Trial(np.random.default_rng([81, len(seed)]))
     outcomes = Counter()
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / file
