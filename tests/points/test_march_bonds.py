@@ -1,6 +1,5 @@
 """Points of bonds in the march: the recursion, lists of any order and reading, and shear of the pieces."""
 
-from itertools import pairwise
 from types import SimpleNamespace
 
 import numpy as np
@@ -8,19 +7,17 @@ import pytest
 from bond_moments import advance_bonds
 from friction_paths import random_walk
 from march_paths import OMEGA, follow_path, make_one_mode
-from modal_bases import make_modal_basis
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 from scipy.special import gammainc
 
-from patchfem.core import InitialState, Missing, SineDrive
+from patchfem.core import Missing, SineDrive
 from patchfem.friction import Bonds
 from patchfem.points import time_march as engine
-from patchfem.points.contacts import BondSum, make_bond_contact, make_pressed_contact
+from patchfem.points.contacts import BondSum, make_bond_contact
 from patchfem.points.time_march import march
 from patchfem.response import energy_balance
 from patchfem.slip.shear_modes import shear_modes
-from patchfem.structure import drives
 
 ROW = np.ones(1)
 FORCE = np.array([0.7, 1.3, 2.0, 0.4]) / 0.4  # normal forces of four points [N]
@@ -237,32 +234,6 @@ def test_order_two_against_integrated_rate_equations(growth):
     assert np.log2(errors[0] / errors[2]) / 6 == pytest.approx(2, abs=0.15)
 
 
-@pytest.mark.parametrize("has_shear", [True, False])
-def test_always_energy_falls_in_free_decay(has_shear):
-    """In a free decay of six modes the energy never rises, and its loss equals the dissipation within 1e-8.
-
-    The period of the fastest mode is shorter than a step.
-    """
-    law = Bonds(0.4, 2e-6)
-    compliance, x = make_compliance(40, 1e-8)
-    force = 98.1e4 * (1 + 1.6 * x) * 1e-4 / 40
-    modes = shear_modes(compliance, law.static * force, law.length, 10) if has_shear else None
-    omega = OMEGA * np.array([1.0, 1.7, 3.1, 5.3, 8.9, 14.2])
-    slide = np.array([1.0, -0.6, 0.5, 0.4, -0.3, 0.2])
-    basis = make_modal_basis(omega, 0.0, slide)
-    start = InitialState(1e-4 * np.array([1.0, -0.3, 0.1, 0.02, -0.01, 0.005]), np.zeros(6))
-    contact = make_bond_contact(law, force, slide, modes)
-    result = march(basis, drives.make_release(1 / 143), contact, 15, 7, window=15, start=start)
-    response = result.response
-    _, stored, dissipated, created = response.extra["ledger"]
-    squares = response.modal_rate**2 + (omega * response.modal) ** 2
-    energy = 0.5 * basis.mass * np.sum(squares, axis=1) + stored
-    assert result.outcome is None and created[-1] == 0.0
-    assert np.diff(energy).max() <= 1e-8 * energy[0]
-    assert energy[0] - energy[-1] == pytest.approx(dissipated[-1], rel=1e-8)
-    assert energy[-1] < 0.5 * energy[0]
-
-
 # ---- lists that grow
 
 GROWING_LISTS = {
@@ -301,33 +272,3 @@ def test_refuses_list_longer_than_limit(monkeypatch):
         Missing, match=r"grew beyond 100 entries \(0 MB\) after step \d+; raise accuracy.tail"
     ):
         march_list(GROWING_LISTS["stretch"], 40, monkeypatch)
-
-
-@pytest.mark.share(0)
-@pytest.mark.parametrize(("order", "grows"), [(0.0, False), (1.0, False), (0.5, True)])
-def test_order_lists_under_prescribed_load(order, grows):
-    """Under a load that falls to zero and rises again the energy balances, and the force converges with the step."""
-    growth = (
-        {"ratio": 0.8, "rest_growth": 0.1, "slip_growth": 3e-7, "rest_speed": 1e-3} if grows else {}
-    )
-    law = Bonds(0.3, 2e-6, order, "report", initial=0.5 if order > 0 else 0.0, **growth)
-
-    def find_load(t):
-        return np.maximum(60 + 70 * np.cos(2 * np.pi * 90 * np.asarray(t)), 0.0)
-
-    basis = make_modal_basis([OMEGA], 0.02)
-    slides = []
-    for steps in (200, 400, 800, 1600):
-        contact = make_pressed_contact(
-            law, 130.0, ROW, bond_sum=BondSum(law, 30.0, 0.01), load=find_load
-        )
-        result = march(basis, SineDrive(30.0, OMEGA), contact, 2, steps, window=2)
-        ledger = result.ledger
-        gap = ledger["work_in"] - ledger["viscous"] - ledger["friction"] - ledger["stored"]
-        assert abs(gap) < 1e-9 * ledger["power"]
-        assert (result.response.extra["normal_load"] == 0).sum() > 50
-        slides.append(result.window.slide[:: steps // 200])
-    changes = [np.abs(b - a).max() for a, b in pairwise(slides)]
-    # Bonds of order 0 have no stiffness, like Coulomb's law, so that the order is not two.
-    assert changes[2] < 1e-3 * np.abs(slides[-1]).max()
-    assert order == 0 or changes[2] < changes[0] / 3
