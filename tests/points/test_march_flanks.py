@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from march_paths import follow_path
 from modal_bases import make_modal_basis
+from scene_texts import BLOCK, SHEAR, STRUCTURE, TRIANGLE, make_friction_table
 
 import patchfem as pf
 from patchfem import load
@@ -163,29 +164,15 @@ def test_exact_energy_balance_with_shear_modes(law):
 def test_exact_tractions_of_scene_sum_to_friction_force(law):
     """In a bench and in a rig the integral of the shear stress over the area is the friction force,
     including the force of the grooves, within 1e-6."""
-    text = f"""
-[contact]
-length = "12.7 mm"
-width = "12.7 mm"
-height = "6 mm"
-load = "115.65 N"
-substrate = "Ti-8Al-1Mo-1V"
-element_size = "1 mm"
-grooves = {{wavelength = "80 um", amplitude = "7.5 um"}}
-[contact.shear]
-[friction]
-law = "{law}"
-static = 0.4
-bond_length = "1 um"
-[accuracy]
-steps_per_cycle = 100
-"""
-    slide = '[slide]\nkind = "triangle"\namplitude = "15 um"\nspeed = "1 mm/s"\ncycles = 2\n'
-    rig = (
-        '[structure]\nmoving_mass = "1.2 kg"\n[[structure.mode]]\nname = "axial"\nfrequency = "143 Hz"\n'
-        'damping = 0.003\nslide = 1.0\n[drive]\nkind = "base"\nfrequency = "143 Hz"\nacceleration = "5 g"\ncycles = 5\n'
+    text = (
+        BLOCK
+        + 'element_size = "1 mm"\ngrooves = {wavelength = "80 um", amplitude = "7.5 um"}\n'
+        + SHEAR
+        + make_friction_table(law)
+        + "[accuracy]\nsteps_per_cycle = 100\n"
     )
-    for motion in (slide, rig):
+    rig = STRUCTURE.replace("cycles = 30", "cycles = 5")
+    for motion in (TRIANGLE.replace("10 um", "15 um"), rig):
         result = pf.run(load(text + motion))
         area = result.patch.pieces.interface.weight
         tau = result.fields["shear_stress"]

@@ -37,9 +37,6 @@ def fourier_coefficients(time, slide, force):
     )
 
 
-# stiffness and damping
-
-
 def simulate_jenkins_loop(amplitude, length, steps):
     """Return time, slide, rate and force of the second of two cycles of a Jenkins element."""
     time, phase = evenly(2, steps)
@@ -73,12 +70,6 @@ def test_exact_jenkins_loop_agrees_with_closed_form(amplitude, length):
     assert found["equivalent_damping"] == pytest.approx(
         float(area) / (2 * pi * 0.5 * amplitude**2), rel=1e-6, abs=1e-12
     )
-
-
-# drift
-
-
-# scenes
 
 
 def sample_slide_densely(done, begin: float, samples: int = 20_000) -> np.ndarray:

@@ -47,11 +47,6 @@ def test_exact_short_runs_are_classified():
     assert settling.classify(5 - 0.5 * np.arange(6), 1e-3) is Outcome.TRANSIENT
 
 
-# free motion that is left
-
-
-# scenes
-
 BEATING = """\
 [normal]
 load = "11.609394870916159 N"

@@ -24,18 +24,12 @@ rest_speed = "1 um/s"
 DWELL = '[slide]\nkind = "dwell"\nspeed = "1 mm/s"\ndistance = "40 um"\nhold = "0.3 s"\ndistance_after = "20 um"\n'
 
 
-def bond_lengths_at_rest(hold):
-    """Return the bond lengths at the start and at the end of a rest, by equation 2.10 of the report
-    for v = 0: eps_0 - (eps_0 - eps) exp(-a_s t/v_h)."""
+def breakaway_ratios(hold):
+    """Return the largest and the last F/(mu_s N) of the 20 um after a rest, from an integration of
+    dz/dx = 1 - z/eps with the bond length eps by equation 2.10: at rest eps_0 - (eps_0 - eps) exp(-a_s t/v_h)."""
     sliding_length = steady_bond_length(SPEED, LENGTH, RATIO, A_S, L_K)
-    return sliding_length, LENGTH - (LENGTH - sliding_length) * np.exp(-A_S * hold / FLOOR)
-
-
-def friction_after_rest(hold, x):
-    """Return F/(mu_s N) at x [m] after a rest, from an integration of dz/dx = 1 - z/eps with the
-    bond length eps by equation 2.10."""
-    sliding_length, start = bond_lengths_at_rest(hold)
-    rate = A_S / SPEED**2 + 1 / (L_K)
+    start = LENGTH - (LENGTH - sliding_length) * np.exp(-A_S * hold / FLOOR)
+    rate = A_S / SPEED**2 + 1 / L_K
     solution = solve_ivp(
         lambda y, z: 1 - z / (sliding_length + (start - sliding_length) * np.exp(-rate * y)),
         (0, 20e-6),
@@ -44,15 +38,8 @@ def friction_after_rest(hold, x):
         rtol=1e-12,
         atol=1e-18,
         max_step=1e-7,
-        dense_output=True,
     )
-    return solution.sol(np.clip(x, 0, None))[0] / (LENGTH)
-
-
-def breakaway_ratios(hold):
-    """Return the largest and the last F/(mu_s N) of the 20 um after a rest."""
-    curve = friction_after_rest(hold, np.linspace(0, 20e-6, 100_001))
-    return curve.max(), curve[-1]
+    return solution.y[0].max() / LENGTH, solution.y[0, -1] / LENGTH
 
 
 @pytest.fixture
@@ -66,12 +53,6 @@ def write_path_scene(tmp_path):
         return load(scene, sets)
 
     return write_table
-
-
-# ---- the dwell
-
-
-# ---- the table
 
 
 HEAD = "time [s],displacement [um]\n"

@@ -1,4 +1,4 @@
-"""Runs of a friction law in every kind of scene: bench, rig, two masses, steady motion, fit."""
+"""Runs of a friction law in every kind of scene: bench, rig, release, fit."""
 
 import csv
 
@@ -15,22 +15,6 @@ from patchfem.scene import load, loads
 LOAD = 100.0  # Normal load of every interface [N].
 POINT = '[normal]\nload = "100 N"\n'
 SINE = '[slide]\nkind = "sine"\namplitude = "10 um"\nfrequency = "100 Hz"\ncycles = 2\n'
-MASSES = """\
-[structure]
-masses = ["0.884 kg", "0.884 kg"]
-[[structure.spring]]
-between = [1, 0]
-stiffness = "713 N/mm"
-[[structure.spring]]
-between = [2, 0]
-stiffness = "713 N/mm"
-[[structure.damper]]
-between = [1, 0]
-coefficient = "{damper} N s/m"
-[[structure.damper]]
-between = [2, 0]
-coefficient = "{damper} N s/m"
-"""
 
 
 def friction_table(law: str) -> str:
@@ -77,17 +61,6 @@ def run_release(law: str, *sets):
             sets=sets,
         )
     ).response
-
-
-def run_two_masses(law: str, interfaces: int, *sets, cycles: int = 20, steps: int = 100):
-    """Return the Result of two equal masses, one or both of them on an interface with the law."""
-    faces = "".join(
-        f'[[structure.interface]]\nbetween = [{k}, 0]\nload = "100 N"\n{law}'
-        for k in range(1, interfaces + 1)
-    )
-    drive = DRIVE.replace("cycles = 30", f"cycles = {cycles}")
-    text = MASSES.format(damper=32) + faces + drive + f"[accuracy]\nsteps_per_cycle = {steps}\n"
-    return run(loads(text, sets=sets), estimate=False)
 
 
 def fit_law(folder, law: str, loop: tuple, free: str):

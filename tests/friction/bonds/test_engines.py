@@ -3,21 +3,15 @@
 import numpy as np
 import pytest
 from friction_paths import (
-    make_bond_sum,
     make_points,
-    reference_traction,
     triangle_path,
     upper_pressure,
 )
-from march_paths import OMEGA, follow_path, make_one_mode
+from march_paths import follow_path
 from scene_texts import DRIVE, KILOGRAM
 
 from patchfem import build
-from patchfem.core import SineDrive
 from patchfem.friction import Bonds
-from patchfem.points.contacts import make_bond_contact
-from patchfem.points.time_march import march
-from patchfem.response import energy_balance
 from patchfem.runs import choose_numerics as settings_of
 from patchfem.runs.rig.bond_lists import choose_bond_summation
 from patchfem.runs.rig.interface import make_contact
@@ -74,35 +68,6 @@ def test_exact_printed_law_creates_energy_per_cycle():
         created = -losses[losses < 0].sum()
         assert (created > 1e-4) == (reading == "report")
         assert (created < 1e-15) == (reading == "stretch")
-
-
-# ---- marches
-
-
-@pytest.mark.parametrize("reading, order", [("report", 2.0), ("stretch", 0.5)])
-def test_exact_marched_list_agrees_with_hand_sum(reading, order):
-    """A sum by hand along the marched relative displacement gives the marched forces, and the energy balance closes."""
-    law = Bonds(0.4, 2e-6, order, reading, initial=0.0)
-    limit = 0.4 * 98.0665
-    marched = march(
-        make_one_mode(OMEGA, 0.01, 1.0),
-        SineDrive(5 * 9.80665, OMEGA),
-        make_bond_contact(law, 98.0665, np.ones(1), bond_sum=make_bond_sum(law, 0.0)),
-        2,
-        100,
-        window=2,
-    )
-    slide = marched.window.slide
-    for k in (20, 60, 110, 160, 200):
-        expected = reference_traction(law, slide[: k + 1], upper_pressure([limit]))[0]
-        assert marched.window.force[k] == pytest.approx(expected, abs=1e-3 * limit)
-    ledger = marched.ledger
-    assert marched.outcome is None and np.ptp(marched.window.slide) > 5e-6
-    assert energy_balance(ledger) <= 1e-8
-    assert ledger["friction"] == pytest.approx(ledger["dissipated"] - ledger["created"], rel=1e-9)
-
-
-# ---- scene key
 
 
 def test_exact_scene_key_selects_engine(tmp_path):

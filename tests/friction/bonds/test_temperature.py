@@ -37,22 +37,6 @@ def test_exact_growth_rates_of_warm_surface(surface, expected):
     )
 
 
-@pytest.mark.parametrize(
-    "surface, reference",
-    [(0.0, 300.0), (300.0, 0.0), (np.nan, 300.0), ([300.0, 0.0], 300.0)],
-)
-def test_refuses_temperature_not_above_zero_kelvin(surface, reference):
-    """A surface or reference temperature of 0 K, below 0 K or NaN is refused."""
-    with pytest.raises(PatchfemError, match="above 0 K"):
-        growth_at_temperature(1.0, 1e-6, surface, reference, 2500.0, 1500.0)
-
-
-# ---- temperature of each point
-
-
-# ---- scenes
-
-
 def test_exact_surface_at_reference_temperature_has_no_effect():
     """A surface at its reference temperature gives the results of a scene without the temperature table."""
     text = POINT + GROWING

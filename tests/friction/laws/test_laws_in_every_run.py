@@ -1,4 +1,4 @@
-"""Each law in each engine: time integration against harmonic balance, two equal interfaces, and the fit to a loop."""
+"""Each law in each engine: time integration against harmonic balance, a release, and the fit to a loop."""
 
 import numpy as np
 import pytest
@@ -7,7 +7,6 @@ from law_runs import (
     run_bench_along_path,
     run_release,
     run_rig,
-    run_two_masses,
     shrinking_sine,
 )
 from scene_texts import DRIVE, MODE, get_only_mistake
@@ -66,19 +65,6 @@ def test_exact_released_bonds_agree_in_both_engines(extra_keys):
     for name in ("slide", "slip"):
         interpolated = CubicSpline(marched.time, getattr(marched, name))(hybrid.time)
         assert getattr(hybrid, name) == pytest.approx(interpolated, abs=5e-9), name
-
-
-@pytest.mark.share(0)
-@pytest.mark.parametrize(
-    "law", [IWAN, BOUC_WEN.format(2.0, 0.7), DAMPED], ids=["iwan", "bouc-wen", "lugre"]
-)
-def test_exact_two_equal_interfaces_move_equally(law):
-    """Two equal interfaces have the relative displacement of a single interface."""
-    two_masses = run_two_masses(law, 2)
-    slides = two_masses.response.extra["slides"]
-    single_slide = run_two_masses(law, 1).response.slide
-    assert slides[:, 0] == pytest.approx(slides[:, 1], abs=1e-12 * np.abs(slides).max())
-    assert slides[:, 0] == pytest.approx(single_slide, abs=1e-7 * np.abs(single_slide).max())
 
 
 @pytest.mark.parametrize(

@@ -46,9 +46,7 @@ def run_trial(trial: Trial) -> None:
 
 def make_pickle(trial: Trial) -> list:
     """Make a pickle with any suffix that a command reads."""
-    name = trial.draw(
-        "x.npy", "x.npz", "x.mat", "x.csv", "x.uff", "x.sdf", "x.x3p", "x.plu", "x.toml", "x.npy"
-    )
+    name = trial.draw(*"x.npy x.npz x.mat x.csv x.uff x.sdf x.x3p x.plu x.toml x.npy".split())
     if name.endswith(".npy") and trial.chance(0.5):
         np.save(name, np.array([MaliciousPickle()], object), allow_pickle=True)
     elif name.endswith(".npz") and trial.chance(0.5):
@@ -141,9 +139,7 @@ def make_xml_bomb(trial: Trial) -> list:
 
 def make_blocking_file(trial: Trial) -> list:
     """Make a pipe without a writer, an endless device, a folder, or a circular link."""
-    name = "x" + trial.draw(
-        ".toml", ".csv", ".npy", ".npz", ".mat", ".uff", ".msh", ".vtu", ".inp", ".x3p"
-    )
+    name = "x" + trial.draw(*".toml .csv .npy .npz .mat .uff .msh .vtu .inp .x3p".split())
     form = trial.draw("pipe", "zero", "folder", "circle", "random")
     if form == "pipe":
         os.mkfifo(name)
@@ -156,9 +152,7 @@ def make_blocking_file(trial: Trial) -> list:
 
 def make_huge_file(trial: Trial) -> list:
     """Make a file with one line, number or name of megabytes, or a sparse file of gigabytes."""
-    name = "x" + trial.draw(
-        ".toml", ".csv", ".inp", ".med", ".msh", ".uff", ".csv", ".npy", ".mat", ".sdf"
-    )
+    name = "x" + trial.draw(*".toml .csv .inp .med .msh .uff .csv .npy .mat .sdf".split())
     form = trial.draw("line", "number", "quote", "hole", "commas", "lines")
     if form == "hole":
         with open(name, "wb") as file:

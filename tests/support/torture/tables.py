@@ -95,21 +95,7 @@ def make_damaged_csv(trial: Trial, kind: str) -> tuple:
     head = HEADS[kind]
     is_invalid = False
     damage = trial.draw(
-        "whole",
-        "cell",
-        "cell",
-        "word",
-        "unit",
-        "empty",
-        "headless",
-        "back",
-        "short",
-        "long",
-        "order",
-        "damage",
-        "damage",
-        "comma",
-        "huge",
+        *"whole cell cell word unit empty headless back short long order damage damage comma huge".split()
     )
     row = int(trial.r.integers(len(rows)))
     if damage == "cell":
