@@ -212,26 +212,10 @@ def try_outputs(trial: Trial) -> list:
     os.symlink("nowhere", "dangling")
     Path("file").write_text("mine")
     make_device("null", 3)
-    target = trial.draw(
-        "mine",
-        "link",
-        "dangling",
-        "file",
-        "/",
-        ".",
-        "..",
-        "",
-        "mine/..",
-        "file/x",
-        "x" * 300,
-        "a/" * 900,
-        "null",
-        "/proc/self",
-        "a\nb",
-        " ",
-        "~",
-        "mine/thesis.txt",
+    names = (
+        "mine link dangling file / . .. mine/.. file/x null /proc/self ~ mine/thesis.txt".split()
     )
+    target = trial.draw(*names, "", "x" * 300, "a/" * 900, "a\nb", " ")
     result = trial.run("run", "scene.toml", "-o", target, "--no-page")
     if Path("mine/thesis.txt").read_text() != "years" or (
         target == "file" and Path("file").read_text() != "mine"
