@@ -14,6 +14,7 @@ from pressed import press, press_to_approach
 
 from patchfem.contact import StripCompliance, patch_problem, solve_by_gradients
 from patchfem.contact.active_set import solve_primal_dual
+from patchfem.contact.conjugate_gradients import project_forces
 from patchfem.contact.gaps import crown, tilt
 from patchfem.core import Compliance, Interface, NotConverged, Outcome, PatchfemError
 
@@ -189,6 +190,20 @@ def test_exact_cycling_sets_are_solved_by_gradients():
     state = press_to_approach(make_pair(x, CYCLE), gap + 8e-9, 8e-9)
     (expected,) = solve_by_enumeration(CYCLE, x, gap)
     assert nodal_forces(make_pair(x, CYCLE), state) == pytest.approx(expected, rel=1e-12)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_exact_projected_forces_are_nearest_with_given_resultants(seed):
+    """The projection has the resultants, and forces that a rigid motion changes where they are above zero."""
+    random = np.random.default_rng(seed)
+    rigid = np.stack([np.ones(60), np.linspace(-1, 1, 60)], axis=1)
+    force = 1e3 * random.normal(size=60)
+    target = random.uniform(5, 50) * np.array([1.0, random.uniform(-0.6, 0.6)])
+    projected = project_forces(force, rigid, target)
+    pressed = projected > 0
+    motion = np.linalg.lstsq(rigid[pressed], (projected - force)[pressed], rcond=None)[0]
+    assert rigid.T @ projected == pytest.approx(target, abs=1e-12 * target[0])
+    assert np.maximum(force + rigid @ motion, 0) == pytest.approx(projected, abs=1e-8)
 
 
 @pytest.mark.parametrize("moment, spring", [(None, 0.0), (1.5e-3, 0.0), (1.5e-3, 300.0)])

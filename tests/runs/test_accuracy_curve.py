@@ -5,12 +5,12 @@ from dataclasses import replace
 from itertools import pairwise
 
 import pytest
-from scene_texts import DRIVE, MODE, PLASTIC, POINT
+from scene_texts import PLASTIC, POINT, SHORT
 
 import patchfem as pf
 from patchfem.runs import compute_accuracy_curve
 
-BLOCK = POINT + PLASTIC + MODE + DRIVE.replace("cycles = 30", "cycles = 60")
+BLOCK = POINT + PLASTIC + SHORT
 MARCH = {"accuracy.method": "march"}
 MAIN_MEASURES = ("relative_displacement_amplitude", "absolute_acceleration_peak", "loop_area")
 

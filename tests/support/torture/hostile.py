@@ -102,7 +102,7 @@ def make_command(trial: Trial, name: str) -> list:
 def make_zip_bomb(trial: Trial) -> list:
     """Make a small archive that unpacks to 620 MB."""
     name = trial.draw("x.npz", "x.x3p", "x.npz")
-    with zipfile.ZipFile(name, "w", zipfile.ZIP_DEFLATED) as archive:
+    with zipfile.ZipFile(name, "w", zipfile.ZIP_DEFLATED, compresslevel=1) as archive:
         head = io.BytesIO()
         np.lib.format.write_array_header_1_0(
             head, {"descr": "<f8", "fortran_order": False, "shape": (8800, 8800)}
@@ -111,8 +111,8 @@ def make_zip_bomb(trial: Trial) -> list:
             "M.npy" if name == "x.npz" else "main.xml", "w", force_zip64=True
         ) as file:
             file.write(head.getvalue() if name == "x.npz" else b"<a>")
-            for _ in range(620):
-                file.write(bytes(10**6))
+            for _ in range(62):
+                file.write(bytes(10**7))
     return make_command(trial, name)
 
 
