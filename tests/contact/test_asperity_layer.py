@@ -1,4 +1,4 @@
-"""The layer of asperities: limits, quadrature, scaling, stiffness and random gaps."""
+"""The layer of asperities: limit of a thin layer, quadrature over peaks, inverse and stiffness of its law, refusal."""
 
 from __future__ import annotations
 
@@ -6,16 +6,15 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from pieces import LENGTH, LOAD, WIDTH, draw_gap, make_coated_pair
+from pieces import LENGTH, LOAD, WIDTH, make_coated_pair
 from pressed import press
 from scipy.integrate import quad
 from scipy.stats import norm
-from skins import press_layer, stretch_law
+from skins import press_strips, stretch_law
 
 from patchfem.contact import (
     ExponentialAsperities,
     HertzAsperities,
-    LinearAsperities,
 )
 from patchfem.contact.asperity_laws import peak_integral
 from patchfem.core import PatchfemError
@@ -23,61 +22,23 @@ from patchfem.core import PatchfemError
 AREA = LENGTH * WIDTH
 MEAN_PRESSURE = LOAD / AREA
 HERTZ_LAYER = HertzAsperities(radius=10e-6, density=1e10, deviation=1e-6, modulus=1.3e11)
-LAYERS = {
-    "linear": LinearAsperities(1e13),
-    "exponential": ExponentialAsperities(0.5e-6, 1e6),
-    "hertz": HERTZ_LAYER,
-}
-each_layer = pytest.mark.parametrize("layer", LAYERS.values(), ids=LAYERS.keys())
-
-
-def pair_arrays(n_elements=100):
-    """Return the normal compliance, the nodes and the nodal areas of the coated pair."""
-    pair = make_coated_pair(n_elements)
-    return pair.normal, pair.interface.x, pair.interface.weight
 
 
 # ---- limit of bare contact
-GAPS = {
-    "flat": lambda x: 0 * x,
-    "tilt": lambda x: 1e-4 * x,
-    "rough": lambda x: draw_gap(np.random.default_rng(5), x, 3e-7),
-}
 
 
 @pytest.mark.parametrize("layer", [ExponentialAsperities(1e-6, MEAN_PRESSURE), HERTZ_LAYER])
 def test_order_one_thin_layers_converge_to_bare_contact(layer):
     """The pressure with a thin layer converges to that of bare contact with the thickness, up to a logarithm."""
-    compliance, x, weight = pair_arrays()
-    gap = GAPS["tilt"](x)
-    bare = press(make_coated_pair(100), gap, LOAD).sigma_n
-    errors = [
-        np.abs(
-            press_layer(stretch_law(layer, t), compliance, x, weight, gap, LOAD).pressure - bare
-        ).max()
-        / bare.max()
-        for t in (1e-3, 1e-4, 1e-5, 1e-6)
-    ]
+    pair = make_coated_pair(100)
+    node = pair.normal, pair.interface.x, pair.interface.weight, np.zeros(1)
+    gap = 1e-4 * pair.interface.x
+    bare = press(pair, gap, LOAD).sigma_n
+    errors = []
+    for t in (1e-3, 1e-4, 1e-5, 1e-6):
+        thin = press_strips(*node, gap, load=LOAD, asperities=stretch_law(layer, t))
+        errors.append(np.abs(thin.pressure[0] - bare).max() / bare.max())
     assert errors[3] < 2e-3 and all(6 < a / b < 14 for a, b in pairwise(errors[1:]))
-
-
-@each_layer
-@pytest.mark.parametrize("offset", [-6.2e-3])
-def test_exact_layer_controls_give_same_forces(layer, offset):
-    """Prescribing the rotation and the approach that moment control returned gives the same forces."""
-    compliance, x, weight = pair_arrays()
-    gap = 2e-5 * x + draw_gap(np.random.default_rng(3), x, 1e-7)
-    free = press_layer(layer, compliance, x, weight, gap, LOAD, LOAD * offset)
-    prescribed_rotation = press_layer(
-        layer, compliance, x, weight, gap + free.theta * x, LOAD, rotation=free.theta
-    )
-    prescribed_approach = press_layer(
-        layer, compliance, x, weight, gap + free.theta * x, approach=free.delta, rotation=free.theta
-    )
-    for other in (prescribed_rotation, prescribed_approach):
-        assert np.abs(other.force - free.force).max() <= 1e-9 * free.force.max()
-        assert other.delta == pytest.approx(free.delta, rel=1e-9) and other.theta == free.theta
-    assert prescribed_approach.load == pytest.approx(LOAD, rel=1e-9)
 
 
 # ---- integral over Gaussian peaks
@@ -118,23 +79,6 @@ def test_exact_separation_inverts_pressure(layer):
 
 
 # ---- convergence for random input
-@each_layer
-@pytest.mark.parametrize("spring", [1e4])
-def test_exact_holder_spring_equals_applied_moment(layer, spring):
-    """A rotation against a spring equals the free rotation under the moment that the spring exerts."""
-    compliance, x, weight = pair_arrays(60)
-    gap = 1e-4 * x
-    moment = 2e-3 * LOAD
-    with_spring = press_layer(
-        layer, compliance, x, weight, gap, LOAD, moment, rotation=1e-4, spring=spring
-    )
-    rotation = with_spring.theta - 1e-4
-    free = press_layer(layer, compliance, x, weight, gap, LOAD, moment + spring * rotation)
-    assert abs(rotation) > 1e-9 and free.theta == pytest.approx(rotation, rel=1e-7)
-    assert np.abs(with_spring.force - free.force).max() <= 1e-9 * LOAD
-    assert with_spring.moment == pytest.approx(
-        moment + spring * rotation, rel=1e-8, abs=1e-9 * LOAD * LENGTH
-    )
 
 
 # ---- refusals
@@ -142,6 +86,15 @@ def test_exact_holder_spring_equals_applied_moment(layer, spring):
 
 def test_refuses_excessive_pressure_of_layer():
     """An approach that gives a pressure beyond the range of numbers is refused."""
-    c, x, weight = pair_arrays(40)
+    x = make_coated_pair(40).interface.x
+    layer = ExponentialAsperities(1e-9, 1e6)
     with pytest.raises(PatchfemError, match="rough layer is too large to compute"):
-        press_layer(ExponentialAsperities(1e-9, 1e6), 0 * c, x, weight, 0 * x, approach=1e-3)
+        press_strips(
+            np.zeros((x.size, x.size)),
+            x,
+            1 + 0 * x,
+            np.zeros(1),
+            0 * x,
+            approach=1e-3,
+            asperities=layer,
+        )

@@ -100,8 +100,7 @@ def press_points(points, gap, load: float) -> tuple:
     return [edge.position for edge in edges], set_stiffness(points, in_contact, ones, edges)
 
 
-@pytest.mark.parametrize("n_points", [721, pytest.param(2967, marks=pytest.mark.slow)])
-def test_exact_point_edges_agree_with_refined_points(n_points):
+def test_exact_point_edges_agree_with_refined_points(n_points: int = 721):
     """Edges agree with points eight times as dense within 0.03 of a spacing, and the stiffness within 7e-5."""
     coarse, fine = (
         press_points(points, (points.x - 0.123e-3) ** 2 / (2 * 0.3), 2e4)

@@ -1,8 +1,6 @@
-"""The periodic half-plane solver compared with Westergaard, Hertz, a dense solve and the finite-element pair."""
+"""The coated finite-element pair compared with a transform solution of coated half-planes."""
 
 from __future__ import annotations
-
-from functools import cache
 
 import numpy as np
 import pytest
@@ -16,69 +14,18 @@ from patchfem.mesh import TensorGrid
 from patchfem.mesh.grid import graded_rows
 
 halfspace = load_study("common/halfspace.py")
-press_periodic, wave_numbers = (
-    halfspace.press_periodic,
-    halfspace.wave_numbers,
-)
-WAVELENGTH, AMPLITUDE = 80e-6, 1.5e-6
 MODULUS = exact.combined_modulus(*CARBIDE)
-FULL_CONTACT_PRESSURE = exact.westergaard_full_pressure(WAVELENGTH, AMPLITUDE, MODULUS)
-
-
-def half_plane_compliance(n_points, length, modulus=MODULUS):
-    """Return the compliance C(k) of two half-planes, zero for k = 0."""
-    k = wave_numbers(n_points, length)
-    return np.concatenate([[0.0], 2 / (modulus * k[1:])])
 
 
 def coated_compliance(n_points, length):
     """Return the compliance C(k) of the coated pair with half-planes below the coatings, zero for k = 0."""
-    k = wave_numbers(n_points, length)
+    k = halfspace.wave_numbers(n_points, length)
     return np.concatenate([[0.0], 2 * exact.layered_compliance(k[1:], CARBIDE, TITANIUM, COATING)])
 
 
 def make_points(n_points, length):
     """Return uniform points about zero."""
     return (np.arange(n_points) - n_points // 2) * length / n_points
-
-
-@cache
-def press_wavy_surface(n_points, fraction):
-    """Return the points and the state of a wavy surface under a fraction of the full-contact pressure."""
-    x = make_points(n_points, WAVELENGTH)
-    gap = 2 * AMPLITUDE * np.sin(np.pi * x / WAVELENGTH) ** 2
-    return x, press_periodic(
-        half_plane_compliance(n_points, WAVELENGTH),
-        gap,
-        WAVELENGTH,
-        fraction * FULL_CONTACT_PRESSURE * WAVELENGTH,
-    )
-
-
-# ---- the wavy surface
-
-
-@pytest.mark.parametrize("fraction", [0.3, 0.99])
-def test_exact_wavy_surface_agrees_with_westergaard(fraction):
-    """Pressure, half-width and approach of a wavy surface agree with Westergaard at 128 and 2048 points per wave."""
-    wave = fraction * FULL_CONTACT_PRESSURE, WAVELENGTH, AMPLITUDE, MODULUS
-    x, state = press_wavy_surface(128, fraction)
-    assert state.pressure[64] == pytest.approx(exact.westergaard_pressure(0.0, *wave), rel=1e-4)
-    assert np.abs(x[state.pressure > 0]).max() == pytest.approx(
-        exact.westergaard_half_width(*wave), abs=WAVELENGTH / 128
-    )
-    assert state.closing == pytest.approx(exact.westergaard_approach(*wave), rel=1e-4)
-    x, state = press_wavy_surface(2048, fraction)
-    expected = exact.westergaard_pressure(x, *wave)
-    assert (
-        np.abs(state.pressure - expected)[np.abs(expected) > 0.2 * expected.max()].max()
-        <= 1e-3 * expected.max()
-    )
-    assert state.closing == pytest.approx(exact.westergaard_approach(*wave), rel=1e-6)
-    assert state.iterations <= 250  # conjugate directions; steepest descent takes 3000
-
-
-# ---- crowns
 
 
 def make_crown_grid(half_width, spacing, growth):
@@ -119,7 +66,7 @@ def test_exact_coated_elements_agree_with_half_plane_transform(
     spacing = exact.hertz_half_width(load, radius, MODULUS) / 16
     n_points = 8 * round(LENGTH / spacing / 2)
     x = make_points(n_points, n_points * spacing / 4)
-    reference = press_periodic(
+    reference = halfspace.press_periodic(
         coated_compliance(n_points, n_points * spacing / 4),
         crown(x, radius),
         n_points * spacing / 4,
@@ -140,6 +87,3 @@ def test_exact_coated_elements_agree_with_half_plane_transform(
     is_outside = (np.abs(grid.x) > 1.1 * half_width) & (np.abs(grid.x) < 1.4 * half_width)
     reference_gap = np.interp(grid.x[is_outside], x, reference.gap)
     assert np.abs(state.gap[is_outside] - reference_gap).max() <= 1e-2 * reference_gap.max()
-
-
-# ---- random gaps

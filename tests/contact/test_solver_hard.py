@@ -125,23 +125,6 @@ def test_exact_single_contact_node_carries_load(node):
 # ---- extreme loads
 
 
-@pytest.mark.parametrize("fraction", [1e-9, 1e-190])
-@pytest.mark.parametrize("moment", [None, 0.0])
-def test_exact_vanishing_load_scales_linearly(fraction, moment):
-    """A tiny load on flat pieces scales linearly, and on a crown only the crest touches."""
-    pair = make_coated_pair(100)
-    full_state, small_state = (
-        press(pair, np.zeros(101), f * LOAD, moment) for f in (1.0, fraction)
-    )
-    assert (
-        np.abs(small_state.sigma_n / fraction - full_state.sigma_n).max()
-        <= 1e-12 * full_state.sigma_n.max()
-    )
-    crown_state = press(pair, crown(pair.interface.x, 1.0), fraction * LOAD, moment)
-    assert np.count_nonzero(crown_state.sigma_n) == 1
-    assert crown_state.approach == pytest.approx(fraction * LOAD * pair.normal[50, 50], rel=1e-12)
-
-
 @pytest.mark.parametrize("load", [1e201, 1.7e308, np.inf, np.nan, -1.0])
 def test_refuses_invalid_load(load):
     """A negative, infinite, undefined or excessive load is refused, and a load line that tips the piece over."""
@@ -301,35 +284,22 @@ def random_state(seed, control):
     )
 
 
-def check_random_states(control, seeds):
-    """Check outcome, residuals and contact conditions of random problems."""
-    for seed in seeds:
+@pytest.mark.parametrize(
+    "control", range(4), ids=["load", "load and moment", "approach", "load and spring"]
+)
+def test_always_random_problems_satisfy_contact_conditions(control):
+    """Random gaps on random compliances satisfy the contact conditions under every control."""
+    for seed in range(25):
         pair, gap, state = random_state(seed, control)
         x = pair.interface.x
         force = nodal_forces(pair, state)
-        base = gap.min()
+        where = control, seed
         assert state.outcome is Outcome.DONE and max(state.residuals.values()) <= RESIDUAL_TOL, (
-            control,
-            seed,
+            where
         )
-        displacement = pair.normal @ force
-        terms = (
-            np.abs(gap)
-            + np.abs(state.rotation * x)
-            + abs(state.approach)
-            + np.abs(pair.normal) @ force
-            + abs(base)
-        )
-        opening = (gap + state.rotation * x - state.approach + displacement) / terms
-        assert force.min() >= 0 and opening.min() >= -RESIDUAL_TOL, (control, seed)
-        assert force @ np.abs(opening) <= RESIDUAL_TOL * force.sum(), (control, seed)
-
-
-CONTROL_NAMES = ["load", "load and moment", "approach", "load and spring"]
-
-
-@pytest.mark.parametrize("n_cases", [25, pytest.param(3000, marks=pytest.mark.slow)])
-@pytest.mark.parametrize("control", range(4), ids=CONTROL_NAMES)
-def test_always_random_problems_satisfy_contact_conditions(control, n_cases):
-    """Random gaps on random compliances satisfy the contact conditions under every control."""
-    check_random_states(control, range(n_cases))
+        terms = np.abs(gap) + np.abs(state.rotation * x) + abs(state.approach)
+        terms += np.abs(pair.normal) @ force + abs(gap.min())
+        opening = gap + state.rotation * x - state.approach + pair.normal @ force
+        opening /= terms
+        assert force.min() >= 0 and opening.min() >= -RESIDUAL_TOL, where
+        assert force @ np.abs(opening) <= RESIDUAL_TOL * force.sum(), where

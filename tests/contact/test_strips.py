@@ -61,18 +61,6 @@ def random_gaps(rng, x, n_strips, amplitude):
 
 
 # ---- wedges in closed form
-@pytest.mark.parametrize("n_strips", [2, 3, 8, 64])
-def test_exact_centre_of_pressure_of_rigid_wedge_in_full_contact(
-    n_strips,
-):
-    """The centre of pressure of a rigid pad in full contact is that of the wedge times 1 - 1/n^2."""
-    c, x, weight, y = rigid_strips(n_strips)
-    roll = 0.7 * wedge_opening_tilt(LOAD, WIDTH, LENGTH, 1e13)
-    state = press_strips(
-        c, x, weight, y, np.zeros(1), roll, load=LOAD, asperities=LinearAsperities(1e13)
-    )
-    _, centre, _, _ = wedge_on_linear_foundation(roll, LOAD, WIDTH, LENGTH, 1e13)
-    assert state.centre_y == pytest.approx(centre * (1 - 1 / n_strips**2), rel=1e-12) and centre < 0
 
 
 def test_order_two_centre_of_partly_open_rigid_pad():
@@ -233,24 +221,3 @@ def test_exact_free_roll_reproduces_prescribed_roll(layer, control):
             and max(free.residuals.values()) <= STRIP_RESIDUAL_TOL
         )
         assert np.abs(free.force - prescribed.force).max() <= 1e-9 * LOAD
-
-
-def test_exact_rolling_strips_equal_rotating_nodes():
-    """Rigid strips of one node under a free roll equal one strip of n nodes under a free rotation."""
-    c, x, weight, y = rigid_strips(1, 24)
-    for layer in (LAYERS["linear"], LAYERS["exponential"], LAYERS["hertz"]):
-        rotated = press_strips(
-            c, x, weight, y, 1e-4 * x**2, load=LOAD, moment=1e-3 * LOAD, asperities=layer
-        )
-        rolled = press_strips(
-            np.zeros((1, 1)),
-            np.zeros(1),
-            weight[:1],
-            x,
-            1e-4 * x[:, None] ** 2,
-            load=LOAD,
-            asperities=layer,
-            roll_moment=1e-3 * LOAD,
-        )
-        assert rolled.position.roll == pytest.approx(rotated.position.theta, rel=1e-10)
-        assert rolled.force[:, 0] == pytest.approx(rotated.force[0], rel=1e-9, abs=1e-12 * LOAD)

@@ -1,7 +1,5 @@
 """Exponentials of stacks of matrices against SciPy."""
 
-from time import process_time
-
 import numpy as np
 import pytest
 from scipy.linalg import expm
@@ -26,22 +24,3 @@ def test_exact_exponentials_agree_with_scipy(size):
     assert difference.max() < 3e-13
     # Cells of a cycle have small norms: the product of thousands of them repeats the error of each.
     assert difference[:15].max() < 5e-16
-
-
-def test_exact_exponentials_take_less_time_than_scipy():
-    """The exponentials of 8192 cells with bonds take less than a third of the CPU time of `scipy.linalg.expm`.
-
-    Once the multipliers of a curve of a patch took 34 CPU seconds.
-    """
-    cells = make_oscillators(5, 0.01, 8192)
-
-    def measure_seconds(function) -> float:
-        """Return the CPU time [s] of a function."""
-        begin = process_time()
-        function(cells)
-        return process_time() - begin
-
-    seconds, reference = (
-        min(measure_seconds(function) for _ in range(3)) for function in (find_exponentials, expm)
-    )
-    assert seconds < reference / 3

@@ -2,15 +2,17 @@
 
 from random_rigs import RIGS, compare_with_reference
 
+# The only values outside their errors, with the largest ratio of true to stated error.
+OUTSIDE = {("13", "stick_fraction_3"): 1.1}
+
 
 def test_always_random_rigs_agree_with_independent_integrator():
-    """Each measure lies within five errors of its reference, at most one of a rig and 5 % of all outside the error."""
-    rigs = {name: compare_with_reference(**rig) for name, rig in RIGS.items()}
-    outside = {
-        name: {measure: ratio for measure, ratio in ratios.items() if ratio > 1}
-        for name, ratios in rigs.items()
+    """Each value lies within its stated error of the reference, but for OUTSIDE; none is missing or NaN."""
+    ratios = {
+        (rig, measure): ratio
+        for rig, case in RIGS.items()
+        for measure, ratio in compare_with_reference(**case).items()
     }
-    assert all(len(ratios) < 2 for ratios in outside.values()), outside
-    assert all(ratio < 5 for ratios in outside.values() for ratio in ratios.values()), outside
-    n_values = sum(map(len, rigs.values()))
-    assert n_values > 500 and sum(map(len, outside.values())) < 0.05 * n_values
+    # NaN is not at most 1, so that it fails.
+    wrong = {key: ratio for key, ratio in ratios.items() if not ratio <= OUTSIDE.get(key, 1.0)}
+    assert not wrong and len(ratios) > 600

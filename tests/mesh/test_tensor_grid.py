@@ -43,31 +43,3 @@ def test_always_grid_has_given_dimensions_and_coating_rows(piece):
         assert np.all(ratio <= growth) and np.all(ratio >= 1 / growth)
     is_coating = grid.is_coating.reshape(grid.x.size - 1, rows.size)
     assert np.all(is_coating @ rows == pytest.approx(coating, rel=1e-12))
-
-
-@pytest.mark.parametrize("coating", [0.0, 0.152e-3, 1.5e-3])
-@pytest.mark.parametrize("columns", [32, 50, 120])
-def test_always_half_element_size_halves_every_cell(columns, coating):
-    """With half the element size, each row of the grid becomes two rows of about half its height."""
-    coarse = graded_grid(12e-3, 6e-3, 12e-3 / columns, coating).refine()
-    fine = graded_grid(12e-3, 6e-3, 6e-3 / columns, coating)
-    assert abs(fine.depth.size - coarse.depth.size) <= 3
-    position = np.linspace(0, 1, 200)
-    layers = [(slice(coarse.coating_rows, None), slice(fine.coating_rows, None))]
-    if coating:
-        layers.append((slice(coarse.coating_rows + 1), slice(fine.coating_rows + 1)))
-    for coarse_rows, fine_rows in layers:
-        depths = coarse.depth[coarse_rows], fine.depth[fine_rows]
-        levels = [np.interp(position, np.linspace(0, 1, depth.size), depth) for depth in depths]
-        assert np.abs(levels[0] - levels[1]).max() <= 0.03 * np.ptp(depths[0])
-
-
-@given(piece_dimensions())
-def test_exact_tributary_lengths_integrate_linear_functions(piece):
-    """The tributary lengths are positive, add up to the length, and integrate a linear function exactly."""
-    grid = graded_grid(*piece)
-    lengths = grid.tributary_lengths()
-    assert lengths.sum() == pytest.approx(piece[0], rel=1e-13)
-    assert lengths.min() > 0
-    # the nodal areas integrate a straight line exactly
-    assert lengths @ (3 + 2 * grid.x) == pytest.approx(3 * piece[0], rel=1e-12)

@@ -1,26 +1,23 @@
 """Points of bonds in the march: the recursion, lists of any order and reading, and shear of the pieces."""
 
-from itertools import pairwise
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from bond_moments import advance_bonds
-from friction_paths import LowerPressure, random_walk, reference_with_lift_off
+from friction_paths import random_walk
 from march_paths import OMEGA, follow_path, make_one_mode
-from modal_bases import make_modal_basis
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 from scipy.special import gammainc
 
-from patchfem.core import InitialState, Missing, Outcome, SineDrive
+from patchfem.core import Missing, SineDrive
 from patchfem.friction import Bonds
 from patchfem.points import time_march as engine
-from patchfem.points.contacts import BondSum, make_bond_contact, make_pressed_contact
+from patchfem.points.contacts import BondSum, make_bond_contact
 from patchfem.points.time_march import march
 from patchfem.response import energy_balance
 from patchfem.slip.shear_modes import shear_modes
-from patchfem.structure import drives
 
 ROW = np.ones(1)
 FORCE = np.array([0.7, 1.3, 2.0, 0.4]) / 0.4  # normal forces of four points [N]
@@ -119,21 +116,6 @@ def test_exact_shear_modes_agree_with_nodal_deflections(step):
     assert last.bend == pytest.approx(compliance @ last.forces, abs=1e-9)
 
 
-@pytest.mark.share(1, 4, 7)
-@pytest.mark.parametrize(("reading", "order"), LAWS)
-def test_exact_points_on_rigid_bodies_equal_single_list(reading, order):
-    """Points on rigid bodies give the force of a single list of bonds within 2e-5 of the friction limit."""
-    law = Bonds(0.4, 1e-6, order, reading)
-    path = reversing_path(80)
-    expected = follow_path(make_lists(law, FORCE.sum()), path, 1e-3)
-    found = follow_path(make_lists(law, FORCE), path, 1e-3)
-    # Away from the position of the first bonds, which have a width where there are several lists.
-    compared = np.abs(path) > 1e-8
-    assert found.n_unsolved == 0
-    change = found.forces[compared, 0] - expected.forces[compared, 0]
-    assert np.abs(change).max() < 2e-5 * 0.4 * FORCE.sum()
-
-
 @pytest.mark.parametrize(
     ("order", "curve", "tolerance"),
     [
@@ -196,30 +178,6 @@ def test_always_sudden_slip_dissipates_energy():
     check_balance(found, path)
 
 
-@pytest.mark.parametrize("law", [Bonds(0.4, 2e-6), Bonds(0.4, 2e-6, 1.0, "report")])
-def test_exact_moving_pressure_agrees_with_sum_over_bonds(law):
-    """The forces under a pressure that is fixed to the lower piece agree with an explicit sum over the bonds.
-
-    For the recursion within 1e-9; for the reading "report" within the error of merging.
-    """
-    x = np.linspace(-30e-6, 30e-6, 61)
-    sigma = 1e6 * np.maximum(0.0, 0.3 + np.sin(x / 4e-6))
-    area = np.full(61, 1e-4 / 61)
-    bond_sum = BondSum(law, 40.0, 0.01) if law.reading == "report" else None
-    contact = make_bond_contact(law, area * 1e6, ROW, None, bond_sum, np.stack([x, sigma / 1e6]))
-    path = 6e-6 * np.sin(np.linspace(0, 7.0, 301))
-    found = follow_path(contact, path, 1e-3)
-    assert found.n_unsolved == 0
-    check_balance(found, path, 1e-9)
-    pressure = LowerPressure(x, sigma)
-    tolerance = 1e-9 if bond_sum is None else 1e-4
-    for k in (60, 151, 300):
-        tractions = reference_with_lift_off(law, path[: k + 1], pressure, 1e-3)
-        assert (tractions == 0).any()
-        force = 0.4 * area @ tractions
-        assert found.forces[k, 0] == pytest.approx(force, abs=tolerance * 0.4 * area @ sigma)
-
-
 # ---- motion
 
 
@@ -276,47 +234,6 @@ def test_order_two_against_integrated_rate_equations(growth):
     assert np.log2(errors[0] / errors[2]) / 6 == pytest.approx(2, abs=0.15)
 
 
-def test_always_unresolved_pressure_waves_are_reported():
-    """Steps longer than the waves of the pressure end as NOT_CONVERGED or agree with short steps; short steps converge."""
-    x = np.linspace(-30e-6, 30e-6, 1201)
-    sigma = 1e6 * np.maximum(0.0, 0.3 + np.sin(x / 1e-6))
-    area = np.full(1201, 1e-4 / 1201)
-    contact = make_bond_contact(Bonds(0.4, 2e-6), area * 1e6, ROW, lower=np.stack([x, sigma / 1e6]))
-    drive = SineDrive(1.5 * 0.4 * area @ sigma, OMEGA)
-    coarse, fine = (
-        march(make_one_mode(OMEGA, 0.01, 1.0), drive, contact, 2, steps, window=2)
-        for steps in (12, 100)
-    )
-    assert coarse.outcome in (None, Outcome.NOT_CONVERGED)
-    assert fine.outcome is None and fine.message == ""
-
-
-@pytest.mark.parametrize("has_shear", [True, False])
-def test_always_energy_falls_in_free_decay(has_shear):
-    """In a free decay of six modes the energy never rises, and its loss equals the dissipation within 1e-8.
-
-    The period of the fastest mode is shorter than a step.
-    """
-    law = Bonds(0.4, 2e-6)
-    compliance, x = make_compliance(40, 1e-8)
-    force = 98.1e4 * (1 + 1.6 * x) * 1e-4 / 40
-    modes = shear_modes(compliance, law.static * force, law.length, 10) if has_shear else None
-    omega = OMEGA * np.array([1.0, 1.7, 3.1, 5.3, 8.9, 14.2])
-    slide = np.array([1.0, -0.6, 0.5, 0.4, -0.3, 0.2])
-    basis = make_modal_basis(omega, 0.0, slide)
-    start = InitialState(1e-4 * np.array([1.0, -0.3, 0.1, 0.02, -0.01, 0.005]), np.zeros(6))
-    contact = make_bond_contact(law, force, slide, modes)
-    result = march(basis, drives.make_release(1 / 143), contact, 15, 7, window=15, start=start)
-    response = result.response
-    _, stored, dissipated, created = response.extra["ledger"]
-    squares = response.modal_rate**2 + (omega * response.modal) ** 2
-    energy = 0.5 * basis.mass * np.sum(squares, axis=1) + stored
-    assert result.outcome is None and created[-1] == 0.0
-    assert np.diff(energy).max() <= 1e-8 * energy[0]
-    assert energy[0] - energy[-1] == pytest.approx(dissipated[-1], rel=1e-8)
-    assert energy[-1] < 0.5 * energy[0]
-
-
 # ---- lists that grow
 
 GROWING_LISTS = {
@@ -355,33 +272,3 @@ def test_refuses_list_longer_than_limit(monkeypatch):
         Missing, match=r"grew beyond 100 entries \(0 MB\) after step \d+; raise accuracy.tail"
     ):
         march_list(GROWING_LISTS["stretch"], 40, monkeypatch)
-
-
-@pytest.mark.share(0)
-@pytest.mark.parametrize(("order", "grows"), [(0.0, False), (1.0, False), (0.5, True)])
-def test_order_lists_under_prescribed_load(order, grows):
-    """Under a load that falls to zero and rises again the energy balances, and the force converges with the step."""
-    growth = (
-        {"ratio": 0.8, "rest_growth": 0.1, "slip_growth": 3e-7, "rest_speed": 1e-3} if grows else {}
-    )
-    law = Bonds(0.3, 2e-6, order, "report", initial=0.5 if order > 0 else 0.0, **growth)
-
-    def find_load(t):
-        return np.maximum(60 + 70 * np.cos(2 * np.pi * 90 * np.asarray(t)), 0.0)
-
-    basis = make_modal_basis([OMEGA], 0.02)
-    slides = []
-    for steps in (200, 400, 800, 1600):
-        contact = make_pressed_contact(
-            law, 130.0, ROW, bond_sum=BondSum(law, 30.0, 0.01), load=find_load
-        )
-        result = march(basis, SineDrive(30.0, OMEGA), contact, 2, steps, window=2)
-        ledger = result.ledger
-        gap = ledger["work_in"] - ledger["viscous"] - ledger["friction"] - ledger["stored"]
-        assert abs(gap) < 1e-9 * ledger["power"]
-        assert (result.response.extra["normal_load"] == 0).sum() > 50
-        slides.append(result.window.slide[:: steps // 200])
-    changes = [np.abs(b - a).max() for a, b in pairwise(slides)]
-    # Bonds of order 0 have no stiffness, like Coulomb's law, so that the order is not two.
-    assert changes[2] < 1e-3 * np.abs(slides[-1]).max()
-    assert order == 0 or changes[2] < changes[0] / 3

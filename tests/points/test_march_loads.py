@@ -12,7 +12,6 @@ from varying_load_cases import (
     LAWS,
     LOAD,
     MASS,
-    MIXED,
     STILL,
     check_energy_of_random_march,
     check_order_two,
@@ -24,6 +23,7 @@ from varying_load_cases import (
     total_energy,
 )
 
+from patchfem.contact import ContactSets
 from patchfem.core import InitialState, SineDrive
 from patchfem.model.structure import compute_strip_slides
 from patchfem.slip.shear_modes import find_sufficient_modes, shear_modes
@@ -78,24 +78,46 @@ def test_order_two_for_small_heave_and_pitch(row):
     assert errors[-1] <= 2e-2 and rates == pytest.approx([2, 2], abs=0.1)
 
 
-def test_exact_energy_of_bouncing_block_is_conserved():
+def check_nodal_forces(sets, snapshots) -> set:
+    """Check the nodal forces of snapshots against new solutions of the contact, and return their contact sets."""
+    contact_sets = set()
+    for snapshot in snapshots:
+        gap = sets.opening + snapshot.heave + snapshot.pitch * sets.x
+        expected = np.zeros(gap.size)
+        if gap.min() < 0:
+            expected = solve_forces(sets.c, sets.x, gap, np.zeros(0))[0]
+        assert np.abs(snapshot.nodal - expected).max() <= 1e-12 * max(LOAD, expected.max())
+        contact_sets.add((expected > 0).tobytes())
+    return contact_sets
+
+
+class FewSets(ContactSets):
+    """Contact sets of which only the last 16 are kept."""
+
+    def make_arrays(self):
+        """Return the arrays of the search."""
+        return super().make_arrays(0.0)
+
+
+@pytest.mark.parametrize("kind", [ContactSets, FewSets])
+def test_exact_bouncing_block_conserves_energy_and_solves_contact(kind):
     """In 5000 steps of heave and pitch with repeated lift-off the energy is constant within
-    1e-12."""
+    1e-12, and nodal forces agree with new solutions of the contact.
+
+    The forces also do where only 16 contact sets are kept.
+    """
     basis = make_modes([150.0, 400.0, 300.0], [0, 0, 0], [1.0, 0.2, 0.0], [20.0, 0.0, 250.0])
-    result = march_pressed(
-        basis,
-        STILL,
-        crowned_contact(),
-        "plastic",
-        10,
-        500,
-        start=InitialState([12e-7, 0, 9e-7], [0.0, 15e-3, 6e-3]),
-    )
-    total = total_energy(result.response, basis)
+    sets = crowned_contact()
+    sets = kind(sets.c, sets.x, sets.opening, sets.in_contact)
+    start = InitialState([12e-7, 0, 9e-7], [0.0, 15e-3, 6e-3])
+    result = march_pressed(basis, STILL, sets, "plastic", 10, 500, start=start, frames=400)
+    assert len(check_nodal_forces(sets, result.snapshots)) > 16 and result.outcome is None
     force = result.response.extra["normal_load"]
-    assert np.ptp(total) <= 1e-12 * total[0] and result.outcome is None
     assert (force == 0).sum() > 500 and force.max() > 2 * LOAD
     assert np.count_nonzero(np.diff((force > 0).astype(int)) == 1) > 20
+    if kind is ContactSets:
+        total = total_energy(result.response, basis)
+        assert np.ptp(total) <= 1e-12 * total[0]
 
 
 def test_exact_nodal_forces_agree_with_unilateral_solution():
@@ -105,66 +127,8 @@ def test_exact_nodal_forces_agree_with_unilateral_solution():
     drive = SineDrive(200.0, 2 * np.pi * 2)
     basis = make_modes([40.0], [1.0], [0.0], [400.0], 0.5)
     result = march_pressed(basis, drive, sets, "plastic", 1, 200, frames=40)
-    contact_sets = set()
-    for snapshot in result.snapshots:
-        gap = sets.opening + snapshot.heave + snapshot.pitch * sets.x
-        expected = solve_forces(sets.c, sets.x, gap, np.zeros(0))[0]
-        assert np.abs(snapshot.nodal - expected).max() <= 1e-12 * LOAD
-        contact_sets.add((expected > 0).tobytes())
-    assert len(result.snapshots) == 40 and len(contact_sets) >= 4 and result.outcome is None
-
-
-def integrate_coulomb_block(basis, drive, stiffness, mu, start, cycles, steps):
-    """Return the slide of a Coulomb block under N = LOAD - stiffness h(t), with h in closed form.
-
-    Small semi-implicit steps are used, with friction as a projection of the speed.
-    """
-    dt = drive.period / steps
-    t = (np.arange(cycles * steps) + 0.5) * dt
-    load = np.maximum(
-        LOAD - stiffness * start * np.cos(np.sqrt(basis.omega[1] ** 2 + stiffness / MASS) * t), 0
-    )
-    force = -drive.acceleration * np.sin(drive.omega * t)
-    limit = mu * load / MASS * dt
-    w2 = basis.omega[0] ** 2
-    d = 2 * basis.zeta[0] * basis.omega[0]
-    q = 0.0
-    v = 0.0
-    slides = np.empty(cycles * steps)
-    for i in range(t.size):
-        trial_speed = v + dt * (force[i] - w2 * (q + 0.5 * dt * v) - d * v)
-        v = max(trial_speed - limit[i], 0.0) + min(trial_speed + limit[i], 0.0)
-        q += dt * v
-        slides[i] = q
-    return slides
-
-
-@pytest.mark.slow  # compiles its own loop
-def test_exact_coulomb_block_under_oscillating_load():
-    """A block that sticks and slips while its heave nearly unloads the contact agrees within 1e-3
-    with small steps of another method."""
-    sets = make_contact()
-    stiffness = float(np.linalg.inv(sets.c).sum())
-    basis = make_modes([143.0, 20.0], [1.0, 0.0], [0.0, 1.0], [0.0, 0.0], 0.02, [1.0, 0.0])
-    basis = replace(basis, zeta=np.array([0.02, 0.0]))
-    drive = SineDrive(8 * 9.80665 * 0.5, 2 * np.pi * 143)
-    start = 0.9 * LOAD / stiffness
-    expected = integrate_coulomb_block(basis, drive, stiffness, 0.3, start, 2, 100_000)
-    result = march_pressed(
-        basis,
-        drive,
-        sets,
-        "coulomb",
-        2,
-        6400,
-        start=InitialState([0.0, start], [0.0, 0.0]),
-    )
-    amplitude = np.abs(expected).max()
-    indices = np.round(result.response.time * 100_000 / drive.period).astype(int)[1:] - 1
-    assert np.abs(result.response.slide[1:] - expected[indices]).max() <= 1e-3 * amplitude
-    load = result.response.extra["normal_load"]
-    assert load.min() < 0.2 * LOAD and load.max() > 1.8 * LOAD
-    assert 0.02 < np.mean(np.diff(result.response.slide) == 0) < 0.9
+    assert len(check_nodal_forces(sets, result.snapshots)) >= 4
+    assert len(result.snapshots) == 40 and result.outcome is None
 
 
 @pytest.mark.share(1)
@@ -175,20 +139,6 @@ def test_order_two_for_combined_slide_heave_and_pitch(name):
     check_order_two(name, 1600, 0.35)
 
 
-def test_order_output_acceleration_agrees_with_differences():
-    """The absolute acceleration of the output agrees with differences of the output rate plus the
-    base acceleration, and the error falls with the step."""
-    drive = SineDrive(40.0, 2 * np.pi * 143)
-    errors = []
-    for steps in (6400, 12800):
-        response = march_pressed(MIXED, drive, crowned_contact(), "plastic", 1, steps).response
-        expected = np.gradient(response.output_rate, response.time) + drive.values(response.time)
-        errors.append(
-            np.median(np.abs(response.acceleration - expected)[1:-1]) / np.abs(expected).max()
-        )
-    assert errors[1] <= 1e-4 and errors[0] / errors[1] > 3
-
-
 @pytest.mark.share(0)
 @pytest.mark.parametrize("laws", [POINT_LAWS, sorted(LAWS)], ids=["points", "all"])
 @given(st.data(), st.integers(0, 10**6), st.sampled_from([60, 200]))
@@ -196,23 +146,6 @@ def test_always_no_energy_is_created(laws, data, seed, steps):
     """No energy is created for random modes, initial states and drives, with coarse steps and
     lift-off."""
     check_energy_of_random_march(data.draw(st.sampled_from(laws)), seed, steps)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    "law, seed, steps",
-    [
-        ("coulomb", 8413, 60),
-        ("coulomb", 140, 200),
-        ("weaker", 8413, 60),
-        ("weaker", 8413, 200),
-        ("weaker", 110, 60),
-    ],
-)
-def test_always_stops_under_varying_load_are_solved(law, seed, steps):
-    """Steps in which a stop depends on the varying load are solved, although no friction force with
-    such a stop is consistent with the load that it causes."""
-    check_energy_of_random_march(law, seed, steps)
 
 
 def test_exact_strip_slides_under_yaw():

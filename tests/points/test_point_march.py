@@ -60,11 +60,3 @@ def test_exact_release_of_a_coulomb_block():
     motion = march(make_modes(0.0), still, contact, 5, 400, start=start)
     assert motion.window.slide[-1] / unit == pytest.approx(-0.5, abs=1e-4)
     assert np.ptp(motion.window.slide[-400:]) == 0
-
-
-def test_exact_parallel_points_are_one_point():
-    """Ten equal points that share the load move as one."""
-    one = run(laws.make_jenkins(1.0, 1e-5, LIMIT), 100, cycles=20)
-    points = [laws.make_jenkins(1.0, 1e-5, LIMIT / 10)] * 10
-    ten = march(make_modes(), DRIVE, Contact([PointSet(points, np.ones(1))], LIMIT), 20, 100)
-    assert ten.window.slide == pytest.approx(one.window.slide, rel=1e-9, abs=1e-15)

@@ -12,7 +12,6 @@ from patchfem.response import (
     locate_reversals,
     make_half_cycles,
 )
-from patchfem.runs.rig.decays import estimate_decay_mesh_errors
 
 RELEASED = DRIVE[: DRIVE.index("kind")] + 'kind = "free"\ndisplacement = "2 mm"\ncycles = 30\n'
 
@@ -49,23 +48,6 @@ def test_order_reversals_between_samples_is_four():
     assert off[0] < 1e-4 and 50 < off[0] / off[1] < 500
 
 
-def test_exact_decay_curve_interpolation():
-    """Interpolation returns the curve at its own points and NaN outside, and differences are added to the errors."""
-    found = fit_decay_curve(make_half_cycles(np.pi * np.arange(9), (-0.9) ** np.arange(9.0)))
-    there = found.interpolate(found.amplitude[2:5])
-    assert there.damping == pytest.approx(found.damping[2:5], rel=1e-12)
-    assert np.isnan(found.interpolate([2.0, 1e-3]).frequency).all()
-    wider = there.add_difference(
-        there, there._replace(damping=there.damping + np.array([1.0, np.nan, 0.0]))
-    )
-    assert wider.damping_error == pytest.approx(there.damping_error + np.array([1.0, np.inf, 0.0]))
-    assert np.isnan(
-        fit_decay_curve(make_half_cycles(np.arange(3.0), np.array([1.0, -0.5, 0.2])))
-        .interpolate([0.3])
-        .damping
-    ).all()
-
-
 def test_always_decay_intervals_cover_nonlinear_damping():
     """More than 95 % of the intervals cover a damping ratio that depends on the amplitude.
 
@@ -97,19 +79,6 @@ def test_always_decay_intervals_cover_nonlinear_damping():
         true = fall(found.amplitude)
         held.append(np.abs(found.damping - true / np.hypot(np.pi, true)) <= found.damping_error)
     assert np.concatenate(held).mean() > 0.95
-
-
-def test_exact_growing_or_few_half_cycles_end_decay_curve():
-    """A decay curve ends at a half cycle that grows, and is empty for fewer than four reversals."""
-    assert (
-        fit_decay_curve(make_half_cycles(np.arange(3.0), np.array([1.0, -0.5, 0.2]))).time.size == 0
-    )
-    assert make_half_cycles(np.arange(5.0), np.array([1.0, -0.5, 0.2, -0.9, 0.1])).size.size == 2
-    assert (
-        make_half_cycles(np.arange(6.0), np.array([1.0, -0.5, 0.25, -0.1, 0.02, 0.02])).size.size
-        == 4
-    )
-    assert locate_reversals(np.arange(3.0), np.arange(3.0), np.ones(3))[0].size == 0
 
 
 def test_exact_coulomb_decay_agrees_with_closed_form():
@@ -262,25 +231,3 @@ def test_always_release_errors_cover_mindlin_damping():
     law = mindlin_damping(decay.amplitude[known], stuck, 1.0)
     assert known.size > 20 and law.max() > 2e-4
     assert (np.abs(decay.damping[known] - law) <= decay.damping_error[known]).all()
-
-
-@pytest.mark.parametrize(
-    "old, new, why",
-    [
-        (
-            "[contact.shear]",
-            '[contact.shear]\n[contact.grooves]\nwavelength = "80 um"\namplitude = "2 um"',
-            "the contact slides on grooves",
-        ),
-        ("slide = 1.0", "slide = 1.0\nnormal = 0.1", "the normal load changes"),
-    ],
-)
-def test_always_missing_static_loop_gives_reason(old, new, why):
-    """If the friction law has no static loop, the mesh error of a decay is zero and has a reason."""
-    scene = CROWNED.replace('"coulomb"', '"elastic-plastic"\nbond_length = "1 um"').replace(
-        old, new, 1
-    )
-    error, said = estimate_decay_mesh_errors(
-        pf.build(scene), None, None, np.array([1e-7, 1e-6]), int
-    )
-    assert said == why and not error.any()

@@ -6,9 +6,7 @@ from scene_texts import DRIVE, KILOGRAM, POINT, make_friction_table
 
 import patchfem as pf
 from patchfem.response import (
-    add_errors,
     convergence_errors,
-    merged_cell_errors,
 )
 from patchfem.response.errors import SAFETY_FACTOR
 
@@ -43,14 +41,6 @@ def test_exact_two_runs_use_given_order(ratio, order):
     assert found == {NAME: pytest.approx(SAFETY_FACTOR * 1e-3)}
 
 
-def test_exact_cell_error_orders_of_measures():
-    """The error from the cells of a law is of first order for instants of events, and of second order for other measures."""
-    fine = {"stick_fraction": 0.2, "loop_area": 1.0}
-    coarse = {"stick_fraction": 0.21, "loop_area": 1.15}
-    found = merged_cell_errors(fine, coarse, fine)
-    assert found == {"stick_fraction": pytest.approx(0.01), "loop_area": pytest.approx(0.03)}
-
-
 def test_exact_time_fractions_have_sampling_error():
     """Fractions of time and phases have an error of the sampling interval, even if all runs agree."""
     same = {"open_fraction": 0.25, "slip_start_phase": 0.6, "stick_fraction": 0.2, NAME: 1.0}
@@ -62,23 +52,6 @@ def test_exact_time_fractions_have_sampling_error():
             NAME: 0.0,
         }
     )
-
-
-def test_exact_error_rules_of_measure_kinds():
-    """Errors contain a relative part; a phase error is at most pi/2, and a drift error depends on the amplitude."""
-    values = {NAME: 2e-3, "slip_start_phase": 3.0, "energy_balance": 4e-9, "drift_per_cycle": 1e-12}
-    parts = {NAME: 1e-6, "slip_start_phase": 1.8, "energy_balance": 1e-10, "drift_per_cycle": 1e-15}
-    errors = [("steps", parts)]
-    measures = add_errors(values, errors, min_relative_error=1e-9)
-    found = {name: measure.error for name, measure in measures.items()}
-    assert found == {
-        NAME: pytest.approx(1e-6 + 2e-12, rel=1e-12),
-        "slip_start_phase": np.pi / 2,
-        "energy_balance": 4e-9,
-        "drift_per_cycle": pytest.approx(1e-15 + 1e-9 * 2e-3 + 1e-21, rel=1e-9),
-    }
-    least = add_errors(values, errors)["drift_per_cycle"].error
-    assert least == pytest.approx(1e-15 + 1e-13 * 2e-3, rel=1e-9)
 
 
 @pytest.mark.parametrize("law", ["coulomb", "elastic-plastic"])

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from scene_texts import MODE, POINT
+from scene_texts import COULOMB, MODE, POINT
 
 from patchfem.core import G_N
 from patchfem.response import (
@@ -16,11 +16,7 @@ from patchfem.scene import loads
 NAME = "relative_displacement_amplitude"
 RIG = (
     POINT
-    + """\
-[friction]
-static = 0.3
-{law}
-"""
+    + COULOMB
     + MODE
     + """\
 [drive]
@@ -32,7 +28,6 @@ onset = "slip"
 cycles = 30
 [accuracy]
 tolerance = 1e-3
-{method}
 """
 )
 ONSET = 0.3 * 26 * 4.4482216152605 / 0.884
@@ -64,19 +59,11 @@ def test_exact_onset_of_table():
     assert bracket_onset(table, make_onset_test("gauge", 2.0)) == (2, 3)
 
 
-def run_levels(law, levels, method="", cycles=30):
-    """Return the result and the measures of a rig at several drive levels."""
-    result = run(
-        loads(RIG.format(law=law, levels=levels, method=method), sets=[f"drive.cycles={cycles}"])
-    )
-    return result, {name: m for name, m in result.measures.items()}
-
-
 @pytest.mark.parametrize("levels", ['["3 g", "3.9 g", "4.5 g", "3.9 g"]', '["4.5 g", "5 g"]'])
 def test_exact_onset_of_rigid_block_is_mu_n_over_m(levels):
     """The onset level of a rigid block agrees with mu N/m within its error, at most 1e-3."""
-    result, found = run_levels('law = "coulomb"', levels)
-    onset = found["onset_level"]
+    result = run(loads(RIG.format(levels=levels)))
+    onset = result.measures["onset_level"]
     assert abs(onset.value - ONSET) <= onset.error <= 1e-3 * ONSET
     table = result.extra["levels"]
     up = table[:3]  # on the way back a block that stands aside slips below mu N/m
@@ -85,26 +72,10 @@ def test_exact_onset_of_rigid_block_is_mu_n_over_m(levels):
     assert np.all(np.diff(result.response.time) >= 0)
 
 
-def test_exact_no_onset_below_friction_limit():
-    """Without slip at any level, the onset is absent and has a reason."""
-    _, found = run_levels('law = "coulomb"', '["1 g", "3 g"]')
-    assert found["onset_level"].value is None
-    assert found["onset_level"].reason == "no level of the increasing sequence slips"
-
-
-def test_always_run_from_event_to_event_reports_each_level():
-    """A run from event to event reports its progress after each level of the drive."""
-    fractions = []
-    text = RIG.format(law='law = "coulomb"', levels='["1 g", "2 g", "4 g", "5 g"]', method="")
-    result = run(loads(text), progress=fractions.append, estimate=False)
-    assert result.extra["engine"] == "hybrid"
-    assert fractions == pytest.approx([0.25, 0.5, 0.75, 1.0])
-
-
-def run_single_level(level: str, cycles: int = 30):
+def run_single_level(level: str):
     """Return a run at one drive level [g] from rest."""
     text = (
-        RIG.format(law='law = "coulomb"', levels='["1 g"]', method="")
+        RIG.format(levels='["1 g"]')
         .replace('waveform = "levels"\n', "")
         .replace('levels = ["1 g"]\nonset = "slip"', f'acceleration = "{level} g"')
     )
@@ -122,9 +93,7 @@ def third_harmonic_ratio(window) -> float:
 
 def test_exact_distortion_onset_has_three_percent_third_harmonic():
     """At the onset by distortion, the default, the third harmonic of the acceleration passes 3 % of the first."""
-    text = RIG.format(law='law = "coulomb"', levels='["3.9 g", "5 g"]', method="").replace(
-        'onset = "slip"\n', ""
-    )
+    text = RIG.format(levels='["3.9 g", "5 g"]').replace('onset = "slip"\n', "")
     onset = run(loads(text)).measures["onset_level"]
     assert onset.value > 1.005 * ONSET and onset.error <= 1e-3 * onset.value
     below, above = (
@@ -136,7 +105,7 @@ def test_exact_distortion_onset_has_three_percent_third_harmonic():
 
 def test_exact_gauge_onset_has_given_amplitude():
     """At the onset by a gauge, the amplitude of the output passes the given length."""
-    text = RIG.format(law='law = "coulomb"', levels='["3.9 g", "4.8 g", "6 g"]', method="")
+    text = RIG.format(levels='["3.9 g", "4.8 g", "6 g"]')
     found = run(
         loads(text.replace('onset = "slip"', 'onset = "gauge"\nonset_length = "0.1 mil"'))
     ).measures

@@ -28,15 +28,6 @@ def evenly(count, steps):
     return phase / OMEGA, phase
 
 
-def unevenly(count, steps):
-    """The same with more samples in the second half of every cycle, and twins an ulp apart, as events have them."""
-    time = evenly(count, steps)[0]
-    extra = (time[:-1] + 0.3 * np.diff(time))[np.arange(count * steps) % steps > steps // 2]
-    twins = np.nextafter(time[7::31], -np.inf)
-    time = np.unique(np.concatenate([time, extra, twins]))
-    return time, OMEGA * time
-
-
 def fourier_coefficients(time, slide, force):
     """Return the first Fourier coefficients of slide and force by the trapezoidal rule."""
     weight = np.full(time.size, 1.0)
@@ -44,9 +35,6 @@ def fourier_coefficients(time, slide, force):
     return compute_harmonic(time, weight, slide - slide.mean(), OMEGA), compute_harmonic(
         time, weight, force, OMEGA
     )
-
-
-# stiffness and damping
 
 
 def simulate_jenkins_loop(amplitude, length, steps):
@@ -82,41 +70,6 @@ def test_exact_jenkins_loop_agrees_with_closed_form(amplitude, length):
     assert found["equivalent_damping"] == pytest.approx(
         float(area) / (2 * pi * 0.5 * amplitude**2), rel=1e-6, abs=1e-12
     )
-
-
-@pytest.mark.parametrize("rest", [0.0, 0.9])
-@pytest.mark.parametrize("fall", [0.4])
-def test_exact_secant_stiffness_at_force_jump(rest, fall):
-    """The secant stiffness at a rest with jumps of the force depends only on the forces before and after the rest."""
-    phase = 2 * pi * np.arange(3 * 400 + 1) / 400 - 1.0
-    turn, part = np.divmod(phase, pi)
-    way = 1 - 2 * (turn % 2)
-    slide = -way * np.cos(np.clip(part * pi / (pi - rest), 0, pi))
-    force = np.where(part < pi - rest, way * np.where(part < pi / 2, 1.0, 1 - fall), way * 0.123)
-    turns = loops.find_reversals(phase / OMEGA, slide, np.zeros(phase.size), force, PERIOD, "jumps")
-    assert loops.secant_stiffness(turns) * loops.mean_half_range(turns) == pytest.approx(
-        -fall / 2, abs=1e-12
-    )
-    assert loops.mean_half_range(turns) == pytest.approx(
-        1.0, abs=2e-4
-    )  # samples alone, without rates
-
-
-# drift
-
-
-@pytest.mark.parametrize("samples", [unevenly])
-@pytest.mark.parametrize("count", [2, 10])
-def test_exact_mean_drift_of_nonuniform_samples(count, samples):
-    """The drift per cycle agrees with the true one within 1e-9, for uniform and non-uniform samples."""
-    time, phase = samples(count, 60)
-    slide = 3e-6 * np.sin(phase + 0.3) + 2e-7 * phase / (2 * pi) + 1e-6
-    rate = OMEGA * (3e-6 * np.cos(phase + 0.3) + 2e-7 / (2 * pi))
-    assert loops.mean_drift(time, slide, rate, PERIOD) == pytest.approx(2e-7, rel=1e-9)
-    assert loops.mean_drift(time, np.full(time.size, 0.3), 0 * rate, PERIOD) == 0.0
-
-
-# scenes
 
 
 def sample_slide_densely(done, begin: float, samples: int = 20_000) -> np.ndarray:

@@ -29,22 +29,6 @@ def test_always_error_covers_two_decays():
     assert settling.extrapolate_steady_amplitude(a[:6], a[:6]) == (None, None)
 
 
-@pytest.mark.parametrize("map_", [[[0.7, 0.3], [-0.4, 0.6]], [[0.9, 0.2], [0.0, 0.5]]])
-def test_exact_plane_map_remainder_agrees_with_neumann_series(map_):
-    """The remainder of a linear map of the plane agrees with (1 - M)^-1 M d within 1e-9."""
-    map_ = np.array(map_)
-    end = np.array([2.0, 1.0])
-    away = [np.array([0.3, -0.5])]
-    for _ in range(6):
-        away.append(map_ @ away[-1])
-    p = (np.array(away) + end) @ [1, 1j]
-    difference = away[-1] - away[-2]
-    rest = np.linalg.solve(np.eye(2) - map_, map_ @ difference) @ [1, 1j]
-    assert settling.plane_map_remainders(p[None, -4:])[0] == pytest.approx(rest, rel=1e-9)
-    value, error = settling.extrapolate_steady_amplitude(np.abs(p), p)
-    assert abs(value - np.hypot(*end)) < error + 1e-12
-
-
 @pytest.mark.parametrize(
     "growth", [1 + 0.1 * np.arange(6), 1e-6 * (7 + np.arange(9)), 1.05 ** np.arange(6)]
 )
@@ -62,11 +46,6 @@ def test_exact_short_runs_are_classified():
     assert settling.classify([0.0, 0.0, 0.0], 1e-3) is Outcome.STEADY
     assert settling.classify(5 - 0.5 * np.arange(6), 1e-3) is Outcome.TRANSIENT
 
-
-# free motion that is left
-
-
-# scenes
 
 BEATING = """\
 [normal]

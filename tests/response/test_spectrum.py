@@ -5,7 +5,6 @@ from math import pi
 import numpy as np
 import pytest
 
-from patchfem.core import Response, SineDrive
 from patchfem.response import spectrum
 
 OMEGA, PERIOD = 2.0, pi
@@ -46,23 +45,3 @@ def test_exact_harmonics_of_jumping_acceleration(steps):
     for n in (1, 3):
         found = spectrum.acceleration_harmonic(t, place, speed, n * OMEGA)
         assert found == pytest.approx(-4j / (pi * n), abs=1e-3 if steps == 8 else 1e-9)
-
-
-@pytest.mark.parametrize("moving", [True, False])
-def test_exact_distortion_includes_base_acceleration(moving):
-    """The distortion refers to the absolute acceleration, which includes that of a moving base."""
-    t = np.linspace(0, 4 * PERIOD, 1601)
-    y = -3 / OMEGA**2 * np.sin(OMEGA * t) - 0.5 / (3 * OMEGA) ** 2 * np.sin(3 * OMEGA * t)
-    v = -3 / OMEGA * np.cos(OMEGA * t) - 0.5 / (3 * OMEGA) * np.cos(3 * OMEGA * t)
-    zero = np.zeros(t.size)
-    window = Response(t, zero[:, None], zero[:, None], zero, zero, y, v, zero, zero, zero, zero)
-    first, third = spectrum.find_acceleration_harmonics(window, SineDrive(2.0, OMEGA, moving))
-    assert first == pytest.approx(5 if moving else 3, rel=1e-7) and third == pytest.approx(
-        0.5, rel=1e-7
-    )
-    found = spectrum.make_acceleration_measures(first, third)
-    assert found == {
-        "absolute_acceleration_fundamental": first,
-        "acceleration_distortion": third / first,
-    }
-    assert spectrum.make_acceleration_measures(1e-16, 1e-17)["acceleration_distortion"] is None

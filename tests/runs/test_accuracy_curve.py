@@ -5,30 +5,12 @@ from dataclasses import replace
 from itertools import pairwise
 
 import pytest
+from scene_texts import PLASTIC, POINT, SHORT
 
 import patchfem as pf
 from patchfem.runs import compute_accuracy_curve
 
-BLOCK = """
-[normal]
-load = "26 lbf"
-[friction]
-law = "elastic-plastic"
-static = 0.3
-bond_length = "1 um"
-[structure]
-moving_mass = "0.884 kg"
-[[structure.mode]]
-name = "axial"
-frequency = "143 Hz"
-damping = 0.003
-slide = 1.0
-[drive]
-kind = "base"
-frequency = "143 Hz"
-acceleration = "5 g"
-cycles = 60
-"""
+BLOCK = POINT + PLASTIC + SHORT
 MARCH = {"accuracy.method": "march"}
 MAIN_MEASURES = ("relative_displacement_amplitude", "absolute_acceleration_peak", "loop_area")
 

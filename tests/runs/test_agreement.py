@@ -89,11 +89,6 @@ PAIRS = {
     "vanishing acceleration": (
         POINT + NONLOCAL + STRUCTURE, VANISHING, "", "accuracy.method=march", MAIN, "hybrid march", 5e-5,
     ),
-    "interlock": (
-        RIG, INTERLOCK + "friction.static=0.05; friction.bond_length=20 um; drive.frequency=180 Hz; "
-        "structure.mode.axial.damping=0.05",
-        "accuracy.method=harmonic", "accuracy.method=march; drive.cycles=60", MAIN, "harmonic march", 3e-5,
-    ),
     "sheared patch with interlock": (
         SHEARED, INTERLOCK + "structure.mode.axial.damping=0.05", "accuracy.method=harmonic",
         "accuracy.method=march; accuracy.steps_per_cycle=800; drive.cycles=60", MAIN, "harmonic march", 0.005,
@@ -116,6 +111,14 @@ PAIRS = {
     "part of a long run": (
         SOFT_BONDS, "structure.mode.axial.damping=0.05", "drive.cycles=300", "drive.cycles=300.5", MAIN,
         "hybrid hybrid", 1e-8,
+    ),
+    "steady motion of two modes": (
+        POINT + PLASTIC + MODE + SECOND + DRIVE, "", "accuracy.method=harmonic", "accuracy.method=exact; drive.cycles=300",
+        MAIN, "harmonic hybrid", 1e-8,
+    ),
+    "steady motion of two interfaces": (
+        PAIR + FORCED, "", "accuracy.method=harmonic", "accuracy.method=exact; drive.cycles=300",
+        MAIN, "harmonic hybrid", 1e-8,
     ),
     "levels down": (
         RIG, "structure.mode.axial.damping=0.05; drive.acceleration=7 g", "accuracy.method=harmonic",

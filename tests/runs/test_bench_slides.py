@@ -7,10 +7,9 @@ from friction_forms import steady_bond_length
 from scene_texts import COULOMB, POINT
 from scipy.integrate import solve_ivp
 
-from patchfem import build, plan, run
+from patchfem import plan, run
 from patchfem.core import PatchfemError
-from patchfem.runs.bench import bench
-from patchfem.scene import load, loads
+from patchfem.scene import load
 
 SPEED, LENGTH, RATIO, A_S, L_K, FLOOR = 1e-3, 2e-6, 0.5, 2e-6, 1e-6, 1e-6
 NONLOCAL = """[friction]
@@ -25,50 +24,22 @@ rest_speed = "1 um/s"
 DWELL = '[slide]\nkind = "dwell"\nspeed = "1 mm/s"\ndistance = "40 um"\nhold = "0.3 s"\ndistance_after = "20 um"\n'
 
 
-def bond_lengths_at_rest(hold, scale=1.0):
-    """Return the bond lengths at the start and at the end of a rest, by equation 2.10 of the report
-    for v = 0: eps_0 - (eps_0 - eps) exp(-a_s t/v_h)."""
-    sliding_length = steady_bond_length(SPEED, LENGTH * scale, RATIO, A_S, L_K * scale)
-    return sliding_length, LENGTH * scale - (LENGTH * scale - sliding_length) * np.exp(
-        -A_S * hold / FLOOR
-    )
-
-
-def friction_after_rest(hold, x, scale=1.0):
-    """Return F/(mu_s N) at x [m] after a rest, from an integration of dz/dx = 1 - z/eps with the
-    bond length eps by equation 2.10."""
-    sliding_length, start = bond_lengths_at_rest(hold, scale)
-    rate = A_S / SPEED**2 + 1 / (L_K * scale)
+def breakaway_ratios(hold):
+    """Return the largest and the last F/(mu_s N) of the 20 um after a rest, from an integration of
+    dz/dx = 1 - z/eps with the bond length eps by equation 2.10: at rest eps_0 - (eps_0 - eps) exp(-a_s t/v_h)."""
+    sliding_length = steady_bond_length(SPEED, LENGTH, RATIO, A_S, L_K)
+    start = LENGTH - (LENGTH - sliding_length) * np.exp(-A_S * hold / FLOOR)
+    rate = A_S / SPEED**2 + 1 / L_K
     solution = solve_ivp(
         lambda y, z: 1 - z / (sliding_length + (start - sliding_length) * np.exp(-rate * y)),
-        (0, 20e-6 * scale),
+        (0, 20e-6),
         [sliding_length],
         method="DOP853",
         rtol=1e-12,
         atol=1e-18,
-        max_step=1e-7 * scale,
-        dense_output=True,
+        max_step=1e-7,
     )
-    return solution.sol(np.clip(x, 0, None))[0] / (LENGTH * scale)
-
-
-def breakaway_ratios(hold, scale=1.0):
-    """Return the largest and the last F/(mu_s N) of the 20 um after a rest."""
-    curve = friction_after_rest(hold, np.linspace(0, 20e-6, 100_001) * scale, scale)
-    return curve.max(), curve[-1]
-
-
-def count_steps(model) -> int:
-    """Return the steps per cycle that a run of the bench takes."""
-    return model.slide.steps(
-        model.accuracy.tolerance, model.accuracy.steps_per_cycle, model.friction.bond_length
-    )
-
-
-def run_bench(text, *sets, steps=None):
-    """Return the response of the bench of a scene."""
-    model = build(loads(text, sets=sets))
-    return bench.run_bench(model, None, steps or count_steps(model))
+    return solution.y[0].max() / LENGTH, solution.y[0, -1] / LENGTH
 
 
 @pytest.fixture
@@ -82,28 +53,6 @@ def write_path_scene(tmp_path):
         return load(scene, sets)
 
     return write_table
-
-
-# ---- the dwell
-
-
-def test_order_of_friction_after_rest_is_two():
-    """The error of the whole force after a rest is of second order in the step; the largest sample
-    alone would jump between samples."""
-    errors = []
-    for steps in (600, 1200, 2400):
-        response = run_bench(POINT + NONLOCAL + DWELL, steps=steps)
-        after_rest = response.slide >= 39.9999e-6
-        reference = friction_after_rest(0.3, response.slide[after_rest] - 40e-6)
-        errors.append(
-            np.abs(response.force[after_rest] / (0.3 * response.load[0]) - reference).max()
-        )
-    assert (
-        errors[1:] == pytest.approx([errors[0] / 4, errors[0] / 16], rel=0.02) and errors[2] < 2e-6
-    )
-
-
-# ---- the table
 
 
 HEAD = "time [s],displacement [um]\n"
@@ -140,13 +89,14 @@ def test_exact_breakaway_of_table_agrees_with_reference(write_path_scene):
 def test_exact_coulomb_bench_breaks_away_at_static_friction():
     """At the first instant and after a rest the force is mu_s N, while sliding mu_k N; the friction
     work depends only on mu_k."""
-    response = run_bench(POINT + COULOMB + "kinetic = 0.2\n" + DWELL)
+    result = run(POINT + COULOMB + "kinetic = 0.2\n" + DWELL)
+    response = result.response
     load = response.load[0]
     force = response.force
     is_moving = np.diff(response.slide) > 0
     starts = np.flatnonzero(is_moving & ~np.append(False, is_moving[:-1]))
     assert starts.size == 2 and force[starts] == pytest.approx(0.3 * load, rel=1e-14)
     assert np.delete(force, starts) == pytest.approx(0.2 * load, rel=1e-14)
-    assert response.values["friction_ratio_peak"] == pytest.approx(0.3)
-    assert response.values["friction_ratio_end"] == 0.2
-    assert response.values["friction_work"] == pytest.approx(0.2 * load * 60e-6, rel=1e-12)
+    assert result.measures["friction_ratio_peak"].value == pytest.approx(0.3)
+    assert result.measures["friction_ratio_end"].value == 0.2
+    assert result.measures["friction_work"].value == pytest.approx(0.2 * load * 60e-6, rel=1e-12)

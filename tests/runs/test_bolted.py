@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from scene_texts import DRIVE, POINT, make_friction_table
+from scene_texts import COATED, COULOMB, DRIVE, POINT, SHEAR, make_friction_table
 
 import patchfem as pf
 
@@ -27,21 +27,7 @@ slide = %r
 output = %r
 base = 0.0
 """
-SHEARED = """\
-[contact]
-length = "12.7 mm"
-width = "12.7 mm"
-height = "6.35 mm"
-load = "26 lbf"
-element_size = "0.5 mm"
-substrate = "Ti-8Al-1Mo-1V"
-[contact.crown]
-radius = "1 m"
-[contact.shear]
-[friction]
-law = "coulomb"
-static = 0.3
-"""
+SHEARED = COATED + '[contact.crown]\nradius = "1 m"\n' + SHEAR + COULOMB
 STUCK = 'measured = "stuck"'
 
 

@@ -6,7 +6,6 @@ import pytest
 
 import patchfem as pf
 from patchfem.core import Outcome
-from patchfem.scene import loads
 
 GROOVES = 'grooves = {wavelength = "80 um", amplitude = "7.5 um"}'
 GROOVED_POINT = f"""
@@ -44,16 +43,6 @@ steps_per_cycle = 100
 WAVE = 2 * np.pi / 80e-6
 
 
-def run_with_keys(text, **keys):
-    """Return the result of a scene with some keys replaced."""
-    return pf.run(loads(text, sets=[f"{key}={value}" for key, value in keys.items()]))
-
-
-def measure_value(result, name):
-    """Return the value of a measure."""
-    return result.measures[name].value
-
-
 def groove_loop_area(load, mu, amplitude, reach):
     """Return the area of the loop of slow sliding between +-reach: N times the integral of the
     difference of the two friction limits."""
@@ -65,19 +54,19 @@ def groove_loop_area(load, mu, amplitude, reach):
 @pytest.mark.parametrize("reach", [30e-6, 200e-6])
 def test_exact_slow_sliding_loop_agrees_with_closed_form(reach):
     """Area and peak force of a slow friction loop over grooves agree with the closed form, and its energies balance."""
-    result = run_with_keys(BENCH, **{"slide.amplitude": f"{reach} m"})
-    assert measure_value(result, "loop_area") == pytest.approx(
+    result = pf.run(BENCH, **{"slide.amplitude": f"{reach} m"})
+    assert result.measures["loop_area"].value == pytest.approx(
         groove_loop_area(115, 0.4, 7.5e-6, reach), rel=1e-9
     )
-    assert measure_value(result, "energy_dissipated") == pytest.approx(
-        measure_value(result, "friction_work"), rel=1e-9
+    assert result.measures["energy_dissipated"].value == pytest.approx(
+        result.measures["friction_work"].value, rel=1e-9
     )
     assert (
-        measure_value(result, "energy_balance") < 1e-12
-        and measure_value(result, "work_check") < 1e-3
+        result.measures["energy_balance"].value < 1e-12
+        and result.measures["work_check"].value < 1e-3
     )
     slope = 7.5e-6 * WAVE
-    assert measure_value(result, "friction_force_peak") == pytest.approx(
+    assert result.measures["friction_force_peak"].value == pytest.approx(
         115 * (slope + 0.4) / (1 - 0.4 * slope), rel=1e-3
     )
 
@@ -85,18 +74,16 @@ def test_exact_slow_sliding_loop_agrees_with_closed_form(reach):
 def test_exact_breakaway_on_grooves_uses_static_coefficient():
     """The friction force is N tan(slope angle + friction angle): with the static coefficient at the
     start, on a falling slope, and with the kinetic coefficient in the loop."""
-    result = run_with_keys(BENCH, **{"friction.kinetic": "0.3"})
-    assert measure_value(result, "loop_area") == pytest.approx(
+    result = pf.run(BENCH, **{"friction.kinetic": "0.3"})
+    assert result.measures["loop_area"].value == pytest.approx(
         groove_loop_area(115, 0.3, 7.5e-6, 30e-6), rel=1e-9
     )
     slope_angle = np.arctan(7.5e-6 * WAVE * np.sin(-0.3))
     first_micron = BENCH.replace(
         'kind = "triangle"\namplitude = "30 um"', 'kind = "constant"\ndistance = "1 um"'
     )
-    result = run_with_keys(
-        first_micron, **{"friction.kinetic": "0.1", "normal.grooves.phase": "0.3 rad"}
-    )
-    assert measure_value(result, "friction_force_peak") == pytest.approx(
+    result = pf.run(first_micron, **{"friction.kinetic": "0.1", "normal.grooves.phase": "0.3 rad"})
+    assert result.measures["friction_force_peak"].value == pytest.approx(
         115 * np.tan(slope_angle + np.arctan(0.4)), rel=1e-9
     )
 
@@ -105,14 +92,14 @@ def test_exact_tanh_loop_on_grooves_agrees_with_limits():
     """Far above the speed v_0 the loop is that of Coulomb's law; far below it is that of a dashpot
     along the slope, c ds/dt with c = mu N/v_0."""
     tanh_bench = BENCH.replace('law = "coulomb"', 'law = "tanh"\nreference_speed = "1 um/s"')
-    assert measure_value(run_with_keys(tanh_bench), "loop_area") == pytest.approx(
+    assert pf.run(tanh_bench).measures["loop_area"].value == pytest.approx(
         groove_loop_area(115, 0.4, 7.5e-6, 30e-6), rel=1e-9
     )
-    viscous = run_with_keys(tanh_bench.replace('"1 um/s"', '"1000 m/s"'))
+    viscous = pf.run(tanh_bench.replace('"1 um/s"', '"1000 m/s"'))
     q = np.linspace(-30e-6, 30e-6, 20_001)
     t = 7.5e-6 * WAVE * np.sin(WAVE * q)
     dashpot = 115 * 0.4 / 1000 * 1e-3 * np.trapezoid(2 * (1 + t**2) ** 1.5, q)
-    assert measure_value(viscous, "loop_area") == pytest.approx(dashpot, rel=1e-6)
+    assert viscous.measures["loop_area"].value == pytest.approx(dashpot, rel=1e-6)
 
 
 LEAVING_KEYS = {
@@ -135,7 +122,7 @@ LEAVING_KEYS = {
 def test_always_lifted_mass_leaving_grooves_is_outcome(text):
     """In every engine the outcome is `leaves_grooves`; a note states the instant, and no warning
     calls it a failed solution."""
-    result = run_with_keys(text, **LEAVING_KEYS)
+    result = pf.run(text, **LEAVING_KEYS)
     assert result.outcome is Outcome.LEAVES_GROOVES
     assert "left their grooves" in result.outcome.sentence
     assert any("leaves the grooves at" in item for item in result.notes)

@@ -1,11 +1,11 @@
 """Difficult cases of dry friction, in every engine that applies, agree with closed forms and other
 programs."""
 
-from functools import lru_cache
 from math import asin, cos, pi, sin
 
 import numpy as np
 import pytest
+from scene_runs import assert_covers
 from scipy.optimize import brentq
 
 from patchfem.runs.run import run
@@ -15,22 +15,21 @@ OMEGA = 2 * pi * 100  # Angular frequency [rad/s] of the mode of 1 kg.
 LOAD = 100.0
 
 
-def format_rig(friction, drive, damping=0.003, frequency=100.0, extra_keys="", law="coulomb"):
+def format_rig(friction, drive, damping=0.003, frequency=100.0, more=""):
     """Return a scene of one mode of 1 kg under 100 N with the given keys of [friction] and [drive]."""
     return f"""\
 [structure]
 moving_mass = "1 kg"
-{extra_keys if extra_keys.startswith("travel") else ""}
 [[structure.mode]]
 name = "axial"
 frequency = "{frequency} Hz"
 damping = {damping}
 slide = 1.0
-{extra_keys if not extra_keys.startswith("travel") else ""}
+{more}
 [normal]
 load = "{LOAD} N"
 [friction]
-law = "{law}"
+law = "coulomb"
 {friction}
 [drive]
 {drive}
@@ -45,26 +44,14 @@ def format_base_drive(acceleration, cycles, ratio=1.0):
     )
 
 
-@lru_cache(maxsize=64)
 def run_text(text, *sets, estimate=True):
-    """Return the result of a scene, computed once."""
+    """Return the result of a scene."""
     return run(loads(text, "a.toml", sets), estimate=estimate)
 
 
 def measure_value(result, name="relative_displacement_amplitude"):
     """Return the value of a measure."""
     return result.measures[name].value
-
-
-def assert_within_error(result, name, reference, round_off=0.0):
-    """Assert that a measure agrees with a reference within its error plus `round_off`."""
-    measure = result.measures[name]
-    assert abs(measure.value - reference) <= measure.error + round_off, (
-        name,
-        measure.value,
-        reference,
-        measure.error,
-    )
 
 
 def assert_energy_balance(result, bound):
@@ -86,7 +73,7 @@ def test_exact_first_slip_near_friction_limit(exponent, second_mode):
             "static = 0.3",
             format_base_drive(30.0 / (1 - excess), 0.5),
             0.0,
-            extra_keys=second_mode,
+            more=second_mode,
         ),
         estimate=False,
     )
@@ -96,79 +83,6 @@ def test_exact_first_slip_near_friction_limit(exponent, second_mode):
     )
     assert result.outcome != "stuck"
     assert_energy_balance(result, 1e-10)
-
-
-def amplitude_with_two_stops(d):
-    """Return the half peak-to-peak amplitude over a/omega^2 of the undamped motion at resonance
-    with two stops per cycle.
-
-    The mass is released at -q when sin t + q = D and moves by x'' + x = sin t - D until x' = 0 at
-    +q (Den Hartog).
-    """
-
-    def residual(q):
-        begin = asin(d - q)
-        a, b = solve_sliding_phase(begin, -q, d)
-        return a(brentq(b, begin + 0.5, begin + pi)) - q
-
-    grid = np.linspace(1e-3, min(d, 0.7853), 400)
-    values = [residual(q) for q in grid]
-    k = next(i for i in range(len(grid) - 1) if values[i] * values[i + 1] < 0)
-    return brentq(residual, grid[k], grid[k + 1], xtol=1e-15)
-
-
-def solve_sliding_phase(start, x, d):
-    """Return the functions x(t) and x'(t) of x'' + x = sin t - d from (x, 0) at the time `start`."""
-    c = x + d + start * cos(start) / 2
-    s = cos(start) / 2 - start * sin(start) / 2
-
-    def displacement(t):
-        return -d - t * cos(t) / 2 + c * cos(t - start) + s * sin(t - start)
-
-    def velocity(t):
-        return -cos(t) / 2 + t * sin(t) / 2 - c * sin(t - start) + s * cos(t - start)
-
-    return displacement, velocity
-
-
-def test_exact_amplitude_above_resonance_threshold():
-    """For a friction limit of D = pi/4 + 1e-3 times the peak drive force, without damping, the
-    amplitude at resonance is bounded and agrees with the half-period solution; at D = 0.8 this
-    solution is the printed 0.299431041748427515."""
-    assert amplitude_with_two_stops(0.8) == pytest.approx(0.299431041748427515, abs=1e-13)
-    d = pi / 4 + 1e-3
-    expected = amplitude_with_two_stops(d)
-    condition_number = (amplitude_with_two_stops(d * (1 + 1e-6)) / expected - 1) / 1e-6
-    assert 5 < abs(condition_number) < 1e3
-    text = format_rig("static = 0.3", format_base_drive(30.0 / d, 1500), 0.0)
-    result = run_text(text, "accuracy.method=exact")
-    assert result.outcome == "steady"
-    assert measure_value(result) * OMEGA**2 / (30.0 / d) == pytest.approx(
-        expected, rel=1e-10 * abs(condition_number)
-    )
-    assert_energy_balance(result, 1e-9)
-    harmonic = run_text(text, "accuracy.method=harmonic")
-    assert_within_error(
-        harmonic,
-        "relative_displacement_amplitude",
-        expected * 30.0 / d / OMEGA**2,
-        1e-9 * expected * 30.0 / d / OMEGA**2,
-    )
-
-
-def test_exact_growth_below_resonance_threshold():
-    """For a friction limit of D = pi/4 - 1e-3 times the peak drive force, without damping, the
-    amplitude at resonance grows by (pi - 4 D) a/omega^2 per cycle."""
-    d = pi / 4 - 1e-3
-    short_run, long_run = (
-        run_text(format_rig("static = 0.3", format_base_drive(30.0 / d, n), 0.0))
-        for n in (900, 1500)
-    )
-    assert short_run.outcome == long_run.outcome == "grows"
-    assert long_run.measures["relative_displacement_amplitude"].error is None
-    rise = (measure_value(long_run) - measure_value(short_run)) / 600 * OMEGA**2 / (30.0 / d)
-    assert rise == pytest.approx(pi - 4 * d, rel=1e-2)
-    assert_energy_balance(long_run, 1e-8)
 
 
 def test_exact_free_block_on_table_agrees_with_closed_form():
@@ -201,7 +115,7 @@ def test_exact_free_block_on_table_agrees_with_closed_form():
     assert abs(measure_value(exact, "drift_per_cycle")) <= 1e-10 * measure_value(exact)
     assert_energy_balance(exact, 1e-9)
     marched = run_text(text, "accuracy.method=march")
-    assert_within_error(marched, "relative_displacement_amplitude", slip / 2 * (30 / d) / w**2)
+    assert_covers(marched.measures, {"relative_displacement_amplitude": slip / 2 * (30 / d) / w**2})
     assert_energy_balance(marched, 1e-8)
 
 
@@ -232,20 +146,3 @@ def test_exact_slip_and_loop_agree_with_independent_program(name, method):
     assert measure_value(result, "loop_area") == pytest.approx(area, rel=rel_tol)
     if method != "harmonic":
         assert_energy_balance(result, 1e-7)
-
-
-def test_exact_static_above_kinetic_has_two_steady_states():
-    """Under 60 m/s^2 at 135/143 of the natural frequency, a mass of 1 kg with 70 N of static and 40
-    N of kinetic friction stays at rest or moves with the amplitude 4.83011 a/omega^2, depending on
-    its start."""
-    text = format_rig("static = 0.7\nkinetic = 0.4", format_base_drive(60.0, 400, 135 / 143))
-    at_rest = run_text(text)
-    moving = run_text(text, 'structure.start={velocity = ["0.5 m/s"]}')
-    assert at_rest.outcome == "stuck" and measure_value(at_rest) < 1e-20
-    assert moving.outcome == "steady"
-    # The printed value is relative to omega_n^2.
-    assert measure_value(moving) == pytest.approx(4.83011 * 60.0 / OMEGA**2, rel=1e-5)
-    for result in (at_rest, moving):
-        assert_energy_balance(result, 1e-7)
-    marched = run_text(text, 'structure.start={velocity = ["0.5 m/s"]}', "accuracy.method=march")
-    assert_within_error(marched, "relative_displacement_amplitude", measure_value(moving))

@@ -25,7 +25,6 @@ COATING = (
     'thickness = "{} m"\n'
 )
 COARSE = "contact.element_size=0.2 mm"
-TILT = "contact.tilt.angle=0.1 mrad"
 
 
 def run_and_check(*sets, text=BLOCKS):
@@ -104,30 +103,6 @@ def test_always_errors_of_single_node_contact_cover_hertz(load):
     ):
         assert error_covers(result, name, reference), name
     assert any("the tolerance is" in line for line in result.warnings)
-
-
-@pytest.mark.parametrize("sets", [(TILT,), (TILT, "contact.crown.radius=2 m")])
-def test_always_patch_scales_linearly_with_load_and_gap(sets):
-    """Load and gap times 1e-9 give pressures and displacements times 1e-9 on the same contact
-    nodes."""
-    scaled_keys = []
-    for assignment in sets:
-        name, number = assignment.split("=")
-        number, unit = number.split()
-        factor = 1e-9 if "tilt" in name else 1e9
-        scaled_keys.append(f"{name}={float(number) * factor!r} {unit}")
-    full = run_and_check(*sets, COARSE)
-    scaled = run_and_check(*scaled_keys, f"contact.load={LOAD * 1e-9!r} N", COARSE)
-    assert np.array_equal(full.patch.active, scaled.patch.active)
-    for name, power in (
-        ("pressure_peak", 1),
-        ("contact_fraction", 0),
-        ("approach", 1),
-        ("normal_stiffness", 0),
-    ):
-        assert measure_value(scaled, name) == pytest.approx(
-            measure_value(full, name) * 1e-9**power, rel=1e-7
-        ), name
 
 
 def test_exact_soft_thin_coating_agrees_with_winkler_foundation():

@@ -4,7 +4,6 @@ rig."""
 import numpy as np
 import pytest
 from scene_texts import BENCH, PATCH, RIG
-from scipy.integrate import solve_ivp
 
 from patchfem.runs.run import run
 from patchfem.scene import loads
@@ -32,22 +31,6 @@ def test_exact_coulomb_with_holder_spring_is_jenkins_element():
         force.append(spring_force)
     assert response.force == pytest.approx(force, abs=1e-9 * LIMIT)
     assert response.force.max() == pytest.approx(LIMIT, rel=1e-12)
-
-
-def test_exact_bonds_with_holder_spring_agree_with_differential_equation():
-    """The first loading of Dahl's law behind a spring k_h agrees with an integration of F' = (mu N
-    - F)/eps (1 - F'/k_h)."""
-    response = run_bench('"nonlocal"\nbond_length = "1 um"', "accuracy.steps_per_cycle=4000")
-    first_loading = slice(0, 900)
-    solution = solve_ivp(
-        lambda q, f: (LIMIT - f) / 1e-6 / (1 + (LIMIT - f) / 1e-6 / HOLDER_STIFFNESS),
-        (0, response.slide[first_loading][-1]),
-        [0.0],
-        t_eval=response.slide[first_loading],
-        rtol=1e-11,
-        atol=1e-10,
-    )
-    assert response.force[first_loading] == pytest.approx(solution.y[0], abs=2e-5 * LIMIT)
 
 
 def test_exact_holder_and_shear_compliances_add():

@@ -11,7 +11,7 @@ import pytest
 import xarray as xr
 from command_line import run_cli
 from scene_runs import assert_agree, find_sentences
-from scipy.io import loadmat
+from yielding_points import solve_after_each_yield
 
 import patchfem as pf
 from patchfem.runs.patch import faces
@@ -63,6 +63,7 @@ CHAIN = (
     + format_interface("[1, 0]", 100, 0.5)
     + format_interface("[2, 1]", 60, 2.0)
     + DRIVE
+    + "[accuracy]\ntolerance = 1e-2\n"
 )
 
 
@@ -77,11 +78,14 @@ def format_equivalent_rig(law: str = LAW) -> str:
     )
 
 
+# A balance of a patch takes seconds, so that it is computed on a coarser mesh.
 @pytest.mark.parametrize("law, method", [(STIFF_LAW, "auto"), (LAW, "march"), (LAW, "harmonic")])
 def test_exact_single_interface_agrees_with_contact_rig(law, method):
     """Every measure and error of a scene agrees between both ways to write it: as an interface and
     as [contact]."""
-    accuracy = f'[accuracy]\nmethod = "{method}"\n'
+    accuracy = (
+        f'[accuracy]\nmethod = "{method}"\ntolerance = {1e-2 if method == "harmonic" else 1e-3}\n'
+    )
     interface = pf.run(SINGLE_INTERFACE.replace(LAW, law) + accuracy)
     rig = pf.run(format_equivalent_rig(law) + accuracy)
     assert interface.outcome == rig.outcome and interface.measures.keys() == rig.measures.keys()
@@ -112,57 +116,23 @@ def chain_result():
     return pf.run(CHAIN)
 
 
-def compute_yield_sequence(giving, limit) -> tuple:
-    """Return the stiffness and the yield displacement of each slip event under a rising
-    displacement.
-
-    `giving` is the compliance (m, m) [m/N] of the nodes and `limit` their friction limits (m,) [N].
-    Stuck nodes carry forces t with giving t = q minus the displacement by slipping nodes; the nodes
-    slip one after the other.
-    """
-    sticks = np.ones(limit.size, bool)
-    displacements = [0.0]
-    forces = [0.0]
-    while sticks.any():
-        coefficients = np.linalg.solve(
-            giving[np.ix_(sticks, sticks)],
-            np.stack(
-                [np.ones(sticks.sum()), giving[np.ix_(sticks, ~sticks)] @ limit[~sticks]], axis=1
-            ),
-        )
-        # Displacement at which each stuck node reaches its friction limit.
-        yield_displacements = (limit[sticks] + coefficients[:, 1]) / coefficients[:, 0]
-        displacements.append(yield_displacements.min())
-        forces.append(
-            float(
-                (coefficients[:, 0] * yield_displacements.min() - coefficients[:, 1]).sum()
-                + limit[~sticks].sum()
-            )
-        )
-        sticks[
-            np.flatnonzero(sticks)[yield_displacements <= yield_displacements.min() * (1 + 1e-9)]
-        ] = False
-    slope = np.diff(forces) / np.diff(displacements)
-    return slope - np.append(slope[1:], 0.0), np.array(displacements[1:])
-
-
 def integrate_chain(model, cycles: int, steps: int) -> tuple:
     """Return the displacement of mass 1 [m] and the friction work [J] after some cycles of CHAIN,
     by leapfrog steps.
 
     The patches are nodes that slip one after the other.
     """
-    yield_sequences = []
+    # Stiffness and yield displacement of the parallel elements of each patch
+    elements = []
     for interface in model.rig.friction.interfaces:
         patch = faces.solve_contact_on_meshes(interface, model.accuracy.tolerance)[0]
         in_contact = patch.active
         load = patch.pressure.sigma_n * patch.pieces.interface.weight
-        yield_sequences.append(
-            compute_yield_sequence(
-                patch.slip_compliance[np.ix_(in_contact, in_contact)],
-                interface.numbers.static * load[in_contact],
-            )
+        slides, rates = solve_after_each_yield(
+            patch.slip_compliance[np.ix_(in_contact, in_contact)],
+            interface.numbers.static * load[in_contact],
         )
+        elements.append((-np.diff(rates.sum(axis=1), append=0.0), slides))
     rows = np.array([[1.0, 0.0], [-1.0, 1.0]])
     omega = 2 * np.pi * 240
     peak = 8 * 9.80665
@@ -170,7 +140,7 @@ def integrate_chain(model, cycles: int, steps: int) -> tuple:
     displacement = np.zeros(2)
     velocity = np.zeros(2)
     work = 0.0
-    element_forces = [np.zeros(k.size) for k, _ in yield_sequences]
+    element_forces = [np.zeros(k.size) for k, _ in elements]
     total = np.zeros(2)
     for n in range(cycles * steps):
         previous = total
@@ -190,7 +160,7 @@ def integrate_chain(model, cycles: int, steps: int) -> tuple:
         displacement = displacement + h * velocity
         increments = rows @ velocity * h
         total = np.zeros(2)
-        for k, (stiffness, limits) in enumerate(yield_sequences):
+        for k, (stiffness, limits) in enumerate(elements):
             element_forces[k] = np.clip(element_forces[k] + increments[k], -limits, limits)
             total[k] = stiffness @ element_forces[k]
         work += float((previous + total) / 2 @ increments)
@@ -254,11 +224,9 @@ def test_always_rigid_patch_moves_as_point_with_warning():
 
 
 def test_always_files_contain_fields_of_every_interface(tmp_path, monkeypatch, chain_result):
-    """The dataset, the plan, the report, the exports and the summary contain every interface."""
+    """The dataset, the report, the exports and the summary contain every interface."""
     monkeypatch.chdir(tmp_path)
-    (tmp_path / "chain.toml").write_text(CHAIN)
-    answer = run_cli("run", "chain.toml", "-o", "out", "-v")
-    assert answer.code == 0 and "pressure_peak_2" in answer.out
+    chain_result.save("out")
     with xr.open_dataset("out/result.nc") as data:
         for number, load in ((1, 100.0), (2, 60.0)):
             weight = data[f"weight_{number}"]
@@ -269,14 +237,6 @@ def test_always_files_contain_fields_of_every_interface(tmp_path, monkeypatch, c
                 data["frame_time"], data["time"], data["friction_force"][number - 1]
             )
             np.testing.assert_allclose(force[1:], expected[1:], atol=1e-4 * np.abs(expected).max())
-    stiffness_chain = json.loads(run_cli("plan", "chain.toml", "--probe", "--json").out)[
-        "stiffness_chain"
-    ]
-    for key, name in (
-        ("pieces_shear", "tangential_stiffness"),
-        ("pieces_shear_2", "tangential_stiffness_2"),
-    ):
-        assert stiffness_chain[key] == pytest.approx(chain_result.measures[name].value, rel=1e-2)
     page = (tmp_path / "out/report.html").read_text()
     assert "Pressure on the interface (1-0)" in page and "Gap (2-1)" in page
     assert run_cli("export", "out/interfaces/2-1", "-o", "fields.csv").code == 0
@@ -285,8 +245,6 @@ def test_always_files_contain_fields_of_every_interface(tmp_path, monkeypatch, c
     summary = json.loads((tmp_path / "out/summary.json").read_text())
     assert summary["numerics"]["interface_nodes_2"] == data.sizes["x_2"]
     assert pf.load("out/scene.resolved.toml").structure.interface[1].contact.load == 60
-    assert run_cli("export", "chain.toml", "-o", "elements.mat").code == 0
-    assert loadmat("elements.mat")["M"].shape == (2, 2)
 
 
 def test_always_interfaces_that_lose_contact_or_have_few_elements_say_so():

@@ -14,7 +14,6 @@ from scene_texts import (
     PIECE,
     PLASTIC,
     POINT,
-    SECOND,
     SHEAR,
     SLIDE,
     STRUCTURE,
@@ -42,7 +41,6 @@ LEVELS = (
 BOUNDED_SWEEP = (
     MODE + SWEEP.replace("3 g", "0.1 g").replace("80", "1") + '[accuracy]\nmethod = "harmonic"\n'
 )
-TWO_MODES = POINT + COULOMB + MODE + SECOND + DRIVE
 DAMPED = "structure.mode.axial.damping=0.3; "
 UNDAMPED = "structure.mode.axial.damping=0; "
 HARMONIC = "accuracy.method=harmonic; "
@@ -332,26 +330,3 @@ def test_exact_motion_without_bound_or_energy_has_exact_measures():
     assert amplitude.value is None and "no bounded motion" in amplitude.reason
     stuck = run_scene(COULOMB_RIG, "drive.acceleration=0.1 g; drive.cycles=12")
     assert stuck.outcome == "stuck" and stuck.measures["energy_balance"].value == 0
-
-
-REMEDIES = [  # Scene, changes, beginning of the warning, and its remedy, which removes it.
-    (
-        '[normal]\nload = "32 N"\nwidth = "2 mm"\n' + NONLOCAL[: NONLOCAL.index("static")]
-        + 'static = 0.58\nbond_length = "12 um"\norder = 0.0\nspread = "47 um"\n[slide]\nkind = "constant"\n'
-        'speed = "49 mm/s"\ndistance = "137 nm"\n',
-        "accuracy.tolerance=0.01",
-    ),
-    (
-        POINT + NONLOCAL + '[slide]\nkind = "sine"\namplitude = "10 um"\nfrequency = "10 Hz"\n',
-        "accuracy.steps_per_cycle=60; accuracy.tolerance=0.9",
-    ),
-]  # fmt: skip
-
-
-@pytest.mark.parametrize("text, changes", REMEDIES)
-def test_exact_remedy_of_failed_work_check_works(text, changes):
-    """A work check above its limit has one warning, which names a number of steps with which the check closes."""
-    (warning,) = run_scene(text, changes).warnings
-    steps = re.search(r"steps_per_cycle = (\d+)", warning)[1]
-    remedied = run_scene(text, f"{changes}; accuracy.steps_per_cycle={steps}")
-    assert remedied.measures["work_check"].value < 1e-3 and not remedied.warnings

@@ -152,28 +152,6 @@ def write_profile(folder, x, z, name="before.csv"):
     return f'[contact.profile]\nfile = "{name}"\n'
 
 
-def test_exact_half_width_spans_outermost_contacts(tmp_path):
-    """Two round peaks 6 mm apart touch: the half-width spans both contacts and the gap between
-    them, the contact fraction only the contacts. A trace that starts at 0 and is as long as the
-    patch gives a note."""
-    x = np.linspace(-LENGTH / 2, LENGTH / 2, 8001)
-    tables = write_profile(tmp_path, x + LENGTH / 2, (np.abs(x) - 3e-3) ** 2 / 2 / 0.5)
-    result = run(
-        load_scene(
-            tables, keys='load = "50 N"\nelement_size = "0.127 mm"', path=tmp_path / "scene.toml"
-        )
-    )
-    half, fraction = (
-        result.measures[name].value for name in ("contact_half_width", "contact_fraction")
-    )
-    assert half == pytest.approx(3e-3 + fraction * LENGTH / 4, rel=1e-3) and 0 < fraction < 0.1
-    assert any("is centred on the patch" in text for text in result.extra["notes"])
-    assert not any("centred on the patch" in text for text in result.warnings)
-
-
-# ---- pieces that differ
-
-
 # ---- the automatic mesh
 def test_exact_automatic_mesh_agrees_with_hertz():
     """The automatic mesh resolves a contact of 1 % of the length, which no uniform mesh of the same

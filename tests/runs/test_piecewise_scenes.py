@@ -1,19 +1,14 @@
-"""Scenes with elastic-plastic elements: the exact engine, which steps between yield events, agrees with the march."""
-
-from __future__ import annotations
+"""Drive levels of a patch: their errors include the error of the mesh."""
 
 import pytest
-from support.scene_texts import (
-    COULOMB,
-    KILOGRAM,
-)
+from scene_texts import COULOMB, KILOGRAM
 
 import patchfem as pf
 
 
 def test_exact_errors_of_levels_include_mesh_error():
     """The errors of a drive level of a patch include the error of the mesh: at the first level they
-    agree within a factor of 4 with those of a single run, and at the last level with those of the
+    agree within a factor of 2 with those of a single run, and at the last level with those of the
     final measures. The onset levels of two meshes agree within their errors.
 
     The errors were 1e-9 of the values in an earlier version.
@@ -35,10 +30,9 @@ def test_exact_errors_of_levels_include_mesh_error():
         assert last_level.errors[name] == pytest.approx(
             coarse.measures[name].error, rel=1e-6, abs=3e-9 * abs(value)
         ), name
-    assert all(
-        1 / 4 < first_level.errors[name] / single_force[name].error < 4
-        for name in first_level.values
-    )
+    # The mesh dominates the errors of these measures.
+    for name in ("relative_displacement_amplitude", "loop_area", "equivalent_stiffness"):
+        assert 1 / 2 < first_level.errors[name] / single_force[name].error < 2, name
     a, b = (result.measures["onset_level"] for result in (coarse, fine))
     assert abs(a.value - b.value) <= a.error + b.error and a.error < 0.05 * a.value
     assert any(

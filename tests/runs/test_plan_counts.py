@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from command_line import run_cli
 from scene_runs import load_scene, run_scene
-from scene_texts import COULOMB, KILOGRAM, POINT
+from scene_texts import COATED, COULOMB, KILOGRAM, POINT, SLIDE
 
 from patchfem import load, plan
 from patchfem.runs.run import run
@@ -44,22 +44,7 @@ def test_always_plan_estimates_bond_list_near_friction_limit():
     assert counts["strips"] / 3 <= run_plan.unknowns["bond_list_about"] <= 3 * counts["strips"]
 
 
-PROBED = """[contact]
-length = "10 mm"
-width = "10 mm"
-height = "5 mm"
-load = "100 N"
-substrate = "steel"
-element_size = "1 mm"
-[friction]
-law = "coulomb"
-static = 0.3
-[slide]
-kind = "sine"
-amplitude = "5 um"
-frequency = "50 Hz"
-cycles = 2
-"""
+PROBED = COATED.replace("0.5 mm", "1 mm") + COULOMB + SLIDE + "cycles = 2\n"
 
 
 def test_exact_probe_measures_what_the_plan_does_not_predict(tmp_path, monkeypatch):

@@ -188,40 +188,50 @@ def test_always_errors_of_patch_cover_reference_and_decrease(name):
 # Known exceptions; of the errors of 60 scenes (seeds 8300000 to 8300059) 99.4 % hold at 1e-2 and 98.3 % at 1e-3:
 # successive changes of the stiffness of patch 601 have the ratios 2.8, 5.8 and 4.3; the first suggests a wrong order.
 MISSES = {(name, "rotational_stiffness", 1e-3) for name in ("601", "609")}
+KNOWN = (
+    3.0  # Ratio of the uncertainty of the reference to an error above which a row does not count.
+)
 MAX_MISS = 1.5  # Largest ratio of true to stated error of an exception.
-KNOWN = 3.0  # Smallest ratio of the stated error to the uncertainty of the reference at which a row counts.
 RANDOM_PATCHES, RANDOM_RIGS = (
     json.loads((FOUND / f"random_{kind}.json").read_text("utf-8")) for kind in ("patches", "rigs")
 )
 
 
+def compare_with_stored(scene: dict, changes: str = "") -> list:
+    """Return the rows of a stored scene: each stored measure has a value, and an error inside the tolerance or a warning."""
+    result = run_scene(scene["scene"], changes)
+    rows = measure_rows(result.measures, scene["true"], scene["doubt"])
+    reasons = {name for name in scene["true"] if result.measures[name].reason}
+    assert {row.name for row in rows} | reasons == set(scene["true"]) and len(rows) > 3
+    tolerance = result.plan.model.accuracy.tolerance
+    if not find_sentences(result.warnings, "the tolerance is"):
+        assert all(result.measures[row.name].error_ratio(tolerance) <= 1 for row in rows)
+    return rows
+
+
 @pytest.mark.share(1, 3, 5)
 @pytest.mark.parametrize("name", RANDOM_PATCHES)
 def test_always_errors_of_random_patch_cover_independent_program(name):
-    """For two random scenes of each kind, the errors cover an independent program, apart from MISSES."""
-    patch = RANDOM_PATCHES[name]
+    """For two random scenes of each kind, the errors cover an independent program, apart from MISSES; NaN is a miss."""
     for tolerance in (1e-2, 1e-3):
-        measures = run_scene(patch["scene"], f"accuracy.tolerance={tolerance}").measures
-        rows = measure_rows(measures, patch["true"], patch["doubt"])
-        rows = [
+        rows = compare_with_stored(RANDOM_PATCHES[name], f"accuracy.tolerance={tolerance}")
+        # An error below the uncertainty of the reference is not decided.
+        misses = [
             row
             for row in rows
-            if KNOWN * row.doubt <= row.error or row.true_error > row.error + KNOWN * row.doubt
+            if not row.holds
+            and not (row.error < KNOWN * row.doubt and row.true_error <= KNOWN * row.doubt)
         ]
-        misses = [row for row in rows if not row.holds]
         assert {(name, row.name, tolerance) for row in misses} <= MISSES
         assert all(row.true_error <= MAX_MISS * row.error + row.doubt for row in misses)
-        assert len(rows) > 3
 
 
 @pytest.mark.share(0, 1, 2, 3)
 @pytest.mark.parametrize("name", RANDOM_RIGS)
 def test_always_errors_of_random_rig_cover_independent_program(name):
-    """All errors of a random rig cover the independent program, but for the work of one rig (1.03 times its error)."""
-    rig = RANDOM_RIGS[name]
-    rows = measure_rows(pf.run(rig["scene"]).measures, rig["true"], rig["doubt"])
-    assert len(rows) == len(rig["true"])
-    misses = [row for row in rows if not row.holds]
+    """All errors of a random rig cover the independent program, but for the work of one rig (1.03 times its error); NaN is a
+    miss."""
+    misses = [row for row in compare_with_stored(RANDOM_RIGS[name]) if not row.holds]
     assert [row.name for row in misses] == ["friction_work"] * (name == "march 304")
     assert all(row.true_error < 1.1 * row.error for row in misses)
 

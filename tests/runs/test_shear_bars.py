@@ -1,5 +1,6 @@
 """Errors of random joints and rigs with partial slip cover results on much finer meshes and steps."""
 
+import pytest
 from shear_scenes import (
     MOTION,
     RIG_TOLERANCE,
@@ -14,18 +15,18 @@ from patchfem.scene import loads
 CHAIN_TOLERANCE = 1e-4  # of the reference of a chain: a hundredth of that of its scene
 
 
-def test_always_errors_of_random_sheared_chain_cover_fine_results():
-    """The errors of a random chain with partial slip cover results on finer meshes and steps. Errors
-    from a single coarser mesh were up to 22 times too small; the campaign `shear-joints` has joints."""
-    rows = compare_scene(*draw_chain(3000), CHAIN_TOLERANCE, MOTION)["rows"]
-    assert len(rows) >= 7 and all(row.holds for row in rows), rows
+# The chain takes minutes.
+@pytest.mark.share(0)
+@pytest.mark.parametrize(
+    "draw, tolerance", [(draw_rig, RIG_TOLERANCE), (draw_chain, CHAIN_TOLERANCE)]
+)
+def test_always_errors_of_random_rig_and_chain_cover_fine_results(draw, tolerance):
+    """The errors of a random rig and a chain with partial slip cover results on finer meshes and steps; none is repeated.
 
-
-def test_always_errors_of_a_rig_that_is_run_once_cover_fine_results():
-    """The same for a rig that is not repeated."""
-    text, keys = draw_rig(3000)
-    keys = keys | {"accuracy.max_seconds": 1e-3}
-    rows = compare_scene(text, keys, RIG_TOLERANCE, MOTION)["rows"]
+    Errors from a single coarser mesh were up to 22 times too small; the campaign `shear-joints` has joints.
+    """
+    text, keys = draw(3000)
+    rows = compare_scene(text, keys | {"accuracy.max_seconds": 1e-3}, tolerance, MOTION)["rows"]
     assert len(rows) >= 7 and all(row.holds for row in rows), rows
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from scene_runs import find_sentences
-from scene_texts import COULOMB, MODE, PLASTIC, POINT, SECOND, SWEEP
+from scene_texts import COULOMB, MODE, PLASTIC, POINT, SWEEP
 
 import patchfem as pf
 from patchfem.runs.rig.steady import curves
@@ -20,47 +20,10 @@ def run_curve(text, **keys):
     return pf.run(text, **STEADY, **keys).extra["curve"]
 
 
-def linear_response(
-    frequency, rows=(1.0,), frequencies=(143.0,), zeta=(0.003,), base=(1.0,), level=3 * G
-):
-    """Return amplitude [m] and absolute acceleration [m/s^2] of the sum `rows` of modes without
-    friction."""
-    w = 2 * np.pi * np.asarray(frequency)[:, None]
-    frequencies = 2 * np.pi * np.array(frequencies)
-    z = -level * np.array(base) / (frequencies**2 - w**2 + 2j * np.array(zeta) * frequencies * w)
-    return np.abs(z @ rows), np.abs(level - w[:, 0] ** 2 * (z @ rows))
-
-
 @pytest.fixture
 def reduced_point_count(monkeypatch):
     """Compute curves with 13 points, refined only where they bend."""
     monkeypatch.setattr(curves, "N_SWEEP_POINTS", 13)
-
-
-@pytest.mark.usefixtures("reduced_point_count")
-@pytest.mark.parametrize(
-    "second_mode", ["", SECOND.replace("slide = 0.1", "slide = 0.1\nbase = 0.1")]
-)
-def test_exact_curve_without_friction_agrees_with_closed_form(second_mode):
-    """Amplitude and acceleration of a curve without friction agree with the closed form within
-    1e-8, for one and for two modes."""
-    base = {"structure.mode.axial.base": "0.9"} if second_mode else {}
-    curve = run_curve(MODE + second_mode + SWEEP.replace('to = "150 Hz"', 'to = "126 Hz"'), **base)
-    modes = (
-        {
-            "rows": (1.0, 0.0),
-            "frequencies": (143.0, 990.0),
-            "zeta": (0.003, 0.01),
-            "base": (0.9, 0.1),
-        }
-        if second_mode
-        else {}
-    )
-    amplitude, acceleration = linear_response(curve["frequency"], **modes)
-    assert curve["amplitude"] == pytest.approx(amplitude, rel=1e-8)
-    assert curve["acceleration_peak"] == pytest.approx(acceleration, rel=1e-8)
-    assert curve["acceleration_fundamental"] == pytest.approx(acceleration, rel=1e-8)
-    assert np.all(curve["acceleration_distortion"] <= curve["acceleration_distortion_error"])
 
 
 @pytest.mark.share(1)
@@ -91,7 +54,7 @@ SINE = '[drive]\nkind = "base"\nfrequency = "{} Hz"\nacceleration = "5 g"\ncycle
 def test_always_unstable_steady_state_is_not_converged():
     """At 200 Hz the only steady state is unstable, and a march does not settle; the outcome is
     not_converged."""
-    result = pf.run(INTERLOCK + SINE.format(200, 10), **STEADY)
+    result = pf.run(INTERLOCK + SINE.format(200, 10), **STEADY, **{"accuracy.tolerance": 1e-2})
     assert result.outcome == "not_converged" and "unstable" in result.extra["regime"]
     assert any("is unstable" in warning and "march" in warning for warning in result.warnings)
 

@@ -104,8 +104,8 @@ def test_exact_report_law_sticks_up_to_half_friction_limit(text, is_stuck):
 
 def test_refuses_stuck_block_with_too_long_bond_list(monkeypatch):
     """A run whose list of bonds would take too long is stopped early, with an estimate of its time and the key to lower."""
-    scene = load(RIG.format(reading="report", push=5.739).replace("cycles = 6", "cycles = 200"))
-    monkeypatch.setattr(engine, "MAX_LIST_SECONDS", 1.0)
+    scene = load(RIG.format(reading="report", push=5.739).replace("cycles = 6", "cycles = 60"))
+    monkeypatch.setattr(engine, "MAX_LIST_SECONDS", 0.6)
     pattern = (
         r"computing time of about (\d+) s, more than the limit of 1 s; lower the number of cycles"
     )

@@ -9,10 +9,10 @@ from command_line import run_cli
 
 import patchfem as pf
 
-LENGTH, SAMPLES = 2e-3, 401
+LENGTH, SAMPLES = 1e-3, 201
 SCENE = """\
 [contact]
-length = "2 mm"
+length = "1 mm"
 width = "4 mm"
 height = "1 mm"
 load = "20 N"
@@ -62,7 +62,9 @@ def test_always_unresolved_contact_is_not_converged(tmp_path):
     """A contact much narrower than its elements has the outcome not_converged, in a run and in a
     sweep."""
     text = (
-        SCENE.split("[contact.tilt]")[0].replace("20 N", "1 N")
+        SCENE.split("[contact.tilt]")[0]
+        .replace("20 N", "1 N")
+        .replace('length = "1 mm"', 'length = "2 mm"')
         + """\
 element_size = "0.2 mm"
 [contact.crown]

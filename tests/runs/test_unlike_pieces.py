@@ -10,15 +10,12 @@ from scene_texts import COATED
 from wedges import singularity_exponent
 
 from patchfem import build
-from patchfem.closed_forms import rounded_punch_half_width
-from patchfem.closed_forms.contact import rounded_punch_pressure
 from patchfem.core import frozen_array
 from patchfem.mesh import TensorGrid
 from patchfem.mesh.grid import graded_rows
 from patchfem.model import extend_grid, make_piece_meshes
 from patchfem.runs.patch.condensed import condense
 from patchfem.runs.patch.press import solve_patch_contact
-from patchfem.runs.patch.result import patch_warnings
 from patchfem.runs.patch.values import compute_static_values
 from patchfem.scene import loads
 
@@ -101,37 +98,6 @@ def test_order_of_corner_pressure_agrees_with_wedge_exponent(tables, angles, pri
     in_range = (inward > 1e-7) & (inward < 5e-6)
     exponent = -np.polyfit(np.log(inward[in_range]), np.log(patch.pressure.sigma_n[in_range]), 1)[0]
     assert exponent == pytest.approx(expected, abs=3e-3)
-
-
-def test_order_of_rounded_punch_error_is_one():
-    """The pressure of a stiff punch with rounded ends on a long block converges to the closed form
-    with first order."""
-    flat = 1e-3
-    radius = 1e-3
-    load = 2e6
-    young = 120e9
-    poisson = 0.3
-    text = BLOCK.replace("24 mm", "80 mm").replace("8 mm", "40 mm").replace("100 kN", "2000 kN")
-    model = build_patch_model(
-        text + '[contact.upper]\nlength = "4 mm"\nheight = "2 mm"\nend_radius = "1 mm"\n'
-        'substrate = {young = "1.2e6 GPa", poisson = 0.3, density = "1 kg/m^3"}\n'
-    )
-    modulus = young / (1 - poisson**2) / (1 + 1e-4)
-    half = rounded_punch_half_width(load, flat, radius, modulus)
-    errors = []
-    for halvings in (0, 1):
-        patch = solve_on_columns(
-            model, graded_columns(half, model.pieces.length / 2, 2e-6), halvings=halvings
-        )
-        expected = rounded_punch_pressure(patch.x, load, flat, radius, modulus)
-        difference = patch.pressure.sigma_n - expected
-        weight = patch.pieces.interface.weight
-        errors.append(np.sqrt((weight * difference**2).sum() / (weight * expected**2).sum()))
-    # The nodes at the contact ends limit the convergence to first order.
-    assert errors[1] < 4e-3 and errors[0] / errors[1] > 1.8
-    assert patch.pressure.sigma_n.max() == pytest.approx(expected.max(), rel=4e-3)
-    assert compute_static_values(patch)["contact_half_width"] == pytest.approx(half, rel=1e-3)
-    assert "steep" not in " ".join(patch_warnings(model, patch))
 
 
 def test_exact_narrow_piece_above_or_below_gives_same_pressure():

@@ -19,7 +19,6 @@ from scene_texts import (
 
 import patchfem as pf
 from patchfem.runs.wear import evolve
-from patchfem.scene import loads
 
 FOUND = Path(__file__).parent / "found"
 TILTED = COATED + '[contact.tilt]\nangle = "0.1 mrad"\n'
@@ -31,7 +30,7 @@ SOFT_RIG = (
     + SHEAR
     + NONLOCAL
     + MODE
-    + '[drive]\nkind = "base"\nfrequency = "143 Hz"\nacceleration = "5 g"\ncycles = 100\n'
+    + '[drive]\nkind = "base"\nfrequency = "143 Hz"\nacceleration = "5 g"\ncycles = 12\n'
 )
 LONG_WEAR = WEAR.replace("135723", "1e9").replace("1e-14", "1e-13")
 WORN_THROUGH_SCENE = (
@@ -40,18 +39,13 @@ WORN_THROUGH_SCENE = (
 LARGE_TOLERANCE = "[accuracy]\ntolerance = 2e-2\n"
 
 
-def run_text(text, **sets):
-    """Return the result of a scene with some keys replaced."""
-    return pf.run(loads(text, "wear.toml"), **sets)
-
-
 def test_exact_worn_volume_is_coefficient_times_load_times_path():
     """The worn volume is kappa N s n within 1e-12; wear widens the contact, lowers the peak and keeps the loop."""
-    worn = run_text(TILTED + COULOMB + SINE + WEAR)
+    worn = pf.run(TILTED + COULOMB + SINE + WEAR)
     volume = worn.measures["worn_volume"]
     assert volume.value == pytest.approx(KAPPA * LOAD * 40e-6 * CYCLES, rel=1e-12)
     assert 0 < volume.error <= 1e-3 * volume.value
-    unworn = run_text(TILTED + COULOMB + SINE)
+    unworn = pf.run(TILTED + COULOMB + SINE)
     assert worn.measures["contact_fraction"].value > 1.4 * unworn.measures["contact_fraction"].value
     assert worn.measures["pressure_peak"].value < 0.6 * unworn.measures["pressure_peak"].value
     assert worn.measures["loop_area"].value == pytest.approx(
@@ -60,24 +54,23 @@ def test_exact_worn_volume_is_coefficient_times_load_times_path():
 
 
 def test_static_measures_after_wear_are_those_of_the_worn_patch():
-    """After wear the pressure peak is that of the worn field within 1 %, with pieces that are rigid and elastic in shear.
+    """After wear the pressure peak is that of the worn field within 1 %, with pieces that are elastic in shear.
 
     With [contact.shear] a bench stated the peak of the unworn patch, which is 2.7 times as high.
     """
     free = TILTED.replace('element_size = "0.5 mm"\n', "")
-    for scene in (free, free + SHEAR):
-        result = run_text(scene + COULOMB + SINE + WEAR + LARGE_TOLERANCE)
-        largest = result.fields["normal_stress"][-1].max()
-        assert result.measures["pressure_peak"].value == pytest.approx(largest, rel=1e-2)
-        x = result.patch.x
-        loaded = np.ptp(x[result.fields["normal_stress"][-1] > 0]) / np.ptp(x)
-        assert result.measures["contact_fraction"].value == pytest.approx(loaded, rel=5e-2)
+    result = pf.run(free + SHEAR + COULOMB + SINE + WEAR + "jumps = 6\n" + LARGE_TOLERANCE)
+    largest = result.fields["normal_stress"][-1].max()
+    assert result.measures["pressure_peak"].value == pytest.approx(largest, rel=1e-2)
+    x = result.patch.x
+    loaded = np.ptp(x[result.fields["normal_stress"][-1] > 0]) / np.ptp(x)
+    assert result.measures["contact_fraction"].value == pytest.approx(loaded, rel=5e-2)
 
 
 @pytest.mark.parametrize("motion", [SINE, STRUCTURE], ids=["bench", "rig"])
 def test_exact_point_contact_wear_agrees_with_archard(motion):
     """The worn volume of a point contact is kappa N 4 A n, on a bench and in a rig."""
-    result = run_text(POINT + COULOMB + motion + WEAR)
+    result = pf.run(POINT + COULOMB + motion + WEAR)
     amplitude = result.measures["slip_amplitude"].value
     assert result.measures["worn_volume"].value == pytest.approx(
         KAPPA * LOAD * 4 * amplitude * CYCLES, rel=2e-3
@@ -85,7 +78,7 @@ def test_exact_point_contact_wear_agrees_with_archard(motion):
     assert "worn_depth_max" not in result.measures
 
 
-@pytest.mark.share(0, 3)
+@pytest.mark.share(2, 3)
 @pytest.mark.parametrize(
     "table",
     [
@@ -99,7 +92,7 @@ def test_exact_point_contact_wear_agrees_with_archard(motion):
 )
 def test_exact_worn_volume_does_not_depend_on_skin_or_shape(table):
     """The worn volume is kappa N s n for every skin, holder and shape."""
-    result = run_text(TILTED + table + COULOMB + SINE + WEAR)
+    result = pf.run(TILTED + table + COULOMB + SINE + WEAR)
     assert result.measures["worn_volume"].value == pytest.approx(
         KAPPA * LOAD * 40e-6 * CYCLES, rel=1e-12
     )
@@ -124,7 +117,7 @@ def test_exact_worn_volume_does_not_depend_on_skin_or_shape(table):
 def test_exact_non_periodic_slide_counts_as_one_wear_cycle(slide, path):
     """A slide that does not repeat counts as one wear cycle of its whole path."""
     for contact in (TILTED, TILTED + SHEAR):
-        volume = run_text(contact + COULOMB + f"[slide]\n{slide}\n" + WEAR).measures["worn_volume"]
+        volume = pf.run(contact + COULOMB + f"[slide]\n{slide}\n" + WEAR).measures["worn_volume"]
         assert volume.value == pytest.approx(
             KAPPA * LOAD * path * CYCLES, rel=1e-12 if contact == TILTED else 0.06
         )
@@ -138,7 +131,7 @@ def test_exact_non_periodic_slide_counts_as_one_wear_cycle(slide, path):
         SOFT_RIG + WEAR + "jumps = 2\n" + LARGE_TOLERANCE,
         TILTED + COULOMB + SINE + WEAR,
         SOFT_RIG + WEAR + LARGE_TOLERANCE,
-        WORN_THROUGH_SCENE + "jumps = 40\n",
+        WORN_THROUGH_SCENE + "jumps = 12\n",
     ],
     ids=["bench_jumps", "rig_jumps", "bench", "rig", "worn_through"],
 )
@@ -177,7 +170,7 @@ def test_exact_resumed_wear_run_writes_identical_files(tmp_path, monkeypatch, te
 
 def test_exact_worn_through_coating_ends_run():
     """A run ends when the coating of the piece that wears more is worn through: the volume is that of the cycles so far."""
-    result = run_text(WORN_THROUGH_SCENE + "upper_share = 0.2\njumps = 40\n")
+    result = pf.run(WORN_THROUGH_SCENE + "upper_share = 0.2\njumps = 12\n")
     cycle, volume, depth = (
         result.measures[name].value
         for name in ("worn_through_cycle", "worn_volume", "worn_depth_max")
@@ -191,7 +184,7 @@ def test_exact_worn_through_coating_ends_run():
     error = result.measures["worn_through_cycle"].error
     for offset in (-error, error):
         text = WORN_THROUGH_SCENE.replace("1e9", repr(cycle + offset))
-        outcome = run_text(text + "upper_share = 0.2\njumps = 40\n").outcome
+        outcome = pf.run(text + "upper_share = 0.2\njumps = 12\n").outcome
         assert (outcome == "worn_through") == (offset > 0)
 
 
@@ -199,7 +192,7 @@ def test_refuses_to_resume_run_of_other_scene(tmp_path, monkeypatch):
     """An interrupted wear run is resumed only by the same scene."""
     scene = tmp_path / "worn.toml"
     save = evolve.save_wear_state
-    scene.write_text(TILTED + COULOMB + SINE + WEAR)
+    scene.write_text(TILTED + COULOMB + SINE + WEAR + "jumps = 2\n")
 
     def save_and_interrupt(*arguments):
         save(*arguments)

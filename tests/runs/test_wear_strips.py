@@ -6,7 +6,6 @@ import pytest
 from scene_texts import COATED, COULOMB, MODE, PIECE
 
 import patchfem as pf
-from patchfem.scene import loads
 
 STRIPS = "[contact.strips]\ncount = 4\n"
 ROLLED = STRIPS + 'roll = "0.1 mrad"\n'
@@ -15,11 +14,6 @@ WEAR = '[wear]\ncoefficient = "1e-14 m^2/N"\ncycles = 135723\n'
 LARGE_TOLERANCE = "[accuracy]\ntolerance = 1e-2\n"
 BASE_DRIVE = '[drive]\nkind = "base"\nfrequency = "143 Hz"\nacceleration = "5 g"\ncycles = 60\n'
 LOAD = 26 * 4.4482216152605
-
-
-def run_text(text, **sets):
-    """Return the result of a scene with some keys replaced."""
-    return pf.run(loads(text, "strips.toml"), **sets)
 
 
 def final_depth(result) -> np.ndarray:
@@ -38,7 +32,7 @@ def test_exact_worn_depth_of_rolled_rigid_pad_agrees_with_closed_form():
     skin = '[contact.asperities]\nlaw = "linear"\nnormal_stiffness = "1e12 Pa/m"\n'
     k = 1e12
     n = 5e4
-    result = run_text(
+    result = pf.run(
         rigid_pieces
         + skin
         + ROLLED.replace("0.1", "0.05")
@@ -61,7 +55,7 @@ def test_exact_worn_depth_of_rolled_rigid_pad_agrees_with_closed_form():
 def test_exact_strips_of_rig_wear_by_their_own_slip():
     """The worn volume of each strip follows from its own slip amplitude; a note states the lateral motion."""
     mode = MODE + 'yaw = "20 rad/m"\n'
-    result = run_text(
+    result = pf.run(
         COATED
         + STRIPS
         + COULOMB

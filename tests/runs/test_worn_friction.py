@@ -113,7 +113,10 @@ def test_exact_bond_length_follows_worn_depth():
 def test_always_wear_beyond_friction_table_gives_warning():
     """Beyond the last depth of the table friction stays constant, and a warning says so."""
     result = run_scene(
-        'wear.friction.depth=["0 um","1 um"]', "wear.friction.coefficient_factor=[1,0.9]"
+        'wear.friction.depth=["0 um","1 um"]',
+        "wear.friction.coefficient_factor=[1,0.9]",
+        "wear.cycles=2e6",
+        "wear.jumps=4",
     )
     assert result.measures["static_coefficient"].value == pytest.approx(0.9 * MU, rel=1e-12)
     assert [

@@ -18,7 +18,7 @@ PLACE = re.compile(r"scene\.toml(:\d+: \S+: |: missing \[|: \S+: |: )")
 
 def test_always_changed_scene_is_refused_with_places_or_read_again():
     """A mistake names file, line or missing table, and key; a resolved scene gives the same values."""
-    trial = Trial(np.random.default_rng(81), None, None, None)
+    trial = Trial(np.random.default_rng(81))
     n_refused = 0
     for _ in range(COUNT):
         tables = grammar.draw_scene(trial)

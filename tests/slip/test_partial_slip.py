@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pieces import LOAD, TILTS, draw_gap, make_coated_pair
 from pressed import press
-from slip_paths import draw_paths, jenkins_forces
+from yielding_points import jenkins_forces, solve_all_points, solve_box_problem
 
 from patchfem.contact import tangential_stiffness
 from patchfem.contact.gaps import crown, tilt
@@ -43,53 +43,6 @@ def test_exact_scaled_limits_equal_recomputed_elements():
         )
 
 
-def solve_box_problem(c, limit, free_slide, force):
-    """Return the forces and the slip that minimise f.C f/2 - f.free_slide subject to |f| <= limit.
-
-    A primal-dual active-set method starts from `force`. The optimality conditions are checked: C f
-    = free_slide at points that stick, C f <= free_slide at +limit and C f >= free_slide at -limit.
-    """
-    scale = np.abs(free_slide).max() + np.abs(c @ limit).max()
-    bound = np.where(force >= limit, 1, np.where(force <= -limit, -1, 0))
-    for _ in range(60 + 3 * limit.size):
-        stuck = bound == 0
-        force = bound * limit
-        if stuck.any():
-            force[stuck] = np.linalg.solve(
-                c[np.ix_(stuck, stuck)],
-                free_slide[stuck] - c[np.ix_(stuck, ~stuck)] @ force[~stuck],
-            )
-        slip = free_slide - c @ force
-        next_bound = np.where(
-            stuck,
-            np.where(force > limit, 1, np.where(force < -limit, -1, 0)),
-            np.where(bound * slip > -1e-15 * scale, bound, 0),
-        )
-        if np.array_equal(next_bound, bound):
-            break
-        bound = next_bound
-    slip = free_slide - c @ force
-    assert np.all(np.abs(force) <= limit * (1 + 1e-12))
-    assert np.abs(slip[bound == 0]).max(initial=0) <= 1e-12 * scale
-    assert (bound * slip).min() >= -1e-12 * scale
-    return force, slip
-
-
-def solve_all_points(c, limit, path):
-    """Return the resultant force at every reversal [N] of points coupled by the compliance c.
-
-    One box-constrained problem is solved per stroke.
-    """
-    slip = np.zeros(limit.size)
-    force = np.zeros(limit.size)
-    resultants = []
-    for slide in path:
-        force, slip_increment = solve_box_problem(c, limit, slide - slip, force)
-        slip = slip + slip_increment
-        resultants.append(force.sum())
-    return np.array(resultants)
-
-
 def test_exact_point_forces_agree_with_box_problem():
     """The force at every point, computed from the stretch of the elements, agrees with the
     box-constrained solution within 1e-10 of the friction limit."""
@@ -120,11 +73,12 @@ def test_always_elements_are_exact_for_rough_gaps(seed, bond_length):
     assert group.stiffness @ group.yield_displacement == pytest.approx(limit.sum(), rel=1e-11)
     touching = limit > 0
     c = pair.tangential[np.ix_(touching, touching)] + np.diag(bond_length / limit[touching])
-    path = next(draw_paths(1, group.yield_displacement[-1], seed % 1000))
-    difference = np.abs(
-        solve_all_points(c, limit[touching], path) - jenkins_forces(group, path)
-    ).max()
-    assert difference <= 1e-10 * limit.sum()
+    # 40 reversals, from micro-slip to gross sliding
+    swing = rng.uniform(0.0, 1.0, 40) * (-1.0) ** np.arange(40) + 0.2 * rng.normal()
+    path = group.yield_displacement[-1] * 10 ** rng.uniform(-1, 0.3) * swing
+    expected = solve_all_points(c, limit[touching], path).sum(axis=1)
+    force = jenkins_forces(path, group.stiffness, group.yield_displacement)[0]
+    assert np.abs(force - expected).max() <= 1e-10 * limit.sum()
 
 
 @pytest.mark.parametrize("shape", ["crown", "tilt"])

@@ -3,35 +3,10 @@ each yield."""
 
 import numpy as np
 import pytest
+from yielding_points import solve_after_each_yield
 
 from patchfem.core import PatchfemError
 from patchfem.slip import jenkins_set, shear_modes
-
-
-def solve_after_each_yield(c, limit):
-    """Return the slides at which points yield (t,) [m] and the force rates before each yield (t, n)
-    [N/m].
-
-    The points are coupled by the compliance c (n, n) and yield at the forces `limit` (n,) [N].
-    """
-    stick = np.ones(limit.size, bool)
-    force = np.zeros(limit.size)
-    slide = 0.0
-    yield_slides = []
-    rates = []
-    while stick.any():
-        rate = np.zeros(limit.size)
-        rate[stick] = np.linalg.solve(c[np.ix_(stick, stick)], np.ones(stick.sum()))
-        increments = np.where(
-            stick & (rate > 0), (limit - force) / np.where(rate > 0, rate, 1.0), np.inf
-        )
-        increment = max(increments.min(), 0.0)
-        slide = slide + increment
-        force = force + rate * increment
-        yield_slides.append(slide)
-        rates.append(rate)
-        stick &= increments > increment * (1 + 1e-9)
-    return np.array(yield_slides), np.array(rates)
 
 
 def half_plane_compliance(count: int):

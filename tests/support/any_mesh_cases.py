@@ -6,11 +6,10 @@ from types import SimpleNamespace
 
 import meshio
 import numpy as np
-from pair_meshes import make_pair_mesh
 from scipy.spatial import Delaunay
 
 from patchfem.mesh import PieceMesh, graded_grid, read_pieces
-from patchfem.mesh.files import CELL_TAGS, EDGE_TAGS
+from patchfem.mesh.files import CELL_TAGS, EDGE_TAGS, join_meshes
 
 
 def mesh_of_grid(grid, split=0.0, seed=None):
@@ -92,21 +91,27 @@ NAMES = {v: k for k, v in (CELL_TAGS | EDGE_TAGS).items()}
 
 
 def make_pair(kind="mixed", grid=GRID):
-    """Return points, cells, edges and tags of the mesh of a pair; kind "mixed" splits every other quadrilateral."""
-    pair = make_pair_mesh(grid)
+    """Return points, cells, edges and tags of the mesh of a pair; kind "mixed" splits every other quadrilateral.
+
+    Node j*ny + i of a piece is column j, row i; the upper piece follows the lower one.
+    """
+    points, ((_, quads, names), (_, edges, ends)) = join_meshes(grid, grid)
+    tags, edge_tags = (
+        np.array([(CELL_TAGS | EDGE_TAGS)[name] for name in group], np.int32)
+        for group in (names, ends)
+    )
     is_split = {"quads": np.zeros, "triangles": np.ones}.get(
         kind, lambda n, t: np.arange(n) % 2 == 0
-    )
-    is_split = is_split(len(pair["quads"]), bool)
-    cut = pair["quads"][is_split]
+    )(len(quads), bool)
+    cut = quads[is_split]
     return SimpleNamespace(
-        points=pair["points"].copy(),
+        points=points.copy(),
         triangles=np.concatenate([cut[:, [0, 1, 2]], cut[:, [0, 2, 3]]]),
-        quads=pair["quads"][~is_split],
-        triangle_tags=np.tile(pair["tags"][is_split], 2),
-        quad_tags=pair["tags"][~is_split],
-        edges=pair["edges"],
-        edge_tags=pair["edge_tags"],
+        quads=quads[~is_split],
+        triangle_tags=np.tile(tags[is_split], 2),
+        quad_tags=tags[~is_split],
+        edges=edges,
+        edge_tags=edge_tags,
     )
 
 

@@ -64,17 +64,20 @@ class LowerPressure(NamedTuple):
         return np.interp(self.places + q, self.places, self.sigma, left=0.0, right=0.0)
 
 
-def make_bond_sum(law: Bonds, tail) -> BondSum:
-    """Return the settings of a list that loses at most a fraction `tail` of the friction limit; 0 keeps every bond."""
-    return BondSum(law, cutoff_age(law.order, tail) if tail else np.inf, 0.0)
+def make_bond_sum(law: Bonds, tail, merge=0.0) -> BondSum:
+    """Return the settings of a list that loses at most a fraction `tail` of the friction limit; 0 keeps every bond.
+
+    merge: widest merged strip in bond lengths; 0 merges nothing.
+    """
+    return BondSum(law, cutoff_age(law.order, tail) if tail else np.inf, merge)
 
 
-def make_points(law: Bonds, pressure, tail=None) -> Contact:
+def make_points(law: Bonds, pressure, tail=None, merge=0.0) -> Contact:
     """Return contact points of unit area under a pressure.
 
     Their bonds are known by their moments without a `tail`, else summed over lists; a tail of 0 keeps every bond.
     """
-    bond_sum = None if tail is None else make_bond_sum(law, tail)
+    bond_sum = None if tail is None else make_bond_sum(law, tail, merge)
     row = np.zeros(0)
     if isinstance(pressure, LowerPressure):
         lower = np.stack([pressure.places, pressure.sigma])
@@ -91,9 +94,9 @@ def march_path(contact: Contact, path, dt=1.0) -> PathHistory:
     return PathHistory(traction, motion.mean, motion.losses, motion.stored[1:])
 
 
-def march_bonds(law: Bonds, path, pressure, dt=1.0, tail=None) -> PathHistory:
+def march_bonds(law: Bonds, path, pressure, dt=1.0, tail=None, merge=0.0) -> PathHistory:
     """Move `make_points` along the knots `path`; dt: scalar or per step."""
-    return march_path(make_points(law, pressure, tail), path, dt)
+    return march_path(make_points(law, pressure, tail, merge), path, dt)
 
 
 def march_under_loads(law, path, loads, dt=1.0, tail=None) -> PathHistory:
@@ -210,12 +213,13 @@ def reference_with_lift_off(law, path, pressure: LowerPressure, dt=1.0):
     """Return `reference_traction` (m,) of points that lose all bonds where a step ends without pressure."""
     is_bare = np.array([pressure(q) <= 0 for q in path])
     tractions = np.zeros(is_bare.shape[1])
+    times = np.broadcast_to(dt, len(path) - 1)
     for point in np.flatnonzero(~is_bare[-1]):
         bare_knots = np.flatnonzero(is_bare[:, point])
         start = bare_knots[-1] if bare_knots.size else 0
         kept = replace(law, initial=0.0) if bare_knots.size else law
         at_point = lambda q: pressure(q)[point : point + 1]  # noqa: B023, E731
-        tractions[point] = reference_traction(kept, path[start:], at_point, dt)[0]
+        tractions[point] = reference_traction(kept, path[start:], at_point, times[start:])[0]
     return tractions
 
 

@@ -46,18 +46,6 @@ def make_elements(count=100, total=6.0, limit=1.2):
     return k, w * limit / (k @ w)
 
 
-def jenkins_forces(path, stiffness, limit):
-    """Return the forces of parallel Jenkins elements along a path from the virgin state at 0, and the last stretches."""
-    stretch = np.zeros(len(stiffness))
-    last = 0.0
-    out = []
-    for q in path:
-        stretch = np.clip(stretch + q - last, -limit, limit)
-        last = q
-        out.append(stiffness @ stretch)
-    return np.array(out), stretch
-
-
 def march_exactly(modes, drive, stiffness, limit, state, stretch, steps, cycles=1):
     """Propagate the modes exactly under a force that is linear in each step, found by fixed-point iteration.
 

@@ -1,11 +1,6 @@
-"""Runs of a friction law in every kind of scene: bench, rig, two masses, steady motion, fit."""
+"""Runs of a friction law in every kind of scene: bench, rig, release, fit."""
 
 import csv
-import json
-import os
-import subprocess
-import sys
-from pathlib import Path
 
 import numpy as np
 from scene_texts import DRIVE, MODE
@@ -20,22 +15,6 @@ from patchfem.scene import load, loads
 LOAD = 100.0  # Normal load of every interface [N].
 POINT = '[normal]\nload = "100 N"\n'
 SINE = '[slide]\nkind = "sine"\namplitude = "10 um"\nfrequency = "100 Hz"\ncycles = 2\n'
-MASSES = """\
-[structure]
-masses = ["0.884 kg", "0.884 kg"]
-[[structure.spring]]
-between = [1, 0]
-stiffness = "713 N/mm"
-[[structure.spring]]
-between = [2, 0]
-stiffness = "713 N/mm"
-[[structure.damper]]
-between = [1, 0]
-coefficient = "{damper} N s/m"
-[[structure.damper]]
-between = [2, 0]
-coefficient = "{damper} N s/m"
-"""
 
 
 def friction_table(law: str) -> str:
@@ -82,46 +61,6 @@ def run_release(law: str, *sets):
             sets=sets,
         )
     ).response
-
-
-def run_two_masses(law: str, interfaces: int, *sets, cycles: int = 20, steps: int = 100):
-    """Return the Result of two equal masses, one or both of them on an interface with the law."""
-    faces = "".join(
-        f'[[structure.interface]]\nbetween = [{k}, 0]\nload = "100 N"\n{law}'
-        for k in range(1, interfaces + 1)
-    )
-    drive = DRIVE.replace("cycles = 30", f"cycles = {cycles}")
-    text = MASSES.format(damper=32) + faces + drive + f"[accuracy]\nsteps_per_cycle = {steps}\n"
-    return run(loads(text, sets=sets), estimate=False)
-
-
-PLAIN = """
-import json, sys
-from law_runs import run_two_masses
-runs = [run_two_masses(sys.argv[1], count, cycles=2, steps=50) for count in (2, 1)]
-both, alone = (run.response for run in runs)
-print(json.dumps([both.extra["slides"].T.tolist(), alone.slide.tolist(),
-                  [run.measures["friction_force_peak"].value for run in runs]]))
-"""
-
-
-def run_two_masses_uncompiled(law: str):
-    """Run `run_two_masses` in a process without compilation.
-
-    Returns displacements (2, t) with both interfaces, displacement (t,) with one, and the peak
-    forces of both runs.
-    """
-    python_path = os.pathsep.join([str(Path(__file__).parent), *filter(None, sys.path)])
-    done = subprocess.run(
-        [sys.executable, "-c", PLAIN, law],
-        capture_output=True,
-        text=True,
-        timeout=300,
-        env=os.environ | {"NUMBA_DISABLE_JIT": "1", "PYTHONPATH": python_path},
-    )
-    assert done.returncode == 0, done.stderr
-    both, alone, pulls = json.loads(done.stdout)
-    return np.array(both), np.array(alone), pulls
 
 
 def fit_law(folder, law: str, loop: tuple, free: str):

@@ -73,7 +73,7 @@ def compare_with_reference(spec: dict, true: dict) -> dict:
         "absolute_acceleration_peak": spec["acceleration"],
     }
     ratios = {}
-    for name in true.keys() & values.keys():
+    for name in true.keys() - {"drift_per_cycle"}:  # which runs of scenes find
         distance = abs(values[name] - true[name])
         if name == "slip_start_phase":
             distance = min(distance, abs(np.pi - distance))

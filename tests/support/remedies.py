@@ -43,7 +43,7 @@ class Remedy(NamedTuple):
 
 def draw_scene(seed: int) -> dict:
     """Return the tables of the first scene of a seed that is valid and planned as cheap."""
-    trial = Trial(np.random.default_rng([28, seed]), None, None, None)
+    trial = Trial(np.random.default_rng([28, seed]))
     while True:
         tables = _draw_coarse_scene(trial, KINDS[seed % len(KINDS)])
         try:

@@ -11,10 +11,10 @@ from time import process_time
 
 import numpy as np
 from campaigns import measure_rows
+from scene_texts import COATED, COULOMB, SHEAR, STRUCTURE
 
 import patchfem as pf
 from patchfem.response.rows import INTERFACE_MEASURES
-from patchfem.scene import Scene, loads
 
 JOINT_TOLERANCE = 1e-6  # Tolerance of the reference of a joint.
 RIG_TOLERANCE = 1e-5  # Tolerance of the reference of a rig or a chain.
@@ -33,36 +33,13 @@ MOTION = (
     *BENCH,
     "equivalent_damping",
 )
-RIG = """
-[contact]
-length = "12.7 mm"
-width = "12.7 mm"
-height = "6.35 mm"
-load = "115 N"
-substrate = "Ti-8Al-1Mo-1V"
-[contact.coating]
-material = "WC-Co"
-thickness = "152 um"
-[contact.shear]
-[friction]
-law = "coulomb"
-static = 0.3
-kinetic = 0.3
-[structure]
-moving_mass = "0.884 kg"
-[[structure.mode]]
-name = "axial"
-frequency = "143 Hz"
-damping = 0.003
-slide = 1.0
-[drive]
-kind = "base"
-frequency = "143 Hz"
-acceleration = "5 g"
-cycles = 150
-[accuracy]
-tolerance = 1e-2
-"""
+RIG = (
+    COATED.replace('element_size = "0.5 mm"\n', "")
+    + SHEAR
+    + COULOMB
+    + STRUCTURE.replace("cycles = 30", "cycles = 150")
+    + "[accuracy]\ntolerance = 1e-2\n"
+)
 
 
 def _draw_shape(draw, crowns: tuple, tilts: tuple) -> dict:
@@ -71,11 +48,6 @@ def _draw_shape(draw, crowns: tuple, tilts: tuple) -> dict:
     if kind == "crown":
         return {"contact.crown.radius": f"{10 ** draw.uniform(*crowns):.3g} m"}
     return {"contact.tilt.angle": f"{10 ** draw.uniform(*tilts):.3g} rad"} if kind == "tilt" else {}
-
-
-def _load_scene(text: str, sets: dict) -> Scene:
-    """Return the scene of a text with keys set."""
-    return loads(text, "random.toml", [f"{key}={value}" for key, value in sets.items()])
 
 
 def draw_joint(seed: int) -> tuple:
@@ -94,7 +66,7 @@ def draw_joint(seed: int) -> tuple:
             "contact.coating.thickness": f"{draw.uniform(50, 400):.0f} um",
         }
     text = re.sub(r"\[contact.crown\]\nradius.*\n(\s+#.*\n)*", "", pf.new("joint"))
-    measures = pf.run(_load_scene(text, sets | {"slide.amplitude": "0.01 um"})).measures
+    measures = pf.run(text, **sets | {"slide.amplitude": "0.01 um"}).measures
     slip_displacement = (
         float(mu) * measures["normal_load"].value / measures["tangential_stiffness"].value
     )
@@ -168,9 +140,9 @@ def draw_chain(seed: int) -> tuple:
 def compare_scene(text: str, sets: dict, tolerance: float, names) -> dict:
     """Compare a scene with the same scene at a smaller tolerance; see `campaigns`."""
     started = process_time()
-    result = pf.run(_load_scene(text, sets))
+    result = pf.run(text, **sets)
     line = {"seconds": process_time() - started, "warnings": list(result.warnings)}
-    finer = pf.run(_load_scene(text, sets | {"accuracy.tolerance": tolerance})).measures
+    finer = pf.run(text, **sets | {"accuracy.tolerance": tolerance}).measures
     truths = {
         name: finer[name].value for name in names if name in finer and finer[name].value is not None
     }

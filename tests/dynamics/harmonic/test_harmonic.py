@@ -5,7 +5,6 @@ import numpy as np
 import pytest
 from bond_moments import advance_bonds
 from harmonic_cases import (
-    jenkins_forces,
     make_bond_law,
     make_elements,
     make_five_modes,
@@ -17,6 +16,7 @@ from harmonic_cases import (
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from modal_bases import make_modal_basis
+from yielding_points import jenkins_forces
 
 from patchfem.core import NotConverged, PatchfemError, SineDrive
 from patchfem.dynamics import (

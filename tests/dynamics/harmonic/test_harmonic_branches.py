@@ -4,7 +4,6 @@ integration."""
 import numpy as np
 import pytest
 from harmonic_cases import (
-    jenkins_forces,
     make_bond_law,
     make_elements,
     make_five_modes,
@@ -15,6 +14,7 @@ from harmonic_motions import find_coexisting_motions
 from modal_bases import make_modal_basis
 from scipy.integrate import solve_ivp
 from scipy.special import ellipk
+from yielding_points import jenkins_forces
 
 from patchfem import plan, run
 from patchfem.core import G_N, NotConverged, SineDrive

@@ -2,16 +2,16 @@
 
 import numpy as np
 import pytest
-from friction_paths import reference_traction, triangle_path, upper_pressure
-from march_paths import OMEGA, follow_path, make_one_mode
+from friction_paths import (
+    make_points,
+    triangle_path,
+    upper_pressure,
+)
+from march_paths import follow_path
 from scene_texts import DRIVE, KILOGRAM
 
 from patchfem import build
-from patchfem.core import SineDrive
 from patchfem.friction import Bonds
-from patchfem.points.contacts import BondSum, make_bond_contact
-from patchfem.points.time_march import march
-from patchfem.response import energy_balance
 from patchfem.runs import choose_numerics as settings_of
 from patchfem.runs.rig.bond_lists import choose_bond_summation
 from patchfem.runs.rig.interface import make_contact
@@ -46,15 +46,7 @@ def load_rig_scene(tmp_path, engine="auto", reading="report", order=1, growth=""
     return scene.load(file)
 
 
-# ---- choice of the engine
-
-
 # ---- lists along a prescribed path
-
-
-def make_lists(law, force=1.0, reach=np.inf, merge=0.0):
-    """Return a point whose bonds are summed over a list."""
-    return make_bond_contact(law, force, np.ones(1), bond_sum=BondSum(law, reach, merge))
 
 
 def test_exact_printed_law_creates_energy_per_cycle():
@@ -66,7 +58,9 @@ def test_exact_printed_law_creates_energy_per_cycle():
     assert path[0] == path[-1] == 0
     for reading, expected in (("report", -3.9761e-4), ("stretch", 2.1858e-5)):
         law = Bonds(1.0, 1.0, 1.0, reading, initial=0.0)
-        forces, energies, n_unsolved, _ = follow_path(make_lists(law), path, 1.0)
+        forces, energies, n_unsolved, _ = follow_path(
+            make_points(law, upper_pressure([1.0]), 0.0), path, 1.0
+        )
         work = forces[:-1, 1] @ np.diff(path)
         assert n_unsolved == 0 and work / (4 * 0.01 * 20) == pytest.approx(expected, rel=1e-3)
         losses = energies[:-1, 0]
@@ -74,35 +68,6 @@ def test_exact_printed_law_creates_energy_per_cycle():
         created = -losses[losses < 0].sum()
         assert (created > 1e-4) == (reading == "report")
         assert (created < 1e-15) == (reading == "stretch")
-
-
-# ---- marches
-
-
-@pytest.mark.parametrize("reading, order", [("report", 2.0), ("stretch", 0.5)])
-def test_exact_marched_list_agrees_with_hand_sum(reading, order):
-    """A sum by hand along the marched relative displacement gives the marched forces, and the energy balance closes."""
-    law = Bonds(0.4, 2e-6, order, reading, initial=0.0)
-    limit = 0.4 * 98.0665
-    marched = march(
-        make_one_mode(OMEGA, 0.01, 1.0),
-        SineDrive(5 * 9.80665, OMEGA),
-        make_lists(law, 98.0665),
-        2,
-        100,
-        window=2,
-    )
-    slide = marched.window.slide
-    for k in (20, 60, 110, 160, 200):
-        expected = reference_traction(law, slide[: k + 1], upper_pressure([limit]))[0]
-        assert marched.window.force[k] == pytest.approx(expected, abs=1e-3 * limit)
-    ledger = marched.ledger
-    assert marched.outcome is None and np.ptp(marched.window.slide) > 5e-6
-    assert energy_balance(ledger) <= 1e-8
-    assert ledger["friction"] == pytest.approx(ledger["dissipated"] - ledger["created"], rel=1e-9)
-
-
-# ---- scene key
 
 
 def test_exact_scene_key_selects_engine(tmp_path):

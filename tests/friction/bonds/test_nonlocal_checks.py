@@ -88,29 +88,6 @@ def test_exact_resultant_of_pad_on_lower_piece(order, reading, tail, width, expe
     assert w / 2 @ tau == pytest.approx(expected[int(order)], abs=1e-8)
 
 
-def sdof_basis(omega=OMEGA, zeta=0.0):
-    """Return the modal basis of a single-degree-of-freedom oscillator."""
-    return make_modal_basis(omega, zeta)
-
-
-# ---- C17: contraction
-
-
-def test_exact_march_converges_beyond_contraction_limit():
-    """A march converges with steps above sqrt(2 eps_0/a_f) = 319.3 us, where fixed-point iteration diverges (C17)."""
-    for ratio in (0.95, 1.4, 3.0):
-        omega = 2 * np.pi / (16 * ratio * 319.3e-6)
-        marched = march(
-            sdof_basis(omega, 0.003),
-            SineDrive(2 * 39.24, omega),
-            make_bond_contact(Bonds(0.4, 2e-6), 98.1, np.ones(1)),
-            100,
-            16,
-            window=2,
-        )
-        assert marched.outcome is None
-
-
 # ---- bench scenes
 
 
@@ -201,7 +178,7 @@ def test_order_of_convergence_to_coulomb_is_half():
     deficits = []
     for length in (1e-7, 1e-8, 1e-9):
         contact = make_bond_contact(Bonds(0.4, length), 98.0665, np.ones(1))
-        basis = sdof_basis(zeta=0.05)
+        basis = make_modal_basis(OMEGA, 0.05)
         marched = march(basis, SineDrive(drive, omega), contact, 60, 3200, window=2)
         assert marched.outcome is None and energy_balance(marched.ledger) <= 1e-8
         deficits.append(1 - np.ptp(marched.window.slide) / 2 / coulomb_amplitude)
@@ -210,6 +187,3 @@ def test_order_of_convergence_to_coulomb_is_half():
         np.log10(deficits[1] / deficits[2]) == pytest.approx(0.5, abs=0.03)
         and 0 < deficits[2] < 4e-3
     )
-
-
-# ---- drift under a biased dither

@@ -32,39 +32,17 @@ def test_exact_spread_factor_equals_double_integral(width):
 
 @pytest.mark.parametrize("law", ["", 'reading = "report"\n', "order = 2\n"])
 def test_exact_bench_forces_scale_with_spread_factor(law):
-    """Every force and the loop area of a bench with spread are those without spread times the factor.
-
-    The widths `contact.width` and `normal.width` give the same factor.
-    """
+    """Every force and the loop area of a bench with spread are those without spread times the factor."""
     factor = carried_fraction(12.7e-3, 4e-3)
-    point = POINT.replace("[normal]\n", '[normal]\nwidth = "12.7 mm"\n')
-    for text in (point, SMALL_PATCH):
-        full, reduced = (
-            bench.run_bench(
-                build(loads(text + NONLOCAL_2UM + law + TRIANGLE, sets=sets)),
-                solve_bench_patch(text),
-                80,
-            )
-            for sets in ([], SPREAD)
-        )
-        assert reduced.force == pytest.approx(
-            factor * full.force, rel=1e-12, abs=1e-12 * np.abs(full.force).max()
-        )
-        assert reduced.values["loop_area"] == pytest.approx(
-            factor * full.values["loop_area"], rel=1e-12
-        )
-        assert reduced.slip == pytest.approx(full.slip, rel=1e-9, abs=1e-18)
-
-
-def solve_bench_patch(text):
-    """Return the solved patch of a scene, or None for a single point."""
-    if text != SMALL_PATCH:
-        return None
-    from patchfem.runs import solve_with_coarser
-
-    return solve_with_coarser(
-        build(loads(SMALL_PATCH + NONLOCAL_2UM + TRIANGLE)).patch, 1e-3, False
-    )[0]
+    text = POINT + 'width = "12.7 mm"\n' + NONLOCAL_2UM + law + TRIANGLE
+    full, reduced = (
+        bench.run_bench(build(loads(text, sets=sets)), None, 80) for sets in ([], SPREAD)
+    )
+    limit = np.abs(full.force).max()
+    assert reduced.force == pytest.approx(factor * full.force, rel=1e-12, abs=1e-12 * limit)
+    areas = [one.values["loop_area"] for one in (reduced, full)]
+    assert areas[0] == pytest.approx(factor * areas[1], rel=1e-12)
+    assert reduced.slip == pytest.approx(full.slip, rel=1e-9, abs=1e-18)
 
 
 def test_exact_strips_use_spread_of_full_width():

@@ -18,7 +18,6 @@ rest_activation = "2500 K"
 slip_activation = "1500 K"
 """
 CONSTANT_SPEED = '[slide]\nkind = "constant"\nspeed = "5 mm/s"\ndistance = "60 um"\n'
-SUBSTRATE = 'substrate = "Ti-8Al-1Mo-1V"'
 
 
 @pytest.mark.parametrize(
@@ -36,22 +35,6 @@ def test_exact_growth_rates_of_warm_surface(surface, expected):
     assert growth_at_temperature(*cold, surface, 293.15, 2500.0, 1500.0) == pytest.approx(
         expected[:2], rel=1e-8
     )
-
-
-@pytest.mark.parametrize(
-    "surface, reference",
-    [(0.0, 300.0), (300.0, 0.0), (np.nan, 300.0), ([300.0, 0.0], 300.0)],
-)
-def test_refuses_temperature_not_above_zero_kelvin(surface, reference):
-    """A surface or reference temperature of 0 K, below 0 K or NaN is refused."""
-    with pytest.raises(PatchfemError, match="above 0 K"):
-        growth_at_temperature(1.0, 1e-6, surface, reference, 2500.0, 1500.0)
-
-
-# ---- temperature of each point
-
-
-# ---- scenes
 
 
 def test_exact_surface_at_reference_temperature_has_no_effect():

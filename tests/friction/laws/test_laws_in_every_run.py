@@ -1,4 +1,4 @@
-"""Each law in each engine: time integration against harmonic balance, two equal interfaces, and the fit to a loop."""
+"""Each law in each engine: time integration against harmonic balance, a release, and the fit to a loop."""
 
 import numpy as np
 import pytest
@@ -7,8 +7,6 @@ from law_runs import (
     run_bench_along_path,
     run_release,
     run_rig,
-    run_two_masses,
-    run_two_masses_uncompiled,
     shrinking_sine,
 )
 from scene_texts import DRIVE, MODE, get_only_mistake
@@ -69,39 +67,9 @@ def test_exact_released_bonds_agree_in_both_engines(extra_keys):
         assert getattr(hybrid, name) == pytest.approx(interpolated, abs=5e-9), name
 
 
-@pytest.mark.share(0)
-@pytest.mark.parametrize(
-    "law", [IWAN, BOUC_WEN.format(2.0, 0.7), DAMPED], ids=["iwan", "bouc-wen", "lugre"]
-)
-def test_exact_two_equal_interfaces_move_equally(law):
-    """Two equal interfaces have the relative displacement of a single interface."""
-    two_masses = run_two_masses(law, 2)
-    slides = two_masses.response.extra["slides"]
-    single_slide = run_two_masses(law, 1).response.slide
-    assert slides[:, 0] == pytest.approx(slides[:, 1], abs=1e-12 * np.abs(slides).max())
-    assert slides[:, 0] == pytest.approx(single_slide, abs=1e-7 * np.abs(single_slide).max())
-
-
-@pytest.mark.slow
-def test_exact_uncompiled_equal_interfaces_move_equally():
-    """Two equal interfaces move as a single interface when the kernels run as Python."""
-    slides, single_slide, peaks = run_two_masses_uncompiled(BOUC_WEN.format(2.0, 0.7))
-    assert slides[0] == pytest.approx(slides[1], abs=1e-12 * np.abs(slides).max())
-    assert slides[0] == pytest.approx(single_slide, abs=1e-7 * np.abs(single_slide).max())
-    assert (
-        np.abs(single_slide).max() > 3 * 31 / 1.3e7 and max(peaks) > 0.9 * 31
-    )  # the interface slips
-
-
 @pytest.mark.parametrize(
     "law, initial_values, free_parameters, values",
     [
-        (
-            IWAN,
-            {"0.31": "0.4", "-0.4": "-0.6"},
-            "friction.static=0.1..0.7,friction.chi=-0.9..-0.1",
-            [0.31, -0.4],
-        ),
         (
             BOUC_WEN.format(1.8, 0.7),
             {"0.31": "0.4", "1.8": "1.0", "0.7": "0.5"},
@@ -115,7 +83,7 @@ def test_exact_uncompiled_equal_interfaces_move_equally():
             [0.31, 0.22, 2e-3],
         ),
     ],
-    ids=["iwan", "bouc-wen", "lugre"],
+    ids=["bouc-wen", "lugre"],
 )
 def test_exact_fit_recovers_parameters_of_loop(
     tmp_path, law, initial_values, free_parameters, values

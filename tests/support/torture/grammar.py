@@ -41,9 +41,7 @@ def draw_quantity(trial: Trial, low: float, high: float, unit: str) -> str:
 
 def draw_scene(trial: Trial, kind: str = "") -> dict:
     """Return a random scene; kind: patch, bench, rig, masses or linear, drawn if empty."""
-    kind = kind or trial.draw(
-        "patch", "patch", "bench", "bench", "rig", "rig", "rig", "masses", "linear"
-    )
+    kind = kind or trial.draw(*"patch patch bench bench rig rig rig masses linear".split())
     out = {"title": f"{kind} of chance"}
     if kind in ("patch", "bench", "rig"):
         out |= (

@@ -34,7 +34,7 @@ def run_trial(trial: Trial) -> None:
     """Read a malicious file with a command that accepts its suffix, and check that it did no harm."""
     kind = KINDS[int(trial.r.integers(len(KINDS)))]
     words = kind(trial)
-    trial.run(*words, seconds=20.0)
+    trial.run(*words)
     written = [
         path
         for path in (Path(MARK), trial.folder.parent / "escaped", trial.folder.parent / MARK)
@@ -46,9 +46,7 @@ def run_trial(trial: Trial) -> None:
 
 def make_pickle(trial: Trial) -> list:
     """Make a pickle with any suffix that a command reads."""
-    name = trial.draw(
-        "x.npy", "x.npz", "x.mat", "x.csv", "x.uff", "x.sdf", "x.x3p", "x.plu", "x.toml", "x.npy"
-    )
+    name = trial.draw(*"x.npy x.npz x.mat x.csv x.uff x.sdf x.x3p x.plu x.toml x.npy".split())
     if name.endswith(".npy") and trial.chance(0.5):
         np.save(name, np.array([MaliciousPickle()], object), allow_pickle=True)
     elif name.endswith(".npz") and trial.chance(0.5):
@@ -104,7 +102,7 @@ def make_command(trial: Trial, name: str) -> list:
 def make_zip_bomb(trial: Trial) -> list:
     """Make a small archive that unpacks to 620 MB."""
     name = trial.draw("x.npz", "x.x3p", "x.npz")
-    with zipfile.ZipFile(name, "w", zipfile.ZIP_DEFLATED) as archive:
+    with zipfile.ZipFile(name, "w", zipfile.ZIP_DEFLATED, compresslevel=1) as archive:
         head = io.BytesIO()
         np.lib.format.write_array_header_1_0(
             head, {"descr": "<f8", "fortran_order": False, "shape": (8800, 8800)}
@@ -113,8 +111,8 @@ def make_zip_bomb(trial: Trial) -> list:
             "M.npy" if name == "x.npz" else "main.xml", "w", force_zip64=True
         ) as file:
             file.write(head.getvalue() if name == "x.npz" else b"<a>")
-            for _ in range(620):
-                file.write(bytes(10**6))
+            for _ in range(62):
+                file.write(bytes(10**7))
     return make_command(trial, name)
 
 
@@ -141,9 +139,7 @@ def make_xml_bomb(trial: Trial) -> list:
 
 def make_blocking_file(trial: Trial) -> list:
     """Make a pipe without a writer, an endless device, a folder, or a circular link."""
-    name = "x" + trial.draw(
-        ".toml", ".csv", ".npy", ".npz", ".mat", ".uff", ".msh", ".vtu", ".inp", ".x3p"
-    )
+    name = "x" + trial.draw(*".toml .csv .npy .npz .mat .uff .msh .vtu .inp .x3p".split())
     form = trial.draw("pipe", "zero", "folder", "circle", "random")
     if form == "pipe":
         os.mkfifo(name)
@@ -156,9 +152,7 @@ def make_blocking_file(trial: Trial) -> list:
 
 def make_huge_file(trial: Trial) -> list:
     """Make a file with one line, number or name of megabytes, or a sparse file of gigabytes."""
-    name = "x" + trial.draw(
-        ".toml", ".csv", ".inp", ".med", ".msh", ".uff", ".csv", ".npy", ".mat", ".sdf"
-    )
+    name = "x" + trial.draw(*".toml .csv .inp .med .msh .uff .csv .npy .mat .sdf".split())
     form = trial.draw("line", "number", "quote", "hole", "commas", "lines")
     if form == "hole":
         with open(name, "wb") as file:
@@ -218,26 +212,10 @@ def try_outputs(trial: Trial) -> list:
     os.symlink("nowhere", "dangling")
     Path("file").write_text("mine")
     make_device("null", 3)
-    target = trial.draw(
-        "mine",
-        "link",
-        "dangling",
-        "file",
-        "/",
-        ".",
-        "..",
-        "",
-        "mine/..",
-        "file/x",
-        "x" * 300,
-        "a/" * 900,
-        "null",
-        "/proc/self",
-        "a\nb",
-        " ",
-        "~",
-        "mine/thesis.txt",
+    names = (
+        "mine link dangling file / . .. mine/.. file/x null /proc/self ~ mine/thesis.txt".split()
     )
+    target = trial.draw(*names, "", "x" * 300, "a/" * 900, "a\nb", " ")
     result = trial.run("run", "scene.toml", "-o", target, "--no-page")
     if Path("mine/thesis.txt").read_text() != "years" or (
         target == "file" and Path("file").read_text() != "mine"

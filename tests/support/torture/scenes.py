@@ -122,7 +122,7 @@ def damage_bytes(trial: Trial, text: bytearray) -> None:
     """Apply one random damage to a text or binary file, in place."""
     start = int(trial.r.integers(len(text) + 1))
     stop = min(len(text), start + int(trial.log_uniform(1, 200)))
-    damage_kind = trial.draw("flip", "cut", "double", "insert", "end", "broken", "digit", "line")
+    damage_kind = trial.draw(*"flip cut double insert end broken digit line".split())
     if damage_kind == "flip" and start < len(text):
         text[start] = int(trial.r.integers(256))
     elif damage_kind == "cut":
@@ -152,7 +152,7 @@ def mutate_scene(trial: Trial, tables: dict) -> None:
     paths = list_paths(tables)
     path = trial.draw(*paths)
     mistake_kind = trial.draw(
-        "value", "value", "value", "scale", "scale", "drop", "rename", "add", "add", "copy", "type"
+        *"value value value scale scale drop rename add add copy type".split()
     )
     if mistake_kind == "add":
         _add_key(trial, tables)
