@@ -5,7 +5,7 @@ from functools import lru_cache, wraps
 from pathlib import Path
 
 # Number of cached results of each function; results for large traces and modes take much memory.
-MAX_CACHED_RESULTS = 8
+MAX_CACHED_FILES = 8
 
 
 def cache_by_file(function: Callable) -> Callable:
@@ -15,7 +15,7 @@ def cache_by_file(function: Callable) -> Callable:
     be hashable, and are passed by position.
     """
 
-    @lru_cache(MAX_CACHED_RESULTS)
+    @lru_cache(MAX_CACHED_FILES)
     def call_cached(paths, _versions, *arguments):
         return function(paths, *arguments)
 

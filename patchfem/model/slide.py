@@ -25,7 +25,7 @@ STEPS_PER_BOND_LENGTH = 20  # number of steps while the slide covers the length 
 MAX_BOND_LENGTHS = 1000
 # Smallest number of steps per cycle, which resolves the loop at any tolerance.
 MIN_STEPS_PER_CYCLE = 100
-MAX_STEPS_PER_CYCLE = 20_000  # largest number of steps per cycle; more would take too long
+MAX_BENCH_STEPS_PER_CYCLE = 20_000  # largest number of steps per cycle; more would take too long
 MAX_PATH_SAMPLES = 20_000_000  # largest number of samples in a path; more take too much memory
 STEP_COUNT_TOL = 1e-12  # relative round-off of a number of steps that is exactly an integer
 
@@ -156,7 +156,7 @@ class SlidePath:
             if length:
                 bond_lengths = min(path / cycles / length, MAX_BOND_LENGTHS)
                 per_cycle = max(per_cycle, STEPS_PER_BOND_LENGTH * bond_lengths)
-        per_cycle = min(max(per_cycle, MIN_STEPS_PER_CYCLE), MAX_STEPS_PER_CYCLE)
+        per_cycle = min(max(per_cycle, MIN_STEPS_PER_CYCLE), MAX_BENCH_STEPS_PER_CYCLE)
         return 4 * ceil(max(cycles * per_cycle, min_steps) / 4)
 
 

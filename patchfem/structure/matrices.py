@@ -25,7 +25,7 @@ ENTRY_TOL = 1e-12
 MIN_DAMPING_EIGENVALUE = -1e-9
 # Largest relative difference of natural frequencies that count as equal; the shapes of such modes
 # may be rotated
-EQUAL_FREQUENCY_TOL = 1e-11
+EQUAL_MODES_TOL = 1e-11
 # Smallest relative motion of the output in a mode; a smaller one is round-off, because the output
 # lies at a node of the mode
 MIN_OUTPUT_MOTION = 1e-9
@@ -275,7 +275,7 @@ def _decouple_equal_frequencies(phi, omega, D) -> tuple:
     """Rotate mode shapes of equal frequency so that the damping matrix D does not couple them."""
     first = 0
     for last in range(1, len(omega) + 1):
-        if last < len(omega) and omega[last] - omega[first] <= EQUAL_FREQUENCY_TOL * omega[last]:
+        if last < len(omega) and omega[last] - omega[first] <= EQUAL_MODES_TOL * omega[last]:
             continue
         block = D[first:last, first:last]
         if last - first > 1 and np.abs(block).sum() > np.abs(np.diag(block)).sum():

@@ -15,7 +15,7 @@ from ..core import PatchfemError
 from .drive_sizes import DriveKeys
 from .drives import RecordedDrive
 
-ROWS_PER_PERIOD = 8  # number of rows of the record per period of the highest frequency
+NOISE_ROWS_PER_PERIOD = 8  # number of rows of the record per period of the highest frequency
 # Smallest number of spectral lines of a record; the values of a record with fewer are not Gaussian
 MIN_SPECTRAL_LINES = 8
 # Tolerance on the number of the spectral line at each end of the band, in line spacings
@@ -63,7 +63,7 @@ def draw_random_record(
     """
     low = float(frequency[0])
     high = float(frequency[-1])
-    n_rows = int(np.ceil(duration * ROWS_PER_PERIOD * high))
+    n_rows = int(np.ceil(duration * NOISE_ROWS_PER_PERIOD * high))
     step = duration / n_rows
     first_line = int(np.ceil(low * duration - SPECTRAL_LINE_TOL))
     lines = np.arange(first_line, int(high * duration + SPECTRAL_LINE_TOL) + 1)

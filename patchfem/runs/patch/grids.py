@@ -25,7 +25,7 @@ from .values import contact_ends
 N_SEARCH_COLUMNS = 96
 # Largest number of columns of the coarsest grid; a layout with more columns is coarsened
 # everywhere.
-MAX_COLUMNS = 120
+MAX_GRID_COLUMNS = 120
 # Each of the following dicts has a value for a static patch (True) and for a patch in motion
 # (False), which gets fewer nodes, because every node slows down each time step.
 CELL_GROWTH = {
@@ -202,7 +202,7 @@ def _resolves_span(layout: Layout, x, ratio: float, span: tuple[float, float]) -
 
 def _resolves_contact(patch_model, x, layout: Layout, zones: Pairs) -> bool:
     """Return whether columns at x (k,) [m] resolve the maxima on a wavy surface and the slip zones [m]."""
-    has_waves = _max_wave_cell(patch_model) < np.inf and x.size <= MAX_COLUMNS
+    has_waves = _max_wave_cell(patch_model) < np.inf and x.size <= MAX_GRID_COLUMNS
     if has_waves and not _resolves_span(layout, x, MAX_WAVE_CELL_RATIO, (x[0], x[-1])):
         return False
     return all(_resolves_span(layout, x, MAX_SEARCH_CELL_RATIO, zone) for zone in zones)
@@ -394,7 +394,7 @@ def _find_pressure_maxima(x, sigma) -> Pairs:
 def make_grids(patch_model, layout: Layout) -> list:
     """Return the grids of both pieces with the columns of a layout; one grid for identical pieces.
 
-    The columns are coarsened to MAX_COLUMNS if needed. The rows are as short as the columns at the
+    The columns are coarsened to MAX_GRID_COLUMNS if needed. The rows are as short as the columns at the
     interface, and also short at the inner face of the coating and at the holder.
 
     Parameters
@@ -409,8 +409,8 @@ def make_grids(patch_model, layout: Layout) -> list:
     list of TensorGrid
     """
     x = divide_into_columns(layout, patch_model.gap.jumps)
-    while x.size > MAX_COLUMNS + 1 and layout.bands:
-        layout = layout.scale_cells(x.size / MAX_COLUMNS)
+    while x.size > MAX_GRID_COLUMNS + 1 and layout.bands:
+        layout = layout.scale_cells(x.size / MAX_GRID_COLUMNS)
         x = divide_into_columns(layout, patch_model.gap.jumps)
     first_row = float(np.diff(x).min())
     length = patch_model.pieces.length

@@ -42,7 +42,7 @@ from .values import EdgeValues, assemble_static_values, estimate_peak_pressure
 
 MIN_LEVELS = 3  # Smallest number of refinement levels at which the order of convergence is known.
 # Largest number of points of a level; more would exceed the CPU time of a patch.
-MAX_POINTS = 60_000
+MAX_PROFILE_POINTS = 60_000
 # Largest product of iterations and points of a level, to limit the CPU time.
 MAX_WORK = 2.5e7
 MIN_POINTS = 500  # Smallest number of points of the coarsest level.
@@ -51,7 +51,7 @@ END_CELL_RATIO = 1e-4
 MIDDLE_CELL_RATIO = 1 / 30  # The same ratio in the middle of the interface.
 CELL_GROWTH = 0.8  # Increase of the cell length per distance from the end [1].
 CONTACT_TOL = 3e-8  # Largest relative residual at which the contact problem counts as solved.
-MAX_ITERATIONS = 4000  # Largest number of iterations of a contact solution.
+MAX_CONTACT_ITERATIONS = 4000  # Largest number of iterations of a contact solution.
 # Ratio of the length of the corner region to the length of the interface.
 CORNER_LENGTH_RATIO = 1e-3
 # Smallest ratio of corner pressure to largest pressure at which the peak may be at the corner.
@@ -140,7 +140,7 @@ def solve_on_points(patch_model, meets_tolerance) -> PointSolution | None:
     patch_model : PatchModel
         Patch with a profile, without strips.
     meets_tolerance : callable
-        Function of a PointSolution that ends the refinement. MAX_POINTS and MAX_WORK end it as
+        Function of a PointSolution that ends the refinement. MAX_PROFILE_POINTS and MAX_WORK end it as
         well.
 
     Returns
@@ -173,13 +173,13 @@ def solve_on_points(patch_model, meets_tolerance) -> PointSolution | None:
 def _count_first_level_points(patch_model) -> int:
     """Return the number of points of the coarsest refinement level."""
     n_samples = patch_model.pieces.length / profile.find_sample_spacing(patch_model.gap.profile)
-    return max(MIN_POINTS, min(round(n_samples / 4), MAX_POINTS // 4))
+    return max(MIN_POINTS, min(round(n_samples / 4), MAX_PROFILE_POINTS // 4))
 
 
 def _is_next_level_expensive(level: PointLevel) -> bool:
     """Return whether the next level would exceed the largest number of points or the largest work."""
     count = level.force.size
-    return 2 * count > MAX_POINTS or 3 * level.n_iterations * count > MAX_WORK
+    return 2 * count > MAX_PROFILE_POINTS or 3 * level.n_iterations * count > MAX_WORK
 
 
 def _combine_refinement_series(
@@ -402,7 +402,7 @@ def _solve_nodal_forces(patch_model, normal: PointCompliance, gap, start) -> Poi
 
     problem = patch_problem(x, gap - offset, loading.load, moment, loading.rotational_stiffness)
     force, n_iterations = solve_by_gradients(
-        normal, problem, CONTACT_TOL, MAX_ITERATIONS, initial_force
+        normal, problem, CONTACT_TOL, MAX_CONTACT_ITERATIONS, initial_force
     )
 
     # Approach and rotation are those of a rigid line fitted to the loaded points (least squares).

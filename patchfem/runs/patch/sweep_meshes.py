@@ -21,7 +21,7 @@ from .press import solve_patch_contact
 
 # Largest number of cases that determine the mesh; of more cases, the most different ones are
 # selected.
-MAX_CASES = 48
+MAX_LAYOUT_CASES = 48
 # Largest number of contact searches; each search uses columns graded to the contacts of the
 # previous one.
 MAX_LAYOUT_SEARCHES = 4
@@ -128,7 +128,7 @@ def select_distinct_patches(patches) -> tuple:
     """
     rows = {_load_and_shape_parameters(patch): patch for patch in patches}
     keys = sorted(rows)
-    if len(keys) <= MAX_CASES:
+    if len(keys) <= MAX_LAYOUT_CASES:
         return [rows[key] for key in keys], True
     numbers = np.array(keys)
     scale = np.abs(numbers).min(axis=0, where=numbers != 0, initial=np.inf)
@@ -138,7 +138,7 @@ def select_distinct_patches(patches) -> tuple:
     coordinates = coordinates / np.maximum(np.ptp(coordinates, axis=0), 1e-300)
     selected = [int(np.argmin(coordinates.sum(axis=1)))]
     distances = np.full(len(keys), np.inf)
-    while len(selected) < MAX_CASES:
+    while len(selected) < MAX_LAYOUT_CASES:
         distances = np.minimum(
             distances, np.abs(coordinates - coordinates[selected[-1]]).max(axis=1)
         )

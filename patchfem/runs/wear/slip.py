@@ -26,7 +26,7 @@ UNBOUNDED_OUTCOMES = (
     Outcome.NOT_CONVERGED,
 )
 MIN_FRAMES = 64  # Smallest number of interface frames per cycle.
-MAX_FRAMES = 800  # Largest number of interface frames per cycle.
+MAX_CYCLE_FRAMES = 800  # Largest number of interface frames per cycle.
 # Ratio of the error due to reversals between samples to the mean change of the path if only every
 # third sample is used.
 REVERSAL_ERROR_FACTOR = 1.5
@@ -133,7 +133,7 @@ def choose_frame_count(tolerance: float) -> int:
 
     A reversal between two of k frames of a sinusoid hides up to (pi/k)^2/2 of the amplitude.
     """
-    return int(np.clip(ceil(np.pi / sqrt(0.02 * tolerance)), MIN_FRAMES, MAX_FRAMES))
+    return int(np.clip(ceil(np.pi / sqrt(0.02 * tolerance)), MIN_FRAMES, MAX_CYCLE_FRAMES))
 
 
 def slips_uniformly(model, per_point: bool = False) -> bool:
