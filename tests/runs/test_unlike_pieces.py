@@ -5,13 +5,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from contact_forms import rounded_punch_pressure
 from pieces import grow_depth
 from scene_texts import COATED
 from wedges import singularity_exponent
 
 from patchfem import build
 from patchfem.closed_forms import rounded_punch_half_width
-from patchfem.closed_forms.contact import rounded_punch_pressure
 from patchfem.core import frozen_array
 from patchfem.mesh import TensorGrid
 from patchfem.mesh.grid import graded_rows

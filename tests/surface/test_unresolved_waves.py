@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
+import contact_forms as closed_forms
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from synthetic import self_affine, waves
 
-from patchfem.closed_forms import contact as closed_forms
 from patchfem.surface import Profile, describe_lost_waves, level
 from patchfem.surface.spectrum import wave_spectrum
 
