@@ -189,8 +189,11 @@ def build_slide(scene) -> SlidePath:
     )
 
 
-def _list_corners(keys) -> tuple:
-    """Return time [s] and displacement [m] at the corners of a constant slide or a dwell, without legs of no duration."""
+def _list_corners(keys) -> tuple[np.ndarray, np.ndarray]:
+    """Return time (k,) [s] and displacement (k,) [m] at the corners of a constant slide or a dwell.
+
+    Legs of no duration are left out.
+    """
     length = np.array([keys.distance, 0.0, keys.distance_after or 0.0])
     duration = np.array([keys.distance / keys.speed, keys.hold or 0.0, length[2] / keys.speed])
     is_leg = duration > 0
@@ -199,8 +202,8 @@ def _list_corners(keys) -> tuple:
 
 
 @cache_by_file
-def read_path_file(path: Path) -> tuple:
-    """Read the columns of a path file (`inputs.slides.read_slide`)."""
+def read_path_file(path: Path) -> tuple[np.ndarray, np.ndarray]:
+    """Read time (k,) [s] and displacement (k,) [m] of a path file (`inputs.slides.read_slide`)."""
     return slides.read_slide(path)
 
 

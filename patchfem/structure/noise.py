@@ -24,9 +24,12 @@ SPECTRAL_LINE_TOL = 1e-9
 
 @dataclass(frozen=True, eq=False, slots=True)
 class RandomRecord(RecordedDrive):
-    """Sampled record of a stationary random drive signal."""
+    """Sampled record of a stationary random drive signal.
 
-    band: tuple = (0.0, 0.0)
+    - band: lowest and highest frequency [Hz].
+    """
+
+    band: tuple[float, float] = (0.0, 0.0)
 
     @property
     def max_frequency_ratio(self) -> float:
@@ -102,10 +105,12 @@ def _build_random(drive: DriveKeys) -> RandomRecord:
     return draw_random_record(frequency, density, duration, keys.seed or 0, drive.period)
 
 
-def _cut_spectrum(frequency, density, low: float | None, high: float | None) -> tuple:
+def _cut_spectrum(
+    frequency, density, low: float | None, high: float | None
+) -> tuple[np.ndarray, np.ndarray]:
     """Restrict a spectrum to the range between two frequencies [Hz].
 
-    Returns frequencies and densities; raises PatchfemError if an end lies outside the spectrum.
+    Returns frequencies (j,) [Hz] and densities (j,); raises PatchfemError if an end lies outside the spectrum.
     """
     low = frequency[0] if low is None else low
     high = frequency[-1] if high is None else high

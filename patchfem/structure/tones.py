@@ -30,7 +30,7 @@ class TonesRecord(RecordedDrive):
 
     beat: float = 1.0
     max_frequency: float = 0.0
-    tones: tuple = ()
+    tones: tuple[tuple[float, float, float], ...] = ()
 
     @property
     def max_frequency_ratio(self) -> float:

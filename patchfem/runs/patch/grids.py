@@ -15,6 +15,7 @@ import numpy as np
 
 from ...mesh.grading import Layout, divide_into_columns, divide_into_rows
 from ...mesh.grid import TensorGrid
+from ...model.patch import PatchModel
 from ...model.pieces import extend_grid, find_rounded_edges
 from . import slip_zones, store
 from .condensed import condense
@@ -112,7 +113,7 @@ class BaseGrids(NamedTuple):
     contact: ContactExtent to which the grids are graded; None without a load.
     """
 
-    bodies: list
+    bodies: list[TensorGrid]
     contact: ContactExtent | None
 
 
@@ -175,7 +176,7 @@ def _search_contact_region(patch_model) -> BaseGrids:
     return BaseGrids(make_grids(patch_model, layout), contact)
 
 
-def make_load_variants(patch_model) -> list:
+def make_load_variants(patch_model) -> list[PatchModel]:
     """Return the patch at the ends of the range of a varying load; [] if no load moves its edges."""
     load = patch_model.loading.load
     if patch_model.mesh.edge_motion != "load" or load is None:
@@ -304,7 +305,7 @@ def _make_point_bands(places, cell: float) -> Bands:
     return [(place, place, cell) for place in places]
 
 
-def _make_edge_bands(edge_positions: list, min_cell: float) -> Bands:
+def _make_edge_bands(edge_positions: list[tuple[float, ...]], min_cell: float) -> Bands:
     """Return the bands of short columns around the contact edges.
 
     If all contacts have equally many edges, each band covers the range over which its edge moves.
@@ -391,7 +392,7 @@ def _find_pressure_maxima(x, sigma) -> Pairs:
     return tuple(zip(x[peak_node + 1].tolist(), half_width.tolist()))
 
 
-def make_grids(patch_model, layout: Layout) -> list:
+def make_grids(patch_model, layout: Layout) -> list[TensorGrid]:
     """Return the grids of both pieces with the columns of a layout; one grid for identical pieces.
 
     The columns are coarsened to MAX_GRID_COLUMNS if needed. The rows are as short as the columns at the

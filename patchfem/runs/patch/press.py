@@ -21,10 +21,11 @@ from ...contact.press import (
     strip_offsets,
 )
 from ...contact.strip_compliance import StripCompliance, WarmStart
-from ...core import Compliance, ContactState, PatchfemError, frozen_array
+from ...core import Compliance, ContactState, Measure, PatchfemError, frozen_array
 from ...exceptions import UnresolvedTrace
-from ...model.patch import PatchStrips
-from ..results.patch_rows import Arrays, Measures, Values
+from ...model.patch import PatchModel, PatchStrips
+from ..results import patch_rows
+from ..results.patch_rows import TABLE, Arrays, Measures, Values
 from .condensed import CondensedPair
 from .skin import make_skin_law
 
@@ -46,15 +47,41 @@ class Surface(NamedTuple):
     unloaded_gap: np.ndarray
 
 
+class Estimate(NamedTuple):
+    """Value and error estimate of a static measure.
+
+    - value: number.
+    - error: error estimate; None without a coarser mesh.
+    - is_extrapolated: whether the value is extrapolated over the nested meshes; otherwise it is
+      that of the finest mesh.
+    """
+
+    value: float
+    error: float | None
+    is_extrapolated: bool = False
+
+    def to_measure(self, name: str) -> Measure:
+        """Convert the estimate to a Measure with the floor of the measure table."""
+        row = TABLE[name]
+        engine = patch_rows.FINEST_MESH_SOURCE
+        if self.is_extrapolated:
+            engine = patch_rows.EXTRAPOLATED_SOURCE
+        error = None if self.error is None else float(self.error)
+        return Measure(float(self.value), row.unit, error, row.floor, engine=engine)
+
+
+Estimates = dict[str, Estimate]  # by the name of the measure
+
+
 class PointSolution(NamedTuple):
     """Contact solution on equally spaced points of a profile, which are finer than the mesh.
 
-    - measures: `measures.Estimate` by name, of the measures that the points resolve.
+    - measures: those of the measures that the points resolve.
     - surface: Surface of the finest refinement level.
     - intervals (k, 2): contact intervals [m].
     """
 
-    measures: dict
+    measures: Estimates
     surface: Surface
     intervals: np.ndarray
 
@@ -102,17 +129,17 @@ class Patch:
     - frames: frames of the interface (`Result.fields`); {} before the end of the run.
     """
 
-    model: object
+    model: PatchModel
     pair: CondensedPair
     pieces: Compliance
     pressure: ContactState
     state: StripsState
     slip_compliance: np.ndarray
     unloaded_gap: np.ndarray
-    notes: tuple
+    notes: tuple[str, ...]
     seconds: Values
     averaging: float | None = None
-    step_variants: tuple = ()
+    step_variants: "tuple[tuple[float, Patch], ...]" = ()
     points: PointSolution | None = None
     measures: Measures | None = None
     frames: Arrays = field(default_factory=dict)
@@ -270,7 +297,7 @@ def solve_patch_contact(patch_model, pair: CondensedPair, worn=None, coarse=None
     return replace(patch, step_variants=tuple(variants))
 
 
-def _gap_variants_at_step(node: int, gap, half_steps, worn) -> tuple:
+def _gap_variants_at_step(node: int, gap, half_steps, worn) -> tuple[np.ndarray, np.ndarray]:
     """Return the two changes (m,) [m] of the gap that put a node on either side of a step.
 
     The worn depth of the node belongs to a gap at half the height of the step. On the higher side
@@ -287,7 +314,7 @@ def _gap_variants_at_step(node: int, gap, half_steps, worn) -> tuple:
         shift = np.broadcast_to(side * half_steps, worn.shape).copy()
         shift[..., node] += worn[..., neighbour] - worn[..., node]
         shifts.append(shift)
-    return tuple(shifts)
+    return shifts[0], shifts[1]
 
 
 def make_patch(
@@ -295,7 +322,7 @@ def make_patch(
     pair: CondensedPair,
     gap,
     contact: SolvedContact,
-    notes: tuple,
+    notes: tuple[str, ...],
     seconds: Values,
 ) -> Patch:
     """Assemble the Patch record of a solved contact.
@@ -377,7 +404,7 @@ class ContactForceSolver:
     - warm_start: contact set and matrix factors of the previous solution.
     """
 
-    model: object
+    model: PatchModel
     bare: Compliance
     gap: np.ndarray
     warm_start: WarmStart = field(default_factory=WarmStart)

@@ -16,6 +16,7 @@ from ..bench import bench
 from ..bench.engine import steps_per_cycle
 from ..bench.slides import integrate_steps
 from ..patch.press import nodal_areas
+from ..results.patch_rows import Values
 from ..results.travel import check_pieces_overlap
 from ..rig import fields, numerics, solve
 
@@ -45,7 +46,7 @@ class CycleSlip(NamedTuple):
 
     path: np.ndarray
     error: float
-    values: dict | None = None
+    values: Values | None = None
     outcome: Outcome | None = None
 
 
@@ -169,7 +170,7 @@ def compute_cycle_slip(model, patch, frames: int) -> CycleSlip:
     return follow(model, patch, frames)
 
 
-def compute_point_slip_path(model, window, values: dict) -> tuple[float, float]:
+def compute_point_slip_path(model, window, values: Values) -> tuple[float, float]:
     """Return the slip path [m] per cycle of a single point under [normal], and its relative error.
 
     The path is weighted with the load. The error comes from differences between cycles.
@@ -271,7 +272,7 @@ def _collect_rig_frames(model, settings, patch, solution) -> _NodeFrames:
     return _NodeFrames(frames["holder_slide"], load, frames["slip"], frames["shear_stress"], True)
 
 
-def _slip_amplitude_change(values: dict, cycle: _Cycle) -> float:
+def _slip_amplitude_change(values: Values, cycle: _Cycle) -> float:
     """Return the relative difference between the slip amplitudes of the last cycle and the window.
 
     A mode that still beats causes this difference.
