@@ -20,7 +20,7 @@ from ...contact.press import (
     split_into_strips,
     strip_offsets,
 )
-from ...contact.strip_compliance import StripCompliance, WarmStart
+from ...contact.strip_compliance import StripCompliance
 from ...core import Compliance, ContactState, Measure, PatchfemError, frozen_array
 from ...exceptions import UnresolvedTrace
 from ...model.patch import PatchModel, PatchStrips
@@ -276,8 +276,7 @@ def solve_patch_contact(patch_model, pair: CondensedPair, worn=None, coarse=None
     def solve_gap(unloaded_gap) -> Patch:
         """Solve the contact problem for an unloaded gap (m,) [m]."""
         begin = perf_counter()
-        warm_start = WarmStart(start)
-        contact = solve_contact(patch_model, pair.compliance, unloaded_gap, warm_start=warm_start)
+        contact = solve_contact(patch_model, pair.compliance, unloaded_gap, start=start)
         times = seconds | {"press": perf_counter() - begin}
         return make_patch(patch_model, pair, unloaded_gap, contact, notes, times)
 
@@ -401,28 +400,28 @@ class ContactForceSolver:
     - model: PatchModel.
     - bare: compliance of the pieces without asperity layer.
     - gap (m,): unloaded gap [m].
-    - warm_start: contact set and matrix factors of the previous solution.
+    - contact_set (m,): nodes in contact of the previous solution, (s, m) for strips; None before the first one.
     """
 
     model: PatchModel
     bare: Compliance
     gap: np.ndarray
-    warm_start: WarmStart = field(default_factory=WarmStart)
+    contact_set: np.ndarray | None = None
 
     def start_from_forces(self, force) -> None:
         """Start the next solution from the contact set of given nodal forces."""
-        self.warm_start.contact_set = np.asarray(force) > 0
+        self.contact_set = np.asarray(force) > 0
 
     def __call__(self, worn, softening) -> np.ndarray:
         """Return the contact forces [N] for worn depth [m] and softening [m/N], (m,) each, or (s, m) for strips."""
         added = np.atleast_2d(softening) if softening.any() else None
-        state = solve_contact(self.model, self.bare, self.gap + worn, added, self.warm_start).state
-        return state.force.reshape(np.shape(worn))
+        gap = self.gap + worn
+        force = solve_contact(self.model, self.bare, gap, added, self.contact_set).state.force
+        self.contact_set = force > 0
+        return force.reshape(np.shape(worn))
 
 
-def solve_contact(
-    patch_model, pieces: Compliance, gap, added=None, warm_start=None
-) -> SolvedContact:
+def solve_contact(patch_model, pieces: Compliance, gap, added=None, start=None) -> SolvedContact:
     """Solve the contact of condensed pieces with the asperity layer, load and holder of a model.
 
     A patch without strips is a single strip. The strips do not interact: each one has the compliance of its
@@ -438,8 +437,8 @@ def solve_contact(
         Unloaded gap [m].
     added : (s, m) ndarray, optional
         What each strip adds to the diagonal of its compliance [m/N].
-    warm_start : WarmStart, optional
-        Results of a similar solution; those of this one are written.
+    start : (s, m) ndarray of bool, optional
+        Nodes in contact of a similar solution, from which the search starts.
 
     Returns
     -------
@@ -452,7 +451,7 @@ def solve_contact(
     offsets = strip_offsets(patch_model.pieces.width, count)
 
     strips = StripModel(
-        StripCompliance(strip.normal, added, warm_start),
+        StripCompliance(strip.normal, added),
         StripLayout(pieces.interface.x, strip.weight, offsets),
         None if skin is None else make_skin_law(patch_model),
     )
@@ -468,7 +467,7 @@ def solve_contact(
         roll=roll,
     )
 
-    state = press_strips(strips, gap, holder)
+    state = press_strips(strips, gap, holder, start)
     pressure = state.pressure
     # A smooth law never reaches 0; what is set to 0 is smaller than the residual of the load balance.
     if strips.is_smooth:
