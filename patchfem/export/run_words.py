@@ -30,7 +30,7 @@ CHECKS = ("energy_balance", "work_check")  # measures that only check a run
 MAX_LISTED = 3  # largest number of interfaces or contact regions that are listed one by one
 # largest slip [m] and largest work relative to force times motion that are attributed to round-off
 SLIP_ROUND_OFF = 1e-15
-WORK_ROUND_OFF = 1e-12
+AREA_ROUND_OFF = 1e-12
 # deviation from the final position, relative to this position, at which a released output is at rest
 REST_FRACTION = 5e-3
 ZERO_FRACTION = 1e-9  # final position, relative to the largest motion, that counts as 0
@@ -241,7 +241,10 @@ def _describe_stuck_outcome(measures: Quantities) -> str:
         measures[name].value or 0.0 if name in measures else 0.0
         for name in ("friction_force_peak", "relative_displacement_amplitude")
     )
-    limits = {"loop_area": WORK_ROUND_OFF * abs(force * motion), "slip_amplitude": SLIP_ROUND_OFF}
+
+    # the largest of several interfaces is named, unless all of them are round-off
+    max_round_off = AREA_ROUND_OFF * abs(force * motion)
+    limits = {"loop_area": max_round_off, "slip_amplitude": SLIP_ROUND_OFF}
     texts = {"loop_area": "{} per cycle", "slip_amplitude": "by {}"}
     for kind, limit in limits.items():
         slipping = {

@@ -8,7 +8,7 @@ from ..formatting import format_number
 from .answer import Answers, Quantity
 from .quantities import format_quantity
 
-MIN_FACTOR = 10.0  # smallest ratio to the first value that is written as a factor
+MIN_RATIO_AS_FACTOR = 10.0  # smallest ratio to the first value that is written as a factor
 # value in a scene file
 TomlValue = str | float | list[Any] | dict[str, Any]
 # table of a page: `title`, `headings`, and `rows` of strings
@@ -49,7 +49,7 @@ def format_entry(name: str, quantity: Quantity | None, first: Quantity | None) -
     if not differs(quantity, first) or abs(first.value) <= _find_uncertainty(first):
         return text
     factor = quantity.value / first.value
-    if abs(factor) >= MIN_FACTOR:
+    if abs(factor) >= MIN_RATIO_AS_FACTOR:
         return f"{text} (x {format_number(factor, 2)})"
     change = (quantity.value - first.value) / abs(first.value)
     return f"{text} ({100 * change:+.{1 if abs(change) > 0.01 else 2}f} %)"

@@ -16,7 +16,7 @@ A law is a number in `law_rows.Law` with a branch in each of five functions. Rea
 
 # Names that other folders use, by module.
 PUBLIC = {
-    "case_rows": ("SAME_CYCLE", "Cases", "Number"),
+    "case_rows": ("SAME_CASE_CYCLE", "Cases", "Number"),
     "cases": ("CaseMarch", "list_parameters", "march_cases"),
     "checkpoint": ("CheckpointFiles", "MAX_EARLY_SAMPLES", "store_checkpoints"),
     "contacts": (

@@ -12,7 +12,7 @@ import numpy as np
 
 from ..compiled.flags_kernels import NJIT_KERNEL
 from ..compiled.jit import njit
-from .case_rows import SAME_CYCLE, Now, Number, Seen
+from .case_rows import SAME_CASE_CYCLE, Now, Number, Seen
 from .return_maps_kernels import (
     Law,
     MeanForce,
@@ -39,7 +39,9 @@ MAX_FORCE_BEND = 0.3
 # Change of the irreversible part of the slide from step to step, relative to the phase of a whole step, above which the
 # steps of the window stay short; near events, where steps grow with their distance, it is resolved like elsewhere
 MAX_SLIP_CHANGE = 0.25
-FULL_STICK = 1e-9  # fraction of the slide below which its irreversible or elastic part is round-off
+FULL_STICK_TOL = (
+    1e-9  # fraction of the slide below which its irreversible or elastic part is round-off
+)
 N_READ = 2  # measured cycles of a motion that repeats
 
 
@@ -667,9 +669,9 @@ def observe_stick(time, h, omega, is_rigid, start, now, seen):
         before = elapsed - 0.5 * h
         part = last / (last - excess)
         crossing = 2 * part * before if part < 0.5 else before + (part - 0.5) * h
-        if 0.5 - abs(last) < FULL_STICK:
+        if 0.5 - abs(last) < FULL_STICK_TOL:
             crossing = before + (0.5 - abs(excess)) * h
-        elif 0.5 - abs(excess) < FULL_STICK:
+        elif 0.5 - abs(excess) < FULL_STICK_TOL:
             crossing = 2 * before * abs(last)
         sticking = crossing if last < 0 else elapsed - crossing
         if last < 0:
@@ -830,8 +832,8 @@ def end_cycle(now, seen, history):
 @njit(**NJIT_KERNEL)
 def repeats(omega, now):
     """Return whether a motion is that of the cycle before, whose end is then replaced."""
-    size = SAME_CYCLE * (now[Now.MAX] - now[Now.MIN])
-    force = SAME_CYCLE * abs(now[Now.MEAN])
+    size = SAME_CASE_CYCLE * (now[Now.MAX] - now[Now.MIN])
+    force = SAME_CASE_CYCLE * abs(now[Now.MEAN])
     is_same = (
         abs(now[Now.SLIDE] - now[Now.LAST_SLIDE]) <= size
         and abs(now[Now.VELOCITY] - now[Now.LAST_VELOCITY]) <= omega * size

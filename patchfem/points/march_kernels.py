@@ -58,7 +58,7 @@ from .return_maps_kernels import (
     write_bond_means,
 )
 
-MAX_ITERATIONS = 200  # Newton iterations of a step
+MAX_NEWTON_ITERATIONS = 200  # Newton iterations of a step
 MAX_CUTS = 40  # trials of a line search
 MAX_OVERSHOOT = 0.5  # slope beyond the minimum of a line search, relative to that at its start
 MAX_STALLS = 4  # iterations that do not halve the smallest residual, after which a step ends
@@ -67,7 +67,7 @@ STALLED = 1e3
 LISTS_STALLED = 1e5
 MAX_RELAXATIONS = 40  # Newton iterations of the pieces after a step
 MAX_LOADS = 60  # repetitions of a step for the loads that follow from its motion
-ROUND_OFF = 4e-16  # round-off error of an increment relative to its size
+INCREMENT_ROUND_OFF = 4e-16  # round-off error of an increment relative to its size
 LOAD_RESIDUAL = 1e-11  # change of the loads relative to the resultant
 
 
@@ -494,7 +494,7 @@ def write_residual(system, level, h):
     tolerance = RESIDUAL * size
     for p in range(n_ports):
         own = ports.compliance[level, 0, p, p]
-        noise = ROUND_OFF * abs(moves[Port.FREE, p]) / own if own > 0 else 0.0
+        noise = INCREMENT_ROUND_OFF * abs(moves[Port.FREE, p]) / own if own > 0 else 0.0
         # The normal contact loses no energy, so that its residuals would add up over the steps.
         weight = 10.0 if p >= heave >= 0 else 1.0
         if own > 0 or p != 0 or not system.structure.path.size:
@@ -667,7 +667,7 @@ def solve_forces(system, level, h):
     smallest = np.inf
     n_stalls = 0
     stalled = LISTS_STALLED if system.options.has_lists else STALLED
-    for count in range(MAX_ITERATIONS):
+    for count in range(MAX_NEWTON_ITERATIONS):
         if n_stalls >= MAX_STALLS and residual <= stalled:
             return True
         for p in range(moves.shape[1]):
@@ -715,7 +715,7 @@ def solve_forces(system, level, h):
             and system.options.has_lists
             and high < np.inf
             and size > 0
-            and change <= ROUND_OFF * size
+            and change <= INCREMENT_ROUND_OFF * size
             and system.points.stiffness.size == 0
         ):
             return True

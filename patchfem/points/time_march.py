@@ -51,7 +51,7 @@ LIST_DAMPING = 1 / 16  # weight of the change of a shear increment for lists, wh
 REDUNDANT = 1e-10  # relative compliance of ports at rest that outnumber the modes
 FIRST_WIDTH = 1e-6  # width in bond lengths over which the initial bonds of several lists lie
 FIRST_STRIPS = 256  # first strips of each of several lists, in addition to those of one step
-MAX_STRIPS = 2_000_000  # largest number of strips of all lists, which limits the memory
+MAX_LIST_STRIPS = 2_000_000  # largest number of strips of all lists, which limits the memory
 STRIP_BYTES = 8 * N_ROWS
 LONG_LIST_ADVICE = (
     'raise accuracy.tail or accuracy.merge, or use reading = "stretch" with order = 1'
@@ -781,25 +781,25 @@ def enlarge_lists(system: System, place: str) -> System:
     Raises
     ------
     Missing
-        If the lists would have more than MAX_STRIPS strips.
+        If the lists would have more than MAX_LIST_STRIPS strips.
     """
     lists = system.lists
     room = lists.bondlist.shape[1]
-    if room >= MAX_STRIPS:
+    if room >= MAX_LIST_STRIPS:
         raise Missing(
             f"the bond list grew beyond {room} entries ({room * STRIP_BYTES / 1e6:.0f} MB) {place}; "
             f"{LONG_LIST_ADVICE}",
             "",
         )
     statuses = lists.statuses.copy()
-    capacity = min(2 * room, MAX_STRIPS) // len(statuses)
+    capacity = min(2 * room, MAX_LIST_STRIPS) // len(statuses)
     bondlist = list_numbers.enlarge_lists(lists.bondlist, statuses, capacity)
     return system._replace(lists=lists._replace(bondlist=bondlist, statuses=statuses))
 
 
 def count_list_bytes(n_strips: float) -> float:
     """Return the memory [bytes] of lists of bonds, with the copy during their enlargement."""
-    return 3 * STRIP_BYTES * min(n_strips, MAX_STRIPS)
+    return 3 * STRIP_BYTES * min(n_strips, MAX_LIST_STRIPS)
 
 
 def split_losses(samples, n: int, scale: float) -> np.ndarray:

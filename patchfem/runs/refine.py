@@ -24,8 +24,8 @@ MAX_SECONDS = 60.0  # Largest CPU time [s] of all passes without accuracy.max_se
 COST_RATIO = 4.0  # Expected ratio of the CPU times of two successive passes.
 ERROR_RATIO = 4.0  # Expected ratio of the errors of two successive passes.
 # Smallest ratio of the errors of two successive passes after which a third one follows.
-MIN_GAIN = 1.5
-MAX_EXCESS = 1e9  # Upper bound of the ratio of error to allowed error, for values of zero.
+MIN_ERROR_GAIN = 1.5
+MAX_ERROR_EXCESS = 1e9  # Upper bound of the ratio of error to allowed error, for values of zero.
 MAX_BENCH_STEPS = 6400  # Largest number of automatically chosen steps per cycle of a bench.
 # Outcomes of runs without measures that finer passes could improve.
 FAILED_OUTCOMES = (Outcome.NOT_CONVERGED, Outcome.NO_CONTACT, Outcome.GROWS)
@@ -66,7 +66,7 @@ def judge_pass(
     name, excess = find_worst_measure(result.measures, model.accuracy.tolerance)
     if excess <= 1 or result.outcome in FAILED_OUTCOMES:
         return Pass(excess)
-    if before is not None and excess * MIN_GAIN > before.excess:
+    if before is not None and excess * MIN_ERROR_GAIN > before.excess:
         return Pass(excess)
 
     # A pass is repeated only along the axis whose error is largest, and only if the run chose it.
@@ -132,7 +132,7 @@ def is_main(name: str) -> bool:
 def find_worst_measure(measures: Measures, tolerance: float) -> tuple[str, float]:
     """Return the main measure with the largest ratio of error to allowed error, and this ratio; ("", 0) without one."""
     found = filter(is_main, measures)
-    ratios = {name: min(measures[name].error_ratio(tolerance), MAX_EXCESS) for name in found}
+    ratios = {name: min(measures[name].error_ratio(tolerance), MAX_ERROR_EXCESS) for name in found}
     worst = max(ratios, key=ratios.get, default="")
     return worst, ratios.get(worst, 0.0)
 

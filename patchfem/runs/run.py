@@ -32,7 +32,7 @@ from .rig import engines, rig
 from .wear import evolve, measures
 
 __all__ = ["Plan", "Result", "StateFile", "plan", "run"]
-NO_MOTION = "no friction acts and no motion was computed"
+NO_FRICTION_MESSAGE = "no friction acts and no motion was computed"
 NO_MOTION_FOUND = "no motion was found; the measures are those of the pressed patch at rest"
 
 
@@ -179,7 +179,9 @@ def _run_pass(
     )
 
     if _is_open(patch) and model.kind != "patch":
-        result = patch_result.make_static_result(replace(inputs, warnings=[*warnings, NO_MOTION]))
+        result = patch_result.make_static_result(
+            replace(inputs, warnings=[*warnings, NO_FRICTION_MESSAGE])
+        )
     elif _has_no_load(model):
         result = _make_result_without_load(inputs)
     else:
@@ -273,7 +275,7 @@ def _make_result_without_load(inputs: RunInputs) -> Result:
         patch=None,
         fields={},
         seconds=inputs.seconds,
-        warnings=[*inputs.warnings, Outcome.NO_CONTACT.sentence, NO_MOTION],
+        warnings=[*inputs.warnings, Outcome.NO_CONTACT.sentence, NO_FRICTION_MESSAGE],
         extra={},
     )
 

@@ -3,12 +3,12 @@
 import json
 from pathlib import Path
 
+import contact_forms as closed_forms
 import numpy as np
 import pytest
 from command_line import run_cli
 
 import patchfem as pf
-from patchfem.closed_forms import contact as closed_forms
 
 UM = 1e-6
 

@@ -110,7 +110,7 @@ FILES = {
 def test_always_damaged_file_is_read_or_refused(tmp_path, name, count):
     """Damaged copies of a file are read or refused with the file name, and at least about 5 % are refused."""
     read, file_name, content, make_file = FILES[name]
-    trial = Trial(np.random.default_rng([81, len(content)]), None, None, None)
+    trial = Trial(np.random.default_rng([81, len(content)]))
     path = tmp_path / file_name
     path.write_bytes(make_file(content))
     read(path)

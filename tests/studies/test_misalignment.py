@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import re
 
+import contact_forms as exact
 import numpy as np
 import pytest
 from study_module import make_study_fixture
 
-from patchfem.closed_forms import contact as exact
 from patchfem.runs.patch.press import solve_patch_contact
 from patchfem.runs.patch.values import compute_static_values
 

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
+import contact_forms as closed_forms
 import numpy as np
 import pytest
 from synthetic import waves
 
-from patchfem.closed_forms import contact as closed_forms
 from patchfem.surface import Profile, describe_lost_waves
 from patchfem.surface.spectrum import wave_spectrum
 

@@ -7,7 +7,7 @@ import numpy as np
 from .vtkhdf import Frames, read_frames
 
 GRID_POINTS = (61, 60)  # columns and rows of the grid
-MAX_FRAMES = 30
+MAX_FILM_FRAMES = 30
 WINDOW_HEIGHT = 0.6  # height of the window around the contact over its width
 # Largest contact, over the length of the pieces, that the window shows as a whole.
 MAX_CONTACT_FRACTION = 0.25
@@ -71,7 +71,9 @@ def stress_frames(path: Path) -> dict[str, np.ndarray]:
     """
     frames = read_frames(path)
     cycle = last_frames(frames.times)
-    numbers = cycle[np.linspace(0, cycle.size - 1, min(MAX_FRAMES, cycle.size)).round().astype(int)]
+    numbers = cycle[
+        np.linspace(0, cycle.size - 1, min(MAX_FILM_FRAMES, cycle.size)).round().astype(int)
+    ]
     left, right, bottom, top = contact_window(frames)
     columns, rows = GRID_POINTS
     x = np.linspace(left, right, columns)

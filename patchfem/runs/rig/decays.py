@@ -38,7 +38,9 @@ NO_LOOP_REASON = (
 )
 NO_STATIC_CURVE_REASON = "no static curve of the mode was found at these amplitudes"
 MAX_POINT_ERROR = 0.5  # Largest relative error at which a point of a decay curve is accepted.
-AMPLITUDES_PER_DECADE = 16  # Number of amplitudes per decade at which the mesh error is computed.
+MESH_AMPLITUDES_PER_DECADE = (
+    16  # Number of amplitudes per decade at which the mesh error is computed.
+)
 
 
 def compute_decay_curve(solution: Solution) -> DecayCurve | None:
@@ -301,7 +303,7 @@ def estimate_stuck_mode_mesh_errors(
         Rig and patch with a stiffer joint, if a joint was subtracted from the modes.
     """
     low, high = np.log10([amplitude.min(), amplitude.max()])
-    at = np.logspace(low, high, 2 + int(AMPLITUDES_PER_DECADE * (high - low)))
+    at = np.logspace(low, high, 2 + int(MESH_AMPLITUDES_PER_DECADE * (high - low)))
     errors, reason = estimate_decay_mesh_errors(
         model,
         patch,

@@ -24,7 +24,7 @@ from .engines import ENGINES, find_obstacle_of_map
 from .hybrid_laws import list_elements
 from .solution import first_interface_load
 
-EQUAL_FREQUENCY_TOL = 1e-9  # Largest relative difference at which two frequencies count as equal.
+SAME_FREQUENCY_TOL = 1e-9  # Largest relative difference at which two frequencies count as equal.
 SINGLE_POINT_WARNING = (
     "the shape of the patch does not affect the motion: with pieces that are rigid in shear, a constant "
     "load and a pressure that moves with the upper piece, the patch moves exactly as one point under the "
@@ -103,7 +103,7 @@ def _warn_of_peak_at_sweep_end(run) -> list[str]:
     drive = run.model.rig.drive.signal
     ends = {"drive.from": drive.low, "drive.to": drive.high}
     for key, end in ends.items():
-        if abs(peak.value - end) <= EQUAL_FREQUENCY_TOL * end:
+        if abs(peak.value - end) <= SAME_FREQUENCY_TOL * end:
             side, move = ("upper", "raise") if end == max(ends.values()) else ("lower", "lower")
             return [
                 f"the largest response lies at {key} = {format_number(end, 6)} Hz, the {side} end of the swept "

@@ -10,7 +10,7 @@ from ..areal import Areal, level
 from ..profile import Profile
 
 CIRCLE = "circle"
-MIN_HEIGHTS = 10  # smallest number of heights that determine a circle
+MIN_CIRCLE_HEIGHTS = 10  # smallest number of heights that determine a circle
 
 
 def parse_form_option(text: str) -> int | str:
@@ -41,9 +41,9 @@ def subtract_form(surface: Profile | Areal, form: int | str = 1) -> tuple[Profil
         )
 
     known = ~surface.missing
-    if known.sum() < MIN_HEIGHTS:
+    if known.sum() < MIN_CIRCLE_HEIGHTS:
         raise PatchfemError(
-            f"{surface.source}: {known.sum()} heights; a circle needs at least {MIN_HEIGHTS}"
+            f"{surface.source}: {known.sum()} heights; a circle needs at least {MIN_CIRCLE_HEIGHTS}"
         )
     from scipy.optimize import least_squares
 
