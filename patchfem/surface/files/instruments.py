@@ -7,13 +7,17 @@ files it reads matrices with their masks, and refuses traces and dates that it d
 """
 
 import io
+from math import prod
 
 import numpy as np
 
 from ...core import Missing, PatchfemError
+from ...inputs.packed import count_zip_bytes, refuse_large_content
 from .content import Content
 from .table import Table
 from .units import HEADER_EXAMPLE, shorten
+
+THINNING = "export a smaller part of the scan, or every second height"
 
 
 def read_instrument(content: Content) -> Table:
@@ -27,6 +31,7 @@ def read_instrument(content: Content) -> Table:
     if content.data.startswith(b"PK"):
         kind = "a zip file; unpack it if it contains a text; X3P is such a format"
         remedy = f"unpack a text that it contains, or {remedy}"
+        refuse_large_content(path, count_zip_bytes(io.BytesIO(content.data)), THINNING)
     try:
         # The import takes two seconds.
         import SurfaceTopography
@@ -43,6 +48,7 @@ def read_instrument(content: Content) -> Table:
         channel = reader.default_channel
         if channel.physical_sizes is None:
             raise ValueError("the file does not give the size of the scan")
+        refuse_large_content(path, 8 * prod(channel.nb_grid_pts), THINNING)
         topography = channel.topography()
         unit = topography.unit
         if unit is not None:
@@ -55,6 +61,8 @@ def read_instrument(content: Content) -> Table:
             steps = np.divide(topography.physical_sizes, z.shape)
             x, y = (np.arange(count) * step for count, step in zip(z.shape, steps))
             columns = {"x": x, "y": y, "z": z.T}
+    except PatchfemError:
+        raise
     except Exception as error:  # a damaged file leads to any kind of exception in a library
         reason = shorten(f"{type(error).__name__}: {error}", 120)
         raise PatchfemError(
