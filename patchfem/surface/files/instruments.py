@@ -14,10 +14,8 @@ import numpy as np
 from ...core import Missing, PatchfemError
 from ...inputs.packed import count_zip_bytes, refuse_large_content
 from .content import Content
-from .table import Table
+from .table import Table, refuse_many_heights
 from .units import HEADER_EXAMPLE, shorten
-
-THINNING = "export a smaller part of the scan, or every second height"
 
 
 def read_instrument(content: Content) -> Table:
@@ -31,7 +29,8 @@ def read_instrument(content: Content) -> Table:
     if content.data.startswith(b"PK"):
         kind = "a zip file; unpack it if it contains a text; X3P is such a format"
         remedy = f"unpack a text that it contains, or {remedy}"
-        refuse_large_content(path, count_zip_bytes(io.BytesIO(content.data)), THINNING)
+        size = count_zip_bytes(io.BytesIO(content.data))
+        refuse_large_content(path, size, "export a smaller part of the scan")
     try:
         # The import takes two seconds.
         import SurfaceTopography
@@ -48,7 +47,8 @@ def read_instrument(content: Content) -> Table:
         channel = reader.default_channel
         if channel.physical_sizes is None:
             raise ValueError("the file does not give the size of the scan")
-        refuse_large_content(path, 8 * prod(channel.nb_grid_pts), THINNING)
+        # A packed file may state far more heights than it has bytes.
+        refuse_many_heights(path, prod(channel.nb_grid_pts))
         topography = channel.topography()
         unit = topography.unit
         if unit is not None:
