@@ -53,14 +53,6 @@ class LuGre:
             form="flow",
         )
 
-    def limit(self, speed):
-        """Return the steady friction force / load, g/N [1], at a speed [m/s].
-
-        It is at least 1e-9 mu_s, because the rate of z divides by it.
-        """
-        rise = (self.static - self.kinetic) * np.exp(-((speed / self.speed) ** 2))
-        return np.maximum(self.kinetic + rise, 1e-9 * self.static)
-
 
 def from_keys(friction, load: float) -> LuGre:
     """Return the LuGre law defined by a [friction] table, for a load N [N] on the whole contact.
