@@ -49,7 +49,6 @@ class LuGre:
             np.zeros(1),
             self.static * load,
             self.static / self.stiffness,
-            is_bounded=False,
             form="flow",
         )
 
