@@ -78,8 +78,6 @@ def level(surface: Profile | Areal) -> Profile | Areal:
     base = np.array([np.broadcast_to(part, known.shape) for part in (1.0, *unit)])
     factors, _, rank, _ = np.linalg.lstsq(base[:, known].T, surface.z[known], rcond=PLACES_RANK_TOL)
     if rank < len(base):
-        raise PatchfemError(
-            f"{surface.source}: {known.sum()} heights, which all lie on one straight line; a plane needs "
-            "three points that do not"
-        )
+        needs = ("a line needs two", "a plane needs three that do not lie on one straight line")
+        raise PatchfemError(f"{surface.source}: {known.sum()} heights; {needs[known.ndim - 1]}")
     return replace(surface, z=frozen_array(surface.z - np.tensordot(factors, base, 1)))

@@ -51,18 +51,6 @@ class ShapeFunctions(NamedTuple):
     decay: float
 
 
-class PathIntegrals(NamedTuple):
-    """Integrals over a path from 0 to x in bond lengths.
-
-    - first, second: of y exp(-y) and y^2 exp(-y)
-    - of_second: integral of the second one over its upper limit
-    """
-
-    first: float
-    second: float
-    of_second: float
-
-
 class MeanStretch(NamedTuple):
     """Path mean of z over an increment [Pa m], and its derivative with respect to the increment [Pa]."""
 
@@ -83,18 +71,6 @@ class GrownLength(NamedTuple):
 
     length: float
     exponent: float
-
-
-class BondStep(NamedTuple):
-    """Sums m, z, s2 over the bonds after an increment, and the integral of s2 dR/eps.
-
-    mu_s/(2 eps_0) times this integral is dissipated.
-    """
-
-    m: float
-    z: float
-    s2: float
-    damage_integral: float
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, forceinline=True, **NJIT_NO_REFCOUNT)
@@ -126,26 +102,11 @@ def _short_shape_functions(x):
     return ShapeFunctions(f1, f2, 1 - x * f1)
 
 
-@njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def _integrate_powers(x, decay):
-    """Return the `PathIntegrals` of a path x in bond lengths; decay = exp(-x)."""
-    if x < MAX_SHORT_PATH:
-        return _integrate_short_powers(x, decay)
-    return _powers_from_cubic(x, decay, 6 - decay * (x * x * x + 3 * x * x + 6 * x + 6))
-
-
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, forceinline=True, **NJIT_NO_REFCOUNT)
-def _integrate_short_powers(x, decay):
-    """Return the `PathIntegrals` of a path x up to MAX_SHORT_PATH by a power series; decay = exp(-x)."""
-    series = _sum_series(MOMENT_SERIES, MOMENT_SERIES.size, x)
-    return _powers_from_cubic(x, decay, x**4 * series)
-
-
-@njit(error_model="numpy", fastmath=FASTMATH_FLAGS, forceinline=True, **NJIT_NO_REFCOUNT)
-def _powers_from_cubic(x, decay, cubic):
-    """Return the `PathIntegrals` from the integral of y^3 exp(-y) by parts."""
-    second = (cubic + x * x * x * decay) / 3
-    return PathIntegrals((second + x * x * decay) / 2, second, x * second - cubic)
+def _integrate_short_square(x, decay):
+    """Return the integral of y^2 exp(-y) from 0 to x up to MAX_SHORT_PATH, by parts from y^3; decay = exp(-x)."""
+    cubic = x**4 * _sum_series(MOMENT_SERIES, MOMENT_SERIES.size, x)
+    return (cubic + x * x * x * decay) / 3
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
@@ -213,12 +174,16 @@ def bond_step(m, z, s2, increment, sigma, eps):
 
     Returns
     -------
-    BondStep
+    BondMoments
     """
     x = abs(increment) / eps
     shapes = shape_functions(x)
-    powers = _integrate_powers(x, shapes.decay)
-    return _step_bonds((m, z, s2), increment, sigma, eps, (shapes.f1, shapes.decay), powers)
+    decay = shapes.decay
+    # The integral of y^2 exp(-y) from 0 to x
+    square = 2 - decay * (x * x + 2 * x + 2)
+    if x < MAX_SHORT_PATH:
+        square = _integrate_short_square(x, decay)
+    return _step_bonds((m, z, s2), increment, sigma, eps, (shapes.f1, decay, square))
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, forceinline=True, **NJIT_NO_REFCOUNT)
@@ -234,36 +199,31 @@ def short_bond_step(m, z, s2, increment, sigma, eps):
 
     Returns
     -------
-    BondStep
+    BondMoments
     """
     x = abs(increment) / eps
     shapes = _short_shape_functions(x)
-    powers = _integrate_short_powers(x, shapes.decay)
-    return _step_bonds((m, z, s2), increment, sigma, eps, (shapes.f1, shapes.decay), powers)
+    square = _integrate_short_square(x, shapes.decay)
+    return _step_bonds((m, z, s2), increment, sigma, eps, (shapes.f1, shapes.decay, square))
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, forceinline=True, **NJIT_NO_REFCOUNT)
-def _step_bonds(bonds, increment, sigma, eps, shapes, powers):
+def _step_bonds(bonds, increment, sigma, eps, shapes):
     """Return the sums over the bonds after an increment: the solution of the equations of the module.
 
-    `bonds` are m, z and s2 before it, `shapes` are f1 and exp(-x), `powers` the `PathIntegrals` of its path.
+    `bonds` are m, z and s2 before it, `shapes` are f1, exp(-x) and the integral of y^2 exp(-y) from 0 to x.
     """
     m, z, s2 = bonds
-    f1, decay = shapes
-    first, second, second_integral = powers
+    f1, decay, square = shapes
     path = abs(increment)
     direction = 1.0 if increment > 0 else -1.0
     x = path / eps
-    zeroth = x * f1
     density_deficit = sigma - m
-    square = eps * eps
     stretched = s2 + 2 * direction * z * path + m * path * path
-    damage = s2 * zeroth + 2 * direction * z * eps * first
-    return BondStep(
+    return BondMoments(
         sigma - density_deficit * decay,
-        z * decay + direction * eps * (sigma * zeroth - density_deficit * x * decay),
-        decay * stretched + sigma * square * second,
-        damage + m * square * second + sigma * square * second_integral,
+        z * decay + direction * eps * (sigma * x * f1 - density_deficit * x * decay),
+        decay * stretched + sigma * eps * eps * square,
     )
 
 

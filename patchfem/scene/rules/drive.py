@@ -1,7 +1,5 @@
 """Rules of [drive]: keys that its kind and its waveform need, exclude or do not use."""
 
-from __future__ import annotations
-
 from ...effects import find_waveform
 from .facts import TableFacts
 from .scene_draft import SceneDraft

@@ -79,10 +79,7 @@ def make_surface(table: Table, units: tuple[str, str] | None = None) -> Profile 
         always state their units.
     """
     size = table.columns["z"].size
-    if size > MAX_HEIGHTS:
-        raise PatchfemError(
-            f"{table.path}: {size} heights, more than {MAX_HEIGHTS:.0e}; export a part of the scan"
-        )
+    refuse_many_heights(table.path, size)
     if units is not None and table.are_units_fixed:
         table = table.add_note("the file states its own units; the units that you gave are ignored")
         units = None
@@ -115,6 +112,14 @@ def make_surface(table: Table, units: tuple[str, str] | None = None) -> Profile 
     notes = _check_span(table.path, max(map(np.ptp, axes)), z, has_sure_units=has_sure_units)
     surface = Profile if z.ndim == 1 else Areal
     return surface(*reversed(axes), frozen_array(z), str(table.path), table.notes + notes)
+
+
+def refuse_many_heights(path, count: int) -> None:
+    """Raise PatchfemError if a surface has more heights than memory should hold."""
+    if count > MAX_HEIGHTS:
+        raise PatchfemError(
+            f"{path}: {count} heights, more than {MAX_HEIGHTS:.0e}; export a part of the scan"
+        )
 
 
 def _convert_column(table: Table, role: str, given: str | None) -> Table:

@@ -248,6 +248,10 @@ def crop(surface: Profile | Areal, *ends: float) -> Profile | Areal:
                 f"surface along {name} from {format_length(axis[0])} to {format_length(axis[-1])}"
             )
         low, high = np.maximum(np.searchsorted(axis, np.add((first, last), near), "right") - 1, 0)
+        if low == high:
+            raise PatchfemError(
+                f"{surface.source}: the window contains a single sample along {name}; take a longer one"
+            )
         parts.append(slice(low, high + 1))
         axes[name] = axis[parts[-1]]
     return replace(surface, **axes, z=surface.z[tuple(reversed(parts))])

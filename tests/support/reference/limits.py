@@ -40,6 +40,7 @@ SIZES = {  # Constant -> description of the quantity that it bounds.
     "campaigns.sweeps.parse_request.MAX_SWEEP_CASES": "number of cases of a sweep",
     "inputs.tables.MAX_BYTES": "bytes of a text file with a table",
     "inputs.records.MAX_BYTES": "bytes of a laboratory file or a .mat file",
+    "inputs.packed.MAX_UNPACKED_BYTES": "bytes of the content of a .npz, .mat or zip file after decompression",
     "mesh.files.MAX_FILE_BYTES": "bytes of a mesh file",
     "surface.files.content.MAX_BYTES": "bytes of the file of a scan, also after decompression",
     "surface.files.table.MAX_LENGTH": "length of a trace [m]",

@@ -331,3 +331,19 @@ def test_refuses_unknown_options(options, message):
     short = [Profile(trace.x[:20], trace.z[:20], trace.source) for trace in pair]
     with pytest.raises(PatchfemError, match="20 heights; a comparison needs at least 40"):
         compare_surfaces(*short)
+
+
+@pytest.mark.parametrize("shape", ["flat", "round"])
+def test_always_floor_of_noisy_track_has_no_bias(shape):
+    """Over 12 noisy tracks, the mean error of the floor is within .8 of its scatter; the largest of the means is above."""
+    worn = make_parabola(60 * NM, 500, 1000, 1500)
+    if shape == "flat":
+        worn = np.where(worn > 0, 60 * NM, 0.0)
+    true = np.convolve(worn, np.ones(100) / 100, "valid").max()
+    floors = []
+    for seed in range(12):
+        found = compare_surfaces(*make_pair(worn, seed, noise=15 * NM))
+        floors.append(found.track.values["depth_floor"])
+    errors = np.array([floor.value for floor in floors]) - true
+    assert abs(errors.mean()) < 0.8 * errors.std()
+    assert sum(floor.low <= true <= floor.high for floor in floors) >= 11
