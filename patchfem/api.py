@@ -12,6 +12,7 @@ perform computations; `run` returns a `Result`. `profile` and `compare` evaluate
 from __future__ import annotations
 
 import re
+import shlex
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import fields, replace
@@ -633,7 +634,12 @@ def sweep(
     sweep_scene = _read_sweep_scene(scene)
     ranges = [f"{key}={format_values(key, values)}" for key, values in values_by_key.items()]
     request = parse_request.Request(ranges, None, draw, sobol, seed)
+    words = [word for text in ranges for word in ("--over", text)]
+    if draw:
+        words += [f"--{'sobol' if sobol else 'random'}", str(draw), "--seed", str(seed)]
+    command = runs.make_command("sweep", sweep_scene.path, sweep_scene.sets)
     cases = parse_request.read_cases(sweep_scene, request)
+    cases = replace(cases, command=shlex.join([*shlex.split(command), *words]))
     pool = executors.make_executor(executor, jobs)
     if out is None:
         answer = sweep_run.compute_in_memory(sweep_scene, cases, pool, _print_to_stderr)

@@ -58,7 +58,7 @@ def make_answer(
         verdict=verdict,
         quantities=_make_quantities(table, analysis),
         data=_make_data(table, case_folders),
-        remarks=Remarks(_describe_failures(table), tuple(notes)),
+        remarks=Remarks((*_describe_failures(table), *table.faults), tuple(notes)),
         details=details,
         origin={
             "patchfem": __version__,
