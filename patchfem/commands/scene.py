@@ -42,6 +42,7 @@ def check(scene: Path, /, *, set_: Sets = (), json_: Json = False):
             return []
         return model_files.find_file_faults(tables, folder, is_complete, notes)
 
+    # all mistakes are raised here
     checked_scene = load_scene(scene, set_, find_file_mistakes)
     notes = [rewrite_powers_of_ten(text) for text in dict.fromkeys([*checked_scene.notes, *notes])]
     content = {

@@ -715,7 +715,7 @@ TABLES: dict[str, tuple[Table, ...]] = {
     "backbone": (
         Table(
             "Values of the key",
-            "table",
+            "cases",
             "value, frequency with a sticking contact = stuck_frequency, largest damping ratio = largest_damping, "
             "at = amplitude_of_largest_damping",
         ),
