@@ -530,11 +530,13 @@ def backbone(
     5
     """
 
-    def build_with(tables: BackboneTables, *, is_written: bool, sets: tuple[str, ...]) -> Model:
+    def build_with(tables: BackboneTables, sets: tuple[str, ...] | None) -> Model:
         """Build the model of the scene, or of the scene as written, with the tables of a backbone."""
         if isinstance(scene, Model):
             return build(scene, **changes)
-        values = {} if is_written else changes | dict(text.split("=", 1) for text in sets)
+        values = {}
+        if sets is not None:
+            values = changes | dict(text.split("=", 1) for text in sets)
         loaded = _load_and_prepare(scene, tables, values)
         return build_model(remember_written(loaded, _count_written(scene), tables))
 

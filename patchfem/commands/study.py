@@ -100,9 +100,9 @@ def backbone(
     Example: patchfem backbone joint.toml --modes "120 Hz:0.01, 170 Hz:0.02"
     """
 
-    def build_model(tables, *, is_written: bool, sets: tuple[str, ...]):
+    def build_model(tables, sets: tuple[str, ...] | None):
         """Build the model of the scene, or of the scene as written, with the tables of a backbone."""
-        loaded_scene = load_scene(scene, () if is_written else (*set_, *sets), prepare=tables)
+        loaded_scene = load_scene(scene, () if sets is None else (*set_, *sets), prepare=tables)
         return model.build(remember_written(loaded_scene, prepare=tables))
 
     if over and any(text.partition("=")[0] == over.partition("=")[0] for text in set_):
@@ -158,8 +158,8 @@ def fit(
     loaded_scene = remember_written(load_scene(scene, set_))
     output = output_options.into(f"{scene.stem}-fit")
     options = fit_requests.FitOptions(hold, leave_out, starts)
-    # the fits to a loop and to a curve are too short for a progress line
-    is_short = fit_requests.choose_kind(loaded_scene, to) in ("loop", "curve")
+    # the fit to a loop is too short for a progress line
+    is_short = fit_requests.choose_kind(loaded_scene, to) == "loop"
     with Progress(output.quiet or output.json_ or is_short) as progress:
         report = None if output.quiet else print_message
         listener = fit_requests.Listener(report, progress)

@@ -178,7 +178,7 @@ def _make_verdict(backbone: Backbone, measures: Quantities) -> tuple[str, ...]:
             changes.append(f"{label} falls from {low} to {high}")
         else:
             changes.append(f"{label} stays at {low}")
-    ends = [format_quantity(float(curve.amplitude[k]), "m", 3) for k in (0, -1)]
+    ends = [format_quantity(curve.amplitude[k], "m", 3) for k in (0, -1)]
     span = f"from {ends[0]} to {ends[1]}" if curve.amplitude.size > 1 else f"at {ends[0]}"
     sentences = [f"{changes[0][0].upper()}{changes[0][1:]}, {changes[1]}, {span}.", natural]
 
@@ -241,7 +241,7 @@ def _make_details(backbone: Backbone) -> JsonObject:
         "missing": backbone.missing,
         "exponent": backbone.exponents,
         "flutter_amplitude": backbone.flutter,
-        "notes": list(backbone.notes),
+        "notes": backbone.notes,
         "method": band and band.method,
         "band": band and {name: getattr(band, name) for name in BAND_COLUMNS},
         "advice": " ".join(backbone.advice),
@@ -261,7 +261,7 @@ def _make_cases_answer(cases: BackboneCases) -> Answer:
         remarks=Remarks(notes=tuple(_list_notes(cases))),
         details={
             "key": axis.key,
-            "values": list(axis.texts),
+            "values": axis.texts,
             "mode": cases.backbones[0].mode,
             "cases": [
                 {"value": text, "measures": _make_quantities(one)} | _make_details(one)
@@ -337,7 +337,7 @@ def _compare_ends(cases: BackboneCases) -> tuple[tuple[str, ...], Quantities]:
     if place is None:
         sentence = "changes frequency and damping ratio by less than their numerical errors"
         return (f"{subject} {sentence}.", *last.advice[:1]), {}
-    amplitude = float(start.amplitude[place])
+    amplitude = start.amplitude[place]
     measures = {"compared_amplitude": Quantity(amplitude, "m")}
     for name, (step, error) in changes.items():
         measures[f"{name}_change"] = Quantity(step[place], UNITS[name], error[place])

@@ -184,7 +184,7 @@ def _describe_search(keys: FittedKeys) -> JsonObject:
     for k, bound in enumerate(keys.ranges):
         ends = intervals.ends[k].tolist()
         values[bound.key] = {
-            "value": float(fit.values[k]),
+            "value": fit.values[k],
             "unit": bound.unit,
             "interval": ends if np.isfinite(ends).all() else None,
             "method": intervals.methods[k],
@@ -211,7 +211,7 @@ def describe_loop_fit(fit: FittedLoop) -> Parts:
     """Return the parts of a fit to a friction loop."""
     loop = fit.loop
     unit = LOOP_UNITS[loop.quantity]
-    peak = float(np.abs(loop.reading).max())
+    peak = np.abs(loop.reading).max()
     n_rows = int((~fit.held_out).sum())
     scores = {
         "residual_rms": Quantity(fit.rms, unit),
@@ -272,7 +272,7 @@ def describe_curve_fit(fit: FittedCurve) -> Parts:
     for k, (name, unit) in enumerate((("frequency", "Hz"), ("damping", "1"))):
         value = measured.value[k]
         distance = fit.model[k] - value
-        rms[name] = float(np.sqrt(np.mean((distance / value) ** 2)))
+        rms[name] = np.sqrt(np.mean((distance / value) ** 2))
         columns |= {
             name: (value, unit),
             f"{name}_error": (errors[k], unit),
@@ -296,7 +296,7 @@ def describe_curve_fit(fit: FittedCurve) -> Parts:
         "method": fit.method,
         "rows": n_rows,
         "rms": rms,
-        "notes": list(fit.notes),
+        "notes": fit.notes,
         "evaluations": fit.n_computed,
     }
     scores = {f"{name}_residual_rms": Quantity(value) for name, value in rms.items()}
