@@ -44,7 +44,6 @@ class Row(NamedTuple):
     unit: str
     text: str
     places: str
-    has_error: bool = False
 
 
 VARIABLES = {
@@ -152,28 +151,24 @@ VARIABLES = {
         "m",
         "half the peak-to-peak motion at the output",
         "extra.curve.amplitude",
-        has_error=True,
     ),
     "curve_acceleration_peak": Row(
         "curve_point",
         "m s-2",
         "largest absolute acceleration",
         "extra.curve.acceleration_peak",
-        has_error=True,
     ),
     "curve_acceleration_fundamental": Row(
         "curve_point",
         "m s-2",
         "first harmonic of the absolute acceleration",
         "extra.curve.acceleration_fundamental",
-        has_error=True,
     ),
     "curve_acceleration_distortion": Row(
         "curve_point",
         "1",
         "third over first harmonic of the absolute acceleration",
         "extra.curve.acceleration_distortion",
-        has_error=True,
     ),
     "curve_multiplier": Row(
         "curve_point", "1", "largest Floquet multiplier", "extra.curve.multiplier"
@@ -184,12 +179,8 @@ VARIABLES = {
     "decay_amplitude": Row(
         "decay_time", "m", "half the peak-to-peak motion of the output", "extra.decay.amplitude"
     ),
-    "decay_frequency": Row(
-        "decay_time", "Hz", "frequency of the decay", "extra.decay.frequency", has_error=True
-    ),
-    "decay_damping": Row(
-        "decay_time", "1", "damping ratio of the decay", "extra.decay.damping", has_error=True
-    ),
+    "decay_frequency": Row("decay_time", "Hz", "frequency of the decay", "extra.decay.frequency"),
+    "decay_damping": Row("decay_time", "1", "damping ratio of the decay", "extra.decay.damping"),
     "frequency": Row("frequency", "Hz", "frequency", "extra.spectra.frequency"),
     "base_acceleration_spectrum": Row(
         "frequency",
@@ -234,10 +225,9 @@ def collect_data(result: Result) -> Variables:
     """Return all arrays of a run, in SI units."""
     data = {}
     for name, row in VARIABLES.items():
-        data |= _read_row(result, name, row)
-        if row.has_error:
-            error = Row(row.dims, row.unit, f"error of {name}", f"{row.places}_error")
-            data |= _read_row(result, f"{name}_error", error)
+        places = " ".join(f"{place}_error" for place in row.places.split())
+        error = Row(row.dims, row.unit, f"error of {name}", places)
+        data |= _read_row(result, name, row) | _read_row(result, f"{name}_error", error)
     if result.plan.kind == "linear":
         data = {name: one for name, one in data.items() if name not in FRICTIONLESS}
     data |= _collect_motion(result) | _collect_loop(result) | _collect_patch(result)

@@ -15,7 +15,7 @@ from ..runs.run import StateFile, is_march, run
 from . import page, store
 from .answer import Answer
 from .fields import vtkhdf
-from .folder import STATE, Folder, is_state
+from .folder import STATE, Folder, list_states
 from .runs import make_answer
 
 MAX_INTERFACES = 6  # largest number of interfaces whose fields are written
@@ -118,8 +118,7 @@ def is_complete(run_plan: Plan, target: Path) -> bool:
     It is False for a folder with the state of an interrupted run. PatchfemError if the folder contains the complete run of
     another scene or of another version.
     """
-    state = target.parent / f"{target.name}.partial"
-    if state.is_dir() and any(is_state(path.name) for path in state.iterdir()):
+    if list_states(target.parent / f"{target.name}.partial"):
         return False
     try:
         version = store.read_summary(target).patchfem

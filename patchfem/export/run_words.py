@@ -329,7 +329,7 @@ def describe_accuracy(result: Result, measures: Quantities) -> str:
     """Return a sentence that all errors are within the tolerance, with the largest; "" if a warning says more."""
     tolerance = result.plan.model.accuracy.tolerance
     if result.outcome is Outcome.GROWS and result.response is not None:
-        end = format_quantity(float(result.response.time[-1]), "s", 3)
+        end = format_quantity(result.response.time[-1], "s", 3)
         return f"The motion still grows after {end}: the measures are those of the last cycles, without errors."
 
     ratios = {
@@ -376,7 +376,7 @@ def describe_release(result: Result) -> tuple[str, str]:
     error = getattr(amplitude, "error", None) or 0.0
     last = getattr(amplitude, "value", None)
     motion = describe_rest(response.time, response.output, error, last)
-    start = format_length(float(response.output[0]), 3)
+    start = format_length(response.output[0], 3)
     sentence = f"Released at {start}, the output {motion}."
     return sentence, _describe_decay(result.extra.get("decay"))
 
@@ -390,7 +390,7 @@ def _describe_decay(decay) -> str:
         return ""
     parts = [
         f"{format_value(decay.frequency[k], decay.frequency_error[k], unit='Hz')} and damping ratio "
-        f"{format_value(decay.damping[k], decay.damping_error[k])} at {format_quantity(float(decay.amplitude[k]), 'm', 3)}"
+        f"{format_value(decay.damping[k], decay.damping_error[k])} at {format_quantity(decay.amplitude[k], 'm', 3)}"
         for k in (known[1], known[-1])
     ]
     return f"It decays with {', with '.join(parts)}."
@@ -409,18 +409,18 @@ def describe_rest(time, output, error: float = 0.0, last: float | None = None) -
         Amplitude of the last whole cycle [m]; by default that of the last tenth of the samples.
     """
     largest = np.abs(output).max()
-    end = 0.0 if abs(output[-1]) < ZERO_FRACTION * largest else float(output[-1])
+    end = 0.0 if abs(output[-1]) < ZERO_FRACTION * largest else output[-1]
     rest_limit = max(error, REST_FRACTION * abs(end), ZERO_FRACTION * largest)
     last_tenth = time >= time[-1] - 0.1 * (time[-1] - time[0])
     amplitude = np.ptp(output[last_tenth]) / 2
     amplitude = amplitude if last is None else min(last, amplitude)
     if amplitude > rest_limit:
-        end_time = format_quantity(float(time[-1]), "s", 3)
-        return f"still moves with an amplitude of {format_length(float(amplitude), 3)} after {end_time}"
+        end_time = format_quantity(time[-1], "s", 3)
+        return f"still moves with an amplitude of {format_length(amplitude, 3)} after {end_time}"
 
     # it rests from the sample after the last one that is far from the end
     far = np.flatnonzero(np.abs(output - end) > rest_limit)
     if not far.size:
         return "does not move"
-    rest = format_quantity(float(time[min(far[-1] + 1, time.size - 1)]), "s", 3)
+    rest = format_quantity(time[min(far[-1] + 1, time.size - 1)], "s", 3)
     return f"rests at {format_length(end, 3)} after {rest}"

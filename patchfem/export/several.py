@@ -16,14 +16,6 @@ Table = dict[str, str | list[str] | list[list[str]]]
 MAX_CELL_LENGTH = 80  # largest number of characters of a value of a scene
 
 
-def differs(quantity: Quantity | None, first: Quantity | None) -> bool:
-    """Return whether a quantity differs from that of the first answer by more than both errors."""
-    if quantity is None or first is None or None in (quantity.value, first.value):
-        return False
-    limit = _find_uncertainty(quantity) + _find_uncertainty(first)
-    return quantity.unit == first.unit and abs(quantity.value - first.value) > limit
-
-
 def _find_uncertainty(quantity: Quantity) -> float:
     """Return the half-width of the interval of a quantity, but at least its floor."""
     if None in (quantity.low, quantity.high):
@@ -46,7 +38,11 @@ def format_entry(name: str, quantity: Quantity | None, first: Quantity | None) -
     if quantity is None:
         return ""
     text = format_quantity(name, quantity)
-    if not differs(quantity, first) or abs(first.value) <= _find_uncertainty(first):
+    if first is None or None in (quantity.value, first.value) or quantity.unit != first.unit:
+        return text
+    uncertainty = _find_uncertainty(first)
+    limit = uncertainty + _find_uncertainty(quantity)
+    if abs(quantity.value - first.value) <= limit or abs(first.value) <= uncertainty:
         return text
     factor = quantity.value / first.value
     if abs(factor) >= MIN_RATIO_AS_FACTOR:
@@ -66,9 +62,8 @@ def list_scene_differences(answers: Answers) -> list[Table]:
         texts = [str(scene.get(key, "-")) for scene in scenes.values()]
         if len(set(texts)) > 1:
             rows.append([key, *(shorten(text, MAX_CELL_LENGTH) for text in texts)])
-    if not rows:
-        return []
-    return [{"title": "Where the scenes differ", "headings": ["key", *answers], "rows": rows}]
+    table = {"title": "Where the scenes differ", "headings": ["key", *answers], "rows": rows}
+    return [table] if rows else []
 
 
 def _flatten(table: TomlValue, prefix: str = "") -> dict[str, TomlValue]:

@@ -252,9 +252,9 @@ def test_exact_fitted_scene_reproduces_fitted_loop(tmp_path, fit_command):
 
 def test_always_unconverged_fit_exits_with_code_3(fit_command, monkeypatch, tmp_path):
     """A fit that reaches its limit of evaluations exits with code 3 and states that it did not converge."""
-    from patchfem.identify import least_squares
+    from patchfem.identify import descent
 
-    monkeypatch.setattr(least_squares, "MAX_EVALUATIONS", 1)
+    monkeypatch.setattr(descent, "MAX_EVALUATIONS", 1)
     assert (
         run_cli(
             *fit_command, "--free", "friction.static=0.1..0.7,friction.bond_length=0.3 um..20 um"

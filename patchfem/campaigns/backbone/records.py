@@ -165,7 +165,3 @@ class Backbone(NamedTuple):
     def best(self) -> Curve | None:
         """Curve of the recommended method; None without a curve."""
         return next((self.curves[name] for name in METHODS if name in self.curves), None)
-
-    def add_notes(self, notes) -> "Backbone":
-        """Return the backbone with further notes placed first."""
-        return self._replace(notes=(*notes, *self.notes))

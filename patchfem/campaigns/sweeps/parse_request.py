@@ -187,7 +187,10 @@ def _check_cases(sweep_scene: SweepScene, cases: Cases) -> str:
     SceneError
         If none of them is valid.
     """
-    numbers = cases.representative_case_numbers(N_CHECKED_CASES)
+    # the first random cases are as good as any others
+    numbers = cases.spread_case_numbers(N_CHECKED_CASES)
+    if cases.is_random:
+        numbers = range(min(N_CHECKED_CASES, len(cases)))
     errors = [sweep_scene.find_errors(cases.assignments(number)) for number in numbers]
     invalid = list(filter(None, errors))
     if not invalid:

@@ -39,7 +39,8 @@ def contact_window(frames: Frames) -> tuple[float, float, float, float]:
     x = line.points[:, 0]
     pressure = line.point_data["normal_stress"].max(axis=0)
     length = np.ptp(x)
-    touching = x[pressure > 0] if pressure.any() else x[[0, -1]]
+    touching = x[pressure > 0]
+    touching = touching if touching.size else x[[0, -1]]
     width = np.ptp(touching)
     is_long = width > MAX_CONTACT_FRACTION * length
     centre = x[np.argmax(pressure)] if is_long else (touching[0] + touching[-1]) / 2

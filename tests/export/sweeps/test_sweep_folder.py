@@ -12,6 +12,7 @@ from computed_cases import ComputedCases
 from scene_texts import COULOMB, POINT, SHORT
 
 from patchfem.export import store
+from patchfem.export.folder import Folder
 
 RIG = POINT + COULOMB + SHORT
 OVER = ("--over", "drive.acceleration=1 g..5 g:10", "--over", "normal.load=10 N..200 N:10,-1 N")
@@ -134,3 +135,21 @@ def test_exact_files_of_cases_follow_keep(scene_file, tmp_path):
         assert summary.case == {"friction.static": "0.1"}
         message = store.read_summary(folder / "cases" / failed["case"]).message
         assert message == failed["message"] and "friction.static" in message
+
+
+def test_exact_partial_files_of_killed_writers_are_removed(scene_file, tmp_path):
+    """A hidden partial file that a killed writer left in the folder of a run or of a sweep is gone after the next one."""
+    name = ".sweep.0123456789abcdef.partial.csv"
+    folder = tmp_path / "swept"
+    over = ("--over", "friction.static=0.1,0.2")
+    run_cli("sweep", scene_file, *over, "-o", folder)
+    (folder / name).write_text("half a table", "utf-8")
+    run_cli("sweep", scene_file, *over, "-o", folder, "--resume")
+    assert {path.name for path in folder.iterdir()} == {*TABLES, "cases", "chunks"}
+
+    partial = tmp_path / "run.partial"
+    (partial / "interfaces").mkdir(parents=True)
+    (partial / "interfaces" / name).write_text("half a file", "utf-8")
+    with Folder(tmp_path / "run", resume=True) as run:
+        (run.path / "summary.json").write_text("{}", "utf-8")
+    assert not list((tmp_path / "run").rglob(".*")) and (tmp_path / "run" / "summary.json").exists()

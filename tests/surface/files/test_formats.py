@@ -4,6 +4,7 @@ import gzip
 import re
 import sys
 import types
+import zipfile
 
 import numpy as np
 import pytest
