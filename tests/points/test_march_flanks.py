@@ -325,4 +325,4 @@ steps_per_cycle = 100
             np.isfinite(result.fields["slip"]).all()
             and result.measures["energy_balance"].value < 1e-10
         )
-        assert any("are the same for all points" in note for note in result.extra["notes"])
+        assert any("are the same for all points" in note for note in result.notes)

@@ -78,7 +78,7 @@ def test_exact_onset_of_rigid_block_is_mu_n_over_m(levels):
     result, found = run_levels('law = "coulomb"', levels)
     onset = found["onset_level"]
     assert abs(onset.value - ONSET) <= onset.error <= 1e-3 * ONSET
-    table = result.extra["levels"]
+    table = result.motion.levels
     up = table[:3]  # on the way back a block that stands aside slips below mu N/m
     assert [one.stuck for one in up] == [one.drive < ONSET for one in up]
     assert result.response.time[-1] * 143 == pytest.approx(30 * len(table))
@@ -97,7 +97,7 @@ def test_always_run_from_event_to_event_reports_each_level():
     fractions = []
     text = RIG.format(law='law = "coulomb"', levels='["1 g", "2 g", "4 g", "5 g"]', method="")
     result = run(loads(text), progress=fractions.append, estimate=False)
-    assert result.extra["engine"] == "hybrid"
+    assert result.settings.engine == "hybrid"
     assert fractions == pytest.approx([0.25, 0.5, 0.75, 1.0])
 
 

@@ -167,7 +167,7 @@ def test_exact_half_width_spans_outermost_contacts(tmp_path):
         result.measures[name].value for name in ("contact_half_width", "contact_fraction")
     )
     assert half == pytest.approx(3e-3 + fraction * LENGTH / 4, rel=1e-3) and 0 < fraction < 0.1
-    assert any("is centred on the patch" in text for text in result.extra["notes"])
+    assert any("is centred on the patch" in text for text in result.notes)
     assert not any("centred on the patch" in text for text in result.warnings)
 
 

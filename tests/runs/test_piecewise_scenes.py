@@ -31,7 +31,7 @@ def test_exact_errors_of_levels_include_mesh_error():
         + 'waveform = "levels"\nonset = "slip"\nlevels = ["600 N", "1200 N"]\n[accuracy]\ntolerance = '
     )
     coarse, fine = (pf.run(levels + tolerance) for tolerance in ("1e-2", "3e-3"))
-    first_level, last_level = coarse.extra["levels"]
+    first_level, last_level = coarse.motion.levels
     for name, value in last_level.values.items():
         assert last_level.errors[name] == pytest.approx(
             coarse.measures[name].error, rel=1e-6, abs=3e-9 * abs(value)
@@ -42,6 +42,4 @@ def test_exact_errors_of_levels_include_mesh_error():
     )
     a, b = (result.measures["onset_level"] for result in (coarse, fine))
     assert abs(a.value - b.value) <= a.error + b.error and a.error < 0.05 * a.value
-    assert any(
-        "onset_level: slip counts only if its amplitude" in note for note in coarse.extra["notes"]
-    )
+    assert any("onset_level: slip counts only if its amplitude" in note for note in coarse.notes)

@@ -49,7 +49,7 @@ def test_exact_long_run_settles_to_steady_state(text, cycles):
     """A run of 300 cycles settles to the steady state of the harmonic engine within 1e-8."""
     steady = pf.run(text, **STEADY)
     run = pf.run(text, **{"accuracy.method": "exact", "drive.cycles": str(cycles)})
-    assert steady.outcome == run.outcome == "steady" and steady.extra["map"] == "shooting"
+    assert steady.outcome == run.outcome == "steady" and steady.settings.map == "shooting"
     assert list_differences(steady, run) == []
     assert steady.measures["loop_area"].value == pytest.approx(
         run.measures["loop_area"].value, rel=1e-9
@@ -58,4 +58,6 @@ def test_exact_long_run_settles_to_steady_state(text, cycles):
         steady.measures["relative_displacement_amplitude"].error
         < 1e-7 * run.measures["relative_displacement_amplitude"].value
     )
-    assert np.abs(steady.extra["multipliers"]).max() < 1 and steady.extra["residual"] < 1e-9
+    assert (
+        np.abs(steady.motion.steady.multipliers).max() < 1 and steady.motion.steady.residual < 1e-9
+    )
