@@ -1510,11 +1510,6 @@ class Result(run_result.Result):
         return f"<div>{title}{sentences}{warnings}<table>{rows}</table></div>"
 
     @property
-    def notes(self) -> list[str]:
-        """Notes about effects that the model neglects."""
-        return list(self.extra.get("notes", ()))
-
-    @property
     def plot(self) -> Plots:
         """Plots of the run: pressure(), stress(), loop(), history(), levels(), accuracy()."""
         return Plots(self)

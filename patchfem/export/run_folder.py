@@ -146,7 +146,7 @@ def write_results(result: Result, folder: Path, case: dict[str, str] | None = No
         Swept keys with their values as written, if the run is a case of a sweep.
     """
     start_time = perf_counter()
-    notes = result.extra.setdefault("notes", [])
+    notes = result.notes
     if result.patch is not None:
         vtkhdf.write_fields(result, folder / store.FIELDS)
     for face in result.faces[:MAX_INTERFACES]:
@@ -168,10 +168,10 @@ def _write_face(result: Result, face: Face, folder: Path) -> list[str]:
         plan=replace(result.plan, model=face.model),
         patch=face.patch,
         fields=face.fields,
-        extra={"notes": []},
+        notes=[],
     )
     vtkhdf.write_fields(face_result, folder / store.FIELDS)
-    return face_result.extra["notes"]
+    return face_result.notes
 
 
 def save_run(result: Result, folder: Path) -> Answer:

@@ -189,10 +189,11 @@ def _describe_unknown(names: list[str]) -> str:
 def _describe_stability(result: Result) -> str:
     """Return the outcome; for a steady motion by harmonic balance with its regime and what becomes of a disturbance."""
     sentence = result.outcome.sentence
-    regime = result.extra.get("regime")
-    if regime is None:
+    steady = result.motion.steady
+    if steady is None:
         return sentence
-    multiplier = float(np.abs(np.asarray(result.extra["multipliers"])).max(initial=0.0))
+    regime = steady.regime
+    multiplier = float(np.abs(steady.multipliers).max(initial=0.0))
     if regime in ("stuck", "unbounded") or multiplier == 0:
         return f"{sentence[:-1]} (regime: {regime})."
     stability = "decays" if multiplier < 1 else "grows or persists"
@@ -378,7 +379,7 @@ def describe_release(result: Result) -> tuple[str, str]:
     motion = describe_rest(response.time, response.output, error, last)
     start = format_length(response.output[0], 3)
     sentence = f"Released at {start}, the output {motion}."
-    return sentence, _describe_decay(result.extra.get("decay"))
+    return sentence, _describe_decay(result.motion.decay)
 
 
 def _describe_decay(decay) -> str:

@@ -37,7 +37,7 @@ def make_answer(result: Result) -> Answer:
         verdict=make_verdict(result, measures, details),
         quantities=measures,
         data=collect_data(result),
-        remarks=Remarks(tuple(result.warnings), tuple(result.extra.get("notes", ()))),
+        remarks=Remarks(tuple(result.warnings), tuple(result.notes)),
         details=details,
         origin=make_origin(source, "run"),
     )
@@ -134,7 +134,7 @@ def make_details(result: Result) -> JsonObject:
 def count_cycles(result: Result) -> float | None:
     """Return the number of cycles of the drive or of the slide in a run, or None if it has none."""
     response = result.response
-    period = result.extra.get("period")
+    period = result.motion.period
     if response is not None and period and result.plan.kind != "bench":
         return (response.time[-1] - response.time[0]) / period
     return tomllib.loads(result.plan.model.source.resolved).get("slide", {}).get("cycles")

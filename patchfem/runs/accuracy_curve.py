@@ -1,6 +1,6 @@
 """Accuracy of a motion against its computing time, from the runs of its error estimate.
 
-In: a Result whose `extra["step_runs"]` has the run and its runs with fewer steps. Out: `StepSetting`s; no further run
+In: a Result whose `motion.step_runs` has the run and its runs with fewer steps. Out: `StepSetting`s; no further run
 is needed. In contrast, `campaigns.cost` measures whole runs.
 """
 
@@ -36,14 +36,14 @@ def compute_accuracy_curve(result) -> list[StepSetting]:
     Parameters
     ----------
     result : Result
-        Result of the motion, with `extra["step_runs"]`.
+        Result of the motion, with `motion.step_runs`.
 
     Returns
     -------
     list of StepSetting
         [] if there is no run with fewer steps, if no error exceeds round-off, or if the steps do not limit the accuracy.
     """
-    step_runs = result.extra.get("step_runs", ())
+    step_runs = result.motion.step_runs
     measures = _select_measures(result.measures, step_runs)
     if len(step_runs) < 2 or not measures:
         return []

@@ -204,7 +204,7 @@ def add_yielding_notes(result, pieces: Pieces) -> None:
     min_peak = peak.value - (peak.error or 0.0) if has_peak else 0.0
     faces = result.yielding_faces
     yielding = faces | find_yielding(result.plan.model.patch, pieces, min_peak)
-    notes = result.extra.setdefault("notes", [])
+    notes = result.notes
     notes[:] = [text for text in notes if text not in faces.values()]
     notes += [text for text in yielding.values() if text not in notes]
 

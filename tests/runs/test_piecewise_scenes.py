@@ -25,7 +25,7 @@ def test_exact_errors_of_levels_include_mesh_error():
     single_force = pf.run(text + 'force = "600 N"', **{"accuracy.tolerance": 1e-2}).measures
     levels = text + 'waveform = "levels"\nonset = "slip"\nlevels = ["600 N", "1200 N"]\n'
     coarse, fine = (pf.run(levels, **{"accuracy.tolerance": one}) for one in (1e-2, 3e-3))
-    first_level, last_level = coarse.extra["levels"]
+    first_level, last_level = coarse.motion.levels
     for name, value in last_level.values.items():
         assert last_level.errors[name] == pytest.approx(
             coarse.measures[name].error, rel=1e-6, abs=3e-9 * abs(value)
@@ -35,6 +35,4 @@ def test_exact_errors_of_levels_include_mesh_error():
         assert 1 / 2 < first_level.errors[name] / single_force[name].error < 2, name
     a, b = (result.measures["onset_level"] for result in (coarse, fine))
     assert abs(a.value - b.value) <= a.error + b.error and a.error < 0.05 * a.value
-    assert any(
-        "onset_level: slip counts only if its amplitude" in note for note in coarse.extra["notes"]
-    )
+    assert any("onset_level: slip counts only if its amplitude" in note for note in coarse.notes)

@@ -105,13 +105,13 @@ def test_always_reduction_errors_cover_full_matrices(matrix_folder, method):
         is_covered += [gap <= bar + 1e-9 * gap for gap, bar in errors.values()]
         assert errors["relative_displacement_amplitude"][0] > 0
     assert np.mean(is_covered) >= 0.95
-    assert any("keeps 2 boundary coordinates and 4 " in note for note in reduced.extra["notes"])
+    assert any("keeps 2 boundary coordinates and 4 " in note for note in reduced.notes)
 
 
 def test_exact_reduction_with_all_modes_equals_full_matrices(matrix_folder):
     """With all modes kept, the measures agree with those of the full matrices within 1e-6."""
     reduced = run_scene(matrix_folder, SCENE, **ONCE, **{"structure.reduced.modes": 100})
-    note = next(note for note in reduced.extra["notes"] if "reduced keeps" in note)
+    note = next(note for note in reduced.notes if "reduced keeps" in note)
     first = reduced.plan.model.rig.structure.frequencies[0]
     assert f"the first frequency of the reduced structure is {first:.5g} Hz" in note
     full = run_scene(matrix_folder, WHOLE, **ONCE)

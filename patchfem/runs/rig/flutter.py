@@ -1,6 +1,6 @@
 """Amplitude above which friction does not limit a mode with negative damping.
 
-In: a `postprocessing.CoupledRun` with such a mode. Out: `flutter_amplitude`, the amplitude of the
+In: a `rig.CoupledRun` with such a mode. Out: `flutter_amplitude`, the amplitude of the
 largest unstable limit cycle (`dynamics.limit_cycles`), and notes.
 """
 

@@ -150,7 +150,7 @@ def friction_rows(tmp_path_factory):
                     RUBS, sets=[*sets, f"drive.frequency={f} Hz", f"drive.acceleration={level} g"]
                 )
             )
-            assert str(one.outcome) in ("steady", "stuck") and one.extra["engine"] == "hybrid"
+            assert str(one.outcome) in ("steady", "stuck") and one.settings.engine == "hybrid"
             out.append(
                 (
                     f,
