@@ -313,7 +313,6 @@ def make_system(
         int(has_lists),
         int(contact.has_loads),
         int(((points.numbers[0] == Law.BONDS) & (points.numbers[3] >= 0)).any()),
-        int(laws == {Law.BONDS} and len(contact.point_sets) == 1),
     )
 
     sets = _make_no_sets() if contact.sets is None else contact.sets.make_arrays()
