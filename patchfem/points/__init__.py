@@ -9,7 +9,7 @@ nodes in partial slip, laws that are much faster than the drive; and, with one p
 4. `contacts`             points of a rig or a bench: elements, bonds, patches, varying loads, grooves
 5. `march_rows`, `lists_kernels`, `flanks_kernels`, `march_kernels`  steps of modes with many points
 6. `checkpoint`, `time_march`  march over the cycles of a drive, with its record; its state on disk
-7. `slide_kernels`, `slides`  points along a prescribed slide
+7. `slides`  points along a prescribed slide
 
 A law is a number in `law_rows.Law` with a branch in each of five functions. Read `return_maps_kernels` first.
 """
