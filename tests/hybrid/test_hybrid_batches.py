@@ -1,4 +1,4 @@
-"""Batches of `hybrid`, errors, histories, samples and early ends."""
+"""Errors of `hybrid`, histories, samples and early ends."""
 
 import dataclasses
 
@@ -9,25 +9,11 @@ from random_rigs import RIGS, make_case
 
 from patchfem.core import SineDrive
 from patchfem.hybrid import cases, drives, runs
-from patchfem.hybrid.laws import masing
 from patchfem.hybrid.laws.masing import from_elements
 from patchfem.hybrid.records import Setting, Status
 from patchfem.structure.drives import RecordedDrive, SweepDrive
 
 AMPLITUDE = "relative_displacement_amplitude"
-
-
-def test_cases_of_a_batch_equal_single_runs():
-    """Each case of a batch has the values of its own run, up to the order of a sum over cycles."""
-    batch = [
-        make_oscillator(masing.from_elements([8.0], [0.1]), acceleration=a, cycles=30)
-        for a in (0.5, 1.0, 1.7)
-    ]
-    values = runs.run_batch(batch).windows[0]
-    for k, case in enumerate(batch):
-        alone = runs.run_case(case).values
-        for name, value in alone.items():
-            assert value == pytest.approx(values[name][k], rel=1e-13, nan_ok=True), name
 
 
 def test_histories_are_those_of_the_dense_output():
@@ -133,7 +119,7 @@ def test_drives_have_the_values_of_their_records():
                 np.zeros(0),
                 1,
             )
-            outputs.append(runs.run_case(case).final.y[0, :2])
+            outputs.append(runs.run_case(case).final.y[:2])
         assert outputs[0] == pytest.approx(outputs[1], abs=1e-4)
 
 
