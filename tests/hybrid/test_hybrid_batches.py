@@ -1,4 +1,4 @@
-"""Batches of `hybrid`, errors, histories, samples and early ends."""
+"""Errors of `hybrid`, histories, samples and early ends."""
 
 import dataclasses
 
@@ -12,6 +12,8 @@ from patchfem.hybrid import cases, drives, runs
 from patchfem.hybrid.laws.masing import from_elements
 from patchfem.hybrid.records import Setting, Status
 from patchfem.structure.drives import RecordedDrive, SweepDrive
+
+AMPLITUDE = "relative_displacement_amplitude"
 
 
 def test_histories_are_those_of_the_dense_output():
@@ -117,7 +119,7 @@ def test_drives_have_the_values_of_their_records():
                 np.zeros(0),
                 1,
             )
-            outputs.append(runs.run_case(case).final.y[0, :2])
+            outputs.append(runs.run_case(case).final.y[:2])
         assert outputs[0] == pytest.approx(outputs[1], abs=1e-4)
 
 
