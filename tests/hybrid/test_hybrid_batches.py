@@ -13,8 +13,6 @@ from patchfem.hybrid.laws.masing import from_elements
 from patchfem.hybrid.records import Setting, Status
 from patchfem.structure.drives import RecordedDrive, SweepDrive
 
-AMPLITUDE = "relative_displacement_amplitude"
-
 
 def test_histories_are_those_of_the_dense_output():
     """Samples lie on the solution of a run whose steps are much smaller; the acceleration obeys eq. 3.4."""
